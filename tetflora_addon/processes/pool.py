@@ -102,23 +102,28 @@ class _Given:
 
     def __init__(self, thing: object) -> None:
         self.thing, self.number, self.forgotten = thing, next(_numbers), False
-        self.parts: list[_Given] = []
         self._lock, self._packed = threading.Lock(), None
 
-    def packed(self) -> Packed:
-        """The bytes of the thing without its `parts`, which are known from then on."""
+    def packed(self) -> tuple[Packed, list[_Given]]:
+        """The bytes of the thing without some of its parts, and these, which have to be there before it."""
         with self._lock:
             if self._packed is None:
-                self._packed = Packed(self.thing, self._known)
+                self._packed = self._pack(self.thing)
             return self._packed
 
-    def _known(self, thing: object) -> int | None:
-        if not getattr(type(thing), "sent_once", False):
-            return None
-        part = _kept(thing)
-        if part not in self.parts:
-            self.parts.append(part)
-        return part.number
+    @staticmethod
+    def _pack(whole: object) -> tuple[Packed, list[_Given]]:
+        parts: list[_Given] = []
+
+        def known(thing: object) -> int | None:
+            if thing is whole or not getattr(type(thing), "sent_once", False):
+                return None
+            part = _kept(thing)
+            if part not in parts:
+                parts.append(part)
+            return part.number
+
+        return Packed(whole, known), parts
 
 
 class _Weakly(_Given):
@@ -133,12 +138,9 @@ class _Weakly(_Given):
         self.forgotten = True
         _once.pop(self.number, None)
 
-    def packed(self) -> Packed:
-        """As above, but not kept, as few processes ask."""
-        thing = self._there()
-        with self._lock:
-            self.parts.clear()
-            return Packed(thing, lambda one: None if one is thing else self._known(one))
+    def packed(self) -> tuple[Packed, list[_Given]]:
+        """As above, but not kept, as few processes ask; several may at once."""
+        return self._pack(self._there())
 
     def holds(self, thing: object) -> bool:
         """Whether it is this one."""
@@ -217,8 +219,8 @@ class _Child:
             send(self._process.stdin, "forget", number)
 
     def _share(self, given: _Given) -> None:
-        packed = given.packed()
-        for part in given.parts:
+        packed, parts = given.packed()
+        for part in parts:
             if part.number not in self._known:
                 self._share(part)
         send(self._process.stdin, "share", given.number, packed)
