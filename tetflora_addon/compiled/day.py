@@ -150,8 +150,7 @@ class DayTotals:
     def share_range(self, rows: NDArray[np.void], species: int) -> tuple[float, float]:
         """Least and greatest `leaf_share` of plants of a species on the day of rows (r,)."""
         trunk = np.flatnonzero(rows["species"] == species)[0]
-        most = max(rows["spring"][trunk], rows["autumn"][trunk])
-        days = rows["day"][trunk] + np.linspace(-most, most, 2 * int(most) + 3)
+        days = _days_of_plants(rows[trunk])
         area = self.area[trunk].mean(axis=0)
         every = (np.full(len(days), table) for table in self.table[trunk].tolist())
         left = [expected(self.tables, self.origin, which, days, [AREA])[0] for which in every]
@@ -233,13 +232,18 @@ def _by_kind(rows: NDArray[np.void], totals: Averages, leaf: RowLeaves) -> tuple
     return area, colour, totals.leaves @ kinds, (totals.leaves * leaf.polygons) @ kinds
 
 
+def _days_of_plants(trunk: np.void) -> NDArray[np.float64]:
+    """Days (n,) that it may be for plants of a species, at most half a day apart, by the row of its trunk."""
+    most = max(trunk["spring"], trunk["autumn"])
+    return trunk["day"] + np.linspace(-most, most, 4 * int(np.ceil(most)) + 1)
+
+
 def _differs(rows: NDArray[np.void], made: DayTotals, of_species: NDArray[np.int64]) -> bool:
     """Whether any plant may have other leaves than in summer."""
     summer = np.array([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]])
     trunk = np.unique(rows["species"], return_index=True)[1]
     for row, which in zip(rows[trunk], of_species, strict=True):
-        most = max(row["spring"], row["autumn"])
-        days = row["day"] + np.linspace(-most, most, 2 * int(most) + 3)
+        days = _days_of_plants(row)
         for table in which.tolist():
             left = expected(made.tables, made.origin, np.full(len(days), table), days)
             if np.abs(np.array(left) - summer).max() > 1e-9:

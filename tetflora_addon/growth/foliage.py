@@ -46,6 +46,8 @@ class Leaves(Arrays):
         How far it turns to the sky; (1,) where that is the same for all.
     sky : (3,) float64 or (n, 3) float32
         Where that is; with the branch in the wind.
+    stages : Stages or None
+        On a day of the year; None where all are as in summer.
     """
 
     branch: NDArray[np.int64]
@@ -55,6 +57,7 @@ class Leaves(Arrays):
     size: NDArray[np.float64]
     light: NDArray[np.float64]
     sky: NDArray[np.floating]
+    stages: Stages | None = None
 
 
 def leaf_keys(branches: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]) -> NDArray[np.uint64]:
@@ -183,7 +186,7 @@ def place_leaves(
     if solid.any():  # from the middle to the base
         position -= (0.5 * size * solid)[:, None] * frame[:, :, 1]
     light = leaf_lights(rows, row, key, outward)
-    return Leaves(owner, key, position, frame, size, light, _SKY if sky is None else sky)
+    return Leaves(owner, key, position, frame, size, light, _SKY if sky is None else sky, stages)
 
 
 def leaf_frames(

@@ -20,6 +20,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
 from ..errors import TetFloraError
 from ..setting import setting
 from ..species.species import LEAF_KINDS, Species
@@ -204,7 +205,7 @@ def may_change(rows: NDArray[np.void], row: NDArray[np.integer], year: NDArray[n
 
 
 @dataclass(frozen=True)
-class Stages:
+class Stages(Arrays):
     """Stages of leaves (n,).
 
     Attributes

@@ -212,9 +212,8 @@ class _Bearers:
                 turned = settled(rows, self.row, again.frame, again.light, again.sky)
                 turned = in_wind(rows, branches, again, turned, seconds)
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
-            stages = stages_of(rows, bearers.branches, owner, key)
-            if stages is not None:
-                places = (*(places or (None, None)), stages, np.take(bearers.branches.year[:, 1], owner))
+            if leaves.stages is not None:
+                places = (*(places or (None, None)), leaves.stages, np.take(bearers.branches.year[:, 1], owner))
             colours = leaf_colours(rows, self.row, key, *places)
             copies.add(key, leaves.position, frame, leaves.size, colours, motion)
 
