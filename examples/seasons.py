@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from devtools import session
 
 from .close_ups import among_others, render, store_sheet
+from .wood import grid
 
 ROOT = Path(__file__).resolve().parent.parent
 SIZE, SAMPLES = (750, 422), 96
@@ -174,19 +175,10 @@ def _add_cherry(scene: bpy.types.Scene) -> None:
 
 
 def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:
-    """A grid with a square hole in its middle, of sides in metres; where wood and edge are become attributes."""
+    """Land on which attributes say where the wood and its edge are."""
     from tetflora_addon.blender.attributes import write
 
-    number = round(side / step) + 1
-    along = np.linspace(-side / 2, side / 2, number)
-    x, y = (values.reshape(-1) for values in np.meshgrid(along, along))
-    first = (np.arange(number - 1)[:, None] * number + np.arange(number - 1)).reshape(-1)
-    faces = np.stack([first, first + 1, first + number + 1, first + number], axis=1)
-    middle = np.maximum(np.abs(x[faces].mean(axis=1)), np.abs(y[faces].mean(axis=1)))
-    seen = y[faces].mean(axis=1) > -60.0
-    mesh = bpy.data.meshes.new(name)
-    points = np.stack([x, y, height(x, y)], axis=1)
-    mesh.from_pydata(points.tolist(), [], faces[(middle > hole / 2) & seen].tolist(), shade_flat=False)
+    mesh, x, y = grid(name, side, step, hole, height, nearest=-60.0)
     inside = wooded(x, y)
     write(mesh, _WOOD, np.clip(inside / 4.0, 0.0, 1.0).astype(np.float32))
     write(mesh, _MARGIN, np.clip(1.0 - np.abs(inside - 1.0) / 4.5, 0.0, 1.0).astype(np.float32))

@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -93,19 +94,35 @@ def build(scene: bpy.types.Scene) -> None:
     scene.tetflora.refine_at_render = False
 
 
-def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:
-    """A grid with a square hole in its middle, of sides in metres; where the wood is becomes an attribute."""
-    from tetflora_addon.blender.attributes import write
+def grid(
+    name: str,
+    side: float,
+    step: float,
+    hole: float,
+    height: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+    nearest: float = -np.inf,
+) -> tuple[bpy.types.Mesh, NDArray[np.float64], NDArray[np.float64]]:
+    """A mesh of squares with a square hole in its middle, of sides in metres, and the places x, y (n,) of its vertices.
 
+    Faces in front of a ``nearest`` y are left out.
+    """
     number = round(side / step) + 1
     along = np.linspace(-side / 2, side / 2, number)
     x, y = (values.reshape(-1) for values in np.meshgrid(along, along))
     first = (np.arange(number - 1)[:, None] * number + np.arange(number - 1)).reshape(-1)
     faces = np.stack([first, first + 1, first + number + 1, first + number], axis=1)
     middle = np.maximum(np.abs(x[faces].mean(axis=1)), np.abs(y[faces].mean(axis=1)))
+    kept = faces[(middle > hole / 2) & (y[faces].mean(axis=1) > nearest)]
     mesh = bpy.data.meshes.new(name)
-    points = np.stack([x, y, height(x, y)], axis=1)
-    mesh.from_pydata(points.tolist(), [], faces[middle > hole / 2].tolist(), shade_flat=False)
+    mesh.from_pydata(np.stack([x, y, height(x, y)], axis=1).tolist(), [], kept.tolist(), shade_flat=False)
+    return mesh, x, y
+
+
+def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:
+    """Land on which an attribute says where the wood is."""
+    from tetflora_addon.blender.attributes import write
+
+    mesh, x, y = grid(name, side, step, hole, height)
     write(mesh, _MASK, wooded(x, y).astype(np.float32))
     return bpy.data.objects.new(name, mesh)
 

@@ -26,10 +26,10 @@ from ..growth.seasons import (
     expected,
     leaf_table,
     mean_autumn_colours,
+    plant_days,
     seasonal_rows,
 )
 from ..species.species import LEAF_KINDS, Species
-from ..species.year import DAYS
 from .averages import Averages, RowLeaves, average, quadratic
 
 KINDS = len(LEAF_KINDS)
@@ -202,7 +202,7 @@ def totals_of_day(
     kinds = [[None if year is None else year.of_kind(k) for k in range(KINDS)] for year in own]
     every = list(dict.fromkeys(leaf for some in kinds for leaf in some))
     tables = np.stack([leaf_table(one) for one in every])
-    origin = np.array([0.0 if one is None else one.middle - DAYS / 2 for one in every])
+    origin = np.array([0.0 if one is None else one.origin for one in every])
     of_species = np.array([[every.index(one) for one in some] for some in kinds])
     years = np.zeros((len(species), KINDS), rows.dtype["year"])
     for number in range(len(species)):
@@ -233,9 +233,8 @@ def _by_kind(rows: NDArray[np.void], totals: Averages, leaf: RowLeaves) -> tuple
 
 
 def _days_of_plants(trunk: np.void) -> NDArray[np.float64]:
-    """Days (n,) that it may be for plants of a species, at most half a day apart, by the row of its trunk."""
-    most = max(trunk["spring"], trunk["autumn"])
-    return trunk["day"] + np.linspace(-most, most, 4 * int(np.ceil(most)) + 1)
+    """Days (n,) that it may be for plants of a species, by the row of its trunk."""
+    return plant_days(trunk["day"], max(trunk["spring"], trunk["autumn"]))
 
 
 def _differs(rows: NDArray[np.void], made: DayTotals, of_species: NDArray[np.int64]) -> bool:

@@ -4,11 +4,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..species.species import Species
-from ..species.year import DAYS
-from .seasons import PRESENT, Season, expected, leaf_table
+from .seasons import PRESENT, Season, expected_of, plant_days
 
 _MIDSUMMER = 196.0
 
@@ -28,14 +25,11 @@ def is_gone(species: Species, season: Season | None) -> bool:
         return False
     if season is None:
         return True
-    day = season.day + (DAYS / 2 if season.latitude < 0 else 0.0)
-    return _number(species, day, abs(season.latitude), season.spread) == 0.0
+    return _number(species, season.northern_day, abs(season.latitude), season.spread) == 0.0
 
 
 def _number(species: Species, day: float, latitude: float, spread: float) -> float:
     """The most leaves, over all that there are ever, that a plant of the species has on a day of its place."""
     year = species.year.at_latitude(latitude)
-    most = spread * max(year.spring, year.autumn)
-    days = day + np.linspace(-most, most, 2 * int(most) + 3)
-    table, origin = leaf_table(year.leaf)[None], np.array([year.leaf.middle - DAYS / 2])
-    return float(expected(table, origin, np.zeros(len(days), np.int64), days, [PRESENT])[0].max())
+    days = plant_days(day, spread * max(year.spring, year.autumn))
+    return float(expected_of(year.leaf, days, PRESENT).max())

@@ -99,6 +99,11 @@ class Season:
         if abs(self.latitude) > 90 or self.spread < 0 or not 0 <= self.snow <= 1:
             raise TetFloraError("Seasons: Latitude must be within 90°, Spread 0 or greater, and Snow between 0 and 1")
 
+    @property
+    def northern_day(self) -> float:
+        """The day at this place as in the north: south of the equator seasons are half a year apart."""
+        return (self.day + (DAYS / 2 if self.latitude < 0 else 0.0)) % DAYS
+
 
 _LEAF_DTYPE = np.dtype(
     [(name, np.float64) for name in ("appear", "turn", "fall", "origin", "growth", "turning", "kept", "turnover")]
@@ -134,7 +139,7 @@ def seasonal_rows(rows: NDArray[np.void], species: Sequence[Species], season: Se
     out = np.zeros(len(rows), np.dtype(rows.dtype.descr + YEAR_COLUMN))
     for name in rows.dtype.names:
         out[name] = rows[name]
-    out["day"] = (season.day + (DAYS / 2 if season.latitude < 0 else 0.0)) % DAYS
+    out["day"] = season.northern_day
     out["year"]["turnover"] = 0.0
     for number, one in enumerate(species):
         own = rows["species"] == number
@@ -162,8 +167,8 @@ def _numbers(leaf: LeafYear) -> np.void:
     out = np.zeros((), _LEAF_DTYPE)
     for name in ("growth", "turning", "kept", "turnover", "appear_spread", "turn_spread", "fall_spread", "dry"):
         out[name] = getattr(leaf, name)
-    out["origin"] = leaf.middle - DAYS / 2
-    out["appear"], out["turn"] = leaf.appear - out["origin"], leaf.turn - out["origin"]
+    out["origin"] = leaf.origin
+    out["appear"], out["turn"] = leaf.appear - leaf.origin, leaf.turn - leaf.origin
     out["fall"] = leaf.fall - leaf.turn
     out["any_fresh"], out["colours"] = leaf.fresh is not None, len(leaf.autumn)
     out["fresh"] = leaf.fresh or 0.0
@@ -329,6 +334,17 @@ def expected(
         before = np.take(flat, low + column * days)
         out.append(before + place * (np.take(flat, low + (column * days + 1)) - before))
     return out
+
+
+def plant_days(day: float, most: float) -> NDArray[np.float64]:
+    """Days (n,) that it may be for plants that are early or late by at most so many, no more than half a day apart."""
+    return day + np.linspace(-most, most, 4 * int(np.ceil(most)) + 1)
+
+
+def expected_of(leaf: LeafYear | None, days: NDArray[np.float64], column: int) -> NDArray[np.float64]:
+    """What to expect of leaves with a year, one column (n,), on days (n,)."""
+    origin = np.array([0.0 if leaf is None else leaf.origin])
+    return expected(leaf_table(leaf)[None], origin, np.zeros(len(days), np.int64), days, [column])[0]
 
 
 def autumn_colours(year: NDArray[np.void], hue: NDArray[np.float64], tint: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ its species; a trunk is two crossed triangles. Every plant has its own length, a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +75,7 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     low, high, *radii = profile.T
     wood, leaves = flora.wood_colour[trunk.row], flora.leaf_colours(trunk)
     if trunk.year is not None:
-        left = _in_leaf(flora, trunk)
+        left = np.minimum(flora.day.leaf_share(trunk), 1.0)
         radii = [radius * (_BARE + (1.0 - _BARE) * left) for radius in radii]
         leaves = wood + left[:, None] * (leaves - wood)
     crown = [np.stack([0 * low, 0 * low, low], axis=1)[:, None]]
@@ -129,12 +129,6 @@ def _shown(flora: Flora, seeds: Seeds, most: int) -> tuple[int, NDArray[np.float
     origin = origin_near(seeds.position)
     some = seeds.take(slice(None, None, max(-(-len(seeds) // most), 1))).counted_from(origin)
     return len(seeds), origin, trunks(flora.rows, some)
-
-
-def _in_leaf(flora: Flora, trunk: Branches) -> NDArray[np.float64]:
-    """Area of the leaves (n,) of plants over that in summer."""
-    summer = flora.in_leaf.leaf_areas(replace(trunk, year=None))
-    return np.clip(flora.leaf_areas(trunk) / np.maximum(summer, 1e-300), 0.0, 1.0)
 
 
 def _profile(flora: Flora, row: int) -> NDArray[np.float64]:

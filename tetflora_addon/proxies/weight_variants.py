@@ -156,18 +156,16 @@ def _at_age(described: Species, years: float) -> Flora:
     return compile_species([with_age(described, years)])
 
 
+@lru_cache(maxsize=64)
 def _with_leaves(species: Species, share: float) -> Flora:
     """A compiled species with a part of its leaves."""
     # What is compiled has its quality and habit already.
     species = replace(species, quality=1.0, habit=0.0)
-    return compile_species([species if share == 1.0 else _thinned(species, share)])
-
-
-@lru_cache(maxsize=64)
-def _thinned(species: Species, share: float) -> Species:
-    orders = tuple(_with_part(order, share) for order in species.orders)
-    spur = None if species.spur is None else _with_part(species.spur, share)
-    return replace(species, orders=orders, spur=spur)
+    if share != 1.0:
+        orders = tuple(_with_part(order, share) for order in species.orders)
+        spur = None if species.spur is None else _with_part(species.spur, share)
+        species = replace(species, orders=orders, spur=spur)
+    return compile_species([species])
 
 
 def _with_part(order: Order, share: float) -> Order:

@@ -79,6 +79,11 @@ class LeafYear:
         """Day in the middle of the leaves' life."""
         return (self.appear + self.fall) / 2
 
+    @property
+    def origin(self) -> float:
+        """Day half a year before that, from which tables and the days of leaves are counted."""
+        return self.middle - DAYS / 2
+
 
 @dataclass(frozen=True)
 class Year:

@@ -19,7 +19,7 @@ from ... import memory
 from ...compiled.crowns import Crown
 from ...emission.budget import enough
 from ...errors import SpeciesError, TetFloraError
-from ...growth.seasons import DAYS, PRESENT, leaf_table
+from ...growth.seasons import PRESENT, expected_of
 from ...refinement.estimate import Estimate, Stand, estimate
 from ..attributes import read
 from ..runtime import Handlers
@@ -161,10 +161,8 @@ def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
     if year is None or year.leaf is None:
         return 1.0
     leaf = year.at_latitude(abs(season.latitude)).leaf
-    day = season.day if season.latitude >= 0.0 else season.day + DAYS / 2
-    table = leaf_table(leaf)[PRESENT]
-    since = (day - leaf.middle + DAYS / 2) % DAYS
-    return 1.0 - _LEAVES * (1.0 - float(np.interp(since, np.linspace(0.0, DAYS, len(table)), table)))
+    left = expected_of(leaf, np.array([season.northern_day]), PRESENT)
+    return 1.0 - _LEAVES * (1.0 - float(left[0]))
 
 
 def _merged(rows: list[tuple[int, NDArray[np.float64], NDArray[np.float64]]]) -> Stand:
