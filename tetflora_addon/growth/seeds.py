@@ -30,6 +30,8 @@ class Seeds(Arrays):
         Rotation of each plant; its columns are the plant's axes in world space, +z along the upright trunk.
     scale : (n,) float64
         Uniform scale, greater than zero.
+    crown : (n, 5) float64 or None
+        Crown forms, see `crown_forms`; None where all plants are as described.
     """
 
     identifiers: tuple[str, ...]
@@ -38,6 +40,7 @@ class Seeds(Arrays):
     position: NDArray[np.float64]
     frame: NDArray[np.float64]
     scale: NDArray[np.float64]
+    crown: NDArray[np.float64] | None = None
 
     def counted_from(self, origin: NDArray[np.float64]) -> Seeds:
         """The same plants in coordinates that begin at a place (3,) of the present ones."""

@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Crown forms: how one plant differs from others of its kind, because of how it grew.
+
+A tree of a stand has a narrow crown far up, which leans to where the light is; one that is recorded in an inventory has
+the crown that was measured. Such plants have a row of five numbers beside their seed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+#: Columns: factor on the lengths of limbs; bare fraction of the trunk, 0 as described; by which fraction limbs to the
+#: east and to the north are longer, and those opposite shorter; factor on the radius of the trunk.
+WIDTH, BASE, EAST, NORTH, GIRTH = range(5)
+#: A plant as its species describes it.
+PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0])
+#: Limits of each column.
+LEAST = np.array([0.2, 0.0, -0.8, -0.8, 0.2])
+MOST = np.array([3.0, 0.95, 0.8, 0.8, 5.0])
+
+
+def crown_forms(
+    number: int,
+    width: ArrayLike = 1.0,
+    base: ArrayLike = 0.0,
+    east: ArrayLike = 0.0,
+    north: ArrayLike = 0.0,
+    girth: ArrayLike = 1.0,
+) -> NDArray[np.float64]:
+    """Crown forms (number, 5) of plants, within the limits; each argument is one number or (number,)."""
+    out = np.empty((number, len(PLAIN)))
+    for column, value in enumerate((width, base, east, north, girth)):
+        out[:, column] = np.clip(value, LEAST[column], MOST[column])
+    return out
