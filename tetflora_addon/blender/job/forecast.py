@@ -26,7 +26,8 @@ from ..runtime import Handlers
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
-from ..scene.fields import PREFIX, field_kinds, stored_size
+from ..scene.field_points import PREFIX
+from ..scene.fields import field_kinds, stored_size
 from ..scene.objects import objects_within, renderable_objects
 from ..scene.own_ages import AGE, sound_ages
 from ..scene.skeletons import species_of

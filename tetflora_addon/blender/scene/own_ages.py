@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 
 MOST_YEARS = 10_000.0
-#: Attribute of fields whose plants differ in their ages; one with `fields.PREFIX` overrides it.
+#: Attribute of fields whose plants differ in their ages; one with `field_points.PREFIX` overrides it.
 AGE = "age"
 #: The age of a plant, for property groups.
 AGE_PROPERTY = {

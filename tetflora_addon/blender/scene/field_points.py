@@ -1,0 +1,207 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The points of a field of plants and their attributes, in the field's own space, checked and with defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...growth.hashing import child_key, key_of_seed
+from ...planting.places import new_seeds
+from ..attributes import frames_of, read, values_of
+from .own_ages import AGE, MOST_YEARS, sound_ages, stored_ages
+
+#: Attributes with this prefix override those without, which other tools may use differently.
+PREFIX = "tf_"
+
+_INTEGERS = {'INT', 'INT8', 'BOOLEAN'}
+
+Points = bpy.types.Mesh | bpy.types.PointCloud
+
+
+@dataclass(frozen=True)
+class FieldPoints:
+    """Points of a field in its own space; a rotation (3, 3, n), scale (1, n) or (3, n) along its axes.
+
+    ``age`` is None where all plants are full-grown.
+    """
+
+    kinds: tuple[str, ...]
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    species: NDArray[np.int64]
+    seed: NDArray[np.int64]
+    age: NDArray[np.float64] | None
+
+    def seeds(self, keys: NDArray[np.uint64] | None) -> NDArray[np.int64]:
+        """Seeds of the points in all places with the given keys; those of the points themselves where it is None."""
+        if keys is None:
+            return self.seed
+        return child_key(key_of_seed(self.seed), keys[:, None]).view(np.int64).reshape(-1)
+
+
+def read_points(
+    obj: bpy.types.Object,
+    kinds: tuple[str, ...],
+    depsgraph: bpy.types.Depsgraph,
+    geometry: bpy.types.GeometrySet | None,
+) -> FieldPoints:
+    """Points of a field of some kinds of plants: of geometry, or as they are stored where that is None.
+
+    Raises
+    ------
+    SceneError
+        An attribute of the wrong type or domain, or with values that cannot be.
+    """
+    if geometry is not None and obj.type == 'MESH' and obj.data.is_editmode:
+        # What is evaluated has no attributes then. Blender keeps this copy with the evaluated object, and frees it.
+        parts = [obj.evaluated_get(depsgraph).to_mesh()]
+    elif geometry is None:
+        parts = [obj.data] if isinstance(obj.data, Points) else []
+    else:
+        parts = [part for part in (geometry.mesh, geometry.pointcloud) if part is not None]
+    sizes = [_size(part) for part in parts]
+    sized = list(zip(parts, sizes, strict=True))
+    position = _joined([read(part, "position").astype(np.float64) for part in parts], (0, 3))
+    rotation = _joined([_rotations(obj, part, size) for part, size in sized], (3, 3, 0))
+    own_scale = _joined([_scales(obj, part, size, 1 if len(parts) == 1 else 3) for part, size in sized], (3, 0))
+    firsts = np.cumsum([0, *sizes]).tolist()
+    seed = _joined([_seeds(obj, *part, first) for part, first in zip(sized, firsts, strict=False)], (0,))
+    species = _joined([_integers(obj, part, "species", size, 0) for part, size in sized], (0,))
+    refuse(obj, (species < 0) | (species >= len(kinds)), f"a species number outside the list of {len(kinds)} species")
+    age = _joined([_ages(obj, part, size) for part, size in sized], (0,)).astype(np.float64)
+    refuse(obj, ~sound_ages(age), f"an age that is not from 0 to {MOST_YEARS:,.0f} years")
+    return FieldPoints(kinds, position, rotation, own_scale, species, seed, age if age.any() else None)
+
+
+def _size(points: Points) -> int:
+    return len(points.points if isinstance(points, bpy.types.PointCloud) else points.vertices)
+
+
+def _attribute(obj: bpy.types.Object, points: Points, name: str, kinds: Iterable[str]) -> bpy.types.Attribute | None:
+    found = points.attributes.get(PREFIX + name) or points.attributes.get(name)
+    if found is None:
+        return None
+    if found.domain != 'POINT' or found.data_type not in kinds:
+        raise SceneError(
+            f'"{obj.name}": attribute "{found.name}" is {found.data_type} on {found.domain}; a field requires '
+            f"{' or '.join(sorted(kinds))} on POINT. Convert it, or store the values as {PREFIX}{name}"
+        )
+    return found
+
+
+def _integers(
+    obj: bpy.types.Object, points: Points, name: str, size: int, default: NDArray[np.int64] | int
+) -> NDArray[np.int64]:
+    attribute = _attribute(obj, points, name, _INTEGERS)
+    if attribute is None:
+        return np.broadcast_to(np.asarray(default, np.int64), size)
+    return values_of(attribute).astype(np.int64)
+
+
+def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> NDArray[np.int64]:
+    """Stored seeds, hashed where the object has a seed; without stored ones, hashes of the points' ids."""
+    roll = obj.tetflora.seed
+    stored = _attribute(obj, points, "seed", _INTEGERS) is not None
+    seeds = _integers(obj, points, "seed" if stored else "id", size, np.arange(first, first + size))
+    return new_seeds(seeds, roll).astype(np.int64) if roll or not stored else seeds
+
+
+def _ages(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.floating]:
+    """Age of each point in years; that of the object without the attribute."""
+    attribute = _attribute(obj, points, AGE, {'FLOAT', 'INT'})
+    if attribute is not None:
+        return values_of(attribute)
+    own = stored_ages([obj])
+    return np.broadcast_to(np.zeros(1) if own is None else own, size)
+
+
+def _rotations(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.float64]:
+    """Rotation of each point in the field's space, (3, 3, n): numpy is fast with long rows."""
+    attribute = _attribute(obj, points, "rotation", {'QUATERNION', 'FLOAT_VECTOR'})
+    if attribute is None:
+        return np.repeat(np.eye(3)[:, :, None], size, axis=2)
+    values = np.ascontiguousarray(values_of(attribute).T, np.float64)
+    return _from_quaternions(values) if len(values) == 4 else _from_eulers(values)
+
+
+def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> NDArray[np.float64]:
+    """Scale of each point along its axes, (3, n), or (1, n) if uniform and ``least`` is 1."""
+    attribute = _attribute(obj, points, "scale", {'FLOAT', 'FLOAT_VECTOR'})
+    if attribute is None:
+        return np.ones((least, size))
+    values = values_of(attribute)
+    if values.ndim == 1:
+        refuse(obj, ~(values > 0.0), "a scale that is not greater than 0")
+        values = np.broadcast_to(values[:, None], (size, least))
+    return np.ascontiguousarray(values.T, np.float64)
+
+
+def _from_quaternions(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations, (3, 3, n), of quaternions of any length, (4, n); that of length 0 is no rotation."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        squared = np.einsum("in,in->n", q, q)
+        twice = np.where(squared == 0.0, 0.0, 2.0 / squared)
+        w, x, y, z = q
+        out = np.zeros((3, 3, q.shape[1]))
+        xx, yy, zz = twice * x * x, twice * y * y, twice * z * z
+        out[0, 0], out[1, 1], out[2, 2] = 1.0 - yy - zz, 1.0 - xx - zz, 1.0 - xx - yy
+        for (i, j), product, turn in (((0, 1), x * y, z), ((0, 2), x * z, -y), ((1, 2), y * z, x)):
+            out[i, j] = twice * (product - w * turn)
+            out[j, i] = twice * (product + w * turn)
+    return out
+
+
+def _from_eulers(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations, (3, 3, n), of XYZ Euler angles in radians, (3, n): first about x, last about z, as Blender's."""
+    with np.errstate(invalid="ignore"):
+        (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
+    rows = (
+        (cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz),
+        (cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz),
+        (-sy, sx * cy, cx * cy),
+    )
+    return np.stack([np.stack(row) for row in rows])
+
+
+def placed_frames(
+    world: NDArray[np.float64], rotation: NDArray[np.float64], scale: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Frames, scales and soundness, as `frames_of`, of all points (3, 3, n) in all places (k, 3, 3): k · n of each."""
+    places, size = len(world), rotation.shape[2]
+    frames, scales, sound = frames_of(world)
+    even = np.allclose(frames * scales[:, None, None], world, rtol=0.0, atol=1e-6 * np.abs(scales).max(initial=0.0))
+    if even and sound.all() and len(scale) == 1:
+        # Nothing is sheared, mirrored or stretched: what comes out are rotations already.
+        linear, found = frames, (scales[:, None] * scale).reshape(-1)
+    else:
+        # Of a scale along axes a column each; a scale alone holds for all of them.
+        linear, rotation, found = world, rotation * scale, None
+    turned = (linear @ rotation.reshape(3, -1)).reshape(places, 3, 3, size).transpose(0, 3, 1, 2).reshape(-1, 3, 3)
+    if found is None:
+        return frames_of(turned)
+    return turned, found, np.isfinite(turned.sum(axis=(1, 2))) & np.isfinite(found)
+
+
+def refuse(obj: bpy.types.Object, bad: NDArray[np.bool_], what: str) -> None:
+    """Raise `SceneError` where some points (n,) of a field are bad, with their number and the first one."""
+    if bad.any():
+        raise SceneError(
+            f'"{obj.name}": {int(bad.sum()):,} of {len(bad):,} points have {what}; the first is point '
+            f"{int(np.argmax(bad))}. Correct or delete them, or disable the field in the TetFlora tab of the sidebar"
+        )
+
+
+def _joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
+    """Arrays as one along the axis that is 0 in ``empty``, which is the shape where there are none."""
+    if not parts:
+        return np.zeros(empty, int)
+    # Do not copy millions of frames where there is nothing to join.
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=empty.index(0))
