@@ -1,0 +1,275 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rasters of heights: where their cells lie, ASCII grids, world files, and values between cells."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError, shown
+from ..files import read_whole
+from ..jobs import Progress
+from .projection import System, code_in
+
+#: Most cells of a raster, and bytes of a text file of them.
+MAX_CELLS, MAX_TEXT = 40_000_000, 1_000_000_000
+#: Most cells along one side; Blender's own images end there too.
+MAX_SIDE = 65_000
+_HEADER = {"ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy", "nodata_value"}
+_HEAD_LINES = 40
+_PIECE = 4_000_000  # bytes of text between two signs of life
+_LIMIT = 1e7  # metres: what is higher, or has larger coordinates than a thousand times so much, is no place
+_SMALL = 4096  # bytes of world files and files with the name of a coordinate system
+WORLD_FILES = {
+    ".png": (".pgw", ".pngw", ".wld"),
+    ".tif": (".tfw", ".tifw", ".wld"),
+    ".tiff": (".tfw", ".tiffw", ".wld"),
+}
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Cells with one value each.
+
+    Attributes
+    ----------
+    values : (h, w) float32
+        Metres, the first row is the first of the file (the northernmost, if ``down`` is); nan where nothing is known.
+    corner : (2,) float64
+        Coordinates of the middle of the first cell of the first row.
+    along, down : (2,) float64
+        Steps from a cell to the next of its row, and to the next row.
+    system : System
+    """
+
+    values: NDArray[np.float32]
+    corner: NDArray[np.float64]
+    along: NDArray[np.float64]
+    down: NDArray[np.float64]
+    system: System
+
+    def places(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Coordinates (n, 2) of places given in cells; 0, 0 is the middle of the first cell."""
+        return self.corner + np.outer(column, self.along) + np.outer(row, self.down)
+
+    @property
+    def outline(self) -> NDArray[np.float64]:
+        """Coordinates of the four corners, (4, 2)."""
+        h, w = self.values.shape
+        return self.places(np.array([-0.5, w - 0.5, w - 0.5, -0.5]), np.array([-0.5, -0.5, h - 0.5, h - 0.5]))
+
+    def at(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Values between cells, (n,), linear; those of the border beyond it, nan where a cell that counts is."""
+        h, w = self.values.shape
+        column, row = np.clip(column, 0.0, w - 1.0), np.clip(row, 0.0, h - 1.0)
+        i, j = (np.minimum(np.floor(c), max(n - 2, 0)).astype(np.int64) for c, n in ((column, w), (row, h)))
+        u, v = column - i, row - j
+        right, below = np.minimum(i + 1, w - 1), np.minimum(j + 1, h - 1)
+        out = np.zeros(len(i))
+        for weight, y, x in (
+            ((1 - u) * (1 - v), j, i),
+            (u * (1 - v), j, right),
+            ((1 - u) * v, below, i),
+            (u * v, below, right),
+        ):
+            # What does not count may be nan.
+            out += np.where(weight > 0.0, weight * self.values[y, x], 0.0)
+        return out
+
+    def coarser(self, most: int) -> Raster:
+        """The same with means of whole blocks of cells, so that there are at most so many; itself if there are."""
+        h, w = self.values.shape
+        step = int(np.ceil(np.sqrt(h * w / max(most, 1))))
+        if step < 2:
+            return self
+        rows, columns = np.arange(0, h, step), np.arange(0, w, step)
+
+        def sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
+
+        known = np.isfinite(self.values)
+        count = sums(known.astype(np.float64))
+        total = sums(np.where(known, self.values, 0.0).astype(np.float64))
+        with np.errstate(invalid="ignore"):
+            values = np.where(count > 0, total / count, np.nan).astype(np.float32)
+        # The last blocks may be smaller: whoever needs places of their middles moves by less than half a block.
+        corner = self.places(np.array([(step - 1) / 2]), np.array([(step - 1) / 2]))[0]
+        return replace(self, values=values, corner=corner, along=step * self.along, down=step * self.down)
+
+
+def checked_size(width: int, height: int, what: str) -> None:
+    """Refuse rasters that are too large, or have no cells.
+
+    Raises
+    ------
+    SceneError
+        ``what`` begins the message.
+    """
+    if min(width, height) < 2 or max(width, height) > MAX_SIDE or width * height > MAX_CELLS:
+        raise SceneError(
+            f"{what}{width:,} by {height:,} cells; from 2 by 2 to {MAX_CELLS:,} in all can be read. Crop it, or "
+            "make it coarser, for example with gdal_translate -outsize 25% 25%"
+        )
+
+
+def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
+    """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line.
+    """
+    content = read_whole(path, MAX_TEXT)
+    name, header, start, line = path.name, {}, 0, 1
+    while line <= _HEAD_LINES:
+        end = content.find(b"\n", start)
+        end = len(content) if end < 0 else end
+        words = content[start : min(end, start + 200)].decode("latin-1").split()
+        key = words[0].lower() if words else ""
+        if (words and not re.match(r"[A-Za-z_]", key)) or key in ("nan", "inf") or start >= len(content):
+            break
+        if words:
+            if key not in _HEADER or len(words) != 2:
+                raise SceneError(
+                    f"{name}: line {line}: {shown(' '.join(words))} is no line of the head of an ASCII grid"
+                )
+            header[key] = _number(words[1], f"{name}: line {line}: {key}")
+        start, line = end + 1, line + 1
+    width, height, corner, dx, dy = _ascii_head(header, name)
+    # Each value is at least one digit and a space: a small file is no large grid, whatever its head says.
+    if len(content) - start + 1 < 2 * width * height:
+        raise SceneError(f"{name}: its head tells of {width:,} by {height:,} values, more than the file can hold")
+    values = np.empty(width * height, np.float32)
+    done = 0
+    while start < len(content):
+        yield Progress(0.9 * start / len(content), f"Reading {name}")
+        end = content.find(b"\n", start + _PIECE)
+        end = len(content) if end < 0 else end + 1
+        piece = content[start:end]
+        found = _numbers(piece, name, line)
+        if done + len(found) > len(values):
+            raise SceneError(f"{name}: more than the {len(values):,} values that its head tells of")
+        values[done : done + len(found)] = found
+        done, start, line = done + len(found), end, line + piece.count(b"\n")
+    if done < len(values):
+        raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values")
+    nothing = header.get("nodata_value", -9999.0)
+    values = without_nodata(values.reshape(height, width), nothing)
+    first = np.array([corner[0], corner[1] + (height - 1) * dy])
+    return Raster(values, first, np.array([dx, 0.0]), np.array([0.0, -dy]), System(_code_beside(path)))
+
+
+def _ascii_head(header: dict[str, float], name: str) -> tuple[int, int, tuple[float, float], float, float]:
+    """Width, height, middle of the lower left cell, and size of cells."""
+    missing = [key for key in ("ncols", "nrows") if key not in header]
+    missing += ["cellsize"] * ("cellsize" not in header and not {"dx", "dy"} <= header.keys())
+    missing += [f"{a}llcorner" for a in "xy" if not header.keys() & {f"{a}llcorner", f"{a}llcenter"}]
+    if missing:
+        raise SceneError(f"{name}: no ASCII grid: {', '.join(missing)} is missing in its head")
+    dx, dy = header.get("dx", header.get("cellsize")), header.get("dy", header.get("cellsize"))
+    width, height = header["ncols"], header["nrows"]
+    if width != int(width) or height != int(height):
+        raise SceneError(f"{name}: ncols and nrows must be whole numbers")
+    checked_size(int(width), int(height), f"{name}: ")
+    if not (0.0 < dx < _LIMIT and 0.0 < dy < _LIMIT):
+        raise SceneError(f"{name}: cellsize must be greater than 0")
+    corner = tuple(
+        header[f"{a}llcenter"] if f"{a}llcenter" in header else header[f"{a}llcorner"] + d / 2
+        for a, d in (("x", dx), ("y", dy))
+    )
+    return int(width), int(height), corner, dx, dy
+
+
+def _numbers(piece: bytes, name: str, line: int) -> NDArray[np.float64]:
+    """All numbers of some lines; a broken one is told by its line."""
+    found = _split(piece)
+    if found is not None:
+        return found
+    for number, text in enumerate(piece.split(b"\n")):
+        if text.strip() and _split(text) is None:
+            words = text.decode("latin-1").split()
+            bad = next((w for w in words if _split(w.encode()) is None), words[0])
+            raise SceneError(f"{name}: line {line + number}: {shown(bad)} is not a number")
+    raise SceneError(f"{name}: line {line}: not a list of numbers")
+
+
+def _split(text: bytes) -> NDArray[np.float64] | None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text.decode("ascii"), sep=" ")
+        except (ValueError, DeprecationWarning):
+            return None
+
+
+def _number(text: str, what: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise SceneError(f"{what} is {shown(text)}, which is not a number") from None
+    if not abs(value) < 1000 * _LIMIT and "nodata" not in what:
+        raise SceneError(f"{what} is {shown(text)}, which is too large")
+    return value
+
+
+def without_nodata(values: NDArray[np.floating], nothing: float | None) -> NDArray[np.float32]:
+    """Values with nan where nothing is known, or what stands there is no height."""
+    values = np.asarray(values, np.float32)
+    bad = ~(np.abs(values) < _LIMIT)
+    if nothing is not None:
+        bad |= values == np.float32(nothing)
+    return np.where(bad, np.float32(np.nan), values)
+
+
+def _code_beside(path: Path) -> int:
+    """EPSG code in a file ``.prj`` beside another; 0 where there is none."""
+    try:
+        text = read_whole(path.with_suffix(".prj"), 16 * _SMALL).decode("latin-1")
+    except OSError:
+        return 0
+    found = re.search(r'AUTHORITY\["EPSG","(\d+)"\]\]\s*$|ID\["EPSG",(\d+)\]\]\s*$', text)
+    if found:
+        return int(found[1] or found[2])
+    # Esri writes names only.
+    zone = re.search(r"UTM_Zone_(\d{1,2})([NS])", text)
+    if zone and re.search(r"WGS_1984|ETRS_1989", text) and 1 <= int(zone[1]) <= 60:
+        return (32600 if zone[2] == "N" else 32700) + int(zone[1])
+    if text.lstrip().startswith("GEOGCS") and re.search(r"WGS_1984|ETRS_1989", text):
+        return 4326
+    return code_in(text) or 0
+
+
+def world_file(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], System] | None:
+    """Middle of the first cell, steps along and down, and system, of an image's world file; None without one.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line.
+    """
+    for ending in WORLD_FILES[path.suffix.lower()]:
+        beside = next((p for p in (path.with_suffix(ending), path.with_suffix(ending.upper())) if p.exists()), None)
+        if beside is None:
+            continue
+        lines = read_whole(beside, _SMALL).decode("latin-1").split()
+        if len(lines) != 6:
+            raise SceneError(f"{beside.name}: {len(lines)} numbers; a world file has six, one on each line")
+        a, d, b, e, x, y = (
+            _number(text.replace(",", "."), f"{beside.name}: line {number}") for number, text in enumerate(lines, 1)
+        )
+        if not abs(a * e - b * d) > 0.0:
+            raise SceneError(f"{beside.name}: line 1: its cells have no size")
+        return np.array([x, y]), np.array([a, d]), np.array([b, e]), System(_code_beside(path))
+    return None
