@@ -116,11 +116,20 @@ def lengths(rows: NDArray[np.void], row: NDArray[np.integer], fraction: NDArray[
     return out
 
 
-def fullness_of(rows: NDArray[np.void], row: NDArray[np.integer], vigour: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Factor (n,) on the numbers of branches and leaves on branches of rows (n,) and vigours (n,)."""
+def fullness_of(
+    rows: NDArray[np.void],
+    row: NDArray[np.integer],
+    vigour: NDArray[np.float64],
+    own: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Factor (n,) on the numbers of branches and leaves on branches of rows (n,) and vigours (n,).
+
+    ``own`` (n,) are their vigours without the crown forms of their plants.
+    """
     weight = rows["count_by_length"][row]
     full = 1 - weight + weight * vigour
     least = rows["least"][row]
     if least.any():  # what has just begun to grow bears nothing yet
-        full = full * np.where(least > 0, np.clip(vigour / np.maximum(least, 1e-9), 0, 1), 1.0)
+        own = vigour if own is None else own
+        full = full * np.where(least > 0, np.clip(own / np.maximum(least, 1e-9), 0, 1), 1.0)
     return full

@@ -18,7 +18,21 @@ from ..species.growing import faded
 from ..species.members import dead_vigour
 from .axes import Axes, axes, profile
 from .branches import Branches, Pose
+from .crown_forms import BASE
 from .envelopes import BOX
+from .formed import (
+    along,
+    are_formed,
+    bare_part,
+    dead_end,
+    formed_trunks,
+    fractions,
+    handed_on,
+    leans,
+    longer,
+    numbers,
+    sparser,
+)
 from .grown_rows import FADES, NOW, fullness_of, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .nodes import Grown, child_number, grown_nodes
@@ -82,8 +96,11 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     one, none = np.ones(len(seeds)), np.zeros(len(seeds))
     sky = by_component(np.tile(_SKY, (len(seeds), 1))) if is_windy(rows) else None
     later = Pose(seeds.position, frame, sky) if moment(rows) else None  # the foot of a plant stands still
-    year = plant_years(rows, row, key)
-    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later, year)
+    year, crown = plant_years(rows, row, key), None
+    if seeds.crown is not None:
+        crown, girth = formed_trunks(rows, row, seeds.crown)
+        length, radius = length * along(rows, row, crown), radius * girth
+    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later, year, crown)
 
 
 def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
@@ -117,12 +134,14 @@ def chosen_drawn(
         # The drawing is bent when its lines are asked for.
         None if plant.later is None else Pose(position, frame, plant.sky),
         plant.year,
+        plant.crown,
     )
 
 
 def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
     """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
-    return fullness_of(rows, branches.row, branches.vigour)
+    vigour, crown = branches.vigour, branches.crown
+    return fullness_of(rows, branches.row, vigour, None if crown is None else vigour / crown[:, 0])
 
 
 def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERAL) -> NDArray[np.int64]:
@@ -134,6 +153,9 @@ def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERA
         number = np.maximum(np.floor(wanted + uniform(key, _ROUND[sort])), 1)  # what divides goes on
         return np.where(child >= 0, number, 0).astype(np.int64)
     whorl = np.maximum(rows["whorl"][child], 1)
+    if are_formed(rows, branches):
+        start = rows["start"][row, DEAD, 0] if sort == DEAD else _started(rows, branches, sort)
+        wanted = wanted * numbers(rows, row, branches.crown[:, BASE], sort, start)
     nodes = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64)
     grown = _grown(rows, branches, sort)
     if grown is not None:
@@ -148,11 +170,24 @@ def _grown(rows: NDArray[np.void], branches: Branches, sort: int) -> Grown | Non
         return None
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
     wanted = varied(rows["count"][row, sort], key, _COUNT[sort]) * fullness(rows, branches) / whorl
-    start, draw = rows["start"][row, sort], np.zeros(len(row))
+    start, draw, formed = rows["start"][row, sort], np.zeros(len(row)), None
     if sort != DEAD:
         draw = signed(key, _START[sort])
     start = start[:, 0] if sort == DEAD else start[:, 0] + start[:, 1] * draw
-    return grown_nodes(rows, branches, sort, int(_PATHS[sort]), wanted, start, draw, uniform(key, _ROUND[sort]))
+    if are_formed(rows, branches):
+        base, none = branches.crown[:, BASE], np.zeros(len(row))
+        bare = bare_part(rows, row, base)
+        if sort == LATERAL:
+            formed, wanted = (bare, none), wanted * sparser(rows, row, base)
+        elif sort == DEAD:
+            formed = none, bare
+    chance = uniform(key, _ROUND[sort])
+    return grown_nodes(rows, branches, sort, int(_PATHS[sort]), wanted, start, draw, chance, formed)
+
+
+def _started(rows: NDArray[np.void], branches: Branches, sort: int) -> NDArray[np.float64]:
+    """Part (n,) of branches that their species leaves bare of children of a sort."""
+    return varied(rows["start"][branches.row, sort], branches.key, _START[sort])
 
 
 def leaf_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
@@ -204,7 +239,7 @@ def chosen_children(
         index, more, extra = grown.chosen(owner, index, rows["whorl"][row])
         path = path + more
     key = child_key(parent.key, child_number(index, path))
-    fading = 1.0
+    fading, formed = 1.0, are_formed(rows, parents)
     if sort == FORK:
         whorl, node, within, fraction = counts[owner], np.zeros_like(index), index, np.ones(len(index))
         t = np.ones(len(index))
@@ -215,19 +250,25 @@ def chosen_children(
         first = child_key(parent.key, child_number(node * whorl, path))
         place = signed(np.where(within > 0, first, key), Draw.PLACE)
         fraction = (node + 0.5 + _PLACE_JITTER * place) / np.maximum(counts[owner] // whorl, 1)
+        base = parent.crown[:, BASE] if formed else None
         if sort == DEAD:
             start, end = rows["start"][parent.row, sort].T
+            end = dead_end(rows, parent.row, base) if formed else end
         else:
-            start, end = varied(rows["start"][parent.row, sort], parent.key, _START[sort]), 1.0
+            start, end = _started(rows, parent, sort), 1.0
+            if formed and sort == LATERAL:
+                start = np.maximum(start, bare_part(rows, parent.row, base))
         t = start + (end - start) * fraction
         if grown is not None:
-            there, part = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
+            there, part, own = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
             on = grown.on[owner]
             t, fraction = np.where(on, there, t), np.where(on, part, fraction)
-        low, high = rows["fraction"][parent.row, sort].T
+        among = fractions(rows, parent.row, base) if formed and sort == LATERAL else rows["fraction"][parent.row, sort]
+        low, high = among.T
         fraction = low + (high - low) * fraction
         if grown is not None:
-            fading = faded(fraction, rows["growing"][parent.row, sort, FADES], extra)
+            first, last = rows["fraction"][parent.row, sort].T
+            fading = faded(first + (last - first) * own, rows["growing"][parent.row, sort, FADES], extra)
     position, frame = lines.at(owner, t)
     sky = lines.sky_at(owner, t)
     angle_base, angle_spread = rows["angle"][row].T
@@ -240,6 +281,15 @@ def chosen_children(
         # Level to the sides, as far as the order asks for; 0 turns whole parents at random, as ``turn`` does.
         level = level_azimuth(frame, sky) + 2 * np.pi * ((1 - spray) * (turn - 0.5) - turn)
         azimuth += np.where(spray > 0, level, 0.0)
+    if sort == FORK:
+        angle = np.where(counts[owner] > 1, angle, 0.0)
+    full_length, reach = parent.length, 1.0
+    if formed:
+        angle = angle * leans(rows, parent, frame, azimuth, sky, sort)
+        full_length = full_length / along(rows, parent.row, parent.crown)
+    frame = turned(frame, azimuth, angle)
+    if formed and sort == LATERAL:
+        reach = longer(rows, parent, frame[:, :, 2], sky)
     around = parent.outward
     limb = (rows["order"][parent.row] == 1) & (sort != FORK)
     if limb.any():
@@ -248,29 +298,30 @@ def chosen_children(
     radius = radius_at(rows, parent, t)
     if sort == LATERAL:
         vigour = lengths(rows, parent.row, fraction) * fading
-        measure = parent.length * rows["nominal"][parent.row] * vigour
         radius = np.where(
             rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_radius"][parent.row] * vigour, radius
         )
+        vigour = vigour * reach
+        measure = full_length * rows["nominal"][parent.row] * vigour
     elif sort == DEAD:
         vigour = dead_vigour(fraction)
-        measure = parent.length * rows["nominal"][parent.row] * vigour
+        measure = full_length * rows["nominal"][parent.row] * vigour
     elif sort == FORK:
-        vigour, measure = parent.vigour, parent.length  # which follows the crown already
+        vigour, measure = parent.vigour, full_length  # which follows the crown already
+        if formed:
+            measure = measure * along(rows, row, parent.crown)
         radius = radius * np.maximum(whorl, 1) ** (-1 / rows["fork_power"][parent.row])
-        angle = np.where(whorl > 1, angle, 0.0)
     else:
         vigour, measure = np.ones(len(index)), parent.scale
     length = measure * ranged(rows, "length", row, key, Draw.LENGTH)
     thickness = ranged(rows, "thickness", row, key, Draw.THICKNESS)
     radius = (length if sort == SPUR else radius) * thickness
-    frame = turned(frame, azimuth, angle)
     later = None
     if lines.later is not None:
         again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)
         later = Pose(again.position, again.frame, again.sky)
     own = row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, sky, later, parent.year
-    return Branches(*own)
+    return Branches(*own, None if parent.crown is None else handed_on(parent, sort, reach))
 
 
 def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:

@@ -51,6 +51,8 @@ class Grown:
         Where nodes begin, where those begin that live for a while, and where all end, in nodes.
     density : (2, n) float64
         Nodes above the begin, and nodes that live for a while, over those of the law.
+    described : (n,) float64
+        Where nodes would begin without the crown forms of plants.
     """
 
     on: NDArray[np.bool_]
@@ -60,6 +62,7 @@ class Grown:
     law: tuple[NDArray[np.float64], ...]
     ends: NDArray[np.float64]
     density: NDArray[np.float64]
+    described: NDArray[np.float64]
 
     def chosen(
         self, owner: NDArray[np.integer], index: NDArray[np.integer], whorl: NDArray[np.integer]
@@ -80,14 +83,15 @@ class Grown:
         node: NDArray[np.integer],
         within: NDArray[np.float64],
         extra: NDArray[np.bool_],
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Fractions of the branch, and of its children, (m,), (m,), for nodes (m,) of branches (m,)."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Fractions (m,) for nodes (m,) of branches (m,): of the branch, of its children, and of those as described."""
         own = node + within
         dense = np.where(extra, self.density[1][owner], np.where(own >= 0, self.density[0][owner], 1.0))
         own = own / np.maximum(dense, 1e-9)
         t = place_at(own, *(one[owner] for one in self.law)) / self.now[owner]
-        low, _, high = self.ends[:, owner]
-        return np.clip(t, 0, 1), np.clip((own - low) / np.maximum(high - low, 1e-9), 0, 1)
+        high = self.ends[2][owner]
+        parts = [(own - low) / np.maximum(high - low, 1e-9) for low in (self.ends[0][owner], self.described[owner])]
+        return np.clip(t, 0, 1), np.clip(parts[0], 0, 1), np.clip(parts[1], 0, 1)
 
 
 def grown_nodes(
@@ -99,6 +103,7 @@ def grown_nodes(
     start: NDArray[np.float64],
     draw: NDArray[np.float64],
     chance: NDArray[np.float64],
+    formed: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> Grown:
     """Living nodes of branches for children of one sort.
 
@@ -114,6 +119,8 @@ def grown_nodes(
         Bare part of each, and the random numbers between -1 and 1 that it follows.
     chance : (n,) float64
         Random numbers by which the nodes of the full-grown branch are rounded.
+    formed : pair of (n,) float64, optional
+        Where the lowest and the topmost are at least, because of crown forms.
     """
     row, key = branches.row, branches.key
     own = rows["growing"][row, sort]
@@ -126,7 +133,11 @@ def grown_nodes(
     settled = rows["settled"][row]
     rounded = (1 - settled) * whole + settled * np.floor(whole + chance)
     density = np.stack([np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0), own[:, EXTRA]])
-    ends = np.stack([node_at(place * now, *law) for place in (start, own[:, FRESH], own[:, UNTIL])])
+    last, described = own[:, UNTIL], node_at(start * now, *law)
+    if formed is not None:
+        last = np.where(last > start, np.maximum(last, formed[1]), last)
+        start = np.maximum(start, formed[0])
+    ends = np.stack([node_at(place * now, *law) for place in (start, own[:, FRESH], last)])
     ends = np.maximum(ends, ends[0])
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
 
@@ -137,4 +148,4 @@ def grown_nodes(
 
     stay = [passed(np.where(place > 0, place * density[0], place), 0) for place in (ends[0], ends[2])]
     first, last = np.stack([stay, [passed(place * density[1], _EXTRA) for place in ends[1:]]], axis=1)
-    return Grown(on, first, np.maximum(last - first, 0), now, law, ends, density)
+    return Grown(on, first, np.maximum(last - first, 0), now, law, ends, density, described)
