@@ -16,6 +16,7 @@ from typing import Any
 from ..errors import SpeciesError, shown
 from ..files import json_of, read_whole
 from ..leaves.schema import read_forms
+from .ecology import read_ecology
 from .extras import read_ages, read_bud, read_dead
 from .members import expected_polygons
 from .reader import FileReader
@@ -159,6 +160,7 @@ ORDER_KEYS: dict[str, Key] = {
 SPECIES_KEYS = (
     "format", "name", "description", "orders", "bark", "quality", "habit", "stand_leaves", "exact", "leaf",
     "leaf_transmission", "blossom", "blossom_transmission", "spur", "bud", "dead", "year", "age",
+    "ecology",
 )  # fmt: skip
 QUALITY_LIMITS = (0.001, 1000.0)
 #: The short shoot of a species that asks for some and describes none.
@@ -278,6 +280,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         exact=reader.truth(data.get("exact", False), "exact"),
         year=read_year(reader, data.get("year")),
         ages=read_ages(reader, data.get("age")),
+        ecology=read_ecology(reader, data.get("ecology")),
     )
     polygons = expected_polygons(species) * species.quality
     if polygons > MAX_POLYGONS:

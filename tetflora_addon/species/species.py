@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
+from .ecology import Ecology
 from .growing import Ages, PartGrown
 from .skeletons import Skeleton
 from .year import Year
@@ -284,6 +285,8 @@ class Species:
         When leaves appear, turn and fall.
     ages : Ages or None
         How it grows.
+    ecology : Ecology or None
+        What it needs among others.
     """
 
     identifier: str
@@ -306,6 +309,7 @@ class Species:
     aged: tuple[Species, float] | None = None
     year: Year | None = None
     ages: Ages | None = None
+    ecology: Ecology | None = None
 
     def forms(self, kind: int) -> tuple[LeafModel | str, ...]:
         """Forms of leaves of a kind, by its index in `LEAF_KINDS`; leaves where there are no blossoms."""

@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a year does to plants: how they grow with the light that they take, and which of them die.
+
+Wood grows in proportion to the light that leaves take, less what the leaves cost (Monteith, "Climate and the efficiency
+of crop production in Britain", 1977). Trunks grow taller for their girth where it is dark beside them, crowns widen
+where it is light, limbs die where it is dark. A plant that grows much less than one of its girth that stands free dies
+soon; how much less depends on its tolerance of shade. All else, such as how many are left, follows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..growth.hashing import child_key, uniform
+from .guilds import Guilds
+from .light import Crowns, LightGrid
+from .plants import DeadPlants, Plants, StandDraw
+from .records import LYING, Records
+
+#: Height for the girth over that in a closed stand: where the light beside the crown is full, and where there is none.
+_SLENDER_LIT, _SLENDER_DARK = 0.72, 1.08
+#: Light beside a crown in which it neither widens nor narrows, for shade tolerance 0 and 5; and how much more lets it
+#: widen as fast as it can.
+_SIDE, _SIDE_MORE = (0.34, 0.12), 0.35
+#: Fractions of the radius, or of what is lacking, by which a crown narrows and widens in a year.
+_NARROWS, _WIDENS = 0.05, 0.15
+#: Fraction of the crown that dies from below in a year where it is quite dark; shortest crown, over the height.
+_RISES, _SHORTEST = 0.1, 0.12
+#: Offset for the difference of light on two sides over its sum, the most of it, and what of it comes in a year.
+_LEANS, _MOST_OFFSET, _TURNS = 1.0, 0.6, 0.08
+#: Part of the vigour that is this year's.
+_RECENT = 0.3
+#: Vigour below which plants are likely to die, for shade tolerance 0 and 5, and the chance where it is 0.
+_WEAK, _DIES = (0.2, 0.06), 0.3
+#: Chance to die for other reasons: that a tenth of the plants reach the lifespan; when the old die, in lifespans.
+_TENTH, _OLD = 2.3, (0.8, 1.15)
+#: Trees that stand dead: least diameter and height, and years until they fall, and are gone, for 40 cm.
+_KEPT_DIAMETER, _KEPT_HEIGHT = 0.05, 2.0
+_STANDS, _LIES = (2.0, 22.0), (8.0, 40.0)
+_DEAD_DIAMETER = 0.4
+
+
+def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guilds: Guilds, block: slice) -> Plants:
+    """Some plants a year later.
+
+    Parameters
+    ----------
+    crowns, taken
+        Of these plants: where they are, and the light that they take, m².
+    block : slice
+        Of all plants.
+    """
+    one = plants.take(block)
+    x, y, radius, base, height = (
+        value[block] for value in (crowns.x, crowns.y, crowns.radius, crowns.base, crowns.height)
+    )
+    guild, taken = one.guild, taken[block]
+
+    def own(values: NDArray) -> NDArray:
+        return np.take(values, guild)
+
+    away, middle = radius + 0.5 * light.cell, base + 0.5 * (height - base)
+    places = ((away, 0.0), (-away, 0.0), (0.0, away), (0.0, -away))
+    east, west, north, south = (light.at(x + dx, y + dy, middle) for dx, dy in places)
+    side = 0.25 * (east + west + north + south)
+    below = light.at(x, y, base)
+    for dx, dy in places:
+        below += light.at(x + 0.7 * dx, y + 0.7 * dy, base)
+    below *= 0.2
+
+    free = np.pi * guilds.radii(guild, one.girth) ** 2 * own(guilds.free)
+    net = taken - own(guilds.cost) * crowns.leaves[block]
+    vigour = (1.0 - _RECENT) * one.vigour + _RECENT * np.clip(net / np.maximum(free, 1e-9), 0.0, 1.5)
+    rate = own(guilds.yields) * one.quality * one.strength
+    girth = one.girth + _thickening(one, np.maximum(net, 0.0) * rate, guilds)
+    dark = 1.0 - np.clip(side, 0.0, 1.0)
+    slender = _SLENDER_LIT + (_SLENDER_DARK - _SLENDER_LIT) * dark
+    short = 0.4 + 0.6 * np.sqrt(one.quality)
+    tall = np.maximum(height, slender * short * guilds.heights(guild, girth))
+
+    widest = guilds.radii(guild, girth)
+    level = _SIDE[0] + (_SIDE[1] - _SIDE[0]) / 5.0 * own(guilds.shade)
+    open_ = np.clip((side - level) / _SIDE_MORE, -1.0, 1.0)
+    widens = np.minimum(widest - guilds.radii(guild, one.girth) + _WIDENS * (widest - radius), widest - radius)
+    wide = radius + np.where(open_ > 0, np.maximum(widens, 0.0) * open_, _NARROWS * radius * np.maximum(open_, -1.0))
+    wide = np.minimum(wide, widest)
+
+    limit = own(guilds.limit)
+    died = np.clip(1.0 - below / limit, 0.0, 1.0) * (tall - height + _RISES * (height - base))
+    low = np.minimum(base + died, (1.0 - _SHORTEST) * tall)
+    old_east, old_north = (
+        before + _TURNS * (np.clip(_LEANS * (a - b) / (a + b + 0.2), -_MOST_OFFSET, _MOST_OFFSET) - before)
+        for before, a, b in ((one.east, east, west), (one.north, north, south))
+    )
+    return replace(
+        one, girth=girth, height=tall, base=low, radius=wide, east=old_east, north=old_north, vigour=vigour,
+        age=one.age + 1.0,
+    )  # fmt: skip
+
+
+def _thickening(one: Plants, wood: NDArray[np.float64], guilds: Guilds) -> NDArray[np.float64]:
+    """By how much plants (n,) become thicker that make so much wood, kg."""
+    step = 0.002
+    rise = np.maximum(guilds.heights(one.guild, one.girth + step) - guilds.heights(one.guild, one.girth), 0.0) / step
+    more = np.take(guilds.solid, one.guild) * one.girth * (2.0 * one.height + one.girth * rise)
+    most = np.take(guilds.thickening, one.guild) * one.quality * one.strength
+    return np.minimum(wood / np.maximum(more, 1e-9), most)
+
+
+def dying(plants: Plants, guilds: Guilds, year: int, block: slice) -> NDArray[np.bool_]:
+    """Which of some plants die in a year."""
+    one = plants.take(block)
+    guild = one.guild
+    weak = np.take(_WEAK[0] + (_WEAK[1] - _WEAK[0]) / 5.0 * guilds.shade, guild)
+    stressed = _DIES * np.maximum(1.0 - one.vigour / weak, 0.0)
+    lifespan = np.take(guilds.lifespan, guild)
+    chance = stressed + _TENTH / lifespan
+    old = _OLD[0] + (_OLD[1] - _OLD[0]) * uniform(one.key, StandDraw.OLD)
+    return (uniform(child_key(one.key, year), StandDraw.DEATH) < chance) | (one.age > old * lifespan)
+
+
+def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells: NDArray, year: float) -> DeadPlants:
+    """What is left of plants that die in a year: trees that stand dead, and will fall, rather down the slope."""
+    large = (last.diameter >= _KEPT_DIAMETER) & (last.height >= _KEPT_HEIGHT)
+    kept = np.flatnonzero(large)
+    plants, last, cells = plants.take(kept), last.take(kept), cells[kept]
+    lasts = np.sqrt(last.diameter.astype(np.float64) / _DEAD_DIAMETER)
+    stands = np.floor((_STANDS[0] + (_STANDS[1] - _STANDS[0]) * uniform(plants.key, StandDraw.FALL) ** 2) * lasts) + 1.0
+    lies = np.floor((_LIES[0] + (_LIES[1] - _LIES[0]) * uniform(plants.key, StandDraw.LIE)) * lasts) + 1.0
+    turn = uniform(plants.key, StandDraw.LEAN)
+    # Directions on a square, which needs no sine: rounded to a circle by its own length.
+    across, along = 4.0 * turn - 2.0, 0.0 * turn
+    along = 1.0 - np.abs((across % 2.0) - 1.0) * 2.0
+    across = np.where(turn < 0.5, 1.0, -1.0) * (1.0 - np.abs(along))
+    east, north = across - 3.0 * slope[0][cells], along - 3.0 * slope[1][cells]
+    length = np.maximum(np.sqrt(east**2 + north**2), 1e-6)
+    lean = (1.05 * LYING * np.stack([east / length, north / length], axis=1)).astype(np.float32)
+    return DeadPlants(last, np.full(len(kept), float(year)), year + stands, year + stands + lies, lean)

@@ -1,0 +1,253 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Grow a stand: year after year plants shade each other, grow, die, fall, and seeds of the others come up.
+
+All random numbers are hashes of the seed, the plant and the year, and sums are of whole numbers: the stand is the same
+whatever the number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TetFloraError
+from ..growth.hashing import mix
+from ..jobs import Progress
+from ..parallel import blocks, on_all_cores
+from ..setting import LENGTH, setting
+from .change import dying, fallen, grown
+from .guilds import Guild, Guilds
+from .light import LightGrid
+from .plants import DeadPlants, Plants, keys_of
+from .records import Records, in_order
+from .renewal import MOST_PLANTS, SeedRain, planted
+from .site import StandSite
+
+#: Plants that are looked at together.
+_BLOCK = 1 << 15
+_GIVEN = 2
+
+
+@dataclass(frozen=True)
+class StandSettings:
+    """How a stand grows. Fields with a label are properties of the scene, and documented by their tooltips."""
+
+    years: int = setting(80, "Years", "How long the stand grows", min=1, soft_max=300, max=2000)
+    interval: int = setting(
+        5,
+        "Interval",
+        "Years between two records of the stand, for the slider through the years; 0 keeps the last year only",
+        min=0,
+        soft_max=50,
+    )
+    seed: int = setting(0, "Seed", "A different seed gives a different stand")
+    density: float = setting(
+        2500.0,
+        "Planted",
+        "Young plants per hectare at the beginning; 0 leaves the ground bare",
+        min=0.0,
+        soft_max=20_000.0,
+    )
+    recruits: float = setting(
+        300.0,
+        "Seedlings",
+        "Most plants that come up from seed per hectare and year; light and soil allow fewer. 0 for none",
+        min=0.0,
+        soft_max=2000.0,
+    )
+    outside: float = setting(
+        1.0,
+        "Seeds from Outside",
+        "Factor on the seeds that arrive from beyond the ground; at 0, only the stand itself bears seeds",
+        min=0.0,
+        soft_max=10.0,
+    )
+    least_height: float = setting(
+        1.0, "Min Height", "Plants lower than this are not part of the result", min=0.0, soft_max=10.0, **LENGTH
+    )
+    cell: float = setting(
+        1.0,
+        "Cell",
+        "Width of the columns in which light is computed; larger is faster and coarser",
+        min=0.1,
+        soft_max=5.0,
+        **LENGTH,
+    )
+
+
+def grow(
+    site: StandSite, guilds: Sequence[Guild], settings: StandSettings, given: Records | None = None
+) -> Generator[Progress, object, Records]:
+    """Grow a stand; a job, which yields after each year and returns its records.
+
+    Parameters
+    ----------
+    site : StandSite
+    guilds : sequence of Guild
+    settings : StandSettings
+    given : Records, optional
+        Plants that are there at the beginning, besides those that are planted; their species are indices of guilds.
+
+    Returns
+    -------
+    Records : plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is gone;
+        with an interval of 0 those of the end alone
+
+    Raises
+    ------
+    TetFloraError
+        A setting cannot be, or the ground is too large; names it.
+    """
+    _check(settings)
+    stand = _Stand(site, Guilds(guilds), settings, given)
+    for year in range(settings.years):
+        yield Progress(year / settings.years, f"Growing the stand: year {year} of {settings.years}")
+        stand.step(year)
+    return stand.finished()
+
+
+def _check(settings: StandSettings) -> None:
+    for name, value, low, high in (
+        ("Years", settings.years, 1, 2000),
+        ("Interval", settings.interval, 0, 2000),
+        ("Planted", settings.density, 0, 1e7),
+        ("Seedlings", settings.recruits, 0, 1e6),
+        ("Seeds from Outside", settings.outside, 0, 1e6),
+        ("Min Height", settings.least_height, 0, 200),
+        ("Cell", settings.cell, 0.05, 50),
+    ):
+        if not low <= value <= high:  # false for NaN as well
+            raise TetFloraError(f"{name} of a stand must be from {low:g} to {high:g}, not {value:g}")
+
+
+class _Stand:
+    """A stand in a year."""
+
+    def __init__(self, site: StandSite, guilds: Guilds, settings: StandSettings, given: Records | None) -> None:
+        self.site, self.guilds, self.settings = site, guilds, settings
+        width, depth = site.size
+        rows, columns = (max(round(size / settings.cell), 3) for size in (depth, width))
+        # Columns are square: the last row and column may lie a little beyond the ground.
+        self.light = LightGrid(rows, columns, max(width / columns, depth / rows))
+        suits = np.stack([site.suits(needs) for needs in guilds.needs])
+        if not suits.any():
+            raise TetFloraError(
+                "None of the species can grow in this climate and on this soil; change Warmth, Winter or the species"
+            )
+        self.slope = site.slope()
+        self.plants = planted(site, guilds, suits, settings.density, settings.seed)
+        if given is not None and len(given):
+            self.plants = Plants.concatenate([self.plants, self._given(given, suits)])
+        if not len(self.plants) and settings.recruits * settings.outside * guilds.rain.sum() <= 0.0:
+            raise TetFloraError(
+                "Nothing is planted and no seeds come; raise Planted, or Seedlings and Seeds from Outside"
+            )
+        self.seeds = SeedRain(site, guilds, suits, settings.recruits, settings.outside)
+        self.count, self.dead, self.kept = len(self.plants), DeadPlants.empty(), []
+
+    def _given(self, given: Records, suits: NDArray) -> Plants:
+        number, guilds, site = len(given), self.guilds, self.site
+        guild = given.species.astype(np.int64)
+        if ((guild < 0) | (guild >= len(guilds.needs))).any():
+            raise TetFloraError("A given plant is of a species that is not in the list")
+        x, y = given.position[:, 0].astype(np.float64) - site.west, given.position[:, 1].astype(np.float64) - site.south
+        width, depth = site.size
+        x, y = np.clip(x, 0.0, width * (1 - 1e-9)), np.clip(y, 0.0, depth * (1 - 1e-9))
+        height = np.maximum(given.height.astype(np.float64), 0.05)
+        girth = guilds.girths(guild, given.diameter.astype(np.float64))
+        small = given.diameter <= 0
+        girth[small] = np.take(guilds.first, guild[small]) * np.minimum(
+            height[small] / np.take(guilds.breast, guild[small]), 1
+        )
+        radius = np.where(given.crown_width > 0, 0.5 * given.crown_width, 0.7 * guilds.radii(guild, girth))
+        key = keys_of(0, _GIVEN) ^ given.seed.astype(np.int64).view(np.uint64)
+        first = len(self.plants)
+        whole = np.ones(number)
+        return Plants(
+            np.arange(first, first + number), mix(key), guild, x, y, girth, height,
+            np.minimum(given.crown_base.astype(np.float64), 0.88 * height), radius,
+            given.offset[:, 0].astype(np.float64), given.offset[:, 1].astype(np.float64), 0.6 * whole,
+            suits[guild, site.cells(x, y)], whole, np.take(guilds.mature, guild), np.zeros(number, bool),
+        )  # fmt: skip
+
+    def step(self, year: int) -> None:
+        """One year."""
+        every = self.settings.interval
+        record = every > 0 and year % every == 0
+        plants = self._recorded(year, record)
+        self._decay(year, record)
+        crowns = plants.crowns(self.guilds)
+        strips = self.light.fill(crowns)
+        taken = np.zeros(len(plants))
+        for index, own in zip(strips, on_all_cores(lambda i: self.light.taken(crowns, i), strips), strict=True):
+            taken[index] = own
+
+        def changed(block: slice) -> tuple[Plants, NDArray[np.bool_]]:
+            after = grown(plants, crowns, taken, self.light, self.guilds, block)
+            return after, dying(after, self.guilds, year, slice(None))
+
+        parts = list(on_all_cores(changed, blocks(len(plants), _BLOCK)))
+        new = Plants.empty()
+        if self.settings.recruits > 0.0:
+            new = self.seeds.plants(plants, self.light, year, self.count, self.settings.seed)
+        if parts:
+            dead = np.concatenate([part[1] for part in parts])
+            self._die(plants.take(np.flatnonzero(dead)), year, record)
+            plants = Plants.concatenate([part[0].take(~part[1]) for part in parts])
+        self.plants = Plants.concatenate([plants, new])
+        self.count += len(new)
+        if len(self.plants) > MOST_PLANTS:
+            raise TetFloraError(
+                f"The stand has more than {MOST_PLANTS:,} plants; lower Seedlings, or choose a smaller ground"
+            )
+
+    def _recorded(self, year: int, record: bool) -> Plants:
+        """Plants, of which those that are tall enough are recorded, or only those that are new."""
+        plants = self.plants
+        if not self.settings.interval:
+            return plants
+        tall = plants.height >= self.settings.least_height
+        index = np.flatnonzero(tall if record else tall & ~plants.known)
+        if len(index):
+            self.kept.append(plants.take(index).records(year, self.guilds, self.site))
+            plants = replace(plants, known=plants.known | tall)
+        return plants
+
+    def _die(self, plants: Plants, year: int, record: bool) -> None:
+        """Plants that do not see the next year."""
+        last = plants.records(year, self.guilds, self.site)
+        if self.settings.interval and not record:
+            self.kept.append(last.take(np.flatnonzero(plants.known)))
+        tall = np.flatnonzero(plants.height >= self.settings.least_height)
+        plants, last = plants.take(tall), last.take(tall)
+        cells = self.site.cells(plants.x, plants.y)
+        self.dead = DeadPlants.concatenate([self.dead, fallen(plants, last, self.slope, cells, year)])
+
+    def _decay(self, year: int, record: bool) -> None:
+        """Dead trees: some fall, some are gone."""
+        dead = self.dead
+        if self.settings.interval and len(dead):
+            # Records of the year in which one falls, of the next, when it lies, and of its last.
+            at = record | (dead.falls == year) | (dead.falls == year - 1) | (dead.gone == year)
+            self.kept.append(dead.take(np.flatnonzero(at & (dead.died < year))).records(year))
+        self.dead = dead.take(np.flatnonzero(dead.gone > year))
+
+    def finished(self) -> Records:
+        """Records of the whole, with plants numbered from 0."""
+        year = self.settings.years
+        self._decay(year, False)
+        end = [self.plants.records(year, self.guilds, self.site), self.dead.records(year)]
+        tall = np.flatnonzero(end[0].height >= self.settings.least_height)
+        known = Records.concatenate([*self.kept, end[0].take(tall), end[1]])
+        first = in_order(known)
+        # A dead tree that falls in the last year is recorded twice: the same row.
+        again = np.flatnonzero(
+            np.append(True, (first.plant[1:] != first.plant[:-1]) | (first.year[1:] != first.year[:-1]))
+        )
+        first = first.take(again)
+        new = np.append(True, first.plant[1:] != first.plant[:-1]) if len(first) else np.zeros(0, bool)
+        return replace(first, plant=(np.cumsum(new) - 1).astype(np.int32))

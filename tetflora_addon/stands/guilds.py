@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Species of a stand as numbers: how large plants of a girth are, one row for each species.
+
+The *girth* of a plant is the diameter of its trunk near the ground: what it is at 1.3 m, and a little more, so that
+seedlings have one too. Results of exponentials are rounded once, here: all that follows is plain arithmetic, which is
+the same on every machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TetFloraError
+from ..species.ages import ages_of
+from ..species.ecology import Ecology, ecology_of
+from ..species.species import Species
+
+BREAST_HEIGHT = 1.3
+#: Metres of girth between two numbers of the table of heights, and of the girth at which a trunk reaches breast height.
+_STEP, _LEAST = 0.002, 0.004
+#: Crowns as long as this fraction of the height have all leaves of a free one.
+FULL = 0.75
+_DIGITS = 5
+
+
+@dataclass(frozen=True)
+class Guild:
+    """One species in a stand.
+
+    Attributes
+    ----------
+    species : Species
+    planted : float
+        Share of what is planted, over those of the others.
+    rain : float
+        Share of the seeds that come from outside, over those of the others.
+    ecology : Ecology, optional
+        In place of that of the species.
+    """
+
+    species: Species
+    planted: float = 1.0
+    rain: float = 1.0
+    ecology: Ecology | None = None
+
+    @property
+    def needs(self) -> Ecology:
+        """Its ecology."""
+        return ecology_of(self.species) if self.ecology is None else self.ecology
+
+
+class Guilds:
+    """Numbers of all guilds; each of `Ecology` is an array (g,) or (g, 2) here.
+
+    Attributes
+    ----------
+    first : (g,) float64
+        Girth at which a trunk is 1.3 m high, metres, or a quarter of the height that it can reach.
+    breast : (g,) float64
+        Height of that.
+    free : (g,) float64
+        Light that a free crown takes beyond what its leaves cost, for each square metre below it.
+    lifespan, mature : (g,) float64
+        Years.
+    """
+
+    def __init__(self, guilds: Sequence[Guild]) -> None:
+        if not guilds:
+            raise TetFloraError("A stand needs at least one species; add one to the list")
+        if not all(
+            np.isfinite(one.planted) and np.isfinite(one.rain) and min(one.planted, one.rain) >= 0 for one in guilds
+        ):
+            raise TetFloraError("Shares of species must be 0 or greater")
+        self.needs = [one.needs for one in guilds]
+        for name in (one for one in Ecology.__dataclass_fields__ if one != "source"):
+            setattr(self, name, np.array([getattr(one, name) for one in self.needs]))
+        self.planted = np.array([one.planted for one in guilds])
+        self.rain = np.array([one.rain for one in guilds])
+        ages = [ages_of(one.species) for one in guilds]
+        self.lifespan = np.array([one.lifespan for one in ages])
+        self.mature = np.array([min(one.flowers, 0.5 * one.lifespan) for one in ages])
+        self.breast = np.minimum(BREAST_HEIGHT, 0.25 * self.height)
+        rate, power = self.slenderness.T
+        self.cost = 0.35 * self.limit
+        self.free = np.round(
+            -np.expm1(-self.extinction * self.leaves) - self.cost * self.extinction * self.leaves, _DIGITS
+        )
+        # As slender below breast height as just above it.
+        thin = np.array([one.thickening for one in self.needs])
+        slope = (self.height - self.breast) * (-np.expm1(-rate * 0.01)) ** power / 0.01
+        self.first = np.round(np.clip(self.breast / slope, np.minimum(_LEAST, thin), 0.03), _DIGITS)
+        number = int(np.ceil(1.6 * self.diameter.max() / _STEP)) + 2
+        girth = _STEP * np.arange(number)
+        dbh = np.maximum(girth[None, :] - self.first[:, None], 0.0)
+        grown = (
+            self.breast[:, None]
+            + (self.height - self.breast)[:, None] * (-np.expm1(-rate[:, None] * dbh)) ** power[:, None]
+        )
+        self._heights = np.round(grown, _DIGITS)
+        # Dry mass is this × girth² × height.
+        self.solid = np.round(self.form * self.wood * np.pi / 4, _DIGITS)
+
+    def heights(self, guild: NDArray, girth: NDArray) -> NDArray[np.float64]:
+        """Heights (n,) in a closed stand, metres."""
+        first = np.take(self.first, guild)
+        place = np.minimum(girth / _STEP, self._heights.shape[1] - 1.001)
+        index = place.astype(np.int64)
+        flat, start = self._heights.ravel(), guild * self._heights.shape[1] + index
+        low = np.take(flat, start)
+        tall = low + (np.take(flat, start + 1) - low) * (place - index)
+        return np.where(girth < first, np.take(self.breast, guild) * girth / first, tall)
+
+    def radii(self, guild: NDArray, girth: NDArray) -> NDArray[np.float64]:
+        """Radii (n,) of crowns that stand free, metres."""
+        first = np.take(self.first, guild)
+        at_first, slope = np.take(self.crown[:, 0], guild), np.take(self.crown[:, 1], guild)
+        return 0.5 * np.where(girth < first, at_first * girth / first, at_first + slope * (girth - first))
+
+    def diameters(self, guild: NDArray, girth: NDArray) -> NDArray[np.float64]:
+        """Diameters (n,) of trunks at breast height, metres."""
+        return np.maximum(girth - np.take(self.first, guild), 0.0)
+
+    def girths(self, guild: NDArray, diameter: NDArray) -> NDArray[np.float64]:
+        """Girths (n,) of trunks of diameters at breast height (n,), metres."""
+        return diameter + np.take(self.first, guild)
+
+    def masses(self, guild: NDArray, girth: NDArray, height: NDArray) -> NDArray[np.float64]:
+        """Dry mass (n,) of the wood above ground, kg."""
+        return np.take(self.solid, guild) * girth**2 * height
