@@ -21,6 +21,7 @@ from .results.forms import form_property
 from .runtime import Listeners
 from .scene import scatterers
 from .scene.explicit import EXPLICIT_PROPERTY
+from .scene.field_sizes import STAND_SMOOTH, STAND_YEAR
 from .scene.own_ages import AGE_PROPERTY
 from .scene.skeletons import FORM_TYPES
 from .settings import AnimationProperties, RefinementProperties
@@ -47,6 +48,11 @@ _OVERRIDES = {'LIBRARY_OVERRIDABLE'}
 
 def _on_age(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     show_age(self.id_data)
+    state.listeners.notify()
+
+
+def _on_year(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    self.id_data.update_tag()
     state.listeners.notify()
 
 
@@ -95,6 +101,8 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         type=TetFloraFieldEntry,
     )
     field_species_index: IntProperty(name="Active Field Species", options={'HIDDEN', 'SKIP_SAVE'})
+    stand_year: FloatProperty(**STAND_YEAR, override=_OVERRIDES, update=_on_year)
+    stand_smooth: BoolProperty(**STAND_SMOOTH, override=_OVERRIDES, update=_on_year)
     is_occluder: BoolProperty(
         name="Occluder",
         description=(

@@ -9,6 +9,7 @@ the time allow. All else is computed at each redraw, in less than a millisecond.
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 
 import bpy
@@ -27,12 +28,14 @@ from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
 from ..scene.field_points import PREFIX
-from ..scene.fields import field_kinds, stored_size
+from ..scene.field_sizes import HEIGHT, stored_now
+from ..scene.fields import field_kinds
 from ..scene.objects import objects_within, renderable_objects
 from ..scene.own_ages import AGE, sound_ages
+from ..scene.sizes import ages_of_heights
 from ..scene.skeletons import species_of
 from ..settings import season_of
-from ..species.edits import species_for
+from ..species.edits import display_height, species_for
 from .contents import check_settings, memory_left, picture_bytes, settings_from
 
 _LOOKED_AT = 2_000  # plants of each kind of storage that stand for all
@@ -130,8 +133,8 @@ def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | N
             if group.enabled:
                 single.append(obj)
         elif group.is_field:
-            if group.enabled and stored_size(obj):
-                parts.append(_field(scene, obj))
+            if group.enabled and len(there := stored_now(obj)):
+                parts.append(_field(scene, obj, there))
         elif obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             within = [o for o in objects_within(obj.instance_collection) if o.tetflora.is_plant]
             if within:
@@ -209,20 +212,42 @@ def _aged(
 
 
 def _field(
-    scene: bpy.types.Scene, obj: bpy.types.Object
+    scene: bpy.types.Scene, obj: bpy.types.Object, there: NDArray[np.int64]
 ) -> tuple[int, NDArray[np.float64], NDArray[np.float64], list[str]]:
-    """The same of a field, as it is stored: what nodes make of it is not known before they are evaluated."""
-    number, kinds = stored_size(obj), [species_of(kind) for kind in field_kinds(obj)]
-    chosen = _some(number)
+    """The same of those points (n,) of a field that are plants now, as they are stored.
+
+    What nodes make of it is not known before they are evaluated.
+    """
+    kinds = [species_of(kind) for kind in field_kinds(obj)]
+    number = len(there)
+    chosen = there[_some(number)]
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     foot = read(obj.data, "position")[chosen].astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-    scale, species = (_stored(obj.data, name, chosen) for name in ("scale", "species"))
+    scale, species, tall = (_stored(obj.data, name, chosen) for name in ("scale", "species", HEIGHT))
     own = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
     scale = own * (np.ones(len(chosen)) if scale is None else scale)
     which = np.zeros(len(chosen), np.int64) if species is None else np.clip(species, 0, len(kinds) - 1).astype(np.int64)
     ages = next((a for n in (PREFIX + AGE, AGE) if (a := _stored(obj.data, n, chosen)) is not None), None)
     ages = np.full(len(chosen), obj.tetflora.age) if ages is None else ages
+    if tall is not None:
+        known = np.isfinite(tall) & (tall > 0.0)
+        ages = np.where(known, _ages_of(scene, kinds, which, tall), ages)
+        scale = np.where(known, own, scale)
     return number, foot, *_aged(scene, scale, kinds, which, ages)
+
+
+def _ages_of(
+    scene: bpy.types.Scene, kinds: list[str], which: NDArray[np.int64], tall: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Ages (n,) at which plants of some kinds are so tall, about."""
+    out = np.zeros(len(tall))
+    for number, kind in enumerate(kinds):
+        own = which == number
+        with suppress(SpeciesError):
+            crown = crown_to_draw(scene, kind)
+            full = display_height(kind) if crown is None else crown.height
+            out[own] = ages_of_heights(species_for(scene, kind), tall[own] / full)
+    return out
 
 
 def _stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: NDArray[np.int64]) -> NDArray | None:

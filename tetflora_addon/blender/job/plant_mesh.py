@@ -141,7 +141,7 @@ def _make_plant_mesh_steps(
     ages = stored_ages(plants)
     seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
     each = [None] * len(plants) if ages is None else ages.reshape(-1, 1)
-    seeds = [aged for _, aged in classed(scene, [("", s, age) for s, age in zip(seeds, each, strict=True)])]
+    seeds = [aged for _, aged in classed(scene, [("", s, age, None) for s, age in zip(seeds, each, strict=True)])]
     kinds = dict.fromkeys(s.identifiers[0] for s in seeds)
     floras = {kind: in_year(scene, compile_for((kind,), scene, depsgraph)) for kind in kinds}
     polygons = sum(expected_polygons(floras[s.identifiers[0]], s) for s in seeds)

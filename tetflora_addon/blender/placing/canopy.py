@@ -15,10 +15,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...growth.crown_forms import BASE, WIDTH
 from ...planting.canopy import Canopy, Sheet
 from ...planting.cover import Floor, Habitat, Suits, mapping
 from ..attributes import world_matrix
-from ..scene.ages import crown_kinds
+from ..scene.ages import crown_kinds, with_sizes
 from ..scene.crowns import crown_for
 from ..scene.fields import field_kinds, fields_of, read_aged_field
 from ..scene.own_ages import stored_ages
@@ -52,20 +53,30 @@ def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     names = list(dict.fromkeys(o.tetflora.species for o in single))
     index = np.array([names.index(o.tetflora.species) for o in single], dtype=np.int32)
     scale = np.cbrt(np.abs(np.linalg.det(places[:, :3, :3])))
-    parts = [(places[:, :3, 3], scale, *crown_kinds(scene, names, index, stored_ages(single)))]
+    parts = [(places[:, :3, 3], scale, None, *crown_kinds(scene, names, index, stored_ages(single)))]
     for field in fields_of(objects):
-        read, ages = read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None])
-        parts.append((read.position, read.scale, *crown_kinds(scene, read.identifiers, read.species, ages)))
+        read, ages = with_sizes(scene, *read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None]))
+        parts.append((read.position, read.scale, read.crown, *crown_kinds(scene, read.identifiers, read.species, ages)))
     species, crowns = [], []
-    for _, _, kinds, which, taller in parts:
+    for _, _, form, kinds, which, taller in parts:
         own = [crown_for(scene, kind) for kind in kinds]
         known = np.array([(c.radius, c.base, c.height, c.leaves) for c in own]).reshape(-1, 4)[which]
-        crowns.append(known * taller[:, None] ** [1, 1, 1, 2])
+        crowns.append(_formed(known, form) * taller[:, None] ** [1, 1, 1, 2])
         species.append(np.array([number_of(species_of(kind)) for kind in kinds], dtype=np.int32)[which])
     position, size = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
     radius, base, top, area = np.concatenate(crowns).T
     canopy = Canopy(position, radius * size, base * size, top * size, area * size**2, np.concatenate(species))
     return canopy, tuple(numbers)
+
+
+def _formed(crowns: NDArray[np.float64], form: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """Radius, base, top and leaf area (n, 4) of crowns that have forms (n, 5) of their own."""
+    if form is None:
+        return crowns
+    radius, base, top, area = crowns.T
+    higher = np.maximum(base, form[:, BASE] * top)
+    left = (top - higher) / np.maximum(top - base, 1e-9)
+    return np.stack([radius * form[:, WIDTH], higher, top, area * form[:, WIDTH] * left], axis=1)
 
 
 def standing(scene: bpy.types.Scene) -> set[str]:

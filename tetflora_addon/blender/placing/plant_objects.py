@@ -16,7 +16,7 @@ from ...planting.places import Placement, new_seeds
 from .. import settings
 from ..attributes import world_matrix
 from ..saved_files import VERSION
-from ..scene.ages import relative_heights
+from ..scene.ages import plainly_aged, relative_heights
 from ..scene.fields import fields_of, quaternions, read_aged_field, stored_size, write_field
 from ..scene.own_ages import stored_ages
 from ..scene.plants import single_plants
@@ -261,6 +261,8 @@ def plants_from_field(
 ) -> list[bpy.types.Object]:
     """Put empties in place of a field; the same individuals stand at the same places.
 
+    Recorded sizes become ages and scales; empties have no crown forms.
+
     Parameters
     ----------
     most : int
@@ -273,7 +275,7 @@ def plants_from_field(
     SceneError
         The field has no points, too many, or cannot be read; nothing is changed.
     """
-    read, ages = read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None])
+    read, ages = plainly_aged(scene, *read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None]))
     if not 0 < len(read) <= most:
         raise SceneError(
             f'"{field.name}" has {len(read):,} plants; '

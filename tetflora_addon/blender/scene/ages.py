@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
 
 import bpy
 import numpy as np
@@ -23,20 +22,19 @@ from numpy.typing import NDArray
 
 from ...errors import SpeciesError
 from ...growth.seeds import Seeds
-from ...species.ages import ages_of, stage, with_age
-from ...species.growing import Ages
+from ...species.ages import ages_of, stage
 from ...species.species import Species
 from ..settings import years_of
 from ..species.edits import species_for
-from .own_ages import MOST_YEARS
-from .skeletons import age_of, aged_kind, species_of
+from .field_sizes import Sizes
+from .sizes import at_age, heights, sized
+from .skeletons import age_of, aged_kind, dead_of, is_aged, later, plain_kind, species_of
 
 #: Classes of a species at most, and years from its death to the last of them.
 MOST, _FALLEN = 12, 40.0
-_NODES = 512  # of heights by age, from a thousandth of a year on
 FULL_GROWN = "Full-grown"
-Part = tuple[str, Seeds, NDArray[np.float64] | None]
-"""The name of an object, its plants, and their ages; None where all are full-grown."""
+Part = tuple[str, Seeds, NDArray[np.float64] | None, Sizes | None]
+"""The name of an object, its plants, their ages, None where all are full-grown, and recorded sizes if there are any."""
 
 
 def stage_text(scene: bpy.types.Scene, identifier: str, age: float) -> str:
@@ -51,10 +49,18 @@ def stage_text(scene: bpy.types.Scene, identifier: str, age: float) -> str:
 
 def classed(scene: bpy.types.Scene, parts: Sequence[Part]) -> list[tuple[str, Seeds]]:
     """Plants whose kinds name the ages that their species is to be compiled for."""
-    if all(ages is None for _, _, ages in parts):
-        return [(name, seeds) for name, seeds, _ in parts]
-    many = _with_many(parts)
-    return [(name, seeds if ages is None else _classed(scene, seeds, ages, many)) for name, seeds, ages in parts]
+    found = [(name, *with_sizes(scene, seeds, ages, sizes)) for name, seeds, ages, sizes in parts]
+    if all(ages is None for _, _, ages in found):
+        return [(name, seeds) for name, seeds, _ in found]
+    many = _with_many(found)
+    return [(name, seeds if ages is None else _classed(scene, seeds, ages, many)) for name, seeds, ages in found]
+
+
+def with_sizes(
+    scene: bpy.types.Scene, seeds: Seeds, ages: NDArray[np.float64] | None, sizes: Sizes | None
+) -> tuple[Seeds, NDArray[np.float64] | None]:
+    """Plants (n,) in their recorded sizes, if there are any, and the ages of all others."""
+    return sized(seeds, ages, sizes, lambda identifier: species_for(scene, identifier))
 
 
 def class_ages(species: Species, years: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -66,10 +72,24 @@ def class_ages(species: Species, years: NDArray[np.float64]) -> NDArray[np.float
     return np.where(years > 0.0, first * ratio**step, 0.0)
 
 
-def heights(species: Species, years: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Heights (n,) at ages (n,), over that at the full age."""
-    known = _heights(ages_of(species))
-    return np.interp(np.log(np.maximum(years, 1e-3)), *known)
+def plainly_aged(
+    scene: bpy.types.Scene, seeds: Seeds, ages: NDArray[np.float64] | None, sizes: Sizes | None
+) -> tuple[Seeds, NDArray[np.float64] | None]:
+    """As `with_sizes`, with all ages (n,) beside kinds that name none; what died young is old and small."""
+    seeds, ages = with_sizes(scene, seeds, ages, sizes)
+    if not any(is_aged(kind) for kind in seeds.identifiers):
+        return seeds, ages
+    years, smaller = np.zeros(len(seeds.identifiers)), np.ones(len(seeds.identifiers))
+    for index, kind in enumerate(seeds.identifiers):
+        years[index], dead = age_of(kind), dead_of(kind)
+        with suppress(SpeciesError):
+            if dead > 0.0:
+                species = species_for(scene, species_of(kind))
+                years[index] = ages_of(species).lifespan + dead
+                smaller[index] = np.divide(*heights(species, np.array([age_of(kind), years[index]])))
+    kinds = tuple(plain_kind(kind) for kind in seeds.identifiers)
+    found = years[seeds.species] + (0.0 if ages is None else ages)
+    return replace(seeds, identifiers=kinds, scale=seeds.scale * smaller[seeds.species]), found
 
 
 def relative_heights(identifier: str, years: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -81,25 +101,18 @@ def relative_heights(identifier: str, years: NDArray[np.floating]) -> NDArray[np
     return np.where(years > 0.0, found, 1.0)
 
 
-@lru_cache(maxsize=64)
-def _heights(ages: Ages) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Logarithms of ages and heights; the same ones whatever plants there are."""
-    years = np.geomspace(1e-3, 2.0 * MOST_YEARS, _NODES)
-    found = np.array([ages.heights(year) for year in years.tolist()])
-    return np.log(years), np.minimum(found, 1.0) if ages.scaled else found
-
-
 def grown_species(scene: bpy.types.Scene, kind: str, species: Species) -> Species:
     """The species of a kind of plant at its age and the scene's years; the same where both are 0."""
-    return at_age(species, age_of(kind) + years_of(scene))
+    return kind_species(species, kind, years_of(scene))
 
 
-def at_age(species: Species, years: float) -> Species:
-    """A species at an age; full-grown, as it is, at 0."""
-    return with_age(species, years) if years > 0.0 else species
+def kind_species(species: Species, kind: str, years: float = 0.0) -> Species:
+    """A species as plants of a kind are after so many years."""
+    age, dead = age_of(kind), dead_of(kind)
+    return at_age(species, age, dead + years) if dead > 0.0 else at_age(species, age + years)
 
 
-def _with_many(parts: Sequence[Part]) -> set[str]:
+def _with_many(parts: Sequence[tuple[str, Seeds, NDArray[np.float64] | None]]) -> set[str]:
     """Species that have more than `MOST` different ages."""
     found: dict[str, set[float]] = {}
     for _, seeds, ages in parts:
@@ -134,8 +147,11 @@ def crown_kinds(
     if ages is None and years == 0.0:
         return tuple(kinds), number.astype(np.int32), np.ones(len(number))
     total = (0.0 if ages is None else ages) + np.full(len(number), years)
-    classes, taller = _in_classes(scene, kinds, number, total, 0.0, range(len(kinds)))
-    return *_by_age(kinds, number, classes), taller
+    which = [n for n, kind in enumerate(kinds) if not is_aged(kind)]
+    total[~np.isin(number, which)] = 0.0
+    older = [later(kind, years) if is_aged(kind) else kind for kind in kinds]
+    classes, taller = _in_classes(scene, kinds, number, total, 0.0, which)
+    return *_by_age(older, number, classes), taller
 
 
 def _by_age(

@@ -21,8 +21,8 @@ from ..runtime import call_soon, redraw
 from ..species.asset_species import TetFloraAssetSpecies, find_asset
 from ..species.edits import display_height, species_for
 from ..worker import call_in_thread
-from .ages import at_age
-from .skeletons import age_of, species_of
+from .ages import kind_species
+from .skeletons import species_of
 
 #: Of a species that cannot be compiled: radius and base over height; leaf area over radius³, and polygons.
 _RADIUS, _BASE, _AREA, _POLYGONS = 0.2, 0.3, 0.5, 50_000.0
@@ -75,7 +75,7 @@ def crown_steps(progress: Progress, scene: bpy.types.Scene, kinds: Iterable[str]
 
 
 def _grown(scene: bpy.types.Scene, kind: str) -> Species:
-    return at_age(species_for(scene, species_of(kind)), age_of(kind))
+    return kind_species(species_for(scene, species_of(kind)), kind)
 
 
 def _in_background() -> bool:

@@ -47,41 +47,42 @@ class FieldPoints:
         return child_key(key_of_seed(self.seed), keys[:, None]).view(np.int64).reshape(-1)
 
 
-def read_points(
-    obj: bpy.types.Object,
-    kinds: tuple[str, ...],
-    depsgraph: bpy.types.Depsgraph,
-    geometry: bpy.types.GeometrySet | None,
-) -> FieldPoints:
-    """Points of a field of some kinds of plants: of geometry, or as they are stored where that is None.
+def parts_of(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, geometry: bpy.types.GeometrySet | None
+) -> list[Points]:
+    """What holds the points of a field: meshes and point clouds of geometry; what is stored where that is None."""
+    if geometry is not None and obj.type == 'MESH' and obj.data.is_editmode:
+        # What is evaluated has no attributes then. Blender keeps this copy with the evaluated object, and frees it.
+        return [obj.evaluated_get(depsgraph).to_mesh()]
+    if geometry is None:
+        return [obj.data] if isinstance(obj.data, Points) else []
+    return [part for part in (geometry.mesh, geometry.pointcloud) if part is not None]
+
+
+def read_points(obj: bpy.types.Object, kinds: tuple[str, ...], parts: list[Points]) -> FieldPoints:
+    """Points of a field of some kinds of plants.
 
     Raises
     ------
     SceneError
         An attribute of the wrong type or domain, or with values that cannot be.
     """
-    if geometry is not None and obj.type == 'MESH' and obj.data.is_editmode:
-        # What is evaluated has no attributes then. Blender keeps this copy with the evaluated object, and frees it.
-        parts = [obj.evaluated_get(depsgraph).to_mesh()]
-    elif geometry is None:
-        parts = [obj.data] if isinstance(obj.data, Points) else []
-    else:
-        parts = [part for part in (geometry.mesh, geometry.pointcloud) if part is not None]
-    sizes = [_size(part) for part in parts]
+    sizes = [point_count(part) for part in parts]
     sized = list(zip(parts, sizes, strict=True))
-    position = _joined([read(part, "position").astype(np.float64) for part in parts], (0, 3))
-    rotation = _joined([_rotations(obj, part, size) for part, size in sized], (3, 3, 0))
-    own_scale = _joined([_scales(obj, part, size, 1 if len(parts) == 1 else 3) for part, size in sized], (3, 0))
+    position = joined([read(part, "position").astype(np.float64) for part in parts], (0, 3))
+    rotation = joined([_rotations(obj, part, size) for part, size in sized], (3, 3, 0))
+    own_scale = joined([_scales(obj, part, size, 1 if len(parts) == 1 else 3) for part, size in sized], (3, 0))
     firsts = np.cumsum([0, *sizes]).tolist()
-    seed = _joined([_seeds(obj, *part, first) for part, first in zip(sized, firsts, strict=False)], (0,))
-    species = _joined([_integers(obj, part, "species", size, 0) for part, size in sized], (0,))
+    seed = joined([_seeds(obj, *part, first) for part, first in zip(sized, firsts, strict=False)], (0,))
+    species = joined([_integers(obj, part, "species", size, 0) for part, size in sized], (0,))
     refuse(obj, (species < 0) | (species >= len(kinds)), f"a species number outside the list of {len(kinds)} species")
-    age = _joined([_ages(obj, part, size) for part, size in sized], (0,)).astype(np.float64)
+    age = joined([_ages(obj, part, size) for part, size in sized], (0,)).astype(np.float64)
     refuse(obj, ~sound_ages(age), f"an age that is not from 0 to {MOST_YEARS:,.0f} years")
     return FieldPoints(kinds, position, rotation, own_scale, species, seed, age if age.any() else None)
 
 
-def _size(points: Points) -> int:
+def point_count(points: Points) -> int:
+    """Number of points of a mesh or point cloud."""
     return len(points.points if isinstance(points, bpy.types.PointCloud) else points.vertices)
 
 
@@ -199,7 +200,7 @@ def refuse(obj: bpy.types.Object, bad: NDArray[np.bool_], what: str) -> None:
         )
 
 
-def _joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
+def joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
     """Arrays as one along the axis that is 0 in ``empty``, which is the shape where there are none."""
     if not parts:
         return np.zeros(empty, int)

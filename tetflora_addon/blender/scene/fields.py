@@ -9,6 +9,7 @@ wrote them. Nothing here loops over plants.
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 from ...camera.camera import origin_near
 from ...growth.seeds import Seeds
 from ..attributes import write
-from .field_points import FieldPoints, placed_frames, read_points, refuse
+from .field_points import FieldPoints, parts_of, placed_frames, read_points, refuse
+from .field_sizes import Sizes, in_year, read_records, read_sizes
 from .objects import geometry_of
 from .own_ages import AGE
 from .skeletons import kind_of, kind_of_choice, species_of
@@ -45,7 +47,7 @@ def stored_size(obj: bpy.types.Object) -> int:
 
 
 def read_field(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, matrices: NDArray[np.float64]) -> Seeds:
-    """Plants of a field as `read_aged_field`, without their ages."""
+    """Plants of a field as `read_aged_field`, without their ages and sizes."""
     return read_aged_field(obj, depsgraph, matrices)[0]
 
 
@@ -55,10 +57,18 @@ def read_aged_field(
     matrices: NDArray[np.float64],
     keys: NDArray[np.uint64] | None = None,
     geometry: bpy.types.GeometrySet | None = None,
-) -> tuple[Seeds, NDArray[np.float64] | None]:
-    """Plants of a field, once for each of its places, and their ages in years; None where all are full-grown.
+) -> tuple[Seeds, NDArray[np.float64] | None, Sizes | None]:
+    """Plants of a field, once for each of its places.
 
-    Transforms of points count as those of plants that are objects.
+    Transforms of points count as those of plants that are objects; where a height is recorded, without their scale.
+
+    Returns
+    -------
+    Seeds
+    ages : (n,) float64 or None
+        Years; None where all are full-grown.
+    sizes : Sizes or None
+        None where none is recorded.
 
     Parameters
     ----------
@@ -79,7 +89,7 @@ def read_aged_field(
         An attribute of the wrong type or domain, or points with an invalid position or scale; the message names the
         object, the number of points and the first one.
     """
-    points = _read(obj, depsgraph, geometry)
+    points, sizes = _read(obj, depsgraph, geometry)
     kinds, position, rotation, own_scale = points.kinds, points.position, points.rotation, points.scale
     matrices = matrices.astype(np.float64)  # single precision in some versions of Blender
     world = matrices[:, :3, :3]
@@ -90,7 +100,17 @@ def read_aged_field(
     refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "zero scale or an invalid position or rotation")
     species = np.tile(points.species.astype(np.int32), len(matrices))
     ages = None if points.age is None else np.tile(points.age, len(matrices))
-    return Seeds(kinds, species, points.seeds(keys), place, frame, scale), ages
+    seeds = Seeds(kinds, species, points.seeds(keys), place, frame, scale)
+    return seeds, ages, None if sizes is None else _placed_sizes(sizes, world)
+
+
+def _placed_sizes(sizes: Sizes, world: NDArray[np.float64]) -> Sizes:
+    """Sizes of the plants of a field in all of its places (k, 3, 3); offsets of crowns turn with the field."""
+    out = sizes.take(np.tile(np.arange(len(sizes)), len(world)))
+    turn = np.repeat(np.arctan2(world[:, 1, 0], world[:, 0, 0]), len(sizes))
+    east, north = out.offset.T
+    turned = np.stack([np.cos(turn) * east - np.sin(turn) * north, np.sin(turn) * east + np.cos(turn) * north], axis=1)
+    return replace(out, offset=np.where(turn[:, None] == 0.0, out.offset, turned))
 
 
 def read_field_matrices(
@@ -116,7 +136,7 @@ def read_field_matrices(
     kinds = field_kinds(obj)
     if not any(species_of(kind) in wanted for kind in kinds):
         return
-    points = _read(obj, depsgraph, geometry)
+    points, _ = _read(obj, depsgraph, geometry)
     seeds = points.seeds(keys).reshape(-1, len(points.species))
     seeds = np.broadcast_to(seeds, (len(matrices), seeds.shape[1]))
     for number, kind in enumerate(kinds):
@@ -133,8 +153,20 @@ def read_field_matrices(
         yield kind, seeds[:, own].reshape(-1), placed.reshape(-1, 4, 4)
 
 
-def _read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, geometry: bpy.types.GeometrySet | None) -> FieldPoints:
-    return read_points(obj, field_kinds(obj), depsgraph, geometry or geometry_of(obj, depsgraph))
+def _read(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, geometry: bpy.types.GeometrySet | None
+) -> tuple[FieldPoints, Sizes | None]:
+    """Points of a field that are plants, of a history those of its year, and their recorded sizes."""
+    held = geometry or geometry_of(obj, depsgraph)  # it owns its parts
+    parts = parts_of(obj, depsgraph, held)
+    points, sizes, records = read_points(obj, field_kinds(obj), parts), read_sizes(obj, parts), read_records(obj, parts)
+    if records is not None:
+        refuse(obj, ~np.isfinite(points.position).all(axis=1), "an invalid position")
+        group = (obj.evaluated_get(depsgraph) if obj.animation_data else obj).tetflora
+        points, sizes = in_year(points, sizes, records, group.stand_year, group.stand_smooth)
+    if sizes is not None and (sizes.height > 0.0).any():
+        points = replace(points, scale=np.where(sizes.height > 0.0, 1.0, points.scale))
+    return points, sizes
 
 
 def write_field(

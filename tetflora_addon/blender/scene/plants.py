@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ...growth.crown_forms import crown_forms
 from ...growth.hashing import child_key, key_of_seed
 from ...growth.seeds import Seeds
 from ..attributes import frames_of, world_matrix
@@ -65,7 +66,7 @@ def read_plants_of(
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
     own = [o for o, _ in grouped]
     single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
-    read: list[Part] = [(single[0].name if single else "", single_plants(single, depsgraph), stored_ages(single))]
+    read: list[Part] = [(single[0].name if single else "", single_plants(single, depsgraph), stored_ages(single), None)]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
     read += [(c.owner.name, *_copied_plants(c)) for c in enabled if _is_plant(c) and _species(c.owner) not in assets]
@@ -83,7 +84,7 @@ def read_plants_of(
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
         hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
         raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
-    owners = [(name, len(seeds)) for name, seeds, _ in read]
+    owners = [(name, len(seeds)) for name, seeds, *_ in read]
     if single:
         owners[:1] = [(obj.name, 1) for obj in single]
     return _merged(classed(scene, read)), tuple(owners)
@@ -99,12 +100,12 @@ def _species(plant: bpy.types.Object) -> str:
 
 def _grown(part: Part, assets: Container[str]) -> Part:
     """Plants without those whose species is an asset, or not there."""
-    name, seeds, ages = part
+    name, seeds, ages, sizes = part
     grows = np.array([species_of(kind) not in assets for kind in seeds.identifiers], bool)
     if grows.all():
         return part
     own = np.flatnonzero(grows[seeds.species])
-    return name, seeds.take(own), None if ages is None else ages[own]
+    return name, seeds.take(own), None if ages is None else ages[own], None if sizes is None else sizes.take(own)
 
 
 @dataclass(frozen=True)
@@ -218,13 +219,13 @@ def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
     return _placed(names, tuple(number), species, seeds, matrices)
 
 
-def _copied_plants(copies: Copies) -> tuple[Seeds, NDArray[np.float64] | None]:
+def _copied_plants(copies: Copies) -> tuple[Seeds, NDArray[np.float64] | None, None]:
     """Instances of a plant, each an individual of its own: its key is added to the seed. And their ages."""
     plant = copies.owner
     seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
     age = stored_ages([plant])
     found = _placed([plant.name], (kind_of(plant),), np.zeros(len(seeds), np.int32), seeds, copies.matrices)
-    return found, None if age is None else np.repeat(age, len(seeds))
+    return found, None if age is None else np.repeat(age, len(seeds)), None
 
 
 def _placed(
@@ -253,11 +254,12 @@ def _merged(read: list[tuple[str, Seeds]]) -> Seeds:
     _check_species([(name, kind) for (name, _), table in zip(read, tables, strict=True) for kind in table.values()])
     identifiers = tuple(sorted({kind for table in tables for kind in table.values()}))
     number = {kind: i for i, kind in enumerate(identifiers)}
-    parts = []
+    parts, formed = [], any(seeds.crown is not None for _, seeds in read)
     for (_, seeds), table in zip(read, tables, strict=True):
         to_all = np.zeros(len(seeds.identifiers), np.int32)
         to_all[list(table)] = [number[kind] for kind in table.values()]
-        parts.append(replace(seeds, identifiers=identifiers, species=to_all[seeds.species]))
+        crown = crown_forms(len(seeds)) if formed and seeds.crown is None else seeds.crown
+        parts.append(replace(seeds, identifiers=identifiers, species=to_all[seeds.species], crown=crown))
     # Do not copy millions of frames where there is nothing to join.
     return parts[0] if len(parts) == 1 else Seeds.concatenate(parts)
 

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plants modelled by hand: curves, mesh edges and hair curves as skeletons, and kinds of plants.
 
-A kind is a text of the species and, if there are any, the form and the age: plants of one kind are compiled once.
+A kind is a text of the species and, if there are any, the form, the age, and years since death: plants of one kind are
+compiled once.
 """
 
 from __future__ import annotations
@@ -197,11 +198,31 @@ def kind_of_choice(group: bpy.types.PropertyGroup) -> str:
     return group.species if group.form is None else f"{group.species}{_BREAK}{group.form.name_full}"
 
 
-def aged_kind(kind: str, age: float) -> str:
-    """The kind of plants of an age in years, from that of full-grown ones; the same where the age is 0."""
+def aged_kind(kind: str, age: float, dead: float = 0.0) -> str:
+    """The kind of plants of an age in years, or so long after their death at it, from that of full-grown ones.
+
+    The same where the age is 0.
+    """
     if age == 0.0:
         return kind
-    return f"{kind}{_BREAK}{age!r}" if _BREAK in kind else f"{kind}{_BREAK}{_BREAK}{age!r}"
+    end = f"{age!r}{_BREAK}{dead!r}" if dead > 0.0 else f"{age!r}"
+    return f"{kind}{_BREAK}{end}" if _BREAK in kind else f"{kind}{_BREAK}{_BREAK}{end}"
+
+
+def is_aged(kind: str) -> bool:
+    """Whether a kind of plants names an age."""
+    return bool(_part(kind, 2))
+
+
+def plain_kind(kind: str) -> str:
+    """The kind of full-grown plants, from that of any age."""
+    return _BREAK.join(kind.split(_BREAK)[:2]).rstrip(_BREAK) if is_aged(kind) else kind
+
+
+def later(kind: str, years: float) -> str:
+    """The kind of plants of an aged kind after so many years."""
+    age, dead, plain = age_of(kind), dead_of(kind), plain_kind(kind)
+    return aged_kind(plain, age, dead + years) if dead > 0.0 else aged_kind(plain, age + years)
 
 
 def species_of(kind: str) -> str:
@@ -218,6 +239,11 @@ def form_of(kind: str) -> bpy.types.Object | None:
 def age_of(kind: str) -> float:
     """Age of a kind of plant in years; 0 is full-grown."""
     return float(_part(kind, 2) or 0.0)
+
+
+def dead_of(kind: str) -> float:
+    """Years since plants of a kind died; 0 alive."""
+    return float(_part(kind, 3) or 0.0)
 
 
 def _part(kind: str, number: int) -> str:

@@ -30,6 +30,7 @@ from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection
 from ..runtime import GoneError, Handlers, call_off, call_soon, redraw
+from ..scene.field_sizes import stand_years
 from ..scene.view import view_camera
 from ..settings import season_of, wind_of, years_of
 from .state import camera_now
@@ -227,9 +228,11 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
-    """Another frame: in the wind all plants have moved, and it may be another day."""
+    """Another frame: in the wind all plants have moved, and it may be another day or year."""
+    if _state.working or not scene.tetflora.auto_refine:
+        return
     moves = wind_of(scene) is not None or season_of(scene) is not None or years_of(scene) > 0.0
-    if not _state.working and scene.tetflora.auto_refine and moves:
+    if moves or stand_years(scene):
         schedule(scene)
 
 

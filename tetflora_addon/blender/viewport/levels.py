@@ -25,6 +25,7 @@ from ..job.contents import compile_for, in_year, load_for, memory_left, read_sce
 from ..runtime import Handlers, JobData, call_off, call_soon, guarded, redraw
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
+from ..scene.field_sizes import stand_years
 from ..scene.objects import taking_part
 from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
 from ..scene.scatterers import is_drop
@@ -180,7 +181,7 @@ def _on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 
 
 def _moment(scene: bpy.types.Scene) -> tuple:
-    return season_of(scene), years_of(scene)
+    return season_of(scene), years_of(scene), stand_years(scene)
 
 
 def _on_undo(scene: bpy.types.Scene, _other: object = None) -> None:

@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fields with recorded sizes, and histories of stands: plants have the sizes that are written down."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.scenes import depsgraph
+from tetflora_addon import errors
+from tetflora_addon.blender.scene.ages import kind_species
+from tetflora_addon.blender.scene.fields import read_aged_field
+from tetflora_addon.blender.scene.plants import read_plants
+from tetflora_addon.blender.scene.skeletons import age_of, dead_of
+from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.growth.crown_forms import BASE, EAST
+from tetflora_addon.growth.growth import radius_at, trunks
+from tetflora_addon.species.catalogue import load_species
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+KEYS = {'INT': "value", 'FLOAT': "value", 'FLOAT_VECTOR': "vector"}
+
+
+def field_of(number, kinds=("birch",), places=None, **attributes):
+    """A field of points a metre apart; attributes are (type, values)."""
+    mesh = bpy.data.meshes.new("field")
+    mesh.vertices.add(number)
+    places = np.arange(number)[:, None] * [1.0, 0.0, 0.0] if places is None else places
+    mesh.attributes["position"].data.foreach_set("vector", np.asarray(places, np.float32).reshape(-1))
+    for key, (kind, values) in attributes.items():
+        shape = (number, 3) if kind == 'FLOAT_VECTOR' else (number,)
+        values = np.broadcast_to(np.asarray(values, np.int32 if kind == 'INT' else np.float32), shape)
+        mesh.attributes.new(key, kind, 'POINT').data.foreach_set(KEYS[kind], values.reshape(-1).copy())
+    obj = bpy.data.objects.new("field", mesh)
+    obj.tetflora.is_field = True
+    for identifier in kinds:
+        obj.tetflora.field_species.add().species = identifier
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def plants():
+    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+
+
+def compiled(kind):
+    return compile_species([kind_species(load_species(kind.split("\n")[0]), kind)])
+
+
+def test_plants_have_the_sizes_that_are_recorded():
+    height = np.array([0.8, 3.0, 9.0, 15.0, 21.0, 28.0])
+    field_of(
+        6,
+        seed=('INT', np.arange(6)),
+        tf_height=('FLOAT', height),
+        tf_diameter=('FLOAT', height / 80.0),
+        tf_crown_width=('FLOAT', height / 3.0),
+        tf_crown_base=('FLOAT', height / 2.0),
+        tf_crown_offset=('FLOAT_VECTOR', (0.2, 0.0, 0.0)),
+    )
+    read = plants()
+    assert all(age_of(kind) > 0.0 for kind in read.identifiers)
+    np.testing.assert_allclose(read.crown[:, BASE], 0.5, rtol=1e-5)
+    np.testing.assert_allclose(read.crown[:, EAST], 0.2, rtol=1e-5)
+    for n, tall in enumerate(height.tolist()):
+        one = read.take(np.array([n]))
+        flora = compiled(read.identifiers[read.species[n]])
+        trunk = trunks(flora.rows, replace(one, species=one.species * 0))
+        if tall > 2.0:
+            girth = 2.0 * radius_at(flora.rows, trunk, 1.3 / trunk.length)[0]
+            assert girth == pytest.approx(tall / 80.0, rel=1e-3)
+        print(tall, one.scale, trunk.length, one.crown)
+
+
+def history():
+    """Two plants: one in the years 10, 20 and 30, which has died in between, the other in 20 and 40."""
+    return field_of(
+        5,
+        places=[(0, 0, 0)] * 3 + [(5, 0, 0)] * 2,
+        seed=('INT', [1, 1, 1, 2, 2]),
+        tf_plant=('INT', [7, 7, 7, 8, 8]),
+        tf_year=('FLOAT', [10, 20, 30, 20, 40]),
+        tf_height=('FLOAT', [2, 4, 4, 1, 3]),
+        tf_dead=('FLOAT', [0, 0, 6, 0, 0]),
+    )
+
+
+def at_year(obj, year, smooth=False):
+    obj.tetflora.stand_year, obj.tetflora.stand_smooth = year, smooth
+    seeds, _, sizes = read_aged_field(obj, depsgraph(), np.eye(4)[None])
+    return seeds.seed.tolist(), sizes.height.tolist(), sizes.dead.tolist()
+
+
+@pytest.mark.parametrize(
+    ("year", "wanted"),
+    [
+        (0.0, ([1], [2.0], [0.0])),  # before the first year of all is that
+        (15.0, ([1], [3.0], [0.0])),
+        (20.0, ([1, 2], [4.0, 1.0], [0.0, 0.0])),
+        (24.0, ([1, 2], [4.0, 1.4], [0.0, 0.0])),
+        (28.0, ([1, 2], [4.0, 1.8], [4.0, 0.0])),
+        (31.0, ([2], [2.1], [0.0])),
+        (90.0, ([2], [3.0], [0.0])),
+    ],
+)
+def test_histories_are_read_at_their_year(year, wanted):
+    obj = history()
+    for smooth in (False, True):
+        for found, own in zip(at_year(obj, year, smooth), wanted, strict=True):
+            assert found == pytest.approx(own, abs=1e-5)
+
+
+def test_years_follow_keys_and_subframes():
+    obj, scene = history(), bpy.context.scene
+    for frame, year in ((1, 10.0), (21, 30.0)):
+        obj.tetflora.stand_year = year
+        obj.tetflora.keyframe_insert("stand_year", frame=frame)
+    for frame, subframe in ((1, 0.0), (8, 0.5)):
+        scene.frame_set(frame, subframe=subframe)
+        year = obj.tetflora.stand_year
+        assert read_aged_field(obj, depsgraph(), np.eye(4)[None])[2].height[0] == pytest.approx(
+            2.0 + (year - 10.0) / 5.0
+        )
+
+
+def test_the_dead_are_dead_at_the_size_of_their_death():
+    obj = history()
+    obj.tetflora.stand_year = 28.0
+    read = plants()
+    assert sorted(dead_of(kind) > 0.0 for kind in read.identifiers) == [False, True]
+    for n, kind in enumerate(read.identifiers):
+        flora = compiled(kind)
+        tall = trunks(flora.rows, replace(read.take(read.species == n), species=np.zeros(1, np.int32))).length
+        assert (flora.leaf_count[0] > 0.0) == (dead_of(kind) == 0.0)
+        assert tall == pytest.approx(4.0 if dead_of(kind) else 1.8, rel=0.5)
+
+
+def test_growth_that_is_smooth_has_no_jumps():
+    obj = history()
+    obj.tetflora.stand_smooth = True
+    years = np.arange(10.0, 39.9, 0.5)
+    ages, length = [], []
+    for year in years.tolist():
+        obj.tetflora.stand_year = year
+        read = plants()
+        own = next(n for n, seed in enumerate(read.seed) if seed == 2 or year < 20.0)
+        kind = read.identifiers[read.species[own]]
+        ages.append(age_of(kind))
+        flora = compiled(kind)
+        length.append(trunks(flora.rows, replace(read.take(np.array([own])), species=np.zeros(1, np.int32))).length[0])
+    late = years >= 20.0
+    assert np.diff(np.array(ages)[late]).min() >= 0.0
+    assert np.diff(np.array(ages)[late]).max() < 1.1
+    assert np.abs(np.diff(np.log(np.array(length)[late]))).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("tf_height", [1.0, np.nan, -1.0], "2 of 3 points have tf_height .* the first is point 1"),
+        ("tf_height", [1.0, 2.0, 201.0], "1 of 3 points have tf_height"),
+        ("tf_dead", [0.0, -2.0, 0.0], "tf_dead"),
+    ],
+)
+def test_sizes_that_cannot_be_are_refused(name, values, message):
+    field_of(3, **{name: ('FLOAT', values)})
+    with pytest.raises(errors.SceneError, match=message):
+        plants()
+
+
+def test_sizes_without_prefix_and_zeros_say_nothing():
+    field_of(3, height=('FLOAT', 3.0), dead=('FLOAT', 1.0), year=('FLOAT', 1.0))
+    before = plants()
+    field_of(3, tf_height=('FLOAT', 0.0), tf_dead=('FLOAT', 0.0), tf_fit=('FLOAT_VECTOR', 0.0))
+    assert before.crown is None
+    assert set(plants().identifiers) == set(before.identifiers) == {"birch"}
+    assert plants().crown is None

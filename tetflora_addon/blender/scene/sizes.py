@@ -1,0 +1,204 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plants of recorded sizes as kinds, scales and crown forms.
+
+A plant that stands still is of the class of heights that is nearest: each is 1.4 times the one below, and the scale
+makes up for what is left. Classes belong to the species alone, so that no plant depends on others.
+
+Where a stand grows in an animation, plants must not jump from class to class. There, plants that were born at about the
+same time and grow at about the same pace are a kind, whose age goes on with the year; scales make up for the
+difference in height. What a plant belongs to follows from its whole life and not from the present year, so that a frame
+alone is that of the film.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled.crowns import crown_of
+from ...compiled.flora import compile_species
+from ...errors import SpeciesError
+from ...growth.axes import axes
+from ...growth.crown_forms import GIRTH, PLAIN, crown_forms
+from ...growth.growth import radius_at, trunks
+from ...growth.seeds import Seeds
+from ...species.ages import ages_of, with_age
+from ...species.growing import Ages
+from ...species.species import Species
+from .field_sizes import Sizes
+from .own_ages import MOST_YEARS
+from .skeletons import aged_kind, form_of, species_of
+
+#: Height of a class over that of the one below, and classes below that of full-grown plants.
+_STEP, _BELOW = 1.4, 11
+_NODES = 512  # of heights by age, from a thousandth of a year on
+#: Years since death that stand for others, as far as plants change: leaves, twigs, boughs and limbs are gone.
+_SINCE = np.array([0.5, 3.0, 9.0, 20.0, 35.0])
+#: Of plants that grow: years between classes of birth and of death, and ratio of the paces of classes.
+_BIRTHS, _DEATHS, _PACE = 20.0, 5.0, 1.6
+_BREAST, _TALL = 1.3, 1.5  # height of the diameter, and least height of a plant that has one, metres
+_DIES = 0.999  # part of its life after which a plant that dies early no longer grows
+_PLANTS = 16  # over which the length of trunks is averaged, as `compiled.crowns` does
+
+
+def heights(species: Species, years: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Heights (n,) at ages (n,), over that at the full age."""
+    known = _heights(ages_of(species))
+    return np.interp(np.log(np.maximum(years, 1e-3)), *known)
+
+
+def ages_of_heights(species: Species, ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ages (n,) at which plants have heights (n,), over that at the full age; the oldest of health for taller ones."""
+    ages = ages_of(species)
+    log_years, found = _heights(ages)
+    rising = log_years <= np.log(ages.full if ages.scaled else ages.decline * ages.lifespan)
+    years = np.exp(np.interp(ratio, found[rising], log_years[rising]))
+    return np.where(ratio == 1.0, ages.full, years)
+
+
+def at_age(species: Species, years: float, dead: float = 0.0) -> Species:
+    """A species at an age, full-grown at 0; or so many years after it has died at that age."""
+    if dead <= 0.0:
+        return with_age(species, years) if years > 0.0 else species
+    ages = ages_of(species)
+    if ages.scaled:
+        return at_age(species, years)
+    years = years or ages.full
+    dying = replace(species, ages=replace(ages, lifespan=years / _DIES, decline=_DIES))
+    # What was measured of dead plants of the species holds for those that died young.
+    return replace(with_age(dying, years / _DIES + dead), aged=(species, ages.lifespan + dead))
+
+
+def sized(
+    seeds: Seeds, ages: NDArray[np.float64] | None, sizes: Sizes | None, find: Callable[[str], Species]
+) -> tuple[Seeds, NDArray[np.float64] | None]:
+    """Plants (n,) of kinds that suit their recorded sizes, and the ages that are left to the others.
+
+    Species that ``find`` does not find are left as they are, which is told elsewhere.
+    """
+    if sizes is None:
+        return seeds, ages
+    kinds, number = list(seeds.identifiers), seeds.species.copy()
+    scale, crown = seeds.scale.copy(), np.tile(PLAIN, (len(seeds), 1))
+    left = None if ages is None else ages.copy()
+    for index, kind in enumerate(seeds.identifiers):
+        own = np.flatnonzero((seeds.species == index) & ((sizes.height > 0.0) | (sizes.dead > 0.0)))
+        if not len(own):
+            continue
+        with suppress(SpeciesError):
+            species = find(species_of(kind))
+            if form_of(kind) is not None:  # it is as it was drawn
+                scale[own] *= _measured(species).fitted(seeds.take(own), sizes.take(own))[0]
+                continue
+            some = sizes.take(own)
+            stages, which = np.unique(_stages(species, some), return_inverse=True)
+            for n, stage in enumerate(stages.tolist()):
+                here = which == n
+                these = own[here]
+                own_scale, own_crown = _measured(at_age(species, stage.real)).fitted(seeds.take(these), some.take(here))
+                scale[these] *= own_scale
+                crown[these], number[these] = own_crown, len(kinds)
+                kinds.append(aged_kind(kind, stage.real, stage.imag))
+            if left is not None:
+                left[own] = 0.0
+    plain = (crown == PLAIN).all()
+    return replace(
+        seeds, identifiers=tuple(kinds), species=number, scale=scale, crown=None if plain else crown
+    ), None if left is None or not left.any() else left
+
+
+def _stages(species: Species, sizes: Sizes) -> NDArray[np.complex128]:
+    """Age (n,) as the real part, and years since death as the imaginary one, of the kind that each plant belongs to."""
+    ages = ages_of(species)
+    full = _measured(species).height
+    dead, height = sizes.dead, np.where(sizes.height > 0.0, sizes.height, full)
+    if ages.scaled:
+        return np.full(len(height), ages.full, complex)
+    if sizes.life is None:
+        years = _class_ages(species, height / full, 1)
+        gone = _SINCE[np.argmin(np.abs(np.log(np.maximum(dead, 0.1)[:, None] / _SINCE)), axis=1)]
+    else:
+        now, born, small, end, tall = sizes.life.T
+        small, tall = (ages_of_heights(species, np.maximum(h, 1e-3) / full) for h in (small, tall))
+        birth = _BIRTHS * np.rint((born - small) / _BIRTHS)
+        pace = tall / np.maximum(end - (born - small), 1.0)
+        pace = _PACE ** np.clip(np.rint(np.log(pace) / np.log(_PACE)), -5, 2)
+        years = np.clip(pace * (now - birth), 0.5, ages.decline * ages.lifespan)
+        gone = np.maximum(now - _DEATHS * np.rint((now - dead) / _DEATHS), 0.01)
+    older = _class_ages(species, height / full, 2)  # leafless, they differ less
+    return np.where(dead > 0.0, older + 1j * gone, years + 0j)
+
+
+def _class_ages(species: Species, ratio: NDArray[np.float64], every: int) -> NDArray[np.float64]:
+    """Ages (n,) of the nearest classes to heights (n,) over that at the full age; one of so many classes counts."""
+    ages = ages_of(species)
+    highest = ages.heights(ages.decline * ages.lifespan)
+    classes = _STEP ** np.arange(-_BELOW // every * every, np.log(highest) / np.log(_STEP) - 0.3, every)
+    classes = np.append(classes, highest) if highest > 1.0 else classes
+    nearest = np.searchsorted(np.sqrt(classes[1:] * classes[:-1]), ratio)
+    return ages_of_heights(species, classes[nearest])
+
+
+class _Measure:
+    """Sizes of a compiled species at one age, for trunks that are not bent to some length by chance.
+
+    Attributes
+    ----------
+    height, radius : float
+        Of the plant and its crown on average, metres.
+    """
+
+    def __init__(self, species: Species) -> None:
+        crown = crown_of(species)
+        self._rows = compile_species([species]).rows
+        number = np.arange(_PLANTS)
+        place, upright, one = np.zeros((_PLANTS, 3)), np.tile(np.eye(3), (_PLANTS, 1, 1)), np.ones(_PLANTS)
+        some = Seeds((species.name,), np.zeros(_PLANTS, np.int32), number, place, upright, one)
+        trunk = trunks(self._rows, some)
+        self.length = float(trunk.length.mean())
+        # The shoot of this year bears leaves nowhere but at its tip.
+        self.height = max(crown.height, float(axes(self._rows, trunk).knots[:, -1, 2].mean()))
+        self.radius = crown.radius
+
+    def fitted(self, seeds: Seeds, sizes: Sizes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Scales (n,) and crown forms (n, 5) with which plants have their recorded sizes."""
+        none = np.zeros(len(seeds), np.int32)
+        one = replace(seeds, identifiers=("",), species=none, scale=np.ones(len(seeds)), crown=None)
+        chance = trunks(self._rows, one).length / self.length
+        known = sizes.height > 0.0
+        scale = np.where(known, sizes.height * sizes.fit[:, 0] / (self.height * chance), 1.0)
+        width = sizes.width * sizes.fit[:, 1] / (2.0 * self.radius * chance * scale)
+        wide = known & (sizes.width > 0.0)
+        forms = crown_forms(
+            len(seeds),
+            np.where(wide, width, 1.0),
+            np.where(known, sizes.base / np.maximum(sizes.height, 1e-9), 0.0),
+            *np.where(known, sizes.offset.T, 0.0),
+        )
+        has = (sizes.diameter > 0.0) & (sizes.height > _TALL)
+        if has.any():
+            formed = trunks(self._rows, replace(one, scale=scale, crown=forms))
+            place = np.minimum(_BREAST / formed.length, 0.95)
+            own = 2.0 * radius_at(self._rows, formed, place)
+            forms[:, GIRTH] = np.where(has & (place < 0.95), sizes.diameter / np.maximum(own, 1e-9), 1.0)
+            forms = crown_forms(len(seeds), *forms.T)
+        return scale, forms
+
+
+@lru_cache(maxsize=512)
+def _measured(species: Species) -> _Measure:
+    return _Measure(species)
+
+
+@lru_cache(maxsize=64)
+def _heights(ages: Ages) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Logarithms of ages and heights; the same ones whatever plants there are."""
+    years = np.geomspace(1e-3, 2.0 * MOST_YEARS, _NODES)
+    found = np.array([ages.heights(year) for year in years.tolist()])
+    return np.log(years), np.minimum(found, 1.0) if ages.scaled else found
