@@ -61,9 +61,9 @@ class Branches(Arrays):
         Position and frame a moment later, where it is asked how plants move.
     year : (n, 2) float64 or None
         On a day of the year: the day that it is for the plant, and its place among the autumn colours of its species.
-    crown : (n, 4) float32 or None
-        Where plants have crown forms: of trunks and their stems the first four columns of these; of all others the
-        factor on their length in the first, and 0.
+    crown : (n, 5) float32 or None
+        Where plants have crown forms: what trunks and their stems know of these, see `formed`; of all others the factor
+        on their length in the first column, and 0.
     """
 
     row: NDArray[np.int32] = field(metadata=column(dtype=np.int32))

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What crown forms change where plants grow: how far limbs reach, where they begin, and how trunks that fork spread.
 
-Only trunks know the form of their plant, and the stems beyond their forks. Limbs are longer or shorter and bear more or
-less for it, as those of any vigour do. Where the bare part of a trunk ends above its first fork, the fork moves up to
-there: trees that grew in the shade fork late. Stems beyond forks set out more steeply where the crown is narrower. Of
-shrubs, whose stems grow from a stool, the form changes how far these lean; drawn plants, and leaves that fill a solid,
-have no crown forms.
+Only trunks know the form of their plant, and the stems beyond their forks. Limbs, dead ones too, are longer or shorter
+and bear more or less for it, as those of any vigour do. Where the bare part of a trunk ends above its first fork, the
+fork moves up to there: trees that grew in the shade fork late. Stems beyond forks set out more steeply where the crown
+is narrower. Of shrubs, whose stems grow from a stool, the form changes how far these lean; drawn plants, and leaves
+that fill a solid, have no crown forms.
 """
 
 from __future__ import annotations
@@ -14,11 +14,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import by_component, dot
+from ..arrays import by_component
 from .branches import Branches
 from .crown_forms import BASE, EAST, GIRTH, NORTH, PLAIN, WIDTH
-from .rows import DEAD, FORK, LATERAL
+from .rows import DEAD, FORK, LATERAL, SPUR
 
+#: Columns of ``crown`` of branches: the first two are those of crown forms, then the vector (east, north) in the
+#: branch's own axes.
+COLUMNS, LIGHT = 5, slice(2, 5)
 #: Stems of a stool lean at most so many times as far as described.
 MOST_LEANING = 1.5
 #: Laterals so many times as long as what bears them are the stems of a stool (see `species.ages`).
@@ -26,12 +29,24 @@ _STEMS = 2.0
 
 
 def formed_trunks(
-    rows: NDArray[np.void], row: NDArray[np.integer], forms: NDArray[np.float64]
+    rows: NDArray[np.void], row: NDArray[np.integer], frame: NDArray[np.float64], forms: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """The column ``crown`` (n, 4) of trunks of rows (n,) with crown forms (n, 5), and factors (n,) on their radii."""
+    """The column ``crown`` (n, 5) of trunks, and factors (n,) on their radii.
+
+    Parameters
+    ----------
+    rows : parameter table
+    row : (n,) int
+    frame : (n, 3, 3) float64
+        Of the trunks.
+    forms : (n, 5) float64
+        Crown forms.
+    """
     own = np.where((rows["phantom"][row] | (rows["envelope"][row] > 0))[:, None], PLAIN, forms)
     own[are_stools(rows, row), BASE] = 0.0
-    return by_component(own[:, :GIRTH].astype(np.float32)), own[:, GIRTH]
+    light = own[:, EAST, None] * frame[:, 0] + own[:, NORTH, None] * frame[:, 1]
+    crown = np.concatenate([own[:, [WIDTH, BASE]], light], axis=1)
+    return by_component(crown.astype(np.float32)), own[:, GIRTH]
 
 
 def are_formed(rows: NDArray[np.void], branches: Branches) -> bool:
@@ -103,47 +118,49 @@ def sparser(rows: NDArray[np.void], row: NDArray[np.integer], base: ArrayLike) -
     return np.where(rows["continues"][row] & (rows["order"][row] == 0), raised(base, first_forks(rows, row))[1], 1.0)
 
 
-def leans(
-    rows: NDArray[np.void],
-    parent: Branches,
-    frame: NDArray[np.float64],
-    azimuth: NDArray[np.float64],
-    sky: NDArray[np.float64] | None,
-    sort: int,
-) -> NDArray[np.float64]:
-    """Factors (m,) on the angles at which children of a sort leave their parents (m,), there with frames (m, 3, 3)."""
-    trunk = rows["order"][parent.row] == 0
-    own = trunk if sort == FORK else trunk & are_stools(rows, parent.row) if sort == LATERAL else np.zeros_like(trunk)
-    if not own.any():
-        return np.ones(len(own))
-    way = np.cos(azimuth)[:, None] * frame[:, :, 0] + np.sin(azimuth)[:, None] * frame[:, :, 1]
-    most = 1.0 if sort == FORK else MOST_LEANING
-    return np.where(own, np.minimum(_reaches(parent, way, sky), most), 1.0)
+def reaches(
+    rows: NDArray[np.void], parent: Branches, azimuth: NDArray[np.float64], sort: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What the form makes of children of a sort that leave parents (m,) at azimuths (m,).
 
-
-def longer(
-    rows: NDArray[np.void], parent: Branches, way: NDArray[np.float64], sky: NDArray[np.float64] | None
-) -> NDArray[np.float64]:
-    """Factors (m,) on the lengths of laterals of parents (m,) that set out in directions (m, 3)."""
-    own = (rows["order"][parent.row] == 0) & ~are_stools(rows, parent.row)
-    return np.where(own, _reaches(parent, way, sky), 1.0)
-
-
-def _reaches(parent: Branches, way: NDArray[np.float64], sky: NDArray[np.float64] | None) -> NDArray[np.float64]:
-    """How far crowns (m,) reach in directions (m, 3) over what is described."""
-    level = way[:, :2]
-    if sky is not None:  # directions are those without wind, which turns z to the sky by the shortest way
-        both = sky + [0.0, 0.0, 1.0]
-        level = level - dot(both, way) / np.maximum(both[:, 2:], 1e-9) * sky[:, :2]
-    level = level / np.maximum(np.hypot(level[:, 0], level[:, 1]), 1e-9)[:, None]
-    crown = parent.crown.astype(np.float64)
-    return crown[:, WIDTH] * (1.0 + crown[:, EAST] * level[:, 0] + crown[:, NORTH] * level[:, 1])
-
-
-def handed_on(parent: Branches, sort: int, factor: ArrayLike) -> NDArray[np.float32]:
-    """The column ``crown`` (m, 4) of children of a sort, by their parents (m,) and the factors on their lengths."""
+    Returns
+    -------
+    lean, length : (m,) float64
+        Factors on their angle with the parent, and on their length.
+    """
+    trunk, one = rows["order"][parent.row] == 0, np.ones(len(parent))
+    light = parent.crown[:, LIGHT].astype(np.float64)
+    # Towards which side the child leaves is known without the wind, which turns all of the parent.
+    reach = parent.crown[:, WIDTH] * (1.0 + np.cos(azimuth) * light[:, 0] + np.sin(azimuth) * light[:, 1])
     if sort == FORK:
-        return parent.crown
-    out = np.zeros((GIRTH, len(parent)), np.float32)
-    out[WIDTH] = factor
+        return np.where(trunk, np.minimum(reach, 1.0), one), one
+    if sort == SPUR:
+        return one, one
+    stool = are_stools(rows, parent.row)
+    return np.where(stool, np.minimum(reach, MOST_LEANING), one), np.where(trunk & ~stool, reach, one)
+
+
+def handed_on(
+    parent: Branches, sort: int, length: ArrayLike, azimuth: NDArray[np.float64], angle: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """The column ``crown`` (m, 5) of children of a sort.
+
+    Parameters
+    ----------
+    parent : Branches of m
+    sort : int
+    length : (m,) float64
+        Factors on the lengths of the children.
+    azimuth, angle : (m,) float64
+        By which they are turned, see `growth.turned`.
+    """
+    out = np.zeros((COLUMNS, len(parent)), np.float32)
+    out[WIDTH] = length
+    if sort == FORK:
+        crown = parent.crown.T
+        x, y, z = crown[LIGHT]
+        ca, sa, cd, sd = (f(v) for v in (azimuth, angle) for f in (np.cos, np.sin))
+        away = ca * x + sa * y
+        out[:] = crown
+        out[LIGHT] = cd * away - sd * z, ca * y - sa * x, sd * away + cd * z
     return out.T

@@ -28,9 +28,8 @@ from .formed import (
     formed_trunks,
     fractions,
     handed_on,
-    leans,
-    longer,
     numbers,
+    reaches,
     sparser,
 )
 from .grown_rows import FADES, NOW, fullness_of, lengths
@@ -98,7 +97,7 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     later = Pose(seeds.position, frame, sky) if moment(rows) else None  # the foot of a plant stands still
     year, crown = plant_years(rows, row, key), None
     if seeds.crown is not None:
-        crown, girth = formed_trunks(rows, row, seeds.crown)
+        crown, girth = formed_trunks(rows, row, frame, seeds.crown)
         length, radius = length * along(rows, row, crown), radius * girth
     return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later, year, crown)
 
@@ -285,11 +284,10 @@ def chosen_children(
         angle = np.where(counts[owner] > 1, angle, 0.0)
     full_length, reach = parent.length, 1.0
     if formed:
-        angle = angle * leans(rows, parent, frame, azimuth, sky, sort)
+        lean, reach = reaches(rows, parent, azimuth, sort)
+        angle = angle * lean
         full_length = full_length / along(rows, parent.row, parent.crown)
     frame = turned(frame, azimuth, angle)
-    if formed and sort == LATERAL:
-        reach = longer(rows, parent, frame[:, :, 2], sky)
     around = parent.outward
     limb = (rows["order"][parent.row] == 1) & (sort != FORK)
     if limb.any():
@@ -304,7 +302,7 @@ def chosen_children(
         vigour = vigour * reach
         measure = full_length * rows["nominal"][parent.row] * vigour
     elif sort == DEAD:
-        vigour = dead_vigour(fraction)
+        vigour = dead_vigour(fraction) * reach
         measure = full_length * rows["nominal"][parent.row] * vigour
     elif sort == FORK:
         vigour, measure = parent.vigour, full_length  # which follows the crown already
@@ -321,7 +319,7 @@ def chosen_children(
         again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)
         later = Pose(again.position, again.frame, again.sky)
     own = row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, sky, later, parent.year
-    return Branches(*own, None if parent.crown is None else handed_on(parent, sort, reach))
+    return Branches(*own, None if parent.crown is None else handed_on(parent, sort, reach, azimuth, angle))
 
 
 def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:
