@@ -26,7 +26,7 @@ from ...species.ages import ages_of, stage
 from ...species.species import Species
 from ..settings import years_of
 from ..species.edits import species_for
-from .field_sizes import Sizes
+from .own_ages import Sizes
 from .sizes import at_age, heights, sized
 from .skeletons import age_of, aged_kind, dead_of, is_aged, later, plain_kind, species_of
 

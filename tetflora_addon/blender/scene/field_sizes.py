@@ -15,10 +15,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Arrays
 from ...errors import SceneError
 from ..attributes import values_of
 from .field_points import FieldPoints, Points, joined, point_count, refuse
+from .own_ages import Sizes
 
 HEIGHT = "tf_height"
 #: Attributes of numbers, with the most that is sound: metres, and years since death.
@@ -64,36 +64,7 @@ _STEADY = np.cos(np.radians(30.0))  # trunks that turn further from one record t
 
 
 @dataclass(frozen=True)
-class Sizes(Arrays):
-    """Sizes of plants (n,), metres in the field's space; 0 is not known.
-
-    Attributes
-    ----------
-    height, diameter, width, base : (n,) float64
-        Of the plant, of its trunk at 1.3 m, mean width of its crown, height of its lowest limb.
-    dead : (n,) float64
-        Years since it died; 0 alive.
-    offset : (n, 2) float64
-        By which fraction limbs to the east and north are longer.
-    fit : (n, 2) float64
-        Factors on height and crown width that make up for what is random in the plant.
-    life : (n, 5) float64 or None
-        Of a history that is to be animated: present year, year and height of the first record and of the last one in
-        life, and nothing depends on the present year but the first column; see `sizes`.
-    """
-
-    height: NDArray[np.float64]
-    diameter: NDArray[np.float64]
-    width: NDArray[np.float64]
-    base: NDArray[np.float64]
-    dead: NDArray[np.float64]
-    offset: NDArray[np.float64]
-    fit: NDArray[np.float64]
-    life: NDArray[np.float64] | None = None
-
-
-@dataclass(frozen=True)
-class Records:
+class History:
     """Which points are records of which plant.
 
     Attributes
@@ -172,7 +143,7 @@ def read_sizes(obj: bpy.types.Object, parts: Sequence[Points]) -> Sizes | None:
     return Sizes(*(by_name[name] for name in order), np.where(fit > 0.0, fit, 1.0))
 
 
-def read_records(obj: bpy.types.Object, parts: Sequence[Points]) -> Records | None:
+def read_records(obj: bpy.types.Object, parts: Sequence[Points]) -> History | None:
     """Which records the points of a field are; None where they are plants.
 
     Raises
@@ -192,11 +163,11 @@ def read_records(obj: bpy.types.Object, parts: Sequence[Points]) -> Records | No
     back = np.zeros(len(plant), bool)
     back[1:] = same[1:] & (year[1:] <= year[:-1])
     refuse(obj, back, f"{YEAR} that is not after that of the record before, of the same plant")
-    return Records(year, np.maximum.accumulate(np.where(same, 0, np.arange(len(plant)))))
+    return History(year, np.maximum.accumulate(np.where(same, 0, np.arange(len(plant)))))
 
 
 def in_year(
-    points: FieldPoints, sizes: Sizes | None, records: Records, now: float, smooth: bool
+    points: FieldPoints, sizes: Sizes | None, records: History, now: float, smooth: bool
 ) -> tuple[FieldPoints, Sizes | None]:
     """The plants that are there in a year, between their records.
 
@@ -228,7 +199,7 @@ def in_year(
     return chosen, Sizes(**columns)
 
 
-def _lives(sizes: Sizes, records: Records, now: float) -> NDArray[np.float64]:
+def _lives(sizes: Sizes, records: History, now: float) -> NDArray[np.float64]:
     """`Sizes.life` (n, 5) of all records."""
     first, alive = records.first, np.flatnonzero(sizes.dead <= 0.0)
     last = first.copy()

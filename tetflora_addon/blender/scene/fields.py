@@ -20,9 +20,9 @@ from ...camera.camera import origin_near
 from ...growth.seeds import Seeds
 from ..attributes import write
 from .field_points import FieldPoints, parts_of, placed_frames, read_points, refuse
-from .field_sizes import Sizes, in_year, read_records, read_sizes
+from .field_sizes import in_year, read_records, read_sizes
 from .objects import geometry_of
-from .own_ages import AGE
+from .own_ages import AGE, Sizes
 from .skeletons import kind_of, kind_of_choice, species_of
 
 #: Types of objects that can be marked as fields.

@@ -1,15 +1,17 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ages that plants and fields have of their own, as they are stored."""
+"""Ages and sizes that plants and fields have of their own, as they are stored."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Arrays
 from ...errors import SceneError
 
 MOST_YEARS = 10_000.0
@@ -54,3 +56,32 @@ def has_ages(field: bpy.types.Object) -> bool:
 def sound_ages(ages: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Which ages are numbers within the limits."""
     return (ages >= 0.0) & (ages <= MOST_YEARS)
+
+
+@dataclass(frozen=True)
+class Sizes(Arrays):
+    """Sizes of plants (n,), metres in the field's space; 0 is not known.
+
+    Attributes
+    ----------
+    height, diameter, width, base : (n,) float64
+        Of the plant, of its trunk at 1.3 m, mean width of its crown, height of its lowest limb.
+    dead : (n,) float64
+        Years since it died; 0 alive.
+    offset : (n, 2) float64
+        By which fraction limbs to the east and north are longer.
+    fit : (n, 2) float64
+        Factors on height and crown width that make up for what is random in the plant.
+    life : (n, 5) float64 or None
+        Of a history that is to be animated: present year, year and height of the first record and of the last one in
+        life, and nothing depends on the present year but the first column; see `sizes`.
+    """
+
+    height: NDArray[np.float64]
+    diameter: NDArray[np.float64]
+    width: NDArray[np.float64]
+    base: NDArray[np.float64]
+    dead: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    fit: NDArray[np.float64]
+    life: NDArray[np.float64] | None = None

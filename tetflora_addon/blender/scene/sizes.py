@@ -31,8 +31,7 @@ from ...growth.seeds import Seeds
 from ...species.ages import ages_of, with_age
 from ...species.growing import Ages
 from ...species.species import Species
-from .field_sizes import Sizes
-from .own_ages import MOST_YEARS
+from .own_ages import MOST_YEARS, Sizes
 from .skeletons import aged_kind, form_of, species_of
 
 #: Height of a class over that of the one below, and classes below that of full-grown plants.
