@@ -6,7 +6,21 @@
 
 import bpy
 
-from . import add, assets, brush, ground_cover, ground_tools, marks, plants, populations, preview, refine, species, year
+from . import (
+    add,
+    assets,
+    brush,
+    ground_cover,
+    ground_tools,
+    marks,
+    places,
+    plants,
+    populations,
+    preview,
+    refine,
+    species,
+    year,
+)
 
 CLASSES = tuple(cls for module in tuple(vars().values()) for cls in getattr(module, "CLASSES", ()))
 

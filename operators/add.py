@@ -196,7 +196,7 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
         scene = context.scene
         yield Progress(0.0, "Reading the ground")
         self._complete_from(scene)
-        weights = _parse_weights(self.species)
+        weights = parse_weights(self.species)
         if self.as_field == 'EMPTIES' and self.count > MOST_EMPTIES:
             raise SceneError(
                 f"{self.count:,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
@@ -250,11 +250,16 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
             if not self.properties.is_property_set(name) and name != "min_distance":
                 setattr(self, name, getattr(settings, "slope_max" if name == "slope_limit" else name))
         if not self.species:
-            mix = [(entry.species, entry.weight) for entry in settings.mix if entry.species]
-            self.species = ", ".join(f"{name}:{weight:g}" for name, weight in mix) or default_species()
+            self.species = mix_in(settings)
 
 
-def _parse_weights(text: str) -> dict[str, float]:
+def mix_in(settings: bpy.types.PropertyGroup) -> str:
+    """The species of a population with their weights, as `parse_weights` reads them."""
+    mix = [(entry.species, entry.weight) for entry in settings.mix if entry.species]
+    return ", ".join(f"{name}:{weight:g}" for name, weight in mix) or default_species()
+
+
+def parse_weights(text: str) -> dict[str, float]:
     """``oak:3, spruce`` to weights by identifier; the weights of a species named twice add up."""
     known = catalogue()
     weights: dict[str, float] = {}

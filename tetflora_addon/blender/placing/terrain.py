@@ -17,6 +17,8 @@ from ..attributes import image_pixels, members, read, values_of, world_matrix
 from ..scene.objects import objects_within
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
+#: Custom property of curves that are paths without a bevel: half their width, metres.
+HALF_WIDTH = "tetflora_half_width"
 #: Settings of populations that mask the ground: keyword arguments of `read_ground`.
 MASKS = (
     *("vertex_group", "image", "uv_layer", "invert_group", "invert_image"),
@@ -65,6 +67,8 @@ def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line
         found = _from_curves(evaluated.data)
     else:
         return []
+    own = obj.get(HALF_WIDTH)
+    half_width = max(half_width, own) if isinstance(own, float) else half_width
     matrix = world_matrix(obj, depsgraph)
     lines = [((points @ matrix[:3, :3].T + matrix[:3, 3])[:, :2], cyclic) for points, cyclic in found if len(points)]
     if not all(np.isfinite(points).all() for points, _ in lines):
@@ -188,6 +192,13 @@ def read_ground(
 def _path(line: Line, distance: float) -> Path:
     points = np.concatenate([line.points, line.points[:1]]) if line.cyclic else line.points
     return Path(points, distance + line.half_width)
+
+
+def lines_within(
+    collection: bpy.types.Collection, depsgraph: bpy.types.Depsgraph, setting: str
+) -> tuple[NDArray[np.float64], ...]:
+    """Curves of a collection as lines on the map, (k, 2) each; closed ones end where they begin."""
+    return tuple(_path(line, 0.0).points for line in _lines(collection, depsgraph, setting))
 
 
 def _lines(

@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curves from outlines of a map, in a collection for each kind: areas and paths of populations, and things to see.
+
+Woods and meadows are closed curves on the ground. Water is flat and filled, buildings stand on the lowest of their
+corners, roads are ribbons: a curve that is tilted on its side and extruded.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Generator
+from dataclasses import dataclass
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...jobs import Progress
+from ...places.outlines import BUILDING, KINDS, WATER, Outline, denser, one_ring, read_outlines
+from ...planting.height_grid import HeightGrid
+from ..compat import shader_tree
+from ..placing.terrain import HALF_WIDTH
+from ..runtime import JobData, guarded
+from ..worker import call_in_thread
+from .origin import in_scene, origin_for, remember
+from .terrain import grounds_in, heights_steps
+
+_STEP, _ABOVE = 4.0, 0.08  # metres between points of roads on the ground, and how far they lie above it
+_SINK = 0.3  # metres that a building reaches into the ground below its lowest corner
+_AT_ONCE = 200
+#: Linear RGB and roughness of what has a surface.
+_LOOKS = {
+    WATER: ("Map water", (0.02, 0.035, 0.04), 0.08),
+    BUILDING: ("Map building", (0.55, 0.5, 0.44), 0.8),
+    "": ("Map road", (0.14, 0.13, 0.12), 0.9),
+}
+#: On materials of maps.
+_MARK = "tetflora_map"
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What importing made.
+
+    Attributes
+    ----------
+    collections : list of bpy.types.Collection
+    number : Counter
+        Outlines of each kind.
+    """
+
+    collections: list[bpy.types.Collection]
+    number: Counter
+
+
+def outline_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    path: Path,
+    grounds: list[bpy.types.Object],
+    code: int,
+    new: bool,
+) -> Generator[Progress, Any, Drawn]:
+    """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
+
+    Parameters
+    ----------
+    grounds : list of objects
+        To lie on; imported ground if empty.
+    code : int
+        EPSG code of the coordinates; 0 where the file tells.
+    new : bool
+        Let its middle be the scene's origin, whatever was imported before.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
+    """
+    data = JobData("Importing", scene)
+    data.add_objects(grounds)
+    return guarded(data, _steps(scene, depsgraph, path, grounds, code, new))
+
+
+def _steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    path: Path,
+    grounds: list[bpy.types.Object],
+    code: int,
+    new: bool,
+) -> Generator[Progress, Any, Drawn]:
+    progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
+    yield progress
+    try:
+        outlines, system = yield from call_in_thread(progress, read_outlines, path, code)
+    except OSError as error:
+        raise SceneError(f"{what}cannot read the file: {error.strerror or error}") from None
+    sizes = [len(ring) for outline in outlines for ring in outline.rings]
+    points = np.concatenate([ring for outline in outlines for ring in outline.rings])
+    place = origin_for(scene, system, points, new, what)
+    flat = iter(np.split(in_scene(place, points, system, what), np.cumsum(sizes)[:-1]))
+    rings = [[next(flat) for _ in outline.rings] for outline in outlines]
+    heights = yield from heights_steps(grounds_in(scene, grounds), depsgraph, Progress(0.4, "Reading the ground"))
+    top = bpy.data.collections.new(path.stem)
+    made = [bpy.data.collections.new(kind) for kind in KINDS]
+    looks = {}
+    try:
+        for number, (outline, own) in enumerate(zip(outlines, rings, strict=True)):
+            if number % _AT_ONCE == 0:
+                yield Progress(0.5 + 0.5 * number / len(outlines), "Drawing outlines", amid=True)
+            curve = _curve(outline, own, heights, looks)
+            made[KINDS.index(outline.kind)].objects.link(curve)
+    except BaseException:  # an error, or Esc
+        _remove([top, *made], list(looks.values()))
+        raise
+    found = [collection for collection in made if collection.objects]
+    for collection in found:
+        top.children.link(collection)
+    bpy.data.batch_remove([collection for collection in made if not collection.objects])
+    scene.collection.children.link(top)
+    remember(scene, place)
+    return Drawn(found, Counter(outline.kind for outline in outlines))
+
+
+def _remove(collections: list[bpy.types.Collection], materials: list[bpy.types.Material]) -> None:
+    objects = [obj for collection in collections for obj in collection.objects]
+    curves = [obj.data for obj in objects]
+    bpy.data.batch_remove([*objects, *collections])
+    bpy.data.batch_remove([*curves, *(material for material in materials if not material.users)])
+
+
+def _curve(
+    outline: Outline, rings: list[NDArray[np.float64]], heights: HeightGrid | None, looks: dict[str, bpy.types.Material]
+) -> bpy.types.Object:
+    """One outline as an object; its points count from its first one, so that far ones are exact."""
+    data = bpy.data.curves.new(outline.name, 'CURVE')
+    filled = outline.closed and outline.kind in (WATER, BUILDING)
+    ribbon = not outline.closed and outline.width > 0.0
+    if filled:
+        data.dimensions, data.fill_mode = '2D', 'BOTH'
+        data.extrude = outline.height / 2.0
+    else:
+        data.dimensions, data.twist_mode = '3D', 'Z_UP'
+        rings = [one_ring(tuple(rings))] if outline.closed else [denser(rings[0], _STEP)] if ribbon else rings
+        data.extrude = outline.width / 2.0
+    ground = [_on(heights, ring) for ring in rings]
+    foot = np.array([*np.round(rings[0][0]), 0.0])
+    if filled:
+        sunk = _SINK if outline.height else 0.0
+        foot[2] = min(float(z.min()) for z in ground) + outline.height / 2.0 - sunk
+    for ring, z in zip(rings, ground, strict=True):
+        local = np.column_stack([ring, z + _ABOVE * ribbon]) - foot
+        if filled:
+            local[:, 2] = 0.0
+        spline = data.splines.new('POLY')
+        spline.points.add(len(local) - 1)
+        spline.points.foreach_set("co", np.column_stack([local, np.ones(len(local))]).astype(np.float32).ravel())
+        spline.use_cyclic_u = outline.closed
+        if ribbon:
+            spline.points.foreach_set("tilt", np.full(len(local), pi / 2.0, np.float32))
+    if filled or ribbon:
+        data.materials.append(_look(outline.kind if outline.kind in (WATER, BUILDING) else "", looks))
+    obj = bpy.data.objects.new(outline.name, data)
+    obj.location = foot
+    if ribbon:
+        obj[HALF_WIDTH] = outline.width / 2.0
+    return obj
+
+
+def _on(heights: HeightGrid | None, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Heights of the ground (n,); 0 where there is none."""
+    return np.zeros(len(points)) if heights is None else np.nan_to_num(heights.at(heights.height, points), nan=0.0)
+
+
+def _look(kind: str, looks: dict[str, bpy.types.Material]) -> bpy.types.Material:
+    """The material of water, buildings or roads; that of an earlier import if there is one."""
+    name, colour, rough = _LOOKS[kind]
+    if kind not in looks:
+        found = next((m for m in bpy.data.materials if m.get(_MARK) == name and m.library is None), None)
+        if found is None:
+            found = bpy.data.materials.new(name)
+            found[_MARK] = name
+            surface = next(node for node in shader_tree(found).nodes if node.type == 'BSDF_PRINCIPLED')
+            surface.inputs["Base Color"].default_value = (*colour, 1.0)
+            surface.inputs["Roughness"].default_value = rough
+            found.diffuse_color = (*colour, 1.0)
+        looks[kind] = found
+    return looks[kind]
+
+
+def told(number: Counter) -> str:
+    """How many outlines of which kinds there are, for a report."""
+    return ", ".join(f"{kind} {number[kind]:,}" for kind in KINDS if number[kind])

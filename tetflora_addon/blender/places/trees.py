@@ -1,0 +1,307 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fields of trees from inventories, and from rasters of canopy height: each tree has the size that is recorded."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, field
+from math import tau
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...growth.hashing import child_key, key_of_seed, uniform
+from ...jobs import Progress
+from ...places.canopy import find_trees
+from ...places.inventories import Inventory, read_inventory
+from ...places.projection import Place
+from ...places.species_names import GENUS, KIN, KIND, species_named
+from ...planting.places import Placement
+from ...planting.rules import species_by_weight
+from ..attributes import write
+from ..placing.plant_objects import add_field
+from ..runtime import JobData, guarded
+from ..species.edits import catalogue, species_for
+from ..worker import call_in_thread, steps_in_thread
+from .completion import complete
+from .origin import in_scene, origin_for, remember
+from .rasters import read_raster
+from .terrain import grounds_in, heights_steps
+
+#: Attributes of fields by the names that sizes have in inventories.
+ATTRIBUTES = {
+    "height": "tf_height",
+    "diameter": "tf_diameter",
+    "crown_width": "tf_crown_width",
+    "crown_base": "tf_crown_base",
+    "dead": "tf_dead",
+}
+#: What to do with species that nobody knows.
+GENERIC, LEFT_OUT = 'GENERIC', 'LEAVE_OUT'
+_GENERIC = "broadleaf_tree"
+
+
+@dataclass
+class Planted:
+    """What importing made.
+
+    Attributes
+    ----------
+    object : bpy.types.Object
+        The field.
+    number : int
+    kin, unknown : Counter
+        Names that stand for others, with how many trees have them: of other species, and of no known one.
+    left_out : int
+        Trees of unknown species that were not planted.
+    completed : int
+        Heights that followed from other sizes.
+    beside : int
+        Trees where there is no ground.
+    notes : list of str
+    inventory : Inventory, optional
+    """
+
+    object: bpy.types.Object | None = None
+    number: int = 0
+    kin: Counter = field(default_factory=Counter)
+    unknown: Counter = field(default_factory=Counter)
+    left_out: int = 0
+    completed: int = 0
+    beside: int = 0
+    notes: list[str] = field(default_factory=list)
+    inventory: Inventory | None = None
+
+
+def inventory_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    path: Path,
+    grounds: list[bpy.types.Object],
+    unknown: str,
+    code: int,
+    units: str,
+    skip: bool,
+    new: bool,
+    seed: int = 0,
+) -> Generator[Progress, Any, Planted]:
+    """Make a field of the trees of a file; yields progress. Closing the steps leaves all as it was.
+
+    Parameters
+    ----------
+    grounds : list of objects
+        To stand on; imported ground if empty.
+    unknown : str
+        `GENERIC`, `LEFT_OUT`, or the identifier of a species for trees of species that nobody knows.
+    code, units, skip
+        As of `read_inventory`.
+    new : bool
+        Let its middle be the scene's origin, whatever was imported before.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
+    """
+    data = JobData("Importing", scene)
+    data.add_objects(grounds)
+    given = (scene, depsgraph, path, grounds, unknown, code, units, skip, new, seed)
+    return guarded(data, _inventory_steps(*given))
+
+
+def _inventory_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    path: Path,
+    grounds: list[bpy.types.Object],
+    unknown: str,
+    code: int,
+    units: str,
+    skip: bool,
+    new: bool,
+    seed: int,
+) -> Generator[Progress, Any, Planted]:
+    progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
+    yield progress
+    try:
+        inventory = yield from call_in_thread(progress, read_inventory, path, code, units, skip)
+    except OSError as error:
+        raise SceneError(f"{what}cannot read the file: {error.strerror or error}") from None
+    place = origin_for(scene, inventory.system, inventory.points, new, what)
+    flat = in_scene(place, inventory.points, inventory.system, what)
+    made = Planted(notes=list(inventory.notes), inventory=inventory)
+    identifiers, kinds = _species(inventory, unknown, made)
+    kept = np.flatnonzero(kinds >= 0)
+    if not len(kept):
+        raise SceneError(f"{what}none of its trees is of a known species; choose what stands for unknown ones")
+    kinds, sizes = kinds[kept], {name: values[kept] for name, values in inventory.sizes.items()}
+    yield Progress(0.5, "Completing sizes")
+    sizes["height"], made.completed = complete(sizes, kinds, identifiers, lambda name: species_for(scene, name))
+    yield from _plant(scene, depsgraph, path.stem, grounds, place, flat[kept], kinds, identifiers, sizes, seed, made)
+    return made
+
+
+def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[str], NDArray[np.int32]]:
+    """Species of the catalogue, and the index (n,) of each tree's; -1 for those to leave out."""
+    known, counts = catalogue(), np.bincount(inventory.name, minlength=len(inventory.names))
+    chosen: list[str] = []
+    for names, count in zip(inventory.names, counts.tolist(), strict=True):
+        matches = [(match, name) for name in names if (match := species_named(name)) and match.species in known]
+        match, name = min(matches, key=lambda m: m[0].certainty, default=(None, names[0] if names else ""))
+        if match is None or match.certainty == KIND:
+            made.unknown[names[0] if names else ""] += count
+            kind = match.species if match is not None else _GENERIC
+            kind = {GENERIC: kind, LEFT_OUT: ""}.get(unknown, unknown)
+            made.left_out += 0 if kind else count
+        else:
+            kind = match.species
+            if match.certainty in (GENUS, KIN):
+                made.kin[name] += count
+        chosen.append(kind)
+    identifiers = sorted({kind for kind in chosen if kind})
+    index = {kind: number for number, kind in enumerate(identifiers)}
+    return identifiers, np.array([index.get(kind, -1) for kind in chosen], np.int32)[inventory.name]
+
+
+def canopy_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    path: Path,
+    grounds: list[bpy.types.Object],
+    mix: Mapping[str, float],
+    least: float,
+    code: int,
+    factor: float,
+    shift: float,
+    new: bool,
+    seed: int = 0,
+) -> Generator[Progress, Any, Planted]:
+    """Make a field of the trees that a raster of canopy height shows; yields progress. Closing the steps leaves all
+    as it was.
+
+    Parameters
+    ----------
+    mix : mapping
+        Weights of species by identifier.
+    least : float
+        Height of the smallest tree, metres.
+    code, factor, shift
+        As of `read_raster`.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, has no trees, or cannot lie in this scene.
+    """
+    data = JobData("Importing", scene)
+    data.add_objects(grounds)
+    given = (scene, depsgraph, path, grounds, mix, least, code, factor, shift, new, seed)
+    return guarded(data, _canopy_steps(*given))
+
+
+def _canopy_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    path: Path,
+    grounds: list[bpy.types.Object],
+    mix: Mapping[str, float],
+    least: float,
+    code: int,
+    factor: float,
+    shift: float,
+    new: bool,
+    seed: int,
+) -> Generator[Progress, Any, Planted]:
+    raster = yield from read_raster(path, code, factor, shift)
+    what = f"{path.name}: "
+    place = origin_for(scene, raster.system, raster.outline, new, what)
+    h, w = raster.values.shape
+    # Steps from a cell in the middle to the next ones, in metres of the scene.
+    middle, along, down = in_scene(
+        place, raster.places(np.array([0, 1, 0]) + w // 2, np.array([0, 0, 1]) + h // 2), raster.system, what
+    )
+    along, down = along - middle, down - middle
+    cell = float(np.sqrt(abs(along[0] * down[1] - along[1] * down[0])))
+    if cell > _COARSEST:
+        raise SceneError(f"{what}its cells are {cell:.1f} m wide; trees can be told apart up to {_COARSEST:g} m")
+    found = yield from steps_in_thread(find_trees(raster.values, cell, least), Progress(0.1, "Looking for treetops"))
+    number = len(found.height)
+    if not number:
+        raise SceneError(f"{what}nothing in it is {least:g} m high; check its unit, or lower Smallest Tree")
+    flat = in_scene(place, raster.places(found.column, found.row), raster.system, what)
+    identifiers = list(mix)
+    keys = child_key(child_key(key_of_seed(seed), _SPECIES), np.arange(number))
+    kinds = species_by_weight(tuple(mix.values()), uniform(keys, 0))
+    unit = np.stack([along / np.linalg.norm(along), down / np.linalg.norm(down)])
+    sizes = {
+        "height": found.height.astype(np.float32),
+        "crown_width": found.width.astype(np.float32),
+        "offset": np.column_stack([found.offset @ unit, np.zeros(number)]).astype(np.float32),
+    }
+    made = Planted()
+    yield from _plant(scene, depsgraph, path.stem, grounds, place, flat, kinds, identifiers, sizes, seed, made)
+    return made
+
+
+_COARSEST = 3.0  # metres
+_SPECIES, _AZIMUTH, _SEED = 1, 2, 3
+
+
+def _plant(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    name: str,
+    grounds: list[bpy.types.Object],
+    place: Place,
+    flat: NDArray[np.float64],
+    kinds: NDArray[np.int32],
+    identifiers: list[str],
+    sizes: dict[str, NDArray[np.float32]],
+    seed: int,
+    made: Planted,
+) -> Generator[Progress, Any, None]:
+    """Make the field; its plants stand on the ground, those beside it as high as the ground is on average."""
+    progress = Progress(0.8, "Standing trees on the ground")
+    yield progress
+    heights = yield from heights_steps(grounds_in(scene, grounds), depsgraph, progress)
+    z = np.zeros(len(flat))
+    if heights is not None:
+        z = heights.at(heights.height, flat)
+        beside = ~np.isfinite(z)
+        made.beside = int(beside.sum())
+        z[beside] = z[~beside].mean() if not beside.all() else 0.0
+    keys = child_key(key_of_seed(seed), np.arange(len(flat)))
+    seeds = (uniform(keys, _SEED) * 2**31).astype(np.int32)
+    turns = tau * uniform(keys, _AZIMUTH)
+    placement = Placement(np.column_stack([flat, z]), turns, np.ones(len(flat)), kinds, seeds, len(flat))
+    age = sizes.get("age")
+    ages = None if age is None else np.where(sizes["height"] > 0.0, 0.0, age)
+    fit = _fit(scene, identifiers, kinds, seeds, sizes)
+    yield Progress(0.95, "Making the field")
+    made.object = add_field(scene, placement, identifiers, ages=ages)
+    made.object.name = made.object.data.name = name
+    for key, attribute in ATTRIBUTES.items():
+        if key in sizes and sizes[key].any():
+            write(made.object.data, attribute, sizes[key], data_type='FLOAT')
+    for values, attribute in ((sizes.get("offset"), "tf_crown_offset"), (fit, "tf_fit")):
+        if values is not None:
+            write(made.object.data, attribute, values, data_type='FLOAT_VECTOR')
+    made.number = len(flat)
+    remember(scene, place)
+
+
+def _fit(
+    scene: bpy.types.Scene,
+    identifiers: list[str],
+    kinds: NDArray[np.int32],
+    seeds: NDArray[np.int32],
+    sizes: dict[str, NDArray[np.float32]],
+) -> NDArray[np.float32] | None:
+    """Factors on height and crown width, (n, 3), that make up for what is random in each plant; None for none."""
+    return None
