@@ -5,10 +5,10 @@
 import bpy
 
 from ..tetflora_addon.blender.job import render
-from . import base, menus, plants, populate, preferences, refine, results, species
+from . import base, menus, places, plants, populate, preferences, refine, results, species
 
 # In the order of registration, which is that of the panels in the tab: as an artist works, a panel after its parent.
-_MODULES = (base, refine, plants, populate, species, results, menus)
+_MODULES = (base, refine, plants, populate, places, species, results, menus)
 CLASSES = tuple(cls for module in _MODULES for cls in module.CLASSES)
 
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
@@ -19,6 +19,7 @@ def register() -> None:
     _register()
     preferences.register()
     bpy.types.VIEW3D_MT_add.append(menus.draw_in_add_menu)
+    bpy.types.TOPBAR_MT_file_import.append(places.draw_in_import_menu)
     bpy.types.VIEW3D_MT_object.append(menus.draw_in_object_menu)
     for menu in (bpy.types.OUTLINER_MT_object, bpy.types.OUTLINER_MT_collection):
         menu.append(menus.draw_in_outliner)
@@ -31,6 +32,7 @@ def unregister() -> None:
     for menu in (bpy.types.OUTLINER_MT_object, bpy.types.OUTLINER_MT_collection):
         menu.remove(menus.draw_in_outliner)
     bpy.types.VIEW3D_MT_object.remove(menus.draw_in_object_menu)
+    bpy.types.TOPBAR_MT_file_import.remove(places.draw_in_import_menu)
     bpy.types.VIEW3D_MT_add.remove(menus.draw_in_add_menu)
     preferences.unregister()
     _unregister()

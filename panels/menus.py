@@ -44,6 +44,7 @@ from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.species.catalogue import FIRST
 from .base import Button, draw_buttons, thumbnail
+from .places import IMPORTS
 from .preferences import PIE
 
 
@@ -147,6 +148,8 @@ class TETFLORA_MT_object(bpy.types.Menu):
             Button(TETFLORA_OT_ground_cover, 'OUTLINER_OB_CURVES'),
             Button(TETFLORA_OT_import_populations, 'IMPORT', "Import Populations..."),
             Button(TETFLORA_OT_export_populations, 'EXPORT', "Export Populations..."),
+            None,
+            *IMPORTS,
             None,
         )
         draw_species_menu(layout)

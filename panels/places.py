@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Real Places: what can be imported, and where on Earth the scene is; the same in Blender's File > Import."""
+
+import bpy
+
+from ..operators.places import (
+    TETFLORA_OT_import_canopy,
+    TETFLORA_OT_import_inventory,
+    TETFLORA_OT_import_outlines,
+    TETFLORA_OT_import_terrain,
+)
+from ..tetflora_addon.blender.places.origin import origin_of
+from ..tetflora_addon.errors import TetFloraError
+from .base import Button, SidebarPanel, draw_buttons, draw_message
+
+#: In the order in which a place is built.
+IMPORTS = (
+    Button(TETFLORA_OT_import_terrain, 'RNDCURVE'),
+    Button(TETFLORA_OT_import_canopy, 'OUTLINER_OB_POINTCLOUD'),
+    Button(TETFLORA_OT_import_inventory, 'SPREADSHEET'),
+    Button(TETFLORA_OT_import_outlines, 'OUTLINER_OB_CURVE'),
+)
+
+
+class TETFLORA_PT_places(SidebarPanel, bpy.types.Panel):
+    """Real places."""
+
+    bl_label = "Real Places"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_buttons(self.layout.column(), *IMPORTS)
+        try:
+            place = origin_of(context.scene)
+        except TetFloraError as error:
+            draw_message(context, self.layout, str(error))
+            return
+        if place is not None:
+            where = f"{place.east:,.0f}, {place.north:,.0f} of " if place.system.code >= 0 else ""
+            draw_message(context, self.layout, f"Origin: {where}{place.system.name}", 'WORLD')
+
+
+def draw_in_import_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Entries in Blender's File > Import."""
+    menu.layout.separator()
+    for kind, ending, icon in (
+        (TETFLORA_OT_import_terrain, "Terrain (.asc, .tif, .png)", 'RNDCURVE'),
+        (TETFLORA_OT_import_canopy, "Canopy Height (.asc, .tif, .png)", 'OUTLINER_OB_POINTCLOUD'),
+        (TETFLORA_OT_import_inventory, "Tree Inventory (.csv, .geojson)", 'SPREADSHEET'),
+        (TETFLORA_OT_import_outlines, "Map Outlines (.geojson)", 'OUTLINER_OB_CURVE'),
+    ):
+        Button(kind, icon, ending).draw(menu.layout)
+
+
+CLASSES = (TETFLORA_PT_places,)
