@@ -156,6 +156,12 @@ class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
             column.prop(settings, "altitude_min", text="Min")
             column.prop(settings, "altitude_max", text="Max")
             column.prop(settings, "altitude_falloff", text="Falloff")
+        column = layout.column(align=True)
+        column.prop(settings, "wetness_min")
+        column.prop(settings, "wetness_max", text="Max")
+        row = column.row()
+        row.active = settings.wetness_min > 0.0 or settings.wetness_max < 1.0
+        row.prop(settings, "wetness_softness", text="Softness")
         layout.prop(settings, "edge_falloff")
         ground = next((entry.object for entry in settings.grounds if entry.object is not None), None)
         row = layout.row(align=True)

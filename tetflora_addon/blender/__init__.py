@@ -3,6 +3,7 @@
 """Everything below the operators that uses bpy: properties, reading scenes, writing results, rendering."""
 
 from . import main_thread, preferences, properties, runtime, saved_files, translations, worker
+from .biomes import library
 from .cli import command
 from .job import forecast, render
 from .placing import assets
@@ -17,6 +18,7 @@ _PARTS = (
     runtime,
     preferences,
     catalogue,
+    library,
     properties,
     render,
     forecast,

@@ -14,6 +14,8 @@ from bpy.props import (
 )
 
 from . import settings
+from .biomes import library
+from .biomes import properties as biome_properties
 from .placing import properties
 from .placing.plant_objects import show_age
 from .results import output_properties
@@ -239,6 +241,13 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         type=properties.TetFloraPopulation,
     )
     populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
+    biomes: CollectionProperty(
+        name="Biomes",
+        description="Biomes of the scene; those above come first where several with limits meet",
+        type=biome_properties.TetFloraBiome,
+    )
+    biomes_index: IntProperty(name="Active Biome", options={'HIDDEN', 'SKIP_SAVE'})
+    new_biome: library.biome_property(options=set())
     output: PointerProperty(type=output_properties.TetFloraOutput)
     brush: PointerProperty(type=properties.TetFloraBrush)
     wind: PointerProperty(type=settings.TetFloraWind)
@@ -276,7 +285,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
     )
 
 
-_MODULES = (properties, output_properties, state, editor, edits, asset_species, scatterers, settings)
+_MODULES = (properties, biome_properties, output_properties, state, editor, edits, asset_species, scatterers, settings)
 CLASSES = (
     *(cls for module in _MODULES for cls in module.CLASSES),
     TetFloraFieldEntry,

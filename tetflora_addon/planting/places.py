@@ -23,6 +23,7 @@ from .plane import Spacing
 from .rules import MOST_PLANTS, Rules, check_rules, species_by_weight
 from .site import REMEDIES, Sample, Site, SiteDraw, lines_of_paths
 from .terrain import Path, Terrain
+from .zones import Zone
 
 _ROUNDS = 24
 _SMALLEST_ROUND = 512
@@ -91,6 +92,7 @@ def place(
     older: NDArray[np.float64] | None = None,
     older_species: NDArray[np.int32] | None = None,
     suits: Mapping[int, Suits] | None = None,
+    zones: Sequence[Zone] = (),
 ) -> Placement:
     """Scatter plants over the ground as the rules ask, evenly as seen on a map.
 
@@ -104,6 +106,8 @@ def place(
         Their species as index into the weights of the rules; -1 for others, which all are if not given.
     suits : mapping of int to callable, optional
         How suitable the ground is for a species (index into the weights), besides what the rules say of all.
+    zones : sequence of Zone
+        Of the ground's triangles; how suitable the ground is, besides, is the product of their shares.
 
     Raises
     ------
@@ -122,7 +126,7 @@ def place(
     older = np.zeros((0, 2)) if older is None else np.asarray(older, dtype=np.float64)[:, :2]
     if older_species is None:
         older_species = np.full(len(older), -1, np.int32)
-    site = Site(ground, rules)
+    site = Site(ground, rules, zones)
     key = key_of_seed(rules.seed)
     spacing = Spacing(rules.min_distance, older)
     company = Company(rules, older, older_species)

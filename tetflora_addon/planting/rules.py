@@ -133,6 +133,26 @@ class Rules:
         soft_max=500.0,
         **LENGTH,
     )
+    wetness_min: float = setting(
+        0.0,
+        "Min Wetness",
+        "Drier ground stays bare. 0 is the driest, as on ridges, and 1 the wettest, as at brooks and in hollows: it "
+        "follows from where water runs on the ground",
+        **_FACTOR,
+    )
+    wetness_max: float = setting(
+        1.0,
+        "Max Wetness",
+        "Wetter ground stays bare; 1 is the wettest, as at brooks and in hollows",
+        **_FACTOR,
+    )
+    wetness_softness: float = setting(
+        0.0,
+        "Wetness Softness",
+        "Range around both limits over which plants become sparser; half of them grow at a limit. 0 for a sharp line",
+        default=0.2,
+        **_FACTOR,
+    )
     aspect: float = setting(
         0.0,
         "Facing",
@@ -217,6 +237,11 @@ def check_rules(rules: Rules) -> None:
             f"Min Altitude ({rules.altitude_min:.5g} m) is greater than Max Altitude ({rules.altitude_max:.5g} m); "
             "lower Min Altitude or raise Max Altitude"
         )
+    if not 0.0 <= rules.wetness_min <= rules.wetness_max <= 1.0:
+        raise SceneError(
+            f"Min Wetness is {rules.wetness_min:.3g} and Max Wetness {rules.wetness_max:.3g}; both must be between 0 "
+            "and 1, and Min not greater than Max"
+        )
     if not rules.clumping <= 1.0:
         raise SceneError(f"Clumping must be between 0 and 1, not {rules.clumping:g}")
     if rules.clumping and not rules.clump_size > 0.0:
@@ -234,6 +259,7 @@ def _check_numbers(rules: Rules) -> None:
         "Density": rules.density,
         "Min Distance": rules.min_distance,
         "Altitude Falloff": rules.altitude_falloff,
+        "Wetness Softness": rules.wetness_softness,
         "Edge Falloff": rules.edge_falloff,
         "Clumping": rules.clumping,
         "Scale at Top": rules.scale_at_top,

@@ -17,6 +17,8 @@ from .cover import Suits
 from .plane import NO_DISTANCE, Lines, clumps, inside_any
 from .rules import Rules
 from .terrain import Path, Terrain, border_of, sampled
+from .wetness import wet_ground
+from .zones import Spots, Zone, by_wetness
 
 CHUNK = 131_072  # places looked at together: what fits into a cache
 _CLUMPS = 2**33  # the key of clumps, away from those of plants
@@ -45,6 +47,8 @@ REMEDIES = {
     "weight": "the vertex group leaves almost no ground; paint more weight, or invert or clear the vertex group",
     "image": "the image is black on almost all of the ground; paint it brighter, or invert or clear it",
     "altitude": "almost no ground lies between Min and Max Altitude; widen the range or lower Altitude Falloff",
+    "wetness": "almost no ground is as wet as Min and Max Wetness ask for; widen the range",
+    "zone": "the biome's mask and limits, or biomes that come before it, leave almost no ground; widen its limits",
     "areas": "the Areas curves contain almost no suitable ground; enlarge them, or clear Areas",
     "paths": "the Paths curves leave almost no ground; lower Path Distance, or clear Paths",
     "edge": "all ground is close to the border; lower Edge Falloff",
@@ -79,15 +83,15 @@ class Sample:
 class Site:
     """Ground that suits the rules, ready to draw places on."""
 
-    def __init__(self, ground: Terrain, rules: Rules) -> None:
-        """Leave out triangles where nothing can grow.
+    def __init__(self, ground: Terrain, rules: Rules, zones: Sequence[Zone] = ()) -> None:
+        """Leave out triangles where nothing can grow; plants get what all of the zones of the ground leave.
 
         Raises
         ------
         SceneError
             Nothing is left; names the setting that leaves nothing.
         """
-        self.ground, self.rules = ground, rules
+        self.ground, self.rules, self.zones = ground, rules, tuple(zones)
         self._key = child_key(key_of_seed(rules.seed), _CLUMPS)
         triangles, normal, chosen = _by_inclination(ground.triangles, rules)
         weight = None
@@ -109,9 +113,10 @@ class Site:
         self.highest = min(float(high[at_altitude].max()), rules.altitude_max)
         triangles, normal, chosen, weight = _kept(at_altitude, triangles, normal, chosen, weight)
         uv = None if ground.uv is None else np.asarray(ground.uv, dtype=np.float64)[chosen]
+        self.within = None
         if ground.areas:
-            source, triangles, weight, uv = _near_areas(ground.areas, triangles, weight, uv)
-            normal = normal[source]
+            source, triangles, weight, uv, self.within = _near_areas(ground.areas, triangles, weight, uv, bool(zones))
+            normal, chosen = normal[source], chosen[source]
             if not len(source):
                 raise SceneError("No suitable ground lies inside the Areas curves; move them over it, or clear Areas")
         self.triangles, self.weight, self.uv = triangles, weight, uv
@@ -127,6 +132,10 @@ class Site:
             if len(border):
                 self.border = Lines(border[:, 0], border[:, 1], np.full(len(border), float(rules.edge_falloff)))
         self.paths = lines_of_paths(ground.paths)
+        self.chosen = chosen
+        self.by_wetness = rules.wetness_min > 0.0 or rules.wetness_max < 1.0
+        wet = self.by_wetness or any(zone.asks_for_water for zone in zones)
+        self.wet = wet_ground(ground.triangles) if wet else None
 
     @property
     def area(self) -> float:
@@ -187,6 +196,10 @@ class Site:
         limits = rules.altitude_min, rules.altitude_max
         if np.isfinite(limits).any():
             yield "altitude", lambda i: _between(points[i, 2], *limits, rules.altitude_falloff)
+        if self.by_wetness:
+            yield "wetness", lambda i: by_wetness(self.wet.at(points[i]), rules)
+        if self.zones:
+            yield "zone", lambda i: self._zone_share(index[i], barycentric[i], points[i])
         if self.uv is not None:
             yield "image", lambda i: self._image_value(index[i], barycentric[i])
         if ground.areas:
@@ -199,6 +212,12 @@ class Site:
             yield "clumping", lambda i: clumps(points[i, :2], rules.clump_size, rules.clumping, self._key)
         if suits is not None:
             yield "habitat", lambda i: suits(points[i, :2])
+
+    def _zone_share(self, index: NDArray[np.int64], barycentric: NDArray, points: NDArray) -> NDArray[np.float64]:
+        if self.within is not None:
+            barycentric = np.einsum("ij,ijk->ik", barycentric, self.within[index])
+        spots = Spots(self.chosen[index], barycentric, points, self.normal[index])
+        return np.prod([zone.share(spots, self.wet) for zone in self.zones], axis=0)
 
     def _image_value(self, index: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
         uv = _mean(np.take(self.uv.reshape(-1, 6), index, axis=0), barycentric)
@@ -277,7 +296,8 @@ def _near_areas(
     triangles: NDArray[np.float64],
     weight: NDArray[np.float64] | None,
     uv: NDArray[np.float64] | None,
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.float64] | None]:
+    located: bool,
+) -> tuple[NDArray[np.int64], NDArray, NDArray | None, NDArray | None, NDArray | None]:
     """Parts of triangles near areas: large ones are divided, so that few places are drawn in vain.
 
     Returns
@@ -286,9 +306,12 @@ def _near_areas(
         Triangle of each part.
     triangles, weight, uv
         Of the parts.
+    within : (n, 3, 3) float64 or None
+        Where their corners are in their triangles, barycentric, if they shall be ``located``.
     """
     boxes = [(area.min(axis=0), area.max(axis=0)) for area in areas]
     columns = [triangles, *([] if weight is None else [weight[..., None]]), *([] if uv is None else [uv])]
+    columns += [np.broadcast_to(np.eye(3), (len(triangles), 3, 3))] if located else []
     corners, source = np.concatenate(columns, axis=2), np.arange(len(triangles))
     for _ in range(_DIVISIONS):
         low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
@@ -308,5 +331,7 @@ def _near_areas(
         quarters = [np.stack(q, axis=1) for q in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
         corners = np.concatenate([corners[small], *quarters])
         source = np.concatenate([source[small], *[source[large]] * 4])
-    weighted = None if weight is None else corners[..., 3]
-    return source, corners[..., :3], weighted, None if uv is None else corners[..., -2:]
+    weighted, within = None if weight is None else corners[..., 3], None
+    if located:
+        corners, within = corners[..., :-3], corners[..., -3:]
+    return source, corners[..., :3], weighted, None if uv is None else corners[..., -2:], within

@@ -11,11 +11,18 @@ contributing area model of basin hydrology", Hydrological Sciences Bulletin 24, 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from hashlib import blake2b
+
 import numpy as np
 from numpy.typing import NDArray
 
+from .height_grid import HeightGrid, cell_for, height_grid
+
 #: The topographic index, a in meters, that counts as dry and as wet: a ridge, and the floor of a valley with a brook.
 DRY, WET = 2.0, 12.0
+#: Finest cells of the ground that plants ask, meters, and their most.
+_FINEST, _MOST = 1.0, 1_000_000
 _LEVEL = 0.01  # tan β; less is as level
 _DRAIN = 1e-6  # least fall of filled ground toward its outlet
 _SPREAD = 1.1  # exponent of the fall (Freeman 1991): flow down a cone is even all around
@@ -132,3 +139,37 @@ def wetness(height: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
     Limits are fixed (`DRY`, `WET`): what is far away, and not uphill, changes nothing.
     """
     return np.clip((topographic_index(height, cell) - DRY) / (WET - DRY), 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class WetGround:
+    """How wet a ground is.
+
+    Attributes
+    ----------
+    grid : HeightGrid
+    wetness : (h, w) float64
+        From 0 to 1, of each cell of the grid.
+    """
+
+    grid: HeightGrid
+    wetness: NDArray[np.float64]
+
+    def at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Wetness at places on the map (n, 2 or more), (n,); beyond all cells it is that of level ground."""
+        return np.nan_to_num(self.grid.at(self.wetness, points), nan=0.5)
+
+
+_kept: dict[bytes, WetGround] = {}  # the last one, by content: layers of plants ask for the same ground
+
+
+def wet_ground(triangles: NDArray[np.float64]) -> WetGround:
+    """How wet a ground (t, 3, 3) is; that of the last one is kept."""
+    key = blake2b(np.ascontiguousarray(triangles).data, digest_size=16).digest()
+    if key not in _kept:
+        cell = cell_for(triangles, _FINEST, _MOST)
+        grid = height_grid(triangles, cell)
+        made = WetGround(grid, wetness(grid.height, cell))
+        _kept.clear()
+        _kept[key] = made
+    return _kept[key]

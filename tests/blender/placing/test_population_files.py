@@ -184,7 +184,7 @@ def test_all_populations_of_a_file_come_or_none(tmp_path, monkeypatch):
     group.populations_index = 0
     before = [p.uid for p in group.populations]
     (tmp_path / "p.json").write_text(json.dumps(_good(5)), encoding="utf-8")
-    filled, real = [], population_files._fill
+    filled, real = [], population_files.fill_population
 
     def fill(population, *rest):
         filled.append(1)
@@ -192,7 +192,7 @@ def test_all_populations_of_a_file_come_or_none(tmp_path, monkeypatch):
         if len(filled) == 4:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(population_files, "_fill", fill)
+    monkeypatch.setattr(population_files, "fill_population", fill)
     with pytest.raises(KeyboardInterrupt):
         population_files.read_populations(bpy.context.scene, tmp_path / "p.json")
     assert [p.uid for p in group.populations] == before

@@ -328,7 +328,7 @@ def _lay_soil(
     area: float,
 ) -> list[str]:
     """Give the ground a soil in the colors of its cover; names of the grounds that keep a material of the artist's."""
-    fits = [obj for obj in grounds if _may_have_soil(obj)]
+    fits = [obj for obj in grounds if may_have_soil(obj)]
     before = next((slot.material for obj in fits for slot in obj.material_slots if is_soil(slot.material)), None)
     lying, growing = _strata(scene, cover, floor, above, area)
     sheet = floor.sheet
@@ -347,20 +347,25 @@ def _lay_soil(
         sheet.cell * np.array([sheet.columns, sheet.rows]),
         before,
     )
-    for obj in fits:
-        if obj.material_slots:
-            slot = next((s for s in obj.material_slots if s.material is None or is_soil(s.material)), None)
-            if slot is not None:
-                slot.material = material
-        else:
-            obj.data.materials.append(material)
+    put_soil(fits, material)
     kept = [obj.name for obj in grounds if obj not in fits]
     if kept:
         material.use_fake_user = True  # for the artist to use
     return kept
 
 
-def _may_have_soil(obj: bpy.types.Object) -> bool:
+def put_soil(grounds: Iterable[bpy.types.Object], material: bpy.types.Material) -> None:
+    """Give grounds that may have it a material for their soil."""
+    for obj in grounds:
+        if obj.material_slots:
+            slot = next((s for s in obj.material_slots if s.material is None or is_soil(s.material)), None)
+            if slot is not None:
+                slot.material = material
+        else:
+            obj.data.materials.append(material)
+
+
+def may_have_soil(obj: bpy.types.Object) -> bool:
     """Whether a ground is of this file and has no material but soil."""
     local = obj.library is None and obj.data.library is None and obj.override_library is None
     return local and all(slot.material is None or is_soil(slot.material) for slot in obj.material_slots)

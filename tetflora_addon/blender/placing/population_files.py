@@ -30,7 +30,15 @@ VERSION = 1
 
 _MIX = ("species", "weight", "companion", "companion_strength", "companion_distance", "habitat", "shed_by")
 #: Keys that are written only where they say something: earlier versions do not know them.
-_RARE = {"habitat": 'ANYWHERE', "shed_by": "", "age": 0.0, "age_spread": 0.0}
+_RARE = {
+    "habitat": 'ANYWHERE',
+    "shed_by": "",
+    "age": 0.0,
+    "age_spread": 0.0,
+    "wetness_min": 0.0,
+    "wetness_max": 1.0,
+    "wetness_softness": float(np.float32(0.2)),
+}
 #: Settings that hold identifiers of species.
 _IDENTIFIERS = ("species", "companion", "shed_by")
 MAX_FILE_BYTES = 4_000_000
@@ -41,7 +49,7 @@ MAX_ENTRIES = 1000
 
 def as_data(populations: Iterable[TetFloraPopulation]) -> dict[str, Any]:
     """Populations as what a file of them holds."""
-    return {"format": FORMAT, "version": VERSION, "populations": [_population_data(p) for p in populations]}
+    return {"format": FORMAT, "version": VERSION, "populations": [population_data(p) for p in populations]}
 
 
 def write_populations(populations: Iterable[TetFloraPopulation], path: Path) -> Path:
@@ -93,7 +101,7 @@ def read_populations(
     try:
         for entry in entries:
             population = add_population(scene, name=entry["name"])
-            _fill(population, entry, scene, missing)
+            fill_population(population, entry, scene, missing)
             if not population.grounds and population.ground_collection is None:
                 set_grounds(population, grounds)
     except BaseException:  # all or nothing
@@ -104,12 +112,13 @@ def read_populations(
     return len(entries), list(dict.fromkeys(missing))
 
 
-def _population_data(population: TetFloraPopulation) -> dict[str, Any]:
+def population_data(population: TetFloraPopulation) -> dict[str, Any]:
+    """A population as a file has it."""
     data: dict[str, Any] = {"name": population.name}
     data["grounds"] = [entry.object.name for entry in population.grounds if entry.object is not None]
     data["species"] = [
         {
-            name: _value(entry.bl_rna.properties[name], getattr(entry, name))
+            name: value_for(entry.bl_rna.properties[name], getattr(entry, name))
             for name in _MIX
             if getattr(entry, name) != _RARE.get(name)
         }
@@ -120,7 +129,7 @@ def _population_data(population: TetFloraPopulation) -> dict[str, Any]:
         if value == _RARE.get(prop.identifier, ...):
             continue
         data[prop.identifier] = (
-            (value.name if value is not None else None) if _is_pointer(prop) else _value(prop, value)
+            (value.name if value is not None else None) if _is_pointer(prop) else value_for(prop, value)
         )
     return data
 
@@ -133,7 +142,7 @@ def _is_pointer(prop: bpy.types.Property) -> bool:
     return prop.type == 'POINTER'
 
 
-def _value(prop: bpy.types.Property, value: Any) -> Any:
+def value_for(prop: bpy.types.Property, value: Any) -> Any:
     """A stored value as files have it; numbers in as few digits as give the same single-precision number back."""
     if prop.type != 'FLOAT':
         return value
@@ -157,37 +166,62 @@ def _checked(data: Any) -> list[dict[str, Any]]:
     ValueError
         Something is not as it must be; names the key.
     """
-    _keys("the file", data, {"format", "version", "populations"}, {"format", "version", "populations"})
-    if data["format"] != FORMAT:
-        raise ValueError(f'"format" is {shown(data["format"])}; population files have "{FORMAT}"')
-    if data["version"] != VERSION or isinstance(data["version"], bool):
-        raise ValueError(
-            f'"version" is {shown(data["version"])}; this version of TetFlora reads {VERSION}; update the extension'
-        )
-    entries = _list_of("populations", data["populations"])
-    simple = {p.identifier: p for p in _simple_settings(TetFloraPopulation)}
-    mix = {name: TetFloraMixEntry.bl_rna.properties[name] for name in _MIX}
+    check_keys("the file", data, {"format", "version", "populations"}, {"format", "version", "populations"})
+    check_format(data, FORMAT, VERSION, "population files")
+    entries = list_of("populations", data["populations"])
     for number, entry in enumerate(entries, 1):
-        where = f"population {number}"
-        _keys(where, entry, {"name"}, {"name", "grounds", "species", *simple})
-        _text(f'{where}: "name"', entry["name"])
-        for name in _list_of(f'{where}: "grounds"', entry.get("grounds", [])):
-            _text(f'{where}: "grounds"', name)
-        for index, part in enumerate(_list_of(f'{where}: "species"', entry.get("species", [])), 1):
-            _keys(f"{where}: species {index}", part, {"species"}, set(mix))
-            for key, value in part.items():
-                _check(f'{where}: species {index}: "{key}"', mix[key], value)
-                if key in _IDENTIFIERS and value and not is_identifier(value):
-                    raise ValueError(f'{where}: species {index}: "{key}" is {shown(value)}; use only {IDENTIFIER_RULE}')
-        for key in simple.keys() & entry.keys():
-            _check(f'{where}: "{key}"', simple[key], entry[key])
+        check_population(f"population {number}", entry)
     return entries
 
 
-def _check(where: str, prop: bpy.types.Property, value: Any) -> None:
+def check_format(data: dict[str, Any], expected: str, version: int, files: str) -> None:
+    """Refuse a file of another format or version with a `ValueError`."""
+    if data["format"] != expected:
+        raise ValueError(f'"format" is {shown(data["format"])}; {files} have "{expected}"')
+    if data["version"] != version or isinstance(data["version"], bool):
+        raise ValueError(
+            f'"version" is {shown(data["version"])}; this version of TetFlora reads {version}; update the extension'
+        )
+
+
+def check_population(where: str, entry: Any, more: Iterable[str] = ()) -> None:
+    """Refuse what cannot be a population.
+
+    Parameters
+    ----------
+    where : str
+        What messages call it.
+    entry : Any
+        Decoded.
+    more : iterable of str
+        Keys that somebody else checks.
+
+    Raises
+    ------
+    ValueError
+        Something is not as it must be; names the key.
+    """
+    simple = {p.identifier: p for p in _simple_settings(TetFloraPopulation)}
+    mix = {name: TetFloraMixEntry.bl_rna.properties[name] for name in _MIX}
+    check_keys(where, entry, {"name"}, {"name", "grounds", "species", *simple, *more})
+    check_text(f'{where}: "name"', entry["name"])
+    for name in list_of(f'{where}: "grounds"', entry.get("grounds", [])):
+        check_text(f'{where}: "grounds"', name)
+    for index, part in enumerate(list_of(f'{where}: "species"', entry.get("species", [])), 1):
+        check_keys(f"{where}: species {index}", part, {"species"}, set(mix))
+        for key, value in part.items():
+            check_value(f'{where}: species {index}: "{key}"', mix[key], value)
+            if key in _IDENTIFIERS and value and not is_identifier(value):
+                raise ValueError(f'{where}: species {index}: "{key}" is {shown(value)}; use only {IDENTIFIER_RULE}')
+    for key in simple.keys() & entry.keys():
+        check_value(f'{where}: "{key}"', simple[key], entry[key])
+
+
+def check_value(where: str, prop: bpy.types.Property, value: Any) -> None:
+    """Refuse a value that a property could not have with a `ValueError`."""
     if _is_pointer(prop):
         if value is not None:
-            _text(where, value)
+            check_text(where, value)
     elif prop.type == 'BOOLEAN':
         if not isinstance(value, bool):
             raise ValueError(f"{where} is {shown(value)}; it must be true or false")
@@ -196,7 +230,7 @@ def _check(where: str, prop: bpy.types.Property, value: Any) -> None:
         if value not in known:
             raise ValueError(f"{where} is {shown(value)}; it must be one of {', '.join(known)}")
     elif prop.type == 'STRING':
-        _text(where, value)
+        check_text(where, value)
     else:
         _check_number(where, prop, value)
 
@@ -215,7 +249,8 @@ def _check_number(where: str, prop: bpy.types.Property, value: Any) -> None:
         raise ValueError(f"{where} is {shown(value)}; it must be {limits_of(prop)}")
 
 
-def _keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:
+def check_keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:
+    """Refuse what is no object, lacks a key or has an unknown one with a `ValueError`."""
     if not isinstance(data, dict):
         raise ValueError(f"{where} is {type(data).__name__}; it must be an object with keys")
     if needed - data.keys():
@@ -224,7 +259,8 @@ def _keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:
         raise ValueError(f'{where} has an unknown key "{readable(min(data.keys() - known), NAME)}"')
 
 
-def _list_of(where: str, value: Any) -> list:
+def list_of(where: str, value: Any) -> list:
+    """A list that is not too long; anything else is a `ValueError`."""
     if not isinstance(value, list):
         raise ValueError(f"{where} is {type(value).__name__}; it must be a list")
     if len(value) > MAX_ENTRIES:
@@ -232,7 +268,8 @@ def _list_of(where: str, value: Any) -> list:
     return value
 
 
-def _text(where: str, value: Any) -> None:
+def check_text(where: str, value: Any) -> None:
+    """Refuse what is not one line of text with a `ValueError`."""
     if not isinstance(value, str):
         raise ValueError(f"{where} is {shown(value)}; it must be a string")
     if readable(value, MAX_TEXT) != value:
@@ -242,7 +279,9 @@ def _text(where: str, value: Any) -> None:
         )
 
 
-def _fill(population: TetFloraPopulation, entry: dict[str, Any], scene: bpy.types.Scene, missing: list[str]) -> None:
+def fill_population(
+    population: TetFloraPopulation, entry: dict[str, Any], scene: bpy.types.Scene, missing: list[str]
+) -> None:
     """Give a new population what a checked entry says, and defaults for the rest."""
     for prop in _simple_settings(population):
         name = prop.identifier

@@ -277,6 +277,12 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
         **_LIVE,
     )
 
+    wetness_min: _RULES.wetness_min
+    wetness_max: _RULES.wetness_max
+    wetness_softness: _RULES.wetness_softness
+
+    biome: StringProperty(name="Biome", **_HIDDEN)  # ``uid`` of the biome of which it is a layer
+
 
 MODES = (
     ('PAINT', "Paint", "Add plants where there are fewer than the density", 'BRUSH_DATA', 0),

@@ -26,6 +26,7 @@ from ...planting.cover import Suits
 from ...planting.places import Placement, place, without
 from ...planting.rules import Companion, Rules
 from ...planting.terrain import Path, Terrain
+from ...planting.zones import Zone
 from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
@@ -36,11 +37,12 @@ from .canopy import not_of_covers, read_suits
 from .distances import HECTARE, distance_of, empty_means, weights_of
 from .plant_objects import EMPTIES_UNASKED, plants_of
 from .terrain import MASKS, read_ground
+from .zones import read_zones, zone_values
 
 #: Identity and state of a population; all else are settings, which can be copied and written to files.
 IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
-    *("mix_index", "distance_from", "covers"),
+    *("mix_index", "distance_from", "covers", "biome"),
 }
 _COMPANION = ("companion", "companion_strength", "companion_distance")
 _DIGITS = 4  # of erased places: tenths of a millimetre
@@ -69,6 +71,7 @@ def fingerprint(population: bpy.types.PropertyGroup) -> str:
             value = value.name_full
         if value != default:
             values.append([name, value])
+    values += zone_values(population)
     return blake2b(repr(values).encode(), digest_size=8).hexdigest()
 
 
@@ -241,6 +244,7 @@ class Search:
     suits: Callable[[], Mapping[int, Suits]]
     erased: tuple[Path, ...]
     species: tuple[str, ...]
+    zones: tuple[Zone, ...] = ()
 
     def placement(self) -> Placement:
         """Find the places; no Blender in it.
@@ -250,7 +254,7 @@ class Search:
         SceneError
             Settings that leave no place.
         """
-        found = place(self.ground, self.rules, *self.present, suits=self.suits())
+        found = place(self.ground, self.rules, *self.present, suits=self.suits(), zones=self.zones)
         return without(found, self.erased)
 
 
@@ -297,7 +301,8 @@ def read_search(
     ground = read_ground(grounds, depsgraph, **masks)
     suits = read_suits(scene, depsgraph, population, ground.triangles, species)
     present = standing(scene, depsgraph, own, species)
-    return Search(ground, rules, present, suits, erased_places(population), species)
+    zones = read_zones(scene, depsgraph, population, grounds)
+    return Search(ground, rules, present, suits, erased_places(population), species, zones)
 
 
 def standing(

@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shipped biomes, each on a hectare of its own land and seen at eye height.
+
+    python -m examples.biomes                        # docs/images/biomes.jpg, from pictures that are in out/biomes
+    python -m examples.biomes beech_fern meadow      # renders these into out/biomes first
+    python -m examples.biomes --all --pictures       # all of them, and their small pictures for menus
+
+Around the hectare there is more of the same land, with the trees of the biome and without what covers the ground.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import dataclass, replace
+from math import radians
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from PIL import Image
+
+from devtools import session
+
+from .close_ups import render
+from .paper.pictures import save_sheet
+from .seasons import LOOKS, Look, Rgb, sky
+from .wood import grid
+
+ROOT = Path(__file__).resolve().parent.parent
+SHIPPED = ROOT / "tetflora_addon" / "biomes"
+SIZE, SAMPLES, COLUMNS = (480, 300), 48, 3
+#: Pictures for menus: pixels, and bytes at most.
+SMALL, LARGEST = (320, 200), 20_000
+#: Side of all land, meters.
+_LAND = 460.0
+
+
+@dataclass(frozen=True)
+class View:
+    """From where a biome is seen, and in which light.
+
+    Attributes
+    ----------
+    eye, ahead : tuple of float
+        x, y and height over the ground, of the camera and of what is in the middle of the picture; meters.
+    sun : tuple of float
+        Height over the horizon and azimuth where the light comes from, from north to the east; degrees.
+    """
+
+    eye: tuple[float, float, float] = (0.0, -42.0, 1.65)
+    ahead: tuple[float, float, float] = (0.0, 0.0, 3.0)
+    lens: float = 28.0
+    sun: tuple[float, float] = (48.0, 236.0)
+    tint: Rgb = (1.0, 0.94, 0.84)
+    grey: float = 0.34
+    haze: tuple[float, Rgb] = (0.0015, (0.55, 0.66, 0.8))
+    clouds: float = 0.5
+
+
+VIEWS = {
+    "beech_fern": View(grey=0.3),
+}
+
+
+def build(identifier: str, view: View) -> None:
+    """Fill an empty scene with a biome, its land, sun and sky."""
+    from tetflora_addon.blender.biomes import adding, files, ground
+    from tetflora_addon.blender.worker import at_once
+
+    scene = bpy.context.scene
+    biome = files.read_biome(SHIPPED / f"{identifier}.json")
+    land = ground.make_land(scene, biome.ground)
+    added = _add(at_once, adding, scene, biome, land)
+    around = _around(biome, ground)
+    scene.collection.objects.link(around)
+    tall = [layer for layer in biome.layers if layer["kind"] != "cover"]
+    if tall:
+        far = replace(biome, layers=tall, ground={**biome.ground, "earth": _mean(land)}, species=biome.species)
+        _add(at_once, adding, scene, far, around)
+    else:
+        around.data.materials.append(land.data.materials[0])
+    print(identifier, ", ".join(f"{name} {number:,}" for name, number in added.layers), *added.bare, flush=True)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.lens, camera.data.clip_start, camera.data.clip_end = view.lens, 0.05, 3000.0
+    eye, ahead = (
+        Vector((x, y, z + float(ground.heights(np.array(x), np.array(y), biome.ground))))
+        for x, y, z in (view.eye, view.ahead)
+    )
+    camera.location, camera.rotation_euler = eye, (ahead - eye).to_track_quat('-Z', 'Y').to_euler()
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    _light(scene, view, around)
+
+
+def _add(at_once, adding, scene, biome, land):
+    bpy.context.view_layer.update()
+    return at_once(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
+
+
+def _around(biome: object, ground: object) -> bpy.types.Object:
+    """The same land around the hectare."""
+    mesh, _, _ = grid("Ground", _LAND, 4.0, ground.SIDE, lambda x, y: ground.heights(x, y, biome.ground))
+    around = bpy.data.objects.new("Ground", mesh)
+    around.tetflora.is_occluder = True
+    return around
+
+
+def _mean(land: bpy.types.Object) -> list[float]:
+    """Mean color of a land's soil, linear RGB."""
+    image = land.data.materials[0].node_tree.nodes["Soil Map"].image
+    pixels = np.zeros(4 * image.size[0] * image.size[1], np.float32)
+    image.pixels.foreach_get(pixels)
+    shown = pixels.reshape(-1, 4)[:, :3].astype(np.float64)
+    return (np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)).mean(axis=0).tolist()
+
+
+def _light(scene: bpy.types.Scene, view: View, around: bpy.types.Object) -> None:
+    from .daylight import add_daylight
+    from .haze import add_haze
+
+    add_daylight(scene, elevation=view.sun[0], azimuth=view.sun[1] - 180.0)
+    sun = next(o for o in scene.objects if o.type == 'LIGHT').data
+    sun.energy, sun.color, sun.angle = 5.0, view.tint, radians(0.8)
+    look: Look = replace(LOOKS["summer"], clouds=view.clouds, haze=view.haze)
+    scene.world = sky(look)
+    around.name = "Ground"
+    add_haze(scene, *view.haze)
+
+
+def render_biome(
+    identifier: str, path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, keep: Path | None = None
+) -> None:
+    """Render one biome, in an empty scene."""
+    session.clean_file()
+    view = VIEWS.get(identifier, View())
+    build(identifier, view)
+    if keep is not None:
+        bpy.ops.wm.save_as_mainfile(filepath=str(keep))
+    render(path, size, samples, grey=view.grey)
+
+
+def save_small(source: Path, identifier: str) -> Path:
+    """Store a biome's picture for menus, as well as its bytes allow."""
+    target = SHIPPED / f"{identifier}.jpg"
+    picture = Image.open(source).convert("RGB").resize(SMALL, Image.Resampling.LANCZOS)
+    for quality in range(84, 30, -4):
+        picture.save(target, quality=quality, optimize=True)
+        if target.stat().st_size <= LARGEST:
+            break
+    return target
+
+
+def render_sheet(path: Path, folder: Path) -> None:
+    """All biomes as one picture; those that the folder has not are rendered."""
+    cells = []
+    for file in sorted(SHIPPED.glob("*.json")):
+        picture = folder / f"{file.stem}.png"
+        if not picture.exists():
+            render_biome(file.stem, picture)
+        cells.append((picture, json.loads(file.read_text(encoding="utf-8"))["name"]))
+    save_sheet(cells, COLUMNS, path)
+
+
+def main() -> int:
+    """Render the sheet of the documentation, or some pictures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("biomes", nargs="*", help="render these")
+    parser.add_argument("--all", action="store_true", help="render all")
+    parser.add_argument("--out", type=Path, default=ROOT / "out" / "biomes")
+    parser.add_argument("--width", type=int, default=SIZE[0])
+    parser.add_argument("--samples", type=int, default=SAMPLES)
+    parser.add_argument("--pictures", action="store_true", help="store pictures for menus beside the biomes")
+    parser.add_argument("--no-sheet", action="store_true")
+    arguments = parser.parse_args()
+    session.start()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    size = arguments.width, round(arguments.width * SIZE[1] / SIZE[0])
+    wanted = [file.stem for file in sorted(SHIPPED.glob("*.json"))] if arguments.all else arguments.biomes
+    for identifier in wanted:
+        picture = arguments.out / f"{identifier}.png"
+        render_biome(identifier, picture, size, arguments.samples)
+        if arguments.pictures:
+            print(save_small(picture, identifier))
+    if not arguments.no_sheet:
+        render_sheet(ROOT / "docs" / "images" / "biomes.jpg", arguments.out)
+    session.stop()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,265 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Add a biome to ground, layer after layer; plant its layers again; remove it with its plants.
+
+Layers become ordinary populations that know their biome: each can be changed, frozen, updated and painted over.
+"""
+
+from __future__ import annotations
+
+import json
+import uuid
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+
+from ...errors import SceneError
+from ...growth.hashing import child_key, key_of_seed, uniform
+from ...jobs import Progress
+from ...species.fallen import KIND as FALLEN_LEAVES
+from ...species.litter import FALLEN
+from ..placing.cover import fallen_from
+from ..placing.population_files import fill_population
+from ..placing.populations import Made, add_population, make_plants_steps, remove_population, set_grounds
+from ..runtime import GoneError, JobData, guarded, is_there
+from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
+from .files import Biome, pages_of, set_limits
+from .ground import lay_soil
+
+_SOIL = 0.06  # fraction of the work at the end
+
+
+@dataclass(frozen=True)
+class Added:
+    """What adding or planting a biome made.
+
+    Attributes
+    ----------
+    name : str
+    layers : list of (str, int)
+        Names of the layers, and how many plants each has.
+    bare : list of str
+        Why layers have no plants.
+    kept : list of str
+        Grounds that keep a material of the artist's.
+    """
+
+    name: str
+    layers: list[tuple[str, int]]
+    bare: list[str]
+    kept: list[str]
+
+
+def find_biome(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
+    """A biome of a scene by its identity."""
+    return next((biome for biome in scene.tetflora.biomes if biome.uid == uid), None)
+
+
+def active_biome(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
+    """The biome that buttons act on; None where there is none."""
+    group = scene.tetflora
+    return group.biomes[group.biomes_index] if 0 <= group.biomes_index < len(group.biomes) else None
+
+
+def layers_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.PropertyGroup]:
+    """Populations of a biome, in their order."""
+    return [population for population in scene.tetflora.populations if population.biome == uid]
+
+
+def add_biome_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    biome: Biome,
+    grounds: Sequence[bpy.types.Object],
+    seed: int = 0,
+) -> Generator[Progress, object, Added]:
+    """Add a biome to grounds, with all of its plants. Closing the steps, or an error, leaves everything as it was.
+
+    Raises
+    ------
+    SceneError
+        It needs a species that the catalog does not have, or no layer finds any place; or something was deleted
+        meanwhile.
+    """
+    data = JobData("Adding the biome", scene)
+    data.add_objects(grounds)
+    return guarded(data, _add_steps(scene, depsgraph, biome, grounds, seed))
+
+
+def _add_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    biome: Biome,
+    grounds: Sequence[bpy.types.Object],
+    seed: int,
+) -> Generator[Progress, object, Added]:
+    yield Progress(0.0, "Reading the biome")
+    with _restored(scene):
+        renamed = _own_species(scene, biome)
+        group, uid = scene.tetflora, uuid.uuid4().hex
+        made = group.biomes.add()
+        made.uid, made.name, made.source = uid, _free_name(scene, biome.name), biome.identifier
+        made.gives_way = biome.gives_way
+        made.data = json.dumps({"ground": biome.ground, "season": biome.season}, ensure_ascii=False)
+        for obj in grounds:
+            made.grounds.add().object = obj
+        set_limits(made, biome.limits)
+        group.biomes_index = len(group.biomes) - 1
+        for number, layer in enumerate(biome.layers):
+            population = add_population(scene, grounds, name=layer["name"])
+            fill_population(population, {k: v for k, v in layer.items() if k != "kind"}, scene, [])
+            set_grounds(population, grounds)
+            population.biome, population.covers = uid, uid if layer["kind"] == "cover" else ""
+            if layer["kind"] == "cover" and "as_field" not in layer:
+                population.as_field = 'FIELD'
+            # A number of its own for each layer, or all would stand in the same places.
+            key = child_key(key_of_seed(seed), number)
+            population.seed = int(uniform(child_key(key, population.seed & 0xFFFFFFFF), 0) * 2**31)
+            for entry in population.mix:
+                entry.species = renamed.get(entry.species, entry.species)
+                entry.shed_by = renamed.get(entry.shed_by, entry.shed_by)
+        return (yield from _plant(scene, depsgraph, uid))
+
+
+def plant_biome_steps(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, biome: bpy.types.PropertyGroup
+) -> Generator[Progress, object, Added]:
+    """Plant all layers of a biome again by their settings, but those that are frozen.
+
+    Raises
+    ------
+    SceneError
+        No layer finds any place.
+    """
+    data, uid = JobData("Planting the biome", scene), biome.uid
+    data.add_objects(entry.object for entry in biome.grounds if is_there(entry.object))
+    return guarded(data, _plant(scene, depsgraph, uid))
+
+
+def _plant(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str) -> Generator[Progress, object, Added]:
+    """Plants of all layers, one after the other, and the soil under them."""
+    yield Progress(0.0, "Planting")
+    names = [population.uid for population in layers_of(scene, uid) if not population.frozen]
+    layers, bare = [], []
+    for number, name in enumerate(names):
+        depsgraph.update()  # plants of the layers before shade the ground, and keep others away
+        population = _layer(scene, name)
+        if population is None:
+            continue
+        for entry in population.mix:
+            _make_litter(scene, entry)
+        title = population.name
+        begin, end = (n / len(names) * (1.0 - _SOIL) for n in (number, number + 1))
+        try:
+            with closing(make_plants_steps(scene, depsgraph, population)) as steps:
+                made = yield from _within(steps, begin, end, title)
+        except GoneError:
+            raise
+        except SceneError as error:
+            bare.append(f"{title}: {error}")
+            continue
+        layers.append((title, made.number))
+    if bare and not layers:
+        raise SceneError(bare[0])
+    yield Progress(1.0 - _SOIL, "Soil")
+    depsgraph.update()
+    biome = find_biome(scene, uid)
+    grounds = [entry.object for entry in biome.grounds if entry.object is not None] if biome is not None else []
+    kept = lay_soil(scene, depsgraph, grounds) if grounds else []
+    return Added(biome.name if biome is not None else "", layers, bare, kept)
+
+
+def _layer(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
+    return next((population for population in scene.tetflora.populations if population.uid == uid), None)
+
+
+def _within(
+    steps: Generator[Progress, object, Made], begin: float, end: float, title: str
+) -> Generator[Progress, object, Made]:
+    """Steps that are a part of others."""
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        message = f"{title}: {step.message}"
+        yield replace(step, fraction=begin + (end - begin) * step.fraction, message=message)
+
+
+def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
+    """Keep the biome's own species in this file; what they are called here, where that differs.
+
+    Raises
+    ------
+    SceneError
+        A layer needs a species that is nowhere.
+    """
+    renamed = {}
+    for identifier, page in pages_of(scene, biome).items():
+        name, known = identifier, catalogue()
+        if identifier in known and dict(species_data(scene, identifier)) != page:
+            name = renamed[identifier] = new_identifier(identifier, known.__contains__)
+        if name not in known:
+            store_species(scene, name, page)
+    known = catalogue()
+    for layer in biome.layers:
+        for part in layer.get("species", []):
+            needed = part.get("shed_by") or part["species"]
+            needed = renamed.get(needed, needed)
+            if needed not in known:
+                raise SceneError(f'"{biome.name}", layer "{layer["name"]}": {unknown_text(needed)}')
+    return renamed
+
+
+def _make_litter(scene: bpy.types.Scene, entry: bpy.types.PropertyGroup) -> None:
+    """Make a species of what another sheds, where an entry needs it and nobody has it."""
+    if entry.shed_by and entry.species not in catalogue():
+        kind = next((k for k in (*FALLEN, FALLEN_LEAVES) if entry.species.endswith(f"_{k}")), "")
+        made = fallen_from(scene, entry.shed_by, kind) if kind else ""
+        entry.species = made or entry.species
+
+
+def _free_name(scene: bpy.types.Scene, name: str) -> str:
+    taken, number = {biome.name for biome in scene.tetflora.biomes}, 1
+    while (free := name if number == 1 else f"{name}.{number:03d}") in taken:
+        number += 1
+    return free
+
+
+@contextmanager
+def _restored(scene: bpy.types.Scene) -> Iterator[None]:
+    """Where what is done ends early, forget the biome that was begun, its populations and its species."""
+    group = scene.tetflora
+    before = {p.uid for p in group.populations} | {b.uid for b in group.biomes}
+    species = {edit.identifier for edit in group.species_edits}
+    active = group.populations_index, group.biomes_index
+    try:
+        yield
+    except BaseException:  # an error, or Esc
+        if is_there(scene):
+            for index in [i for i, p in enumerate(group.populations) if p.uid not in before][::-1]:
+                remove_population(scene, index)
+            for index in [i for i, b in enumerate(group.biomes) if b.uid not in before][::-1]:
+                group.biomes.remove(index)
+            group.populations_index, group.biomes_index = active
+            for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
+                revert_species(identifier)
+        raise
+
+
+def remove_biome(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> int:
+    """Remove a biome with its populations and their plants; those of frozen ones stay. How many plants went."""
+    uid, group, number = biome.uid, scene.tetflora, 0
+    for index in [i for i, p in enumerate(group.populations) if p.biome == uid][::-1]:
+        number += remove_population(scene, index)
+    group.biomes.remove(next(i for i, b in enumerate(group.biomes) if b.uid == uid))
+    group.biomes_index = max(min(group.biomes_index, len(group.biomes) - 1), 0)
+    return number
+
+
+def stored(biome: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """What a biome keeps of its file beside its layers."""
+    return json.loads(biome.data) if biome.data else {}

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The ground of biomes: a hectare of land where there is none, and soil in the colors of what stands and lies on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import radians, tan
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...files import json_of
+from ...growth.hashing import key_of_seed
+from ...planting.canopy import Sheet
+from ...planting.plane import gradient_noise
+from ..attributes import world_matrix
+from ..materials.soil import is_soil, soil_material
+from ..placing.cover import may_have_soil, put_soil
+from ..placing.populations import own_objects
+from ..placing.terrain import read_ground
+from ..scene.crowns import crown_for
+from ..scene.fields import fields_of, read_field
+from .files import GROUND
+
+NAME = "Land"
+#: Side of land that is made, and of its squares, meters.
+SIDE, STEP = 100.0, 1.0
+_CELL, _MOST = 0.5, 400_000  # of the map of the soil
+#: Waves of hills: meters from one to the next, and their height over that of the hills.
+_WAVES = ((46.0, 0.42), (17.0, 0.1), (5.0, 0.016))
+_BED, _BANK = 1.6, 22.0  # meters from the middle of a valley: its bed, and to where it has a third of its depth left
+#: How bright low plants are together, of how bright one blade is: they shade each other.
+_SHADED = 0.72
+
+
+def heights(
+    x: NDArray[np.float64], y: NDArray[np.float64], ground: Mapping[str, Any], seed: int = 0
+) -> NDArray[np.float64]:
+    """Of land for a biome, meters: hills, a slope that rises to the north, and a valley from west to east."""
+    value = {name: ground.get(name, GROUND[name][0]) for name in ("hills", "slope", "valley")}
+    points, key = np.stack([x, y], axis=-1).reshape(-1, 2), key_of_seed(seed)
+    waves = sum(part * gradient_noise(points / size, key).reshape(x.shape) for size, part in _WAVES)
+    aside = np.abs(y - brook(x))
+    deep = 1.0 / (1.0 + (np.maximum(aside - _BED, 0.0) / _BANK) ** 2)
+    rough = waves * (1.0 - 0.85 * deep * (value["valley"] > 0.0))
+    fall = 0.012 * x * (value["valley"] > 0.0)  # water runs west
+    return value["hills"] * 2.0 * rough + tan(radians(value["slope"])) * y - value["valley"] * deep + fall
+
+
+def brook(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where the middle of a valley is, y by x, meters."""
+    return 7.0 * np.sin(np.asarray(x) / 19.0) + 3.0 * np.sin(np.asarray(x) / 7.3 + 1.0)
+
+
+def make_land(scene: bpy.types.Scene, ground: Mapping[str, Any], seed: int = 0) -> bpy.types.Object:
+    """A hectare of land around the 3D cursor."""
+    along = np.arange(-SIDE / 2, SIDE / 2 + 0.1, STEP)
+    x, y = np.meshgrid(along, along)
+    points = np.stack([x, y, heights(x, y, ground, seed)], axis=2).reshape(-1, 3)
+    number = len(along)
+    first = (np.arange(number - 1)[:, None] * number + np.arange(number - 1)).reshape(-1)
+    faces = np.stack([first, first + 1, first + number + 1, first + number], axis=1)
+    mesh = bpy.data.meshes.new(NAME)
+    mesh.from_pydata(points.tolist(), [], faces.tolist(), shade_flat=False)
+    land = bpy.data.objects.new(NAME, mesh)
+    land.location = scene.cursor.location
+    land.tetflora.is_occluder = True
+    scene.collection.objects.link(land)
+    return land
+
+
+def lay_soil(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.Object]) -> list[str]:
+    """Give ground a soil in the colors of the low plants and the litter of all biomes on it.
+
+    Returns
+    -------
+    list of str
+        Names of grounds that keep a material of the artist's.
+    """
+    fits = [obj for obj in grounds if may_have_soil(obj)]
+    kept = [obj.name for obj in grounds if obj not in fits]
+    if not fits:
+        return kept
+    triangles = read_ground(fits, depsgraph).triangles
+    sheet = Sheet.over(triangles.reshape(-1, 3), _CELL, _MOST)
+    cells = sheet.rows * sheet.columns
+    on_it = set(fits)
+    found = [b for b in scene.tetflora.biomes if on_it & {entry.object for entry in b.grounds}]
+    earth, turf, share, here = np.zeros((cells, 3)), np.zeros((cells, 3)), np.zeros(cells), np.full(cells, 1e-9)
+    hidden, colour = np.zeros(cells), np.zeros((cells, 3))
+    for biome in found:
+        ground = json_of(biome.data).get("ground", {}) if biome.data else {}
+        value = {name: np.array(ground.get(name, GROUND[name][0])) for name in ("earth", "turf", "turf_share")}
+        own = np.full(cells, 1e-6)
+        for low, cell, area, colours in _low_plants(scene, depsgraph, biome.uid, sheet):
+            own += np.bincount(cell, minlength=cells)
+            if low:
+                hidden += np.bincount(cell, area, cells)
+                colour += np.stack([np.bincount(cell, area * c, cells) for c in colours.T], axis=1)
+        own = _blurred(own.reshape(sheet.rows, sheet.columns)).reshape(-1)
+        here += own
+        earth += own[:, None] * value["earth"]
+        turf += own[:, None] * value["turf"]
+        share += own * value["turf_share"]
+    earth, turf, share = earth / here[:, None], turf / here[:, None], share / here
+    square = sheet.cell**2
+    lying = 1.0 - np.exp(-hidden / square)
+    mean = _SHADED * colour / np.maximum(hidden, 1e-12)[:, None]
+    ground = earth + (lying * (1.0 - share))[:, None] * (mean - earth)
+    before = next((slot.material for obj in fits for slot in obj.material_slots if is_soil(slot.material)), None)
+    shape = sheet.rows, sheet.columns
+    size = sheet.cell * np.array([sheet.columns, sheet.rows])
+    material = soil_material(
+        "Land", ground.reshape(*shape, 3), share.reshape(shape), turf.mean(axis=0), sheet.low, size, before
+    )
+    put_soil(fits, material)
+    return kept
+
+
+def _low_plants(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str, sheet: Sheet
+) -> Iterable[tuple[bool, NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]]:
+    """Plants of the layers of a biome: whether they are low, their cells, what each hides, m², and its color."""
+    for population in scene.tetflora.populations:
+        if population.biome != uid:
+            continue
+        for obj in fields_of(own_objects(scene, population)):
+            read = read_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])
+            place = ((read.position[:, :2] - sheet.low) / sheet.cell).astype(np.int64)
+            place = np.clip(place, 0, (sheet.columns - 1, sheet.rows - 1))
+            crowns = [crown_for(scene, kind) for kind in read.identifiers]
+            seen = np.array([crown.seen for crown in crowns])[read.species] * read.scale**2
+            colours = np.array([crown.colour for crown in crowns])[read.species]
+            yield bool(population.covers), place[:, 1] * sheet.columns + place[:, 0], seen, colours
+
+
+def _blurred(grid: NDArray[np.float64], reach: int = 8) -> NDArray[np.float64]:
+    """Means over squares of 2 · reach + 1 cells, (rows, columns)."""
+    for axis in (0, 1):
+        sums = np.cumsum(np.pad(grid, [(reach + 1, reach) if a == axis else (0, 0) for a in (0, 1)], mode="edge"), axis)
+        long = sums.shape[axis]
+        grid = np.take(sums, range(2 * reach + 1, long), axis) - np.take(sums, range(long - 2 * reach - 1), axis)
+    return grid / (2 * reach + 1) ** 2

@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Zones of the biomes of a scene: which part of its ground each biome takes, and which comes first.
+
+Biomes with limits or a mask come first, in the order of the list; those without take what is left. So a riparian wood
+that is added to a beech wood pushes it back from the water.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from math import inf
+from typing import Any
+
+import bpy
+
+from ...planting.zones import Limits, Zone, distance_lines
+from .terrain import lines_within, read_ground
+
+#: Settings of a biome's mask, by the names that `read_ground` has for them.
+MASK = ("vertex_group", "invert_group", "image", "invert_image", "uv_layer")
+
+
+def biome_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup | None:
+    """The biome of which a population is a layer; None of others."""
+    uid = population.biome
+    return next((biome for biome in scene.tetflora.biomes if biome.uid == uid), None) if uid else None
+
+
+def limits_of_zone(biome: bpy.types.PropertyGroup) -> Limits:
+    """The limits of a biome; those that are switched off are open."""
+    given = {field.name: getattr(biome, field.name) for field in fields(Limits)}
+    if not biome.use_altitude:
+        given |= {"altitude_min": -inf, "altitude_max": inf}
+    if biome.paths is None:
+        given |= {"path_min": 0.0, "path_max": inf}
+    return Limits(**given)
+
+
+def is_limited(biome: bpy.types.PropertyGroup) -> bool:
+    """Whether a biome takes only a part of its ground."""
+    return bool(biome.vertex_group or biome.image or not limits_of_zone(biome).open)
+
+
+def come_before(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> list[bpy.types.PropertyGroup]:
+    """Biomes to which one gives way: those with limits that stand above it or, if it has none itself, all of them.
+
+    Only where they share a ground.
+    """
+    if not biome.gives_way:
+        return []
+    own, found = {entry.object for entry in biome.grounds}, []
+    limited = is_limited(biome)
+    for other in scene.tetflora.biomes:
+        if other.uid == biome.uid:
+            if limited:
+                break
+        elif is_limited(other) and own & {entry.object for entry in other.grounds}:
+            found.append(other)
+    return found
+
+
+def zone_values(population: bpy.types.PropertyGroup) -> list[Any]:
+    """All that decides the zone of a population, for its fingerprint; empty without a biome."""
+    scene = population.id_data
+    biome = biome_of(scene, population) if population.biome else None
+    if biome is None:
+        return []
+    values = []
+    for one in (biome, *come_before(scene, biome)):
+        masks = [getattr(value, "name_full", value) for value in (getattr(one, name) for name in MASK)]
+        limits = repr(limits_of_zone(one)) if is_limited(one) else ""
+        values.append([*masks, limits, one.paths.name_full if one.paths else ""])
+    return values if len(values) > 1 or is_limited(biome) else []
+
+
+def read_zones(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    population: bpy.types.PropertyGroup,
+    grounds: Sequence[bpy.types.Object],
+) -> tuple[Zone, ...]:
+    """Zones that limit a population on its grounds: its biome's, and the inverse of those to which that gives way.
+
+    Raises
+    ------
+    SceneError
+        A mask or a path cannot be read, as the message says.
+    """
+    biome = biome_of(scene, population)
+    if biome is None:
+        return ()
+    own = [_zone(biome, grounds, depsgraph)] if is_limited(biome) else []
+    others = [replace(_zone(other, grounds, depsgraph), inverse=True) for other in come_before(scene, biome)]
+    return (*own, *others)
+
+
+def _zone(biome: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Zone:
+    limits = limits_of_zone(biome)
+    lines = () if biome.paths is None else lines_within(biome.paths, depsgraph, "Paths")
+    mask = {name: getattr(biome, name) for name in MASK}
+    if not (biome.vertex_group or biome.image):
+        return Zone(limits, lines=distance_lines(lines, limits))
+    ground = read_ground(grounds, depsgraph, **mask)
+    return Zone(limits, ground.weight, ground.uv, ground.image, distance_lines(lines, limits))

@@ -1,0 +1,190 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Zones: which part of the ground one kind of land takes, 0 to 1, so that kinds blend where it falls from 1 to 0.
+
+A zone is a mask times limits along slope, altitude, wetness and the distance from lines. Where others come first, it
+gets what these leave: shares of all zones of a ground add up to 1 at most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, pi, radians
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..setting import LENGTH, setting
+from .plane import Lines
+from .rules import Rules
+from .terrain import sampled
+from .wetness import WetGround
+
+_ANGLE = {"subtype": 'ANGLE', "min": 0.0, "max": pi / 2}
+_FACTOR = {"subtype": 'FACTOR', "min": 0.0, "max": 1.0}
+_WIDTH = "Range around both limits over which one kind of land gives way to the next; 0 for a sharp line"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Between which values of the ground a zone lies; each limit is in the middle of its soft edge.
+
+    Altitudes are z in the world and distances those from lines on the map, meters; slopes are angles in radians.
+    """
+
+    slope_min: float = setting(0.0, "Min Slope", "Flatter ground is not part of the biome", **_ANGLE)
+    slope_max: float = setting(pi / 2, "Max Slope", "Steeper ground is not part of the biome", **_ANGLE)
+    slope_softness: float = setting(0.0, "Slope Softness", _WIDTH, default=radians(10.0), **_ANGLE)
+    altitude_min: float = setting(
+        -inf,
+        "Min Altitude",
+        "Lower ground is not part of the biome",
+        default=0.0,
+        soft_min=-1000.0,
+        soft_max=5000.0,
+        **LENGTH,
+    )
+    altitude_max: float = setting(
+        inf,
+        "Max Altitude",
+        "Higher ground is not part of the biome",
+        default=100.0,
+        soft_min=-1000.0,
+        soft_max=5000.0,
+        **LENGTH,
+    )
+    altitude_softness: float = setting(
+        0.0, "Altitude Softness", _WIDTH, default=10.0, min=0.0, soft_max=500.0, **LENGTH
+    )
+    wetness_min: float = setting(0.0, "Min Wetness", "Drier ground is not part of the biome", **_FACTOR)
+    wetness_max: float = setting(1.0, "Max Wetness", "Wetter ground is not part of the biome", **_FACTOR)
+    wetness_softness: float = setting(0.0, "Wetness Softness", _WIDTH, default=0.2, **_FACTOR)
+    path_min: float = setting(
+        0.0, "From", "Ground nearer to the paths is not part of the biome", min=0.0, soft_max=100.0, **LENGTH
+    )
+    path_max: float = setting(
+        inf,
+        "To",
+        "Ground farther from the paths is not part of the biome",
+        default=10.0,
+        min=0.0,
+        soft_max=500.0,
+        **LENGTH,
+    )
+    path_softness: float = setting(0.0, "Path Softness", _WIDTH, default=2.0, min=0.0, soft_max=100.0, **LENGTH)
+
+    @property
+    def open(self) -> bool:
+        """Whether all ground is within them."""
+        level = self.slope_min <= 0.0 and self.slope_max >= pi / 2 - 1e-6
+        high = (self.altitude_min, self.altitude_max) == (-inf, inf)
+        wet = self.wetness_min <= 0.0 and self.wetness_max >= 1.0
+        return level and high and wet and self.path_min <= 0.0 and self.path_max == inf
+
+
+@dataclass(frozen=True)
+class Spots:
+    """Places on the ground, as zones ask for them.
+
+    Attributes
+    ----------
+    triangle : (n,) int64
+        Of the ground.
+    barycentric : (n, 3) float64
+    position : (n, 3) float64
+        Meters.
+    normal : (n, 3) float64
+        Of the ground, upwards.
+    """
+
+    triangle: NDArray[np.int64]
+    barycentric: NDArray[np.float64]
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Zone:
+    """One zone of a ground of t triangles.
+
+    Attributes
+    ----------
+    weight : (t, 3) float, optional
+        Mask at the corners, 0 to 1; linear between.
+    uv : (t, 3, 2) float, optional
+        Where the corners are in the image.
+    image : (h, w) float, optional
+        Mask in texels, 0 to 1; the first row is at the bottom.
+    lines : Lines, optional
+        What distances are measured from: see `distance_lines`.
+    inverse : bool
+        All but the zone, as what gives way to it has.
+    """
+
+    limits: Limits
+    weight: NDArray[np.float64] | None = None
+    uv: NDArray[np.float64] | None = None
+    image: NDArray[np.float32] | None = None
+    lines: Lines | None = None
+    inverse: bool = False
+
+    @property
+    def asks_for_water(self) -> bool:
+        """Whether the wetness of the ground matters."""
+        return self.limits.wetness_min > 0.0 or self.limits.wetness_max < 1.0
+
+    def share(self, spots: Spots, wet: WetGround | None) -> NDArray[np.float64]:
+        """How much of each place is the zone's, (n,) from 0 to 1."""
+        one = self.limits
+        slope = np.arccos(np.clip(spots.normal[:, 2], 0.0, 1.0))
+        share = soft_between(slope, one.slope_min, one.slope_max, one.slope_softness, 0.0, pi / 2)
+        z = spots.position[:, 2]
+        share *= soft_between(z, one.altitude_min, one.altitude_max, one.altitude_softness, -inf, inf)
+        if self.weight is not None:
+            own = np.clip(np.nan_to_num(self.weight[spots.triangle]), 0.0, 1.0)
+            share *= np.einsum("ij,ij->i", own, spots.barycentric)
+        if self.image is not None:
+            uv = np.einsum("ijk,ij->ik", self.uv[spots.triangle], spots.barycentric)
+            share *= np.clip(np.nan_to_num(sampled(self.image, uv)), 0.0, 1.0)
+        if self.lines is not None:
+            away = self.lines.nearness(spots.position[:, :2]) * _reach(one)
+            share *= soft_between(away, one.path_min, one.path_max, one.path_softness, 0.0, inf)
+        if wet is not None and self.asks_for_water:
+            share *= by_wetness(wet.at(spots.position), one)
+        return 1.0 - share if self.inverse else share
+
+
+def distance_lines(lines: tuple[NDArray[np.float64], ...], limits: Limits) -> Lines | None:
+    """Lines on the map, (k, 2) each, to measure the distances that limits ask for; None without any."""
+    ends = [np.repeat(line, 2, axis=0) if len(line) == 1 else line for line in lines]
+    if not ends or not np.isfinite(_reach(limits)):
+        return None
+    start, end = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
+    return Lines(start, end, np.full(len(start), _reach(limits)))
+
+
+def _reach(limits: Limits) -> float:
+    """Meters beyond which distances do not matter."""
+    return limits.path_max + 0.5 * limits.path_softness + 1e-3
+
+
+def by_wetness(wet: NDArray[np.float64], limits: Limits | Rules) -> NDArray[np.float64]:
+    """How well ground of a wetness (n,), 0 to 1, fits ``wetness_min``, ``wetness_max`` and ``wetness_softness``."""
+    return soft_between(wet, limits.wetness_min, limits.wetness_max, limits.wetness_softness, 0.0, 1.0)
+
+
+def soft_between(
+    values: NDArray[np.float64], low: float, high: float, softness: float, least: float, most: float
+) -> NDArray[np.float64]:
+    """1 between two limits, 0 beyond them, a half at each where there is softness, (n,).
+
+    Limits at the ``least`` and the ``most`` that a value can be have no edge. What ends at a limit and what begins
+    there, with the same softness, make 1 together.
+    """
+    share = np.ones(len(values))
+    for inside, used in ((values - low, low > least), (high - values, high < most)):
+        if used and softness > 1e-9:
+            share *= np.clip(inside / softness + 0.5, 0.0, 1.0)
+        elif used:
+            share *= inside >= 0.0
+    return share
