@@ -117,6 +117,8 @@ class _Tags:
         if version not in (42, 43) or (version == 43 and start[4:8] != struct.pack(f"{order}HH", 8, 0)):
             raise SceneError(f"{name}: this is no TIFF file")
         self.order, self.big = order, version == 43
+        if self.big and len(start) < 16:
+            raise SceneError(f"{name}: head: the file ends within it")
         offset = self._unpack("Q", start[8:16]) if self.big else self._unpack("I", start[4:8])
         self.found = self._directory(offset)
 

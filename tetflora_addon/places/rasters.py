@@ -23,6 +23,7 @@ MAX_CELLS, MAX_TEXT = 40_000_000, 1_000_000_000
 #: Most cells along one side; Blender's own images end there too.
 MAX_SIDE = 65_000
 _HEADER = {"ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy", "nodata_value"}
+_BEYOND = 3.4e38  # fits into single precision, as numbers that stand for nothing do
 _HEAD_LINES = 40
 _PIECE = 4_000_000  # bytes of text between two signs of life
 _LIMIT = 1e7  # metres: what is higher, or has larger coordinates than a thousand times so much, is no place
@@ -159,7 +160,7 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
         found = _numbers(piece, name, line)
         if done + len(found) > len(values):
             raise SceneError(f"{name}: more than the {len(values):,} values that its head tells of")
-        values[done : done + len(found)] = found
+        values[done : done + len(found)] = np.clip(found, -_BEYOND, _BEYOND)
         done, start, line = done + len(found), end, line + piece.count(b"\n")
     if done < len(values):
         raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values")
@@ -227,7 +228,7 @@ def without_nodata(values: NDArray[np.floating], nothing: float | None) -> NDArr
     values = np.asarray(values, np.float32)
     bad = ~(np.abs(values) < _LIMIT)
     if nothing is not None:
-        bad |= values == np.float32(nothing)
+        bad |= values == np.float32(np.clip(nothing, -_BEYOND, _BEYOND))
     return np.where(bad, np.float32(np.nan), values)
 
 
