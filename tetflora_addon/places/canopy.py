@@ -21,7 +21,7 @@ from ..jobs import Progress
 #: Crown width in metres: the first, and the second for each square metre of height (Popescu and Wynne, mixed stands).
 WINDOW = (2.51503, 0.00901)
 #: A crown's edge is at least so high, over its top; and at most so far from it, in windows.
-_EDGE, _REACH = 0.3, 1.5
+_EDGE, _REACH = 0.3, 2.5
 _MOST_WINDOW = 20.0  # metres from a top within which others are looked for
 _LEAN = 0.6  # at most, how far the middle of a crown is from its top, in radii
 _AROUND = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0))

@@ -148,9 +148,8 @@ class _Reading:
         for name, source, factor in (("diameter", "girth", 1.0 / math.pi), ("crown_width", "crown_radius", 2.0)):
             sizes[name] = np.where(sizes[name] > 0.0, sizes[name], factor * sizes.pop(source))
         base, height = sizes["crown_base"], sizes["height"]
-        self._refuse(
-            (base >= height) & (height > 0.0) & (base > 0.0), "crown_base", lambda _: "is not below its height"
-        )
+        above = (base >= height) & (height > 0.0) & (base > 0.0)
+        self._refuse(above, "crown_base", lambda i: f"{base[i]:g} m is not below the height of {height[i]:g} m")
         sizes["dead"] = self._dead()
         points, system = self._points(code)
         names, index = self._names()
