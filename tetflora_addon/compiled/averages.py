@@ -202,7 +202,7 @@ def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
         if rows["drawn"][i]:
             length[i], radius[i] = rows["size"][i, :2]
         for sort in np.flatnonzero(rows["next"][i] >= 0):
-            sums[i, sort] = one = _sums(exact, i, int(sort))
+            sums[i, sort] = one = children_sums(exact, i, int(sort))
             j = rows["next"][i, sort]
             if sort == SPUR:
                 length[j], radius[j] = rows["length"][j, 0], rows["length"][j, 0] * rows["thickness"][j, 0]
@@ -263,7 +263,8 @@ class _Sums:
     radius: float
 
 
-def _sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
+def children_sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
+    """Sums over the children of a sort of a mean branch of row ``i``."""
     row, child = rows[i], rows[rows["next"][i, sort]]
     number, thickness = float(row["count"][sort, 0]), child["thickness"][0]
     if sort == FORK:

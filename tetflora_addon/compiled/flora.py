@@ -32,6 +32,7 @@ from .averages import Averages, RowLeaves, average, quadratic, row_leaves
 from .bounds import leaf_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
 from .day import DayTotals, totals_of_day
+from .formed_totals import FormedTotals, formed_totals
 from .orientation import Orientation, orientation_of
 from .samples import Samples, draw_samples
 
@@ -187,7 +188,12 @@ class Flora:
 
     def leaf_areas(self, subplants: Branches) -> NDArray[np.float64]:
         """Expected one-sided area (n,) of the leaves of sub-plants, m²."""
-        area = self._at_place(self.area_nodes, subplants) if subplants.year is None else self.day.leaf_areas(subplants)
+        if subplants.year is None:
+            area, some = self._at_place(self.area_nodes, subplants), self._formed(subplants)
+            if len(some):
+                area[some] *= self.formed_totals.leaves(subplants.take(some))
+        else:
+            area = self.day.leaf_areas(subplants, self._formed_kinds(subplants))
         return fullness(self.rows, subplants) * area * subplants.scale**2
 
     def leaf_colours(self, subplants: Branches) -> NDArray[np.float64]:
@@ -200,8 +206,13 @@ class Flora:
     def wood_areas(self, subplants: Branches) -> NDArray[np.float64]:
         """Expected surface (n,) of the branches of sub-plants, m²."""
         row, full = subplants.row, fullness(self.rows, subplants)
-        relative = self.fixed_wood[row] + full * self.full_wood[row]
-        return relative * subplants.length * subplants.radius + full * self.spur_wood[row] * subplants.scale**2
+        relative, spurs = self.fixed_wood[row] + full * self.full_wood[row], full * self.spur_wood[row]
+        some = self._formed(subplants)
+        if len(some):
+            wood, short = self.formed_totals.wood(subplants.take(some))
+            relative[some] *= wood
+            spurs[some] *= short
+        return relative * subplants.length * subplants.radius + spurs * subplants.scale**2
 
     def face_counts(self, subplants: Branches) -> NDArray[np.float64]:
         """Expected number (n,) of the faces of sub-plants, leaves and branches."""
@@ -209,12 +220,49 @@ class Flora:
         faces = self.polygons[row]
         if subplants.year is not None:
             faces = faces - self.leaf_faces[row] + self.day.leaf_faces(subplants)
-        return fixed + fullness(self.rows, subplants) * (faces - fixed)
+        counts = fixed + fullness(self.rows, subplants) * (faces - fixed)
+        some = self._formed(subplants)
+        if len(some):
+            own = subplants.take(some)
+            wood = (self.formed_totals.faces(own) - 1.0) * (self.polygons - self.leaf_faces)[own.row]
+            counts[some] += wood + (self._leaf_faces(own) - self._leaf_faces(replace(own, crown=None)))
+        return counts
 
     def branch_faces(self, subplants: Branches) -> NDArray[np.float64]:
         """Expected number (n,) of the faces of the branches of sub-plants."""
-        faces = self.leaf_faces[subplants.row] if subplants.year is None else self.day.leaf_faces(subplants)
-        return self.face_counts(subplants) - fullness(self.rows, subplants) * faces
+        return self.face_counts(subplants) - fullness(self.rows, subplants) * self._leaf_faces(subplants)
+
+    def _leaf_faces(self, subplants: Branches) -> NDArray[np.float64]:
+        """Expected number (n,) of the faces of the leaves of sub-plants, without their fullness."""
+        if subplants.year is not None:
+            return self.day.leaf_faces(subplants, self._formed_kinds(subplants, faces=True))
+        faces = self.leaf_faces[subplants.row]
+        some = self._formed(subplants)
+        if len(some):
+            faces[some] *= self.formed_totals.leaves(subplants.take(some), faces=True)
+        return faces
+
+    @cached_property
+    def formed_totals(self) -> FormedTotals:
+        """What crown forms change; computed when first asked for, as few scenes have any."""
+        if self.in_leaf is not self:
+            return self.in_leaf.formed_totals
+        return formed_totals(self.rows, self.averages, self.leaf.polygons)
+
+    def _formed(self, subplants: Branches) -> NDArray[np.intp]:
+        """Sub-plants (k,) of (n,) whose totals crown forms change."""
+        if subplants.crown is None or not (self.rows["order"] == 0)[subplants.row].any():
+            return np.zeros(0, np.intp)
+        return np.flatnonzero(self.formed_totals.formed[subplants.row])
+
+    def _formed_kinds(self, subplants: Branches, faces: bool = False) -> NDArray[np.float64] | None:
+        """`FormedTotals.leaves` (n, k) of sub-plants, 1 where nothing is formed; None where nothing is at all."""
+        some = self._formed(subplants)
+        if not len(some):
+            return None
+        out = np.ones((len(subplants), len(LEAF_KINDS)))
+        out[some] = self.formed_totals.leaves(subplants.take(some), faces, kinds=True)
+        return out
 
     def one_leaf_area(self, branches: Branches) -> NDArray[np.float64]:
         """Mean one-sided area (n,) of a single leaf of sub-plants, m²; 0 where they have none."""

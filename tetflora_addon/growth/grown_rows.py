@@ -69,8 +69,7 @@ def grow_children(
     varies = start[1] / start[0] if start[0] > 0 else 0.0
     begins = varied_begin(begin, varies, _GAUSS)
     own = begins, np.maximum(end, begins), power, whole, below
-    base, some, tip = (node_at(place * here / full, *own) for place in (starts, fresh, until))
-    there = float(_WEIGHTS @ (np.maximum(tip - base, 0) + nodes.extra * np.maximum(tip - np.maximum(some, base), 0)))
+    there = _alive(own, (starts, fresh, until), here / full, nodes.extra)
     row["fraction"][sort] = fraction
     row["count"][sort] *= there / number
     row["start"][sort] = mean, variation
@@ -81,13 +80,37 @@ def grow_children(
         )
 
 
+def _alive(law: tuple, places: tuple, now: float, extra: float) -> float:
+    """Mean number of living nodes, by where they begin, where those that live for a while do, and where they end."""
+    base, some, tip = (node_at(place * now, *law) for place in places)
+    return float(_WEIGHTS @ (np.maximum(tip - base, 0) + extra * np.maximum(tip - np.maximum(some, base), 0)))
+
+
+def living(row: np.void, sort: int, bare: float = 0.0, dead: float | None = None) -> float:
+    """Mean number of children of one sort of branches of a row that is not full-grown.
+
+    ``bare`` is where the lowest are at least, by a crown form; or if they are dead ones ``dead`` where the topmost are.
+    """
+    own, number, (mean, variation) = row["growing"][sort], row["count"][sort, 0], row["start"][sort]
+    begins = varied_begin(own[BEGIN], own[VARIES], _GAUSS)
+    law = begins, np.maximum(own[END], begins), own[POWER], own[WHOLE] * number, own[BELOW] * number
+    starts = np.maximum(mean + (0.0 if dead is not None else variation) * _GAUSS, bare)
+    until = max(own[UNTIL], dead or 0.0) if own[UNTIL] > mean else own[UNTIL]
+    return _alive(law, (starts, own[FRESH], until), own[NOW], own[EXTRA])
+
+
 def varied_begin(begin: ArrayLike, varies: ArrayLike, draw: NDArray[np.float64]) -> NDArray[np.float64]:
     """Where nodes of branches (n,) begin, by random numbers (n,) between -1 and 1."""
     return np.minimum(begin * (1 + varies * draw), np.maximum(begin, 0.999))
 
 
-def spread_children(row: np.void, sort: int) -> tuple[NDArray[np.float64], ...]:
+def spread_children(
+    row: np.void, sort: int, bare: float = 0.0, dead: float = 0.0, among: NDArray[np.float64] | None = None
+) -> tuple[NDArray[np.float64], ...]:
     """Children of one sort of a mean branch of a row that is not full-grown, as many as stand for all.
+
+    ``bare`` and ``dead`` are as in `living`; ``among`` (2,) is where the row's children begin and end among those of
+    the order's branch, by a crown form.
 
     Returns
     -------
@@ -100,11 +123,14 @@ def spread_children(row: np.void, sort: int) -> tuple[NDArray[np.float64], ...]:
     """
     own, number = row["growing"][sort], row["count"][sort, 0]
     law = own[BEGIN], own[END], own[POWER], own[WHOLE] * number, own[BELOW] * number
-    base, some, tip = node_at(np.array([row["start"][sort, 0], own[FRESH], own[UNTIL]]) * own[NOW], *law)
-    node, weight, extra = some_nodes((base, some, tip), own[EXTRA])
-    low, high = row["fraction"][sort]
-    fraction = low + (high - low) * (node - base) / max(tip - base, 1e-9)
-    return np.clip(place_at(node, *law) / own[NOW], 0, 1), fraction, weight, faded(fraction, own[FADES], extra)
+    start = row["start"][sort, 0]
+    until = max(own[UNTIL], dead) if own[UNTIL] > start else own[UNTIL]
+    base, lowest, some, tip = node_at(np.array([start, max(start, bare), own[FRESH], until]) * own[NOW], *law)
+    node, weight, extra = some_nodes((lowest, max(some, lowest), tip), own[EXTRA])
+    (low, high), described = row["fraction"][sort] if among is None else among, row["fraction"][sort]
+    fraction = low + (high - low) * (node - lowest) / max(tip - lowest, 1e-9)
+    own_fraction = described[0] + (described[1] - described[0]) * (node - base) / max(tip - base, 1e-9)
+    return np.clip(place_at(node, *law) / own[NOW], 0, 1), fraction, weight, faded(own_fraction, own[FADES], extra)
 
 
 def lengths(rows: NDArray[np.void], row: NDArray[np.integer], fraction: NDArray[np.float64]) -> NDArray[np.float64]:
