@@ -22,22 +22,24 @@ from .plants import DeadPlants, Plants, StandDraw
 from .records import LYING, Records
 
 #: Height for the girth over that in a closed stand: where the light beside the crown is full, and where there is none.
-_SLENDER_LIT, _SLENDER_DARK = 0.72, 1.08
-#: Light beside a crown in which it neither widens nor narrows, for shade tolerance 0 and 5; and how much more lets it
-#: widen as fast as it can.
-_SIDE, _SIDE_MORE = (0.34, 0.12), 0.35
+_SLENDER_LIT, _SLENDER_DARK = 0.72, 1.14
+#: Light beside a crown in which it begins to widen, for shade tolerance 0 and 5: crowns of tolerant trees reach into each
+#: other; how much more than that lets it widen as fast as it can; and where that is, in lengths of a dome and of a cone.
+_SIDE, _SIDE_MORE, _BESIDE = (0.62, 0.23), 0.35, (0.35, 0.15)
+#: Light beside it, over that in which limbs die, below which it narrows.
+_DARK = 1.5
 #: Fractions of the radius, or of what is lacking, by which a crown narrows and widens in a year.
 _NARROWS, _WIDENS = 0.05, 0.15
 #: Fraction of the crown that dies from below in a year where it is quite dark; shortest crown, over the height.
-_RISES, _SHORTEST = 0.1, 0.12
+_RISES, _SHORTEST = 0.3, 0.12
 #: Offset for the difference of light on two sides over its sum, the most of it, and what of it comes in a year.
 _LEANS, _MOST_OFFSET, _TURNS = 1.0, 0.6, 0.08
 #: Part of the vigour that is this year's.
 _RECENT = 0.3
 #: Vigour below which plants are likely to die, for shade tolerance 0 and 5, and the chance where it is 0.
-_WEAK, _DIES = (0.2, 0.06), 0.3
-#: Chance to die for other reasons: that a tenth of the plants reach the lifespan; when the old die, in lifespans.
-_TENTH, _OLD = 2.3, (0.8, 1.15)
+_WEAK, _DIES = (0.17, 0.025), 0.15
+#: Chance to die for other reasons: of so many in a lifespan, for each that is left; when the old die, in lifespans.
+_OTHERS, _OLD = 1.0, (0.8, 1.15)
 #: Trees that stand dead: least diameter and height, and years until they fall, and are gone, for 40 cm.
 _KEPT_DIAMETER, _KEPT_HEIGHT = 0.05, 2.0
 _STANDS, _LIES = (2.0, 22.0), (8.0, 40.0)
@@ -63,13 +65,14 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
     def own(values: NDArray) -> NDArray:
         return np.take(values, guild)
 
-    away, middle = radius + 0.5 * light.cell, base + 0.5 * (height - base)
+    away = radius + 0.5 * light.cell
+    middle = base + (_BESIDE[0] + (_BESIDE[1] - _BESIDE[0]) * own(guilds.top)) * (height - base)
     places = ((away, 0.0), (-away, 0.0), (0.0, away), (0.0, -away))
     east, west, north, south = (light.at(x + dx, y + dy, middle) for dx, dy in places)
     side = 0.25 * (east + west + north + south)
     below = light.at(x, y, base)
     for dx, dy in places:
-        below += light.at(x + 0.7 * dx, y + 0.7 * dy, base)
+        below += light.at(x + 0.5 * dx, y + 0.5 * dy, base)
     below *= 0.2
 
     free = np.pi * guilds.radii(guild, one.girth) ** 2 * own(guilds.free)
@@ -84,9 +87,10 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
 
     widest = guilds.radii(guild, girth)
     level = _SIDE[0] + (_SIDE[1] - _SIDE[0]) / 5.0 * own(guilds.shade)
-    open_ = np.clip((side - level) / _SIDE_MORE, -1.0, 1.0)
+    open_ = np.clip((side - level) / _SIDE_MORE, 0.0, 1.0)
+    closed = np.clip(1.0 - side / (_DARK * own(guilds.limit)), 0.0, 1.0)
     widens = np.minimum(widest - guilds.radii(guild, one.girth) + _WIDENS * (widest - radius), widest - radius)
-    wide = radius + np.where(open_ > 0, np.maximum(widens, 0.0) * open_, _NARROWS * radius * np.maximum(open_, -1.0))
+    wide = radius + np.maximum(widens, 0.0) * open_ - _NARROWS * radius * closed
     wide = np.minimum(wide, widest)
 
     limit = own(guilds.limit)
@@ -118,7 +122,7 @@ def dying(plants: Plants, guilds: Guilds, year: int, block: slice) -> NDArray[np
     weak = np.take(_WEAK[0] + (_WEAK[1] - _WEAK[0]) / 5.0 * guilds.shade, guild)
     stressed = _DIES * np.maximum(1.0 - one.vigour / weak, 0.0)
     lifespan = np.take(guilds.lifespan, guild)
-    chance = stressed + _TENTH / lifespan
+    chance = stressed + _OTHERS / lifespan
     old = _OLD[0] + (_OLD[1] - _OLD[0]) * uniform(one.key, StandDraw.OLD)
     return (uniform(child_key(one.key, year), StandDraw.DEATH) < chance) | (one.age > old * lifespan)
 
