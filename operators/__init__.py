@@ -19,6 +19,7 @@ from . import (
     preview,
     refine,
     species,
+    stands,
     year,
 )
 

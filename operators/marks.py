@@ -20,6 +20,7 @@ from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
 from ..tetflora_addon.blender.scene.objects import SURFACE_TYPES, may_instance
 from ..tetflora_addon.blender.species.catalogue import default_species
 from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.blender.stands.growing import shown_stand
 from .base import Reporting, counted, in_object_mode, need, plants_selected, select_only, selected_plants
 
 
@@ -224,6 +225,7 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
             ('LEAVES', "Leaf Objects", "Meshes that replace leaves"),
             ('OUTPUT', "Output", "Species with their own pass index, light group or materials"),
             ('FIELD', "Field Species", "Species of the active field of plants"),
+            ('STAND', "Stand", "Species of the stand"),
         ),
     )
     action: EnumProperty(
@@ -266,6 +268,8 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
             return context.scene.tetflora.output, "species"
         if self.which == 'MIX':
             return shown_population(context.scene), "mix"
+        if self.which == 'STAND':
+            return shown_stand(context), "species"
         return context.scene.tetflora, "leaf_objects"
 
 

@@ -147,8 +147,15 @@ class TETFLORA_UL_output_species(_SpeciesList, bpy.types.UIList):
     which, entries, beside = 'OUTPUT', "species", "pass_index"
 
 
+class TETFLORA_UL_stand_species(_SpeciesList, bpy.types.UIList):
+    """A species of a stand and its share of what is planted."""
+
+    which, entries, beside = 'STAND', "species", "planted"
+
+
 CLASSES = (
     TETFLORA_UL_mix,
+    TETFLORA_UL_stand_species,
     TETFLORA_UL_leaf_objects,
     TETFLORA_UL_field_species,
     TETFLORA_UL_output_species,

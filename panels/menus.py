@@ -40,6 +40,7 @@ from ..operators.refine import (
     TETFLORA_OT_make_plant_mesh,
     TETFLORA_OT_refine,
 )
+from ..operators.stands import TETFLORA_OT_grow_stand
 from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.species.catalogue import FIRST
@@ -130,6 +131,7 @@ class TETFLORA_MT_object(bpy.types.Menu):
         draw_buttons(
             layout,
             _POPULATE,
+            Button(TETFLORA_OT_grow_stand, 'TIME'),
             Button(TETFLORA_OT_mark_occluder, 'MOD_MASK', "Mark or Unmark as Occluder"),
             Button(TETFLORA_OT_mark_explicit, 'MESH_ICOSPHERE', "Refine or Ignore These Meshes"),
             Button(TETFLORA_OT_use_as_species, 'ASSET_MANAGER'),

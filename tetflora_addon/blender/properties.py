@@ -29,6 +29,7 @@ from .scene.skeletons import FORM_TYPES
 from .settings import AnimationProperties, RefinementProperties
 from .species import asset_species, editor, edits
 from .species.catalogue import SpeciesChoice
+from .stands import properties as stand_properties
 from .viewport import state
 
 #: Notified with a scene when Refine Automatically is switched on or off there.
@@ -105,6 +106,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
     field_species_index: IntProperty(name="Active Field Species", options={'HIDDEN', 'SKIP_SAVE'})
     stand_year: FloatProperty(**STAND_YEAR, override=_OVERRIDES, update=_on_year)
     stand_smooth: BoolProperty(**STAND_SMOOTH, override=_OVERRIDES, update=_on_year)
+    stand: PointerProperty(type=stand_properties.TetFloraStand)
     is_occluder: BoolProperty(
         name="Occluder",
         description=(
@@ -241,6 +243,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         type=properties.TetFloraPopulation,
     )
     populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
+    stand: PointerProperty(type=stand_properties.TetFloraStand)
     biomes: CollectionProperty(
         name="Biomes",
         description="Biomes of the scene; those above come first where several with limits meet",
@@ -285,7 +288,10 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
     )
 
 
-_MODULES = (properties, biome_properties, output_properties, state, editor, edits, asset_species, scatterers, settings)
+_MODULES = (
+    *(properties, stand_properties, biome_properties, output_properties, state),
+    *(editor, edits, asset_species, scatterers, settings),
+)
 CLASSES = (
     *(cls for module in _MODULES for cls in module.CLASSES),
     TetFloraFieldEntry,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...planting.places import new_seeds
 from ..attributes import KINDS, read, values_of, write
+from ..scene.field_sizes import has_history
 from ..scene.fields import FIELD_ATTRIBUTES, field_kinds, quaternions
 from ..scene.skeletons import kind_of_choice
 
@@ -38,6 +39,7 @@ def editable(obj: bpy.types.Object) -> bool:
         and not obj.data.edges
         and not obj.data.polygons
         and obj.data.shape_keys is None
+        and not has_history(obj)
         and all(a.data_type in KINDS for a in obj.data.attributes if not a.is_internal)
         and all(a.data_type == FIELD_ATTRIBUTES.get(a.name, a.data_type) for a in obj.data.attributes)
     )

@@ -222,7 +222,7 @@ def add_field(
         Years; all are full-grown if not given.
     """
     rows = (placement.position, placement.rotation, placement.scale, placement.species, placement.seed)
-    return _link_field(scene, write_field(FIELD, *rows, species, ages=ages), collection)
+    return link_field(scene, write_field(FIELD, *rows, species, ages=ages), collection)
 
 
 def field_from_plants(
@@ -247,7 +247,7 @@ def field_from_plants(
     read = single_plants(plants, depsgraph)
     species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
-    made = _link_field(scene, write_field(FIELD, *rows, species, forms, stored_ages(plants)), collection)
+    made = link_field(scene, write_field(FIELD, *rows, species, forms, stored_ages(plants)), collection)
     remove_plants(plants)
     return made
 
@@ -310,9 +310,10 @@ def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int
     return number
 
 
-def _link_field(
+def link_field(
     scene: bpy.types.Scene, field: bpy.types.Object, collection: bpy.types.Collection | None = None
 ) -> bpy.types.Object:
+    """Put a field that TetFlora made into a collection; the scene's for plants if not given."""
     field.tetflora.version, field[_FIELD_MARK] = VERSION, True
     (collection or plant_collection(scene)).objects.link(field)
     prepare_scene(scene)

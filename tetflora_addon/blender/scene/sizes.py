@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plants of recorded sizes as kinds, scales and crown forms.
 
-A plant that stands still is of the class of heights that is nearest: each is 1.4 times the one below, and the scale
+A plant that stands still is of the class of heights that is nearest: each is 1.5 times the one below, and the scale
 makes up for what is left. Classes belong to the species alone, so that no plant depends on others.
 
 Where a stand grows in an animation, plants must not jump from class to class. There, plants that were born at about the
@@ -35,10 +35,10 @@ from .own_ages import MOST_YEARS, Sizes
 from .skeletons import aged_kind, form_of, species_of
 
 #: Height of a class over that of the one below, and classes below that of full-grown plants.
-_STEP, _BELOW = 1.4, 11
+_STEP, _BELOW = 1.5, 9
 _NODES = 512  # of heights by age, from a thousandth of a year on
 #: Years since death that stand for others, as far as plants change: leaves, twigs, boughs and limbs are gone.
-_SINCE = np.array([0.5, 3.0, 9.0, 20.0, 35.0])
+_SINCE = np.array([1.0, 6.0, 25.0])
 #: Of plants that grow: years between classes of birth and of death, and ratio of the paces of classes.
 _BIRTHS, _DEATHS, _PACE = 20.0, 5.0, 1.6
 _BREAST, _TALL = 1.3, 1.5  # height of the diameter, and least height of a plant that has one, metres
@@ -93,14 +93,14 @@ def sized(
         with suppress(SpeciesError):
             species = find(species_of(kind))
             if form_of(kind) is not None:  # it is as it was drawn
-                scale[own] *= _measured(species).fitted(seeds.take(own), sizes.take(own))[0]
+                scale[own] *= measured(species).fitted(seeds.take(own), sizes.take(own))[0]
                 continue
             some = sizes.take(own)
             stages, which = np.unique(_stages(species, some), return_inverse=True)
             for n, stage in enumerate(stages.tolist()):
                 here = which == n
                 these = own[here]
-                own_scale, own_crown = _measured(at_age(species, stage.real)).fitted(seeds.take(these), some.take(here))
+                own_scale, own_crown = measured(at_age(species, stage.real)).fitted(seeds.take(these), some.take(here))
                 scale[these] *= own_scale
                 crown[these], number[these] = own_crown, len(kinds)
                 kinds.append(aged_kind(kind, stage.real, stage.imag))
@@ -115,7 +115,7 @@ def sized(
 def _stages(species: Species, sizes: Sizes) -> NDArray[np.complex128]:
     """Age (n,) as the real part, and years since death as the imaginary one, of the kind that each plant belongs to."""
     ages = ages_of(species)
-    full = _measured(species).height
+    full = measured(species).height
     dead, height = sizes.dead, np.where(sizes.height > 0.0, sizes.height, full)
     if ages.scaled:
         return np.full(len(height), ages.full, complex)
@@ -144,32 +144,34 @@ def _class_ages(species: Species, ratio: NDArray[np.float64], every: int) -> NDA
     return ages_of_heights(species, classes[nearest])
 
 
-class _Measure:
+class Measure:
     """Sizes of a compiled species at one age, for trunks that are not bent to some length by chance.
 
     Attributes
     ----------
+    flora : Flora
+        Of this species alone.
     height, radius : float
         Of the plant and its crown on average, metres.
     """
 
     def __init__(self, species: Species) -> None:
         crown = crown_of(species)
-        self._rows = compile_species([species]).rows
+        self.flora = compile_species([species])
         number = np.arange(_PLANTS)
         place, upright, one = np.zeros((_PLANTS, 3)), np.tile(np.eye(3), (_PLANTS, 1, 1)), np.ones(_PLANTS)
         some = Seeds((species.name,), np.zeros(_PLANTS, np.int32), number, place, upright, one)
-        trunk = trunks(self._rows, some)
+        trunk = trunks(self.flora.rows, some)
         self.length = float(trunk.length.mean())
         # The shoot of this year bears leaves nowhere but at its tip.
-        self.height = max(crown.height, float(axes(self._rows, trunk).knots[:, -1, 2].mean()))
+        self.height = max(crown.height, float(axes(self.flora.rows, trunk).knots[:, -1, 2].mean()))
         self.radius = crown.radius
 
     def fitted(self, seeds: Seeds, sizes: Sizes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Scales (n,) and crown forms (n, 5) with which plants have their recorded sizes."""
         none = np.zeros(len(seeds), np.int32)
         one = replace(seeds, identifiers=("",), species=none, scale=np.ones(len(seeds)), crown=None)
-        chance = trunks(self._rows, one).length / self.length
+        chance = trunks(self.flora.rows, one).length / self.length
         known = sizes.height > 0.0
         scale = np.where(known, sizes.height * sizes.fit[:, 0] / (self.height * chance), 1.0)
         width = sizes.width * sizes.fit[:, 1] / (2.0 * self.radius * chance * scale)
@@ -182,17 +184,18 @@ class _Measure:
         )
         has = (sizes.diameter > 0.0) & (sizes.height > _TALL)
         if has.any():
-            formed = trunks(self._rows, replace(one, scale=scale, crown=forms))
+            formed = trunks(self.flora.rows, replace(one, scale=scale, crown=forms))
             place = np.minimum(_BREAST / formed.length, 0.95)
-            own = 2.0 * radius_at(self._rows, formed, place)
+            own = 2.0 * radius_at(self.flora.rows, formed, place)
             forms[:, GIRTH] = np.where(has & (place < 0.95), sizes.diameter / np.maximum(own, 1e-9), 1.0)
             forms = crown_forms(len(seeds), *forms.T)
         return scale, forms
 
 
 @lru_cache(maxsize=512)
-def _measured(species: Species) -> _Measure:
-    return _Measure(species)
+def measured(species: Species) -> Measure:
+    """What is known of a species at its age; found once."""
+    return Measure(species)
 
 
 @lru_cache(maxsize=64)

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator
+from dataclasses import replace
 
 import bpy
+import numpy as np
 
 from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...jobs import Progress
 from ...preview.levels import Level, Levels, gather
-from ...preview.light_plants import Shapes, bounds_of_plants, light_plants
+from ...preview.light_plants import MOST_PLANTS, Shapes, bounds_of_plants, light_plants
 from ...preview.simple_crowns import joined, simple_crowns
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
@@ -29,12 +31,14 @@ from ..scene.field_sizes import stand_years
 from ..scene.objects import taking_part
 from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
 from ..scene.scatterers import is_drop
+from ..scene.sizes import measured
 from ..settings import season_of, years_of
 from ..species import edits
 from ..worker import call_in_thread, steps_in_thread
 from . import state
 from .state import camera_now, find, of
 
+_MANY_KINDS = 12  # more are compiled one by one, and kept
 _SOON = 0.2  # seconds from a change of plants to reading them again
 
 
@@ -134,8 +138,25 @@ def _shapes_of(
         if not crowns:
             raise
         return joined(crowns)
-    grown = make(in_year(scene, compile_for(seeds.identifiers, scene, depsgraph)), seeds)
-    return joined([grown, *crowns]) if crowns else grown
+    grown = _grown(scene, depsgraph, make, seeds)
+    return joined([*grown, *crowns]) if crowns or len(grown) > 1 else grown[0]
+
+
+def _grown(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, make: Callable[[Flora, Seeds], Shapes], seeds: Seeds
+) -> list[Shapes]:
+    """Plants that grow in the form of ``make``; many kinds of them one by one, which are known from other years."""
+    kinds = seeds.identifiers
+    if len(kinds) <= _MANY_KINDS:
+        return [make(in_year(scene, compile_for(kinds, scene, depsgraph)), seeds)]
+    some, out = seeds.take(slice(None, None, max(-(-len(seeds) // MOST_PLANTS), 1))), []
+    for number, species in enumerate(load_for(kinds, scene, depsgraph)):
+        own = some.take(np.flatnonzero(some.species == number))
+        if len(own):
+            one = replace(own, identifiers=(kinds[number],), species=np.zeros(len(own), np.int32))
+            out.append(make(in_year(scene, measured(species).flora), one))
+    left = len(seeds) - len(some)
+    return [replace(out[0], of=out[0].of + left), *out[1:]]
 
 
 def schedule() -> None:

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Grow a Stand: species, years and site of a wood that grows, and the slider through its years."""
+
+import bpy
+
+from ..operators.stands import (
+    TETFLORA_OT_animate_growth,
+    TETFLORA_OT_grow_again,
+    TETFLORA_OT_grow_stand,
+    TETFLORA_OT_keep_year,
+)
+from ..tetflora_addon.blender.scene.field_sizes import has_history
+from ..tetflora_addon.blender.stands.growing import is_stand, shown_stand
+from .base import Button, SidebarPanel, TETFLORA_UL_stand_species, draw_properties, split_layout
+
+
+class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
+    """Grow a stand."""
+
+    bl_label = "Grow a Stand"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        stand, active = shown_stand(context), context.active_object
+        if is_stand(active):
+            if has_history(active):
+                column = layout.column()
+                column.scale_y = 1.4
+                column.prop(active.tetflora, "stand_year", text="Year", slider=True)
+                layout.prop(active.tetflora, "stand_smooth")
+                row = layout.row(align=True)
+                Button(TETFLORA_OT_animate_growth, 'KEYFRAME').draw(row)
+                Button(TETFLORA_OT_keep_year, 'PINNED').draw(row)
+            Button(TETFLORA_OT_grow_again, 'FILE_REFRESH').draw(layout)
+        else:
+            Button(TETFLORA_OT_grow_stand, 'TIME', "Grow Stand on Selected Meshes").draw(layout)
+        draw_properties(layout.column(), stand, "years", "density", "recruits", "outside", "seed")
+        TETFLORA_UL_stand_species.draw_in(layout, stand)
+        if not stand.species:
+            layout.label(text="Default: a mixed wood of central Europe", icon='INFO')
+        elif 0 <= stand.species_index < len(stand.species):
+            draw_properties(layout.column(align=True), stand.species[stand.species_index], "planted", "rain")
+
+
+class _PartOfStand(SidebarPanel):
+    """Mix-in for panels within Grow a Stand, closed at first."""
+
+    bl_parent_id = "TETFLORA_PT_stand"
+    bl_options = {'DEFAULT_CLOSED'}
+
+
+class TETFLORA_PT_stand_site(_PartOfStand, bpy.types.Panel):
+    """Climate, soil, and where plants can stand."""
+
+    bl_label = "Site"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        stand = shown_stand(context)
+        draw_properties(layout.column(align=True), stand, "warmth", "winter")
+        draw_properties(layout.column(align=True), stand, "moisture", "relief", "fertility")
+        layout.prop(stand, "slope_max")
+        ground = next((entry.object for entry in stand.grounds if entry.object is not None), None)
+        if ground is not None:
+            layout.prop_search(stand, "vertex_group", ground, "vertex_groups")
+        else:
+            layout.prop(stand, "vertex_group")
+        draw_properties(layout, stand, "areas", "paths")
+        if stand.paths is not None:
+            layout.prop(stand, "path_distance")
+
+
+class TETFLORA_PT_stand_detail(_PartOfStand, bpy.types.Panel):
+    """How finely the stand is computed and recorded."""
+
+    bl_label = "Detail"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_properties(split_layout(self).column(), shown_stand(context), "interval", "least_height", "cell")
+
+
+CLASSES = (TETFLORA_PT_stand, TETFLORA_PT_stand_site, TETFLORA_PT_stand_detail)

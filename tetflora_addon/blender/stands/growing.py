@@ -1,0 +1,327 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Grow a stand as a job, and make a field of its records: each point is a plant in one year (`scene.field_sizes`)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass, fields, replace
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...jobs import Progress
+from ...stands.grow import StandSettings, grow
+from ...stands.guilds import Guild
+from ...stands.records import Records
+from ...stands.site import StandSite
+from ..attributes import write
+from ..placing.plant_objects import link_field
+from ..placing.terrain import read_ground
+from ..runtime import JobData, guarded, is_there
+from ..scene.field_points import read_points
+from ..scene.field_sizes import (
+    FIT,
+    OFFSET,
+    PLANT,
+    SIZE_ATTRIBUTES,
+    YEAR,
+    has_history,
+    in_year,
+    read_records,
+    read_sizes,
+)
+from ..scene.fields import field_kinds, quaternions, write_field
+from ..scene.own_ages import Sizes
+from ..settings import check_limits
+from ..species.edits import catalogue, species_for
+from ..worker import call_in_thread, steps_in_thread
+from .sites import Soil, stand_site
+
+NAME = "Stand"
+#: A wood of central Europe, with shares of what is planted and of seeds.
+MIXED_WOOD = {
+    "beech": (3.0, 2.0),
+    "oak": (3.0, 1.0),
+    "birch": (3.0, 3.0),
+    "ash": (1.0, 1.0),
+    "hornbeam": (1.0, 1.0),
+    "hazel": (0.5, 1.0),
+}
+#: Settings that a stand hands on; identity and state are its own.
+_OWN = {"rna_type", "name", "is_grown", "grounds", "species", "species_index"}
+_MASKS = ("vertex_group", "areas", "paths", "path_distance")
+_GROWING = (0.08, 0.85)  # fractions of the job: before, and while it grows
+
+
+@dataclass(frozen=True)
+class GrownStand:
+    """What growing a stand made."""
+
+    field: bpy.types.Object
+    plants: int  # in the last year
+    records: int
+    years: int
+
+
+def is_stand(obj: bpy.types.Object | None) -> bool:
+    """Whether an object is a field that was grown as a stand."""
+    return obj is not None and obj.tetflora.is_field and obj.tetflora.stand.is_grown
+
+
+def shown_stand(context: bpy.types.Context) -> bpy.types.PropertyGroup:
+    """Settings that panels show: those of the active stand, or of new ones."""
+    active = context.active_object
+    return active.tetflora.stand if is_stand(active) else context.scene.tetflora.stand
+
+
+def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+    """Give a stand the settings of another, and its species; a mixed wood where it has none."""
+    for prop in source.bl_rna.properties:
+        if prop.identifier not in _OWN:
+            setattr(target, prop.identifier, getattr(source, prop.identifier))
+    target.species.clear()
+    known = catalogue()
+    rows = [(e.species, e.planted, e.rain) for e in source.species if e.species]
+    rows = rows or [(name, *shares) for name, shares in MIXED_WOOD.items() if name in known]
+    for name, planted, rain in rows or [(name, 1.0, 1.0) for name in list(known)[:1]]:
+        entry = target.species.add()
+        entry.species, entry.planted, entry.rain = name, planted, rain
+
+
+def new_stand_steps(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Iterable[bpy.types.Object]
+) -> Generator[Progress, object, GrownStand]:
+    """Grow a stand on meshes by the scene's settings for new ones.
+
+    Closing the steps, or an error, leaves the scene as it was.
+
+    Raises
+    ------
+    TetFloraError
+        No ground, a species that the catalogue does not have, or settings with which nothing grows.
+    """
+    grounds = list(grounds)
+    data = JobData("Growing the stand", scene)
+    data.add_objects(grounds)
+    return guarded(data, _new_stand_steps(data, scene, depsgraph, grounds))
+
+
+def again_steps(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, field: bpy.types.Object
+) -> Generator[Progress, object, GrownStand]:
+    """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
+    grounds = [e.object for e in field.tetflora.stand.grounds if e.object is not None and scene in e.object.users_scene]
+    data = JobData("Growing the stand", scene)
+    data.add_objects([*grounds, field])
+    return guarded(data, _again_steps(data, scene, depsgraph, field, grounds))
+
+
+def _new_stand_steps(
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: list[bpy.types.Object]
+) -> Generator[Progress, object, GrownStand]:
+    # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
+    field = write_field(NAME, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ())
+    mesh, made = field.data, False
+    try:
+        stand = field.tetflora.stand
+        copy_stand(scene.tetflora.stand, stand)
+        for obj in grounds:
+            stand.grounds.add().object = obj
+        grown = yield from _again_steps(data, scene, depsgraph, field, grounds)
+        stand = field.tetflora.stand
+        stand.is_grown, made = True, True
+        field.tetflora.stand_year = float(stand.years)
+        field.display_type = 'BOUNDS'  # its points are plants of all years
+        link_field(scene, field)
+        return grown
+    finally:
+        if not made:
+            if is_there(field):
+                bpy.data.objects.remove(field)
+            if is_there(mesh) and not mesh.users:
+                bpy.data.meshes.remove(mesh)
+
+
+def _again_steps(
+    data: JobData,
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    field: bpy.types.Object,
+    grounds: list[bpy.types.Object],
+) -> Generator[Progress, object, GrownStand]:
+    progress = Progress(0.0, "Reading the ground")
+    yield progress
+    stand = field.tetflora.stand
+    for group in (stand, *stand.species):
+        check_limits(group, f'"{field.name}"')
+    if not grounds:
+        raise SceneError(f'"{field.name}" has no ground in this scene; select meshes and use Grow Stand')
+    entries = [entry for entry in stand.species if entry.species]
+    if not entries:
+        raise SceneError(f'"{field.name}" has no species; add one to the list')
+    guilds = [Guild(species_for(scene, e.species), e.planted, e.rain) for e in entries]
+    names = [entry.species for entry in entries]
+    soil = Soil(**{f.name: getattr(stand, f.name) for f in fields(Soil)})
+    settings = StandSettings(**{f.name: getattr(stand, f.name) for f in fields(StandSettings)})
+    ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
+    site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
+    records = yield from _growing(site, guilds, settings)
+    if not len(records):
+        raise SceneError(
+            "Nothing is left of the stand: no plant is as tall as Min Height; grow it longer, plant more, or change "
+            "the species, Warmth or Moisture"
+        )
+    progress = Progress(sum(_GROWING), "Writing the stand")
+    yield progress
+    columns = yield from call_in_thread(progress, _columns, records, site, corner)
+    data.check()
+    _replace(field, names, *columns)
+    last = int(records.year.max())
+    return GrownStand(field, len(records.at(last)), len(records), last)
+
+
+def _growing(site: StandSite, guilds: list[Guild], settings: StandSettings) -> Generator[Progress, object, Records]:
+    steps, (begin, part) = steps_in_thread(grow(site, guilds, settings), Progress(0.0, "Growing the stand")), _GROWING
+    try:
+        while True:
+            progress = next(steps)
+            yield replace(progress, fraction=begin + part * progress.fraction)
+    except StopIteration as stop:
+        return stop.value
+    finally:
+        steps.close()
+
+
+def _columns(
+    records: Records, site: StandSite, corner: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], Records]:
+    """Positions (n, 3) in the world and rotations (n, 4) of records."""
+    position = records.position.astype(np.float64)
+    lean, lying = records.lean.astype(np.float64), records.lying
+    # What lies follows the ground.
+    east, north = site.slope()
+    cells = site.cells(position[:, 0], position[:, 1])
+    length = np.maximum(np.hypot(*lean.T), 1e-9)
+    rise = np.where(lying, (lean[:, 0] * east[cells] + lean[:, 1] * north[cells]) / length, 0.0)
+    way = np.stack([lean[:, 0], lean[:, 1], np.where(lying, 1.0 + length * rise, 1.0)], axis=1)
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    position[:, :2] += corner
+    # The shortest turn from upright.
+    turn = np.stack([1.0 + way[:, 2], -way[:, 1], way[:, 0], np.zeros(len(way))], axis=1)
+    return position, turn / np.linalg.norm(turn, axis=1, keepdims=True), records
+
+
+def _replace(
+    field: bpy.types.Object,
+    names: list[str],
+    position: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    records: Records,
+) -> None:
+    """Give a field the records in place of its points."""
+    given = position, rotation, np.ones(len(records)), records.species, records.seed
+    other = write_field(NAME, *given, names)
+    values = {
+        "tf_height": records.height,
+        "tf_diameter": records.diameter,
+        "tf_crown_width": records.crown_width,
+        "tf_crown_base": records.crown_base,
+        "tf_dead": records.dead,
+        OFFSET: np.pad(records.offset, ((0, 0), (0, 1))),
+        YEAR: records.year,
+        PLANT: records.plant,
+    }
+    for name, column in values.items():
+        write(other.data, name, column, data_type=SIZE_ATTRIBUTES[name])
+    old, field.data = field.data, other.data
+    field.matrix_world = other.matrix_world.copy()
+    group = field.tetflora
+    group.field_species.clear()
+    for name in names:
+        group.field_species.add().species = name
+    bpy.data.objects.remove(other)
+    if not old.users:
+        bpy.data.meshes.remove(old)
+    field.update_tag()
+
+
+def keep_year(field: bpy.types.Object) -> int:
+    """Make a field of the plants of a history in its present year; how many there are.
+
+    Raises
+    ------
+    SceneError
+        It is no history, or cannot be read.
+    """
+    if not has_history(field):
+        raise SceneError(f'"{field.name}" has no years; select a stand that was grown')
+    group, parts = field.tetflora, [field.data]
+    points, sizes, records = (
+        read_points(field, field_kinds(field), parts),
+        read_sizes(field, parts),
+        read_records(field, parts),
+    )
+    points, sizes = in_year(points, sizes, records, group.stand_year, False)
+    number = len(points.species)
+    if not number:
+        raise SceneError(f'"{field.name}" has no plants in this year; choose another')
+    turn = quaternions(np.moveaxis(points.rotation, 2, 0))
+    own = points.species.astype(np.int32), points.seed.astype(np.int32)
+    other = write_field(field.data.name, points.position, turn, points.scale.mean(axis=0), *own, ())
+    for name, column in _stored(sizes).items():
+        write(other.data, name, column, data_type=SIZE_ATTRIBUTES[name])
+    # `write_field` counts from a corner near the points; here they stay in the field's own space.
+    write(other.data, "position", points.position)
+    old, field.data, group.seed = field.data, other.data, 0
+    bpy.data.objects.remove(other)
+    if not old.users:
+        bpy.data.meshes.remove(old)
+    field.display_type = 'TEXTURED'
+    field.update_tag()
+    return number
+
+
+def _stored(sizes: Sizes | None) -> dict[str, NDArray]:
+    """Attributes of sizes that say anything."""
+    if sizes is None:
+        return {}
+    found = {
+        "tf_height": sizes.height,
+        "tf_diameter": sizes.diameter,
+        "tf_crown_width": sizes.width,
+        "tf_crown_base": sizes.base,
+        "tf_dead": sizes.dead,
+        OFFSET: np.pad(sizes.offset, ((0, 0), (0, 1))),
+    }
+    found = {name: column for name, column in found.items() if column.any()}
+    if (sizes.fit != 1.0).any():
+        found[FIT] = np.pad(sizes.fit, ((0, 0), (0, 1)))
+    return found
+
+
+def animate(field: bpy.types.Object, first: int, last: int) -> tuple[float, float]:
+    """Key the years of a history from a frame to another, evenly; the first year and the last.
+
+    Raises
+    ------
+    SceneError
+        It is no history.
+    """
+    if not has_history(field):
+        raise SceneError(f'"{field.name}" has no years; select a stand that was grown')
+    year = read_records(field, [field.data]).year
+    begin, end = float(year.min()), float(year.max())
+    group = field.tetflora
+    group.stand_smooth = True
+    editing = bpy.context.preferences.edit
+    before, editing.keyframe_new_interpolation_type = editing.keyframe_new_interpolation_type, 'LINEAR'
+    try:
+        for frame, at in ((first, begin), (last, end)):
+            group.stand_year = at
+            field.keyframe_insert("tetflora.stand_year", frame=frame)
+    finally:
+        editing.keyframe_new_interpolation_type = before
+    return begin, end

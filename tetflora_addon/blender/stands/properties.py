@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings of stands: of new ones (``Scene.tetflora.stand``) and of each that was grown (``Object.tetflora.stand``)."""
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+
+from ...planting.rules import Rules
+from ...setting import LENGTH
+from ...stands.grow import StandSettings
+from ..placing.properties import TetFloraGround
+from ..settings import properties_of
+from ..species.catalogue import SpeciesChoice
+
+_GROWTH = properties_of(StandSettings, options=set())
+_RULES = properties_of(Rules, options=set())
+_FACTOR = {"min": 0.0, "max": 1.0, "subtype": 'FACTOR', "options": set()}
+
+
+class TetFloraStandEntry(bpy.types.PropertyGroup, SpeciesChoice):
+    """One species of a stand."""
+
+    takes_assets = False  # they do not grow
+
+    planted: FloatProperty(
+        name="Planted",
+        description="Share of this species among the plants that are planted at the beginning, relative to the others",
+        default=1.0,
+        min=0.0,
+        soft_max=10.0,
+        max=1e6,
+        options=set(),
+    )
+    rain: FloatProperty(
+        name="Seeds",
+        description="Share of this species among the seeds that arrive from outside, relative to the others",
+        default=1.0,
+        min=0.0,
+        soft_max=10.0,
+        max=1e6,
+        options=set(),
+    )
+
+
+class TetFloraStand(bpy.types.PropertyGroup):
+    """What a stand grows from."""
+
+    is_grown: BoolProperty(name="Stand", description="This field was grown as a stand", options={'HIDDEN'})
+    grounds: CollectionProperty(name="Grounds", description="Meshes that the stand grows on", type=TetFloraGround)
+    species: CollectionProperty(
+        name="Species",
+        description="Species of the stand; if empty, a mixed wood of central Europe",
+        type=TetFloraStandEntry,
+    )
+    species_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+
+    years: properties_of(StandSettings, options=set(), default=100).years
+    density: _GROWTH.density
+    recruits: _GROWTH.recruits
+    outside: _GROWTH.outside
+    seed: _GROWTH.seed
+    interval: _GROWTH.interval
+    least_height: _GROWTH.least_height
+    cell: _GROWTH.cell
+
+    warmth: FloatProperty(
+        name="Warmth",
+        description=(
+            "Sum of the daily mean temperatures above 5 °C in a year, where altitude is 0; it is colder above. About "
+            "900 in Lapland, 1,700 in central Europe, 3,500 on the Mediterranean"
+        ),
+        default=1700.0,
+        min=0.0,
+        soft_max=6000.0,
+        max=12_000.0,
+        step=10_000,
+        precision=0,
+        options=set(),
+    )
+    winter: FloatProperty(
+        name="Winter",
+        description="Mean temperature of the coldest month, in °C, where altitude is 0",
+        default=-1.0,
+        min=-80.0,
+        soft_min=-30.0,
+        soft_max=20.0,
+        max=40.0,
+        step=100,
+        precision=1,
+        options=set(),
+    )
+    moisture: FloatProperty(
+        name="Moisture", description="Moisture of level soil: 0 is dry, 0.5 fresh, 1 wet", default=0.5, **_FACTOR
+    )
+    relief: FloatProperty(
+        name="By Relief",
+        description="How much drier ridges are, and how much wetter valleys, by the shape of the ground",
+        default=0.5,
+        **_FACTOR,
+    )
+    fertility: FloatProperty(name="Fertility", description="Soil: 0 is poor, 1 is rich", default=0.7, **_FACTOR)
+    slope_max: _RULES.slope_max
+    vertex_group: StringProperty(
+        name="Vertex Group",
+        description="Vertex group of the ground whose weights say where plants can stand: 0 is bare",
+        options=set(),
+    )
+    areas: PointerProperty(
+        name="Areas",
+        description="Collection of closed curves; the stand grows only inside them, as seen from above",
+        type=bpy.types.Collection,
+    )
+    paths: PointerProperty(
+        name="Paths",
+        description="Collection of curves along which the ground stays bare, as seen from above",
+        type=bpy.types.Collection,
+    )
+    path_distance: FloatProperty(
+        name="Path Distance",
+        description="Minimum distance from trunks to the path's centerline",
+        default=2.0,
+        min=0.0,
+        soft_max=50.0,
+        options=set(),
+        **LENGTH,
+    )
+
+
+CLASSES = (TetFloraStandEntry, TetFloraStand)
