@@ -139,7 +139,15 @@ def test_new_tools_are_in_menus_so_that_search_finds_them():
     for draw in (draw_in_add_menu, TETFLORA_MT_object.draw):
         draw(SimpleNamespace(layout=layout), bpy.context)
     drawn, menus = set(layout.names("operator")), layout.names("menu")
-    tools = ("paint_plants", "drop_to_ground", "first_forest", "ground_cover", "keep_results", "preview_levels")
+    tools = (
+        "paint_plants",
+        "drop_to_ground",
+        "first_forest",
+        "ground_cover",
+        "grow_stand",
+        "keep_results",
+        "preview_levels",
+    )
     files = ("import_populations", "export_populations")
     assert {f"tetflora.{name}" for name in tools + files} <= drawn <= _ids()
     assert "TETFLORA_MT_place_plant" in menus

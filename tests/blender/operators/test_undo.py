@@ -84,6 +84,16 @@ def populated_as_field() -> None:
     select(next(o for o in bpy.data.objects if o.tetflora.is_field))
 
 
+def stand() -> None:
+    """A small stand of one species has grown."""
+    ground_active()
+    group = scene().tetflora.stand
+    group.years, group.interval, group.density = 6, 3, 1500.0
+    group.species.add().species = "birch"
+    assert ops().grow_stand() == {'FINISHED'}
+    group.years = 7
+
+
 def frozen() -> None:
     populated()
     assert ops().freeze_population() == {'FINISHED'}
@@ -183,6 +193,10 @@ CASES: list[Case] = [
     ("ground_cover", populated, "ground_cover", {}),
     ("ground_cover again", lambda: (populated(), cover(), change_population()), "ground_cover", {}),
     ("ground_snow", lambda: (populated(), paint_ground()), "ground_snow", {}),
+    ("grow_stand", lambda: (stand(), select(bpy.data.objects["ground"])), "grow_stand", {}),
+    ("grow_again", lambda: (stand(), change_stand()), "grow_again", {}),
+    ("animate_growth", stand, "animate_growth", {}),
+    ("keep_year", stand, "keep_year", {}),
     ("set_population_ground", lambda: (populated(), select(add_mesh("other"))), "set_population_ground", {}),
 ]
 #: Operators with an undo step that cannot be called without a file from outside; their own case is below.
@@ -203,6 +217,10 @@ def paint_ground() -> None:
 def change_population() -> None:
     scene().tetflora.populations[0].count = 7
     scene().tetflora.populations[0].seed = 5
+
+
+def change_stand() -> None:
+    bpy.context.active_object.tetflora.stand.seed = 5
 
 
 def cover() -> None:

@@ -53,6 +53,7 @@ MIXED_WOOD = {
 #: Settings that a stand hands on; identity and state are its own.
 _OWN = {"rna_type", "name", "is_grown", "grounds", "species", "species_index"}
 _MASKS = ("vertex_group", "areas", "paths", "path_distance")
+_YEAR_PATH = "tetflora.stand_year"
 _GROWING = (0.08, 0.85)  # fractions of the job: before, and while it grows
 
 
@@ -303,7 +304,7 @@ def _stored(sizes: Sizes | None) -> dict[str, NDArray]:
 
 
 def animate(field: bpy.types.Object, first: int, last: int) -> tuple[float, float]:
-    """Key the years of a history from a frame to another, evenly; the first year and the last.
+    """Key the years of a history from a frame to another, evenly from 0 to the last one; returns both.
 
     Raises
     ------
@@ -312,16 +313,23 @@ def animate(field: bpy.types.Object, first: int, last: int) -> tuple[float, floa
     """
     if not has_history(field):
         raise SceneError(f'"{field.name}" has no years; select a stand that was grown')
-    year = read_records(field, [field.data]).year
-    begin, end = float(year.min()), float(year.max())
+    begin, end = 0.0, float(read_records(field, [field.data]).year.max())
     group = field.tetflora
     group.stand_smooth = True
-    editing = bpy.context.preferences.edit
-    before, editing.keyframe_new_interpolation_type = editing.keyframe_new_interpolation_type, 'LINEAR'
-    try:
-        for frame, at in ((first, begin), (last, end)):
-            group.stand_year = at
-            field.keyframe_insert("tetflora.stand_year", frame=frame)
-    finally:
-        editing.keyframe_new_interpolation_type = before
+    for curve in _year_curves(field):
+        curve.keyframe_points.clear()
+    for frame, at in ((first, begin), (last, end)):
+        group.stand_year = at
+        field.keyframe_insert(_YEAR_PATH, frame=frame)
+    for curve in _year_curves(field):
+        for point in curve.keyframe_points:
+            point.interpolation = 'LINEAR'
     return begin, end
+
+
+def _year_curves(field: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """Curves of keys of a stand's year."""
+    animation = field.animation_data
+    layers = animation.action.layers if animation is not None and animation.action is not None else ()
+    bags = [bag for layer in layers for strip in layer.strips for bag in strip.channelbags]
+    return [curve for bag in bags for curve in bag.fcurves if curve.data_path == _YEAR_PATH]

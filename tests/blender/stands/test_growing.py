@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stands in Blender: growing on a ground, its masks, growing again, keys, and keeping a year."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.scenes import add_mesh, depsgraph, select
+from tetflora_addon import errors
+from tetflora_addon.blender.placing.brush import Standing
+from tetflora_addon.blender.scene.field_sizes import has_history, stored_now
+from tetflora_addon.blender.scene.fields import read_aged_field
+from tetflora_addon.blender.stands import growing
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def stand_on(ground, years=12, **settings):
+    """A stand of birches that has grown on a ground; ``settings`` are those of new stands."""
+    group = bpy.context.scene.tetflora.stand
+    for name, value in {"years": years, "interval": 4, "density": 1500.0, **settings}.items():
+        setattr(group, name, value)
+    if not group.species:
+        group.species.add().species = "birch"
+    select(ground)
+    assert bpy.ops.tetflora.grow_stand() == {'FINISHED'}
+    return bpy.context.active_object
+
+
+def plants_of(field, year):
+    field.tetflora.stand_year = year
+    return read_aged_field(field, depsgraph(), np.array(field.matrix_world)[None])
+
+
+def digest(field):
+    return [attribute.name for attribute in field.data.attributes], plants_of(field, 8.0)[0].position.tolist()
+
+
+def test_a_stand_grows_on_its_ground_and_has_a_history():
+    ground = add_mesh("ground", size=15.0)
+    ground.location = (500.0, 20.0, 7.0)
+    bpy.context.view_layer.update()
+    field = stand_on(ground)
+    assert growing.is_stand(field)
+    assert field.tetflora.stand_year == 12.0
+    assert bpy.context.scene.tetflora.preview.plants == 'LIGHT'
+    young, old = plants_of(field, 4.0), plants_of(field, 12.0)
+    assert len(old[0]) > 50
+    assert np.median(old[2].height) > 1.5 * np.median(young[2].height)
+    place = old[0].position - [500.0, 20.0, 7.0]
+    assert np.abs(place[:, :2]).max() <= 15.0
+    np.testing.assert_allclose(place[:, 2], 0.0, atol=1e-3)
+
+
+def test_the_same_settings_grow_the_same_stand_and_others_another():
+    field = stand_on(add_mesh("ground", size=12.0))
+    before = digest(field)
+    assert bpy.ops.tetflora.grow_again() == {'FINISHED'}
+    assert digest(field) == before
+    field.tetflora.stand.seed = 1
+    assert bpy.ops.tetflora.grow_again() == {'FINISHED'}
+    assert digest(field) != before
+    assert len([obj for obj in bpy.data.objects if obj.tetflora.is_field]) == 1
+
+
+def test_masks_keep_the_stand_away():
+    ground = add_mesh("ground", size=15.0)
+    ground.vertex_groups.new(name="west").add([0, 3], 1.0, 'REPLACE')
+    field = stand_on(ground, vertex_group="west", density=4000.0)
+    west = plants_of(field, 12.0)[0].position[:, 0]
+    assert (west < 0.0).mean() > 0.65
+
+
+def test_a_year_is_kept_as_a_plain_field():
+    field = stand_on(add_mesh("ground", size=12.0))
+    seeds, _, sizes = plants_of(field, 6.5)
+    assert bpy.ops.tetflora.keep_year() == {'FINISHED'}
+    assert not has_history(field)
+    kept, _, now = plants_of(field, 0.0)
+    np.testing.assert_array_equal(kept.seed, seeds.seed)
+    np.testing.assert_allclose(kept.position, seeds.position, atol=1e-5)
+    np.testing.assert_allclose(kept.frame, seeds.frame, atol=1e-5)
+    np.testing.assert_allclose(now.height, sizes.height, rtol=1e-6)
+    assert len(stored_now(field)) == len(seeds)
+    assert bpy.ops.tetflora.grow_again() == {'FINISHED'}
+    assert has_history(field)
+
+
+def test_growth_is_keyed_from_the_first_year_to_the_last():
+    field, scene = stand_on(add_mesh("ground", size=10.0)), bpy.context.scene
+    scene.frame_start, scene.frame_end = 11, 31
+    assert bpy.ops.tetflora.animate_growth() == {'FINISHED'}
+    assert field.tetflora.stand_smooth
+    for frame, subframe, year in ((11, 0.0, 0.0), (21, 0.0, 6.0), (21, 0.5, 6.3), (31, 0.0, 12.0)):
+        scene.frame_set(frame, subframe=subframe)
+        assert field.tetflora.stand_year == pytest.approx(year, abs=1e-4)
+
+
+def test_the_brush_leaves_histories_alone():
+    field = stand_on(add_mesh("ground", size=10.0))
+    standing = Standing(bpy.context.scene, depsgraph(), covers=True)
+    assert len(standing.places) == len(plants_of(field, 12.0)[0])
+    assert not standing.removable.any()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [({"warmth": 0.0}, "climate"), ({"density": 0.0, "recruits": 0.0}, "planted"), ({"slope_max": 0.0}, "steeper")],
+)
+def test_what_cannot_grow_is_told_and_changes_nothing(settings, message):
+    ground = add_mesh("ground", size=10.0)
+    ground.rotation_euler = (0.3, 0.0, 0.0)
+    before = len(bpy.data.objects), len(bpy.data.meshes)
+    with pytest.raises((errors.TetFloraError, RuntimeError), match=message):
+        stand_on(ground, **settings)
+    assert (len(bpy.data.objects), len(bpy.data.meshes)) == before
+
+
+def test_leaving_early_changes_nothing():
+    ground = add_mesh("ground", size=10.0)
+    before = len(bpy.data.objects), len(bpy.data.meshes)
+    steps = growing.new_stand_steps(bpy.context.scene, depsgraph(), [ground])
+    for _ in range(4):
+        next(steps)
+    steps.close()
+    assert (len(bpy.data.objects), len(bpy.data.meshes)) == before
