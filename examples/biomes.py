@@ -57,12 +57,25 @@ class View:
     sun: tuple[float, float] = (48.0, 236.0)
     tint: Rgb = (1.0, 0.94, 0.84)
     grey: float = 0.34
-    haze: tuple[float, Rgb] = (0.0015, (0.55, 0.66, 0.8))
+    haze: tuple[float, Rgb] = (0.0004, (0.5, 0.62, 0.8))
     clouds: float = 0.5
+    free: float = 6.0  # meters in front of the camera without trees and shrubs
 
 
+_COOL, _GOLD = (1.0, 0.95, 0.88), (1.0, 0.86, 0.66)
 VIEWS = {
-    "beech_fern": View(grey=0.3),
+    "alpine_treeline": View((6.0, -44.0, 1.7), (-6.0, 0.0, 3.2), 24.0, (38.0, 250.0), grey=0.42, clouds=0.6),
+    "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (50.0, 215.0), grey=0.32),
+    "birch_pine": View((0.0, -42.0, 1.6), (4.0, 0.0, 4.6), 26.0, (36.0, 240.0), _GOLD, grey=0.38),
+    "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), grey=0.38, clouds=0.8),
+    "hedgerow": View((-44.0, -9.0, 1.7), (0.0, 2.0, 2.2), 28.0, (36.0, 200.0), _COOL, grey=0.42),
+    "meadow": View((0.0, -44.0, 1.5), (-2.0, 0.0, 2.6), 28.0, (42.0, 245.0), grey=0.44),
+    "mediterranean_scrub": View((0.0, -44.0, 1.7), (2.0, 0.0, 2.2), 28.0, (46.0, 240.0), _COOL, grey=0.44, clouds=0.3),
+    "oak_savanna": View((0.0, -46.0, 1.9), (0.0, 0.0, 3.8), 28.0, (24.0, 245.0), _GOLD, grey=0.42),
+    "park": View((0.0, -46.0, 1.65), (0.0, 0.0, 4.0), 28.0, (40.0, 240.0), grey=0.42),
+    "riparian_willow": View((30.0, -4.0, 1.7), (0.0, 2.0, 2.2), 26.0, (40.0, 230.0), grey=0.38, free=4.0),
+    "spruce_forest": View((0.0, -38.0, 1.6), (0.0, 0.0, 3.4), 26.0, (42.0, 210.0), grey=0.3, free=4.5),
+    "tropical_understorey": View((0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), grey=0.32, free=4.5),
 }
 
 
@@ -88,12 +101,48 @@ def build(identifier: str, view: View) -> None:
     camera.data.lens, camera.data.clip_start, camera.data.clip_end = view.lens, 0.05, 3000.0
     eye, ahead = (
         Vector((x, y, z + float(ground.heights(np.array(x), np.array(y), biome.ground))))
-        for x, y, z in (view.eye, view.ahead)
+        for x, y, z in (_clear(scene, view), view.ahead)
     )
     camera.location, camera.rotation_euler = eye, (ahead - eye).to_track_quat('-Z', 'Y').to_euler()
     scene.collection.objects.link(camera)
     scene.camera = camera
     _light(scene, view, around)
+
+
+def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
+    """The place nearest to that of a view from which no plant stands close in the picture."""
+    from tetflora_addon.blender.attributes import world_matrix
+    from tetflora_addon.blender.placing.canopy import canopy_of, is_cover
+    from tetflora_addon.blender.scene.crowns import crown_for
+    from tetflora_addon.blender.scene.fields import fields_of, read_field
+
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    canopy, _ = canopy_of(scene, depsgraph)
+    plants, reach = [canopy.position[:, :2]], [view.free + 0.3 * canopy.radius]
+    covers = {population.uid for population in scene.tetflora.populations if is_cover(population)}
+    for field in fields_of([obj for obj in scene.objects if obj.tetflora.population in covers]):
+        read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
+        high = np.array([crown_for(scene, kind).height for kind in read.identifiers])[read.species] * read.scale
+        plants.append(read.position[high > 0.3, :2])
+        reach.append(2.2 * high[high > 0.3])
+    plants, reach = np.concatenate(plants), np.concatenate(reach)
+    near = np.hypot(*(plants - view.eye[:2]).T) < 30.0
+    plants, reach = plants[near], reach[near]
+    along = np.array(view.ahead[:2]) - view.eye[:2]
+    along /= np.linalg.norm(along)
+    side = np.arange(-10.0, 10.1, 0.5)
+    places = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    places = places[np.argsort(np.hypot(*places.T), kind="stable")] + view.eye[:2]
+    best = {}
+    for place in places:
+        away = plants - place
+        ahead, beside = away @ along, np.abs(away @ [-along[1], along[0]])
+        seen = (ahead > -0.4) & (beside < 0.75 * np.maximum(ahead, 0.0) + 0.6)
+        best[tuple(place)] = (np.hypot(*away[seen].T) / reach[seen]).min(initial=9.0)
+        if best[tuple(place)] >= 1.0:
+            break
+    x, y = max(best, key=best.__getitem__)
+    return float(x), float(y), view.eye[2]
 
 
 def _add(at_once, adding, scene, biome, land):

@@ -9,6 +9,7 @@ import bpy
 from . import (
     add,
     assets,
+    biomes,
     brush,
     ground_cover,
     ground_tools,

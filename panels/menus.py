@@ -15,6 +15,7 @@ from ..operators.assets import (
     TETFLORA_OT_stop_using_as_species,
     TETFLORA_OT_use_as_species,
 )
+from ..operators.biomes import TETFLORA_OT_add_biome
 from ..operators.brush import TETFLORA_OT_paint_plants
 from ..operators.ground_cover import TETFLORA_OT_ground_cover
 from ..operators.ground_tools import TETFLORA_OT_place_plant
@@ -45,6 +46,7 @@ from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.species.catalogue import FIRST
 from .base import Button, draw_buttons, thumbnail
+from .biomes import FALLBACK_ICON, TETFLORA_MT_add_biome
 from .places import IMPORTS
 from .preferences import PIE
 
@@ -117,6 +119,7 @@ def draw_in_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """The entry in Blender's Add menu."""
     menu.layout.separator()
     _FIRST_FOREST.draw(menu.layout)
+    menu.layout.menu(TETFLORA_MT_add_biome.__name__, icon=FALLBACK_ICON)
     draw_place_menu(menu.layout)
     menu.layout.menu(TETFLORA_MT_add_plant.__name__, icon='OUTLINER_OB_FORCE_FIELD')
 
@@ -148,6 +151,7 @@ class TETFLORA_MT_object(bpy.types.Menu):
             layout,
             _DROP,
             Button(TETFLORA_OT_ground_cover, 'OUTLINER_OB_CURVES'),
+            Button(TETFLORA_OT_add_biome, FALLBACK_ICON),
             Button(TETFLORA_OT_import_populations, 'IMPORT', "Import Populations..."),
             Button(TETFLORA_OT_export_populations, 'EXPORT', "Export Populations..."),
             None,

@@ -11,6 +11,7 @@ import pytest
 
 from devtools import build
 from tetflora_addon.blender import preferences, properties
+from tetflora_addon.blender.biomes.properties import TetFloraBiome
 from tetflora_addon.blender.cli.command import main
 from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraMixEntry, TetFloraPopulation
 from tetflora_addon.blender.results import output_properties
@@ -29,6 +30,7 @@ GROUPS = (
     properties.TetFloraLeafObject,
     TetFloraPopulation,
     TetFloraMixEntry,
+    TetFloraBiome,
     output_properties.TetFloraOutput,
     output_properties.TetFloraSpeciesOutput,
     state.TetFloraPreview,

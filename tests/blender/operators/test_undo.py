@@ -16,6 +16,7 @@ import bpy
 import pytest
 
 import operators
+from benchmarks import places_files
 from devtools import session
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
@@ -52,6 +53,15 @@ def forest() -> None:
 def ground_active() -> None:
     forest()
     select(bpy.data.objects["ground"])
+
+
+def biome_added() -> None:
+    ground_active()
+    assert ops().add_biome(biome="dead_forest") == {'FINISHED'}
+
+
+def change_biome() -> None:
+    scene().tetflora.biomes[0].wetness_max = 0.4
 
 
 def refined() -> None:
@@ -197,10 +207,19 @@ CASES: list[Case] = [
     ("grow_again", lambda: (stand(), change_stand()), "grow_again", {}),
     ("animate_growth", stand, "animate_growth", {}),
     ("keep_year", stand, "keep_year", {}),
+    ("add_biome", ground_active, "add_biome", {"biome": "hedgerow"}),
+    ("update_biome", lambda: (biome_added(), change_biome()), "update_biome", {}),
+    ("remove_biome", biome_added, "remove_biome", {}),
     ("set_population_ground", lambda: (populated(), select(add_mesh("other"))), "set_population_ground", {}),
 ]
 #: Operators with an undo step that cannot be called without a file from outside; their own case is below.
-FROM_FILES = {"import_populations", "load_species"}
+PLACES = {
+    "grid": "import_terrain",
+    "big_tiff": "import_canopy",
+    "csv": "import_inventory",
+    "outlines": "import_outlines",
+}
+FROM_FILES = {"import_populations", "load_species", *PLACES.values()}
 
 
 def mark_ground() -> None:
@@ -268,6 +287,11 @@ def test_what_comes_from_a_file_of_populations_can_be_undone(history, tmp_path):
     populated()
     assert ops().export_populations(filepath=str(path)) == {'FINISHED'}
     check("import_populations", {"filepath": str(path)})
+
+
+@pytest.mark.parametrize("kind", PLACES)
+def test_imported_places_can_be_undone(history, tmp_path, kind):
+    check(PLACES[kind], {"filepath": str(places_files.write(tmp_path, kind)[1])})
 
 
 def test_a_species_that_was_loaded_can_be_undone(history, tmp_path):

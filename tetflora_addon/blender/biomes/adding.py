@@ -12,7 +12,6 @@ import uuid
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
 
 import bpy
 
@@ -27,7 +26,7 @@ from ..placing.populations import Made, add_population, make_plants_steps, remov
 from ..runtime import GoneError, JobData, guarded, is_there
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
 from .files import Biome, pages_of, set_limits
-from .ground import lay_soil
+from .ground import lay_soil, make_line
 
 _SOIL = 0.06  # fraction of the work at the end
 
@@ -107,6 +106,8 @@ def _add_steps(
         for obj in grounds:
             made.grounds.add().object = obj
         set_limits(made, biome.limits)
+        if "path_max" in biome.limits:
+            made.paths = make_line(scene, f"{made.name} line", grounds)
         group.biomes_index = len(group.biomes) - 1
         for number, layer in enumerate(biome.layers):
             population = add_population(scene, grounds, name=layer["name"])
@@ -243,6 +244,8 @@ def _restored(scene: bpy.types.Scene) -> Iterator[None]:
             for index in [i for i, p in enumerate(group.populations) if p.uid not in before][::-1]:
                 remove_population(scene, index)
             for index in [i for i, b in enumerate(group.biomes) if b.uid not in before][::-1]:
+                if group.biomes[index].paths is not None:
+                    bpy.data.batch_remove([*group.biomes[index].paths.objects, group.biomes[index].paths])
                 group.biomes.remove(index)
             group.populations_index, group.biomes_index = active
             for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
@@ -258,8 +261,3 @@ def remove_biome(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> int:
     group.biomes.remove(next(i for i, b in enumerate(group.biomes) if b.uid == uid))
     group.biomes_index = max(min(group.biomes_index, len(group.biomes) - 1), 0)
     return number
-
-
-def stored(biome: bpy.types.PropertyGroup) -> dict[str, Any]:
-    """What a biome keeps of its file beside its layers."""
-    return json.loads(biome.data) if biome.data else {}

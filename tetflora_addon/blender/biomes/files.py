@@ -33,9 +33,9 @@ from ..placing.population_files import (
 )
 from ..placing.properties import TetFloraPopulation
 from ..placing.zones import limits_of_zone
-from ..species.edits import find_edit, listed, species_data
+from ..species.edits import find_edit, species_data
 from .library import MAX_FILE_BYTES
-from .properties import TetFloraBiome
+from .properties import TetFloraBiome, data_of
 from .stands import check_stand
 
 FORMAT = "TetFlora biome"
@@ -158,10 +158,10 @@ def biome_data(
 ) -> dict[str, Any]:
     """Populations as the layers of a file, with the limits of their biome and species that only this file has."""
     data: dict[str, Any] = {"format": FORMAT, "version": VERSION, "name": name, "description": description}
-    stored = json_of(biome.data) if biome is not None and biome.data else {}
+    stored = data_of(biome) if biome is not None else {}
     data |= {key: value for key, value in stored.items() if key in ("ground", "season") and value}
     layers = [_layer_data(population) for population in populations]
-    species = _species_data(scene, {part["species"] for layer in layers for part in layer.get("species", [])})
+    species = _species_data(scene, [part for layer in layers for part in layer["species"]])
     if species:
         data["species"] = species
     if biome is not None:
@@ -194,13 +194,11 @@ def _layer_data(population: bpy.types.PropertyGroup) -> dict[str, Any]:
     return layer
 
 
-def _species_data(scene: bpy.types.Scene, identifiers: set[str]) -> dict[str, dict[str, Any]]:
-    """Pages of those species that are edited or new in this file, and not made from others as litter is."""
-    found = {}
-    for name in sorted(identifiers):
-        if find_edit(scene, name) is not None and not any(name.startswith(f"{other}_") for other in listed()):
-            found[name] = dict(species_data(scene, name))
-    return found
+def _species_data(scene: bpy.types.Scene, parts: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Pages of those species that are edited or new in this file; what they shed is made from them."""
+    names = {part.get("shed_by", "") for part in parts} - {""}
+    names |= {part["species"] for part in parts if not part["species"].startswith(part.get("shed_by", "?") + "_")}
+    return {name: dict(species_data(scene, name)) for name in sorted(names) if find_edit(scene, name) is not None}
 
 
 def pages_of(scene: bpy.types.Scene, biome: Biome) -> dict[str, dict[str, Any]]:

@@ -10,9 +10,9 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 from numpy.typing import NDArray
 
-from ...files import json_of
 from ...growth.hashing import key_of_seed
 from ...planting.canopy import Sheet
 from ...planting.plane import gradient_noise
@@ -24,6 +24,7 @@ from ..placing.terrain import read_ground
 from ..scene.crowns import crown_for
 from ..scene.fields import fields_of, read_field
 from .files import GROUND
+from .properties import data_of
 
 NAME = "Land"
 #: Side of land that is made, and of its squares, meters.
@@ -72,6 +73,23 @@ def make_land(scene: bpy.types.Scene, ground: Mapping[str, Any], seed: int = 0) 
     return land
 
 
+def make_line(scene: bpy.types.Scene, name: str, grounds: Iterable[bpy.types.Object]) -> bpy.types.Collection:
+    """A collection with a curve that winds across the grounds from west to east, for biomes that follow lines."""
+    corners = np.array([obj.matrix_world @ Vector(corner) for obj in grounds for corner in obj.bound_box])
+    (west, south, low), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
+    x = np.linspace(west, east, 60)
+    y = 0.5 * (south + north) + 0.012 * (north - south) * brook(100.0 * (x - 0.5 * (west + east)) / (east - west))
+    curve = bpy.data.curves.new(name, 'CURVE')
+    curve.dimensions = '3D'
+    spline = curve.splines.new('POLY')
+    spline.points.add(len(x) - 1)
+    spline.points.foreach_set("co", np.stack([x, y, 0.0 * x + low, 0.0 * x + 1.0], axis=1).ravel().tolist())
+    made = bpy.data.collections.new(name)
+    scene.collection.children.link(made)
+    made.objects.link(bpy.data.objects.new(name, curve))
+    return made
+
+
 def lay_soil(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.Object]) -> list[str]:
     """Give ground a soil in the colors of the low plants and the litter of all biomes on it.
 
@@ -92,7 +110,7 @@ def lay_soil(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Se
     earth, turf, share, here = np.zeros((cells, 3)), np.zeros((cells, 3)), np.zeros(cells), np.full(cells, 1e-9)
     hidden, colour = np.zeros(cells), np.zeros((cells, 3))
     for biome in found:
-        ground = json_of(biome.data).get("ground", {}) if biome.data else {}
+        ground = data_of(biome).get("ground", {})
         value = {name: np.array(ground.get(name, GROUND[name][0])) for name in ("earth", "turf", "turf_share")}
         own = np.full(cells, 1e-6)
         for low, cell, area, colours in _low_plants(scene, depsgraph, biome.uid, sheet):

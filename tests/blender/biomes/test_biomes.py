@@ -1,0 +1,268 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Biomes: shipped files are sound, what they say is planted, what is saved comes back, and neighbours blend."""
+
+from __future__ import annotations
+
+import copy
+import json
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
+from tetflora_addon.blender.biomes import adding, files, ground, library, saving
+from tetflora_addon.blender.placing import populations
+from tetflora_addon.blender.preferences import preferences
+from tetflora_addon.blender.species.edits import catalogue
+from tetflora_addon.blender.worker import at_once
+from tetflora_addon.errors import SceneError
+from tetflora_addon.species.fallen import KIND
+from tetflora_addon.species.litter import FALLEN
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+SHIPPED = sorted(library.builtin_folder().glob("*.json"))
+SMALL = {
+    "format": "TetFlora biome",
+    "version": 1,
+    "name": "Small",
+    "description": "For tests",
+    "ground": {"earth": [0.2, 0.1, 0.05], "turf_share": 0.25},
+    "species": {
+        "blue_bush": {"of": "bush", "name": "Blue Bush", "every_order": {"leaf_colour": [[0.1, 0.1, 0.3], [0, 0, 0.1]]}}
+    },
+    "layers": [
+        {
+            "kind": "population", "name": "Bushes", "by_density": True, "density": 900.0, "min_distance": 0.8,
+            "slope_max": 30.0, "species": [{"species": "blue_bush", "weight": 3.0}, {"species": "bush"}],
+        },
+        {
+            "kind": "cover", "name": "Floor", "by_density": True, "density": 20000.0, "min_distance": 0.0, "tilt": 1.0,
+            "as_field": "FIELD",
+            "species": [
+                {"species": "wood_grass", "weight": 2.0, "habitat": "LIGHT"},
+                {"species": "blue_bush_litter", "habitat": "LITTER", "shed_by": "blue_bush"},
+            ],
+        },
+    ],
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path):
+    own = preferences()
+    own.species_folder = str(tmp_path / "species")
+    library.look_again()
+    yield
+    own.species_folder = ""
+    library.look_again()
+
+
+def scene():
+    return bpy.context.scene
+
+
+def small(**changes) -> files.Biome:
+    return files.checked(copy.deepcopy({**SMALL, **changes}), "small")
+
+
+def add(biome: files.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.Added:
+    return at_once(adding.add_biome_steps(scene(), depsgraph(), biome, list(grounds), seed))
+
+
+def places(uid: str) -> np.ndarray:
+    """Where the plants of a biome stand, (n, 3)."""
+    found = [np.zeros((0, 3))]
+    for layer in adding.layers_of(scene(), uid):
+        for obj in populations.own_objects(scene(), layer):
+            own = np.zeros((len(obj.data.vertices), 3)) if obj.tetflora.is_field else np.array([obj.location])
+            if obj.tetflora.is_field:
+                obj.data.vertices.foreach_get("co", flat := np.zeros(own.size, np.float32))
+                own = flat.reshape(-1, 3)
+            found.append(own)
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_biomes_are_sound(path):
+    """They pass the checks, need only species that there are, and have a small picture."""
+    biome, known = files.read_biome(path), catalogue()
+    pages = files.pages_of(scene(), biome)
+    for layer in biome.layers:
+        for part in layer["species"]:
+            name, shed_by = part["species"], part.get("shed_by", "")
+            if shed_by:
+                assert shed_by in known or shed_by in pages
+                assert name.removeprefix(f"{shed_by}_") in (*FALLEN, KIND)
+            else:
+                assert name in known or name in pages
+    assert set(pages).isdisjoint(known), "species of a biome have names of their own"
+    assert files.as_text(json.loads(path.read_text(encoding="utf-8"))) == path.read_text(encoding="utf-8")
+    picture = library.picture_file(path)
+    assert picture is not None and picture.stat().st_size <= 20_000
+    assert biome.description and library.biomes()[path.stem].name == biome.name
+
+
+def test_there_are_twelve():
+    assert len(SHIPPED) == 12
+
+
+def test_a_biome_makes_what_its_file_says():
+    """Layers with their names, numbers, species, covers and soil; the same seed makes the same, another another."""
+    land = add_mesh("ground", size=10.0)
+    added = add(small(), land)
+    assert [name for name, _ in added.layers] == ["Bushes", "Floor"]
+    assert 10 <= added.layers[0][1] <= 60 and 100 <= added.layers[1][1] <= 900
+    (biome,) = scene().tetflora.biomes
+    bushes, floor = adding.layers_of(scene(), biome.uid)
+    assert [entry.object for entry in bushes.grounds] == [land] and not bushes.covers and floor.covers
+    assert {"blue_bush", "blue_bush_litter"} <= {edit.identifier for edit in scene().tetflora.species_edits}
+    assert bushes.min_distance == pytest.approx(0.8) and bushes.slope_max == pytest.approx(np.radians(30.0))
+    assert land.material_slots[0].material is not None
+    first = places(biome.uid)
+    adding.remove_biome(scene(), biome)
+    assert not scene().tetflora.populations and not [o for o in scene().objects if o is not land]
+    add(small(), land)
+    assert np.array_equal(places(scene().tetflora.biomes[0].uid), first)
+    adding.remove_biome(scene(), scene().tetflora.biomes[0])
+    add(small(), land, seed=1)
+    assert not np.array_equal(places(scene().tetflora.biomes[0].uid), first)
+
+
+def test_what_is_saved_comes_back():
+    """Layers, limits, species of this file and the ground, by way of the user's folder."""
+    land = add_mesh("ground", size=6.0)
+    given = small(limits={"slope_max": 42.0, "wetness_min": 0.25, "altitude_max": 30.0})
+    add(given, land)
+    scene().tetflora.biomes[0].wetness_min = 0.0
+    path = saving.save_biome(scene(), "Small", "For tests", picture=False, replace=False)
+    read = files.read_biome(library.biomes()["small"].path)
+    assert path == library.biomes()["small"].path and library.biomes()["small"].is_own
+    assert [{k: v for k, v in layer.items() if k != "seed"} for layer in read.layers] == given.layers
+    assert read.limits == {"slope_max": 42.0, "altitude_max": 30.0} and read.ground == given.ground
+    assert files.pages_of(scene(), read) == files.pages_of(scene(), given)
+    with pytest.raises(SceneError, match="already has"):
+        saving.save_biome(scene(), "Small", "", picture=False, replace=False)
+    library.delete("small")
+    assert "small" not in library.biomes()
+    with pytest.raises(SceneError, match="built-in"):
+        library.delete("meadow")
+
+
+def test_neighbours_blend():
+    """A biome with limits takes its part; one without leaves it, as much as the mask says; nothing else changes."""
+    land = add_mesh("ground", size=10.0)
+    group = land.vertex_groups.new(name="west")
+    group.add([0, 3], 1.0, 'ADD')
+    floor = small(layers=[SMALL["layers"][1] | {"species": [{"species": "wood_grass"}]}], species={})
+    add(floor, land)
+    meadow = scene().tetflora.biomes[0].uid
+    before = places(meadow)
+    at_once(adding.plant_biome_steps(scene(), depsgraph(), adding.find_biome(scene(), meadow)))
+    assert np.array_equal(places(meadow), before), "planting again changes nothing"
+    add(replace(floor, name="Other"), land)
+    other = scene().tetflora.biomes[1]
+    other.vertex_group = "west"
+    from tetflora_addon.blender.placing.rules import awaits_update
+
+    assert awaits_update(adding.layers_of(scene(), meadow)[0]), "the mask of one is the other's limit"
+    for uid in (meadow, other.uid):
+        at_once(adding.plant_biome_steps(scene(), depsgraph(), adding.find_biome(scene(), uid)))
+    east, west = places(meadow), places(adding.find_biome(scene(), scene().tetflora.biomes[1].uid).uid)
+    assert abs(len(east) + len(west) - len(before)) < 5.0 * np.sqrt(len(before))
+    assert east[:, 0].mean() > 2.0 and west[:, 0].mean() < -2.0
+    adding.find_biome(scene(), meadow).gives_way = False
+    at_once(adding.plant_biome_steps(scene(), depsgraph(), adding.find_biome(scene(), meadow)))
+    assert np.array_equal(places(meadow), before)
+
+
+def test_a_biome_that_follows_lines_gets_one():
+    """Its plants stand along a curve that the artist may move."""
+    land = add_mesh("ground", size=15.0)
+    add(small(limits={"path_max": 2.0, "path_softness": 0.5}), land)
+    (biome,) = scene().tetflora.biomes
+    assert biome.paths is not None
+    found = places(biome.uid)
+    assert len(found) > 20 and np.abs(found[:, 1]).max() < 8.0
+
+
+def _broken():
+    def changed(**changes):
+        return {**SMALL, **changes}
+
+    def in_layer(**changes):
+        return changed(layers=[{**SMALL["layers"][0], **changes}])
+
+    return [
+        (changed(format="TetFlora populations"), '"format"'),
+        (changed(version=2), "update the extension"),
+        (changed(name="  "), '"name" is empty'),
+        (changed(layers=[]), '"layers" is empty'),
+        (changed(more=1), 'unknown key "more"'),
+        (changed(limits={"slope_max": 120}), '"limits": "slope_max"'),
+        (changed(limits={"wet": 1}), 'unknown key "wet"'),
+        (changed(ground={"earth": [0.1, 0.2]}), "three numbers"),
+        (changed(ground={"hills": "high"}), '"ground": "hills"'),
+        (changed(season={"day": 400}), '"season": "day"'),
+        (changed(species={"../a": {"of": "bush"}}), "cannot name a species"),
+        (changed(species={"a": {"of": 3}}), '"of"'),
+        (changed(species={"a": {"name": "A"}}), "missing"),
+        (in_layer(kind="tree"), '"kind"'),
+        (in_layer(density="many"), '"density"'),
+        (in_layer(species=[]), 'no "species"'),
+        (in_layer(species=[{"species": "bush", "weight": -1}]), '"weight"'),
+        (in_layer(wetness_min=1.5), '"wetness_min"'),
+    ]
+
+
+@pytest.mark.parametrize(("data", "said"), _broken(), ids=lambda value: value if isinstance(value, str) else "")
+def test_broken_files_are_refused(tmp_path, data, said):
+    """By the names of file and key; nothing is imported."""
+    path = tmp_path / "broken.json"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(SceneError, match=r"broken\.json") as error:
+        saving.import_biome(path, replace=False)
+    assert said in str(error.value) and "broken" not in library.biomes()
+
+
+def test_nothing_is_left_of_what_fails(monkeypatch):
+    """An unknown species, a broken one, ground where nothing can grow, and Esc in the middle of a layer."""
+    land = add_mesh("ground", size=6.0)
+    depsgraph()
+    before = datablocks(), len(scene().tetflora.species_edits)
+    unknown = [{**SMALL["layers"][0], "species": [{"species": "no_such"}]}]
+    steep = [{**layer, "slope_min": 80.0, "slope_max": 90.0} for layer in SMALL["layers"]]
+    for changes, said in (
+        ({"layers": unknown}, "no_such"),
+        ({"species": {"blue_bush": {"of": "bush", "habit": 7}}}, "habit"),
+        ({"layers": steep}, "slope"),
+    ):
+        with pytest.raises(Exception, match=said):
+            add(small(**changes), land)
+        assert (datablocks(), len(scene().tetflora.species_edits)) == before
+        assert not scene().tetflora.populations and not scene().tetflora.biomes
+    steps = adding.add_biome_steps(scene(), depsgraph(), small(), [land])
+    for step in steps:
+        if step.message.startswith("Floor"):
+            break
+    steps.close()
+    assert (datablocks(), len(scene().tetflora.species_edits)) == before and not scene().tetflora.biomes
+
+
+def test_the_button_makes_land_where_there_is_none(monkeypatch):
+    """On the selected ground otherwise; the startup's cube is none."""
+    monkeypatch.setattr(ground, "SIDE", 8.0)
+    path = library.own_place("small")
+    path.write_text(files.as_text(SMALL), encoding="utf-8")
+    library.look_again()
+    assert bpy.ops.tetflora.add_biome(biome="small") == {'FINISHED'}
+    land = bpy.context.object
+    assert land.dimensions.x == pytest.approx(8.0) and land.tetflora.is_occluder
+    select(land)
+    assert bpy.ops.tetflora.add_biome(biome="small", seed=3) == {'FINISHED'}
+    assert [entry.object for entry in scene().tetflora.biomes[1].grounds] == [land]
+    assert bpy.ops.tetflora.update_biome() == {'FINISHED'}
+    assert bpy.ops.tetflora.remove_biome() == {'FINISHED'} and len(scene().tetflora.biomes) == 1
