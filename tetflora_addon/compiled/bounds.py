@@ -122,6 +122,18 @@ def unit_bounds(rows: NDArray[np.void]) -> NDArray[np.float64]:
     return bounds
 
 
+def limb_reaches(rows: NDArray[np.void], bounds: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far anything is from where its limb leaves the trunk (r,), for trunks of length 1; 0 for other rows."""
+    out = np.zeros(len(rows))
+    for index in np.flatnonzero(rows["order"] == 0)[::-1]:
+        for sort in (LATERAL, DEAD, FORK):
+            child = rows["next"][index, sort]
+            if child >= 0:
+                far = np.hypot(bounds[child, 0], max(bounds[child, 2], -bounds[child, 1])) * rows["nominal"][index]
+                out[index] = max(out[index], rows["length"][child].sum() * (out[child] if sort == FORK else far))
+    return out
+
+
 def leaf_reaches(
     rows: NDArray[np.void], bounds: NDArray[np.float64], model_reach: NDArray[np.float64]
 ) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ from ..species.habit import with_habit
 from ..species.quality import with_quality
 from ..species.species import LEAF_KINDS, Species
 from .averages import Averages, RowLeaves, average, quadratic, row_leaves
-from .bounds import leaf_reaches, sampled_bounds, unit_bounds, widest_radii
+from .bounds import leaf_reaches, limb_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
 from .day import DayTotals, totals_of_day
 from .formed_totals import FormedTotals, formed_totals
@@ -181,6 +181,11 @@ class Flora:
         wood = _wood_totals(totals) * (totals.length * totals.radius)[:, None]
         area = totals.leaf_area[:, 1] + wood / 2
         return fit_clumping(self.rows, self.forms, area, self.polygons, self.leaf_width, totals.length)
+
+    @cached_property
+    def limb_reach(self) -> NDArray[np.float64]:
+        """How far anything is from where its limb leaves the trunk (r,), for trunks of length 1."""
+        return limb_reaches(self.rows, self.bound)
 
     def species_of(self, row: NDArray[np.integer]) -> NDArray[np.integer]:
         """Index (n,) of the species that rows (n,) belong to."""

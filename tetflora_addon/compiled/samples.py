@@ -22,6 +22,7 @@ from ..growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, 
 from ..growth.growth import branch_counts, chosen_children, chosen_drawn, leaf_counts, radius_at
 from ..growth.hashing import child_key, evenly, key_of_seed, mix, systematic, thinned
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR, SPUR_ORDER
+from .limbs import Limbs, Shares, limbs_of
 
 SAMPLES = 1024
 _PATHS = 1536  # branches of each row that are followed
@@ -60,6 +61,8 @@ class Points:
         How far a leaf turns to the sky.
     young : (k,) float32
         How young it is, see `growth.foliage.youth`.
+    limbs : Limbs of k
+    shares : Shares of r
     """
 
     first: NDArray[np.int64]
@@ -70,6 +73,8 @@ class Points:
     outward: NDArray[np.float32]
     light: NDArray[np.float32]
     young: NDArray[np.float32]
+    limbs: Limbs
+    shares: Shares
 
     def runs(self, subplants: Branches) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """First sample and number of samples (n,), (n,) that stand for sub-plants as they are turned to the sky."""
@@ -148,6 +153,7 @@ class _Points(Arrays):
     light: NDArray[np.float64]
     young: NDArray[np.float64]
     area: NDArray[np.float64]
+    limbs: Limbs | None = None
 
     @classmethod
     def on(
@@ -280,7 +286,7 @@ class _Walk:
             # So rare that no path has met any: they are taken to be where the branches of the row itself are.
             points = replace(self.wood, row=np.full_like(self.wood.row, expected.argmax()))
             own = np.flatnonzero(self.wood.row == row)
-        # Areas are scaled so that each row has its expected area; paths only give its distribution.
+        # Each row has its expected area; paths only give its distribution.
         met = np.bincount(points.row[own], points.area[own], len(expected))
         area = points.area[own] * (expected / np.where(met > 0, met, 1))[points.row[own]]
         base, under = self.branches[i], points.line[own, self.slot[i]] - self.start[i]
@@ -295,7 +301,10 @@ class _Walk:
             pick = systematic(area, group, place, distinct)
         else:
             pick = systematic(area, group, place, numbers[:1])
-        return self._local(points.take(own[pick]), base.take(under[pick]), i), first, numbers
+        picked, base = points.take(own[pick]), base.take(under[pick])
+        on = picked.line[:, self.slot] - self.start
+        limbs = limbs_of(self.rows, self.first, i, on, self.branches, picked.row, base)
+        return replace(self._local(picked, base, i), limbs=limbs), first, numbers
 
     def _local(self, points: _Points, base: Branches, i: int) -> _Points:
         """Points (n,) in the axes of branches (n,) of a row, in units of their length."""
@@ -322,8 +331,7 @@ def _in_bands(points: _Points, own: NDArray[np.int64], base: Branches, under: ND
 
 def _wood_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
     """A place on the wood of each branch."""
-    branches = one.branches
-    every = np.arange(len(branches))
+    branches, every = one.branches, np.arange(len(one.branches))
     along = evenly(branches.key, _ALONG)
     position, frame = lines.at(every, along)
     area = one.weight * branches.length * radius_at(rows, branches, along)
@@ -371,13 +379,13 @@ class _Collector:
     def __init__(self, rows: int) -> None:
         self.first, self.number = np.zeros((2, rows, _CLASSES), np.int64)
         self.parts: list[_Points] = []
-        self.done = 0
+        self.rows: list[int] = []
 
     def add(self, row: int, points: _Points, first: NDArray[np.int64], number: NDArray[np.int64]) -> None:
         """Samples of a row."""
-        self.first[row], self.number[row] = self.done + first, number
+        self.first[row], self.number[row] = len(self.rows) + first, number
         self.parts.append(points)
-        self.done += len(points.row)
+        self.rows += [row] * len(points.row)
 
     def points(self) -> Points:
         """All of them."""
@@ -385,5 +393,8 @@ class _Collector:
         def whole(name: str, shape: tuple[int, ...], kind: type = np.float32) -> NDArray:
             return np.concatenate([np.zeros((0, *shape)), *(getattr(p, name) for p in self.parts)]).astype(kind, "C")
 
-        vectors, numbers = whole("position", (3,)), (whole(name, ()) for name in ("outward", "light", "young"))
-        return Points(self.first, self.number, vectors, whole("frame", (3, 3)), whole("row", (), np.int32), *numbers)
+        limbs = Limbs.concatenate([p.limbs for p in self.parts])
+        shares = Shares.of(limbs, np.array(self.rows, np.int64), len(self.first))
+        vectors, numbers = whole("position", (3,)), [whole(name, ()) for name in ("outward", "light", "young")]
+        own = vectors, whole("frame", (3, 3)), whole("row", (), np.int32), *numbers
+        return Points(self.first, self.number, *own, limbs, shares)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..arrays import Arrays
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..compiled.placed import extents
 from ..growth.branches import Branches
 from ..refinement.contents import Held, Totals, bounding_cylinders
 from ..refinement.decisions import Decision
@@ -262,7 +263,7 @@ def opaque_fractions(flora: Flora, own: Branches, totals: Totals) -> NDArray[np.
 
     A spruce has twenty layers of needles across its crown. Where it is hidden, the first of them cast its shadow.
     """
-    bound = flora.sampled_bound[own.row]
+    bound = extents(flora, own)
     silhouette = _FILLED * 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * own.length**2
     return np.minimum(_LAYERS * silhouette / np.maximum(totals.optical_area, 1e-300), 1.0)
 

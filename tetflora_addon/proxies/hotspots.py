@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..compiled.placed import extents
 from ..growth.branches import Branches
 from ..refinement.lights import Light
 
@@ -105,7 +106,7 @@ def light_ratios(
     The sky has no hotspot. Where there are lamps, it is taken for little.
     """
     place = subplants.position + 0.5 * subplants.length[:, None] * subplants.frame[:, :, 2]
-    radius, low, high = flora.sampled_bound[subplants.row].T
+    radius, low, high = extents(flora, subplants).T
     volume = _FILLED * np.pi * radius**2 * (high - low) * subplants.length**3
     extinction = 0.5 * flora.leaf_areas(subplants) / np.maximum(volume, 1e-300)
     leaf, eye = np.sqrt(flora.one_leaf_area(subplants)), _towards_eye(camera, place)

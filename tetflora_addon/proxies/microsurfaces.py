@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, gathered, perpendicular, products, spread
 from ..compiled.flora import Flora
+from ..compiled.placed import one_sided, placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import axes
 from ..growth.branches import Branches
@@ -107,12 +108,9 @@ def subplant_facets(
     totals = subplant_totals(flora, subplants)
     part = np.ones(len(subplants)) if weight is None else weight
     wood_side = leaf_side if wood_side is None else wood_side
-    return Facets.concatenate(
-        [
-            _leaves_of_subplants(flora, subplants, totals, leaf_side, part, real, once),
-            _wood_of_subplants(flora, subplants, totals, wood_side, part, real),
-        ]
-    )
+    leaves = _leaves_of_subplants(flora, subplants, totals, leaf_side, part, real, once)
+    made = Facets.concatenate([leaves, _wood_of_subplants(flora, subplants, totals, wood_side, part, real)])
+    return made if subplants.crown is None else made.take(np.flatnonzero(made.side > 0))
 
 
 def piece_facets(
@@ -198,28 +196,29 @@ def _in_a_face(flora: Flora, row: NDArray, key: NDArray[np.uint64], frame: NDArr
 
 
 def _picked(
-    flora: Flora, points: Points, subplants: Branches, owner: NDArray, index: NDArray, key: NDArray[np.uint64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Samples (m,) for facets, their places (m, 3) in the world, and the rotations (m, 3, 3) from their axes to it.
+    flora: Flora, points: Points, subplants: Branches, owner: NDArray, index: NDArray, key: NDArray, area: NDArray
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Samples (m,) for facets, their places (m, 3), rotations (m, 3, 3) from their axes to the world, and areas (m,).
 
-    Runs of samples are spread over a sub-plant, and each sub-plant starts its run elsewhere. Where it has more facets
-    than there are samples, none may lie upon another: whole plants are turned about their trunk, which gives an equally
-    likely plant; in others places are moved a little.
+    Runs of samples are spread over a sub-plant, and each starts its run elsewhere. Where there are more facets than
+    samples, none may lie upon another: whole plants are turned about their trunk, which gives an equally likely plant;
+    in others places are moved a little.
     """
     first, number = points.runs(subplants)
     start = (uniform(subplants.key, _START) * number).astype(np.int64)
     pick = first[owner] + (start[owner] + index) % number[owner]
-    place = gathered(points.position, pick).astype(np.float64)
+    place, share = placed_samples(flora, points, subplants, owner, pick)
+    place = place.astype(np.float64)
     base = gathered(subplants.frame, owner)
     again = index // number[owner]
     if again.any():
-        whole = (flora.rows["order"] == 0) & ~flora.rows["phantom"]
-        _turned(base, again, np.flatnonzero((again > 0) & whole[subplants.row[owner]]))
-        moved = np.flatnonzero((again > 0) & ~whole[subplants.row[owner]])
+        whole = ((flora.rows["order"] == 0) & ~flora.rows["phantom"])[subplants.row] & ~one_sided(subplants)
+        _turned(base, again, np.flatnonzero((again > 0) & whole[owner]))
+        moved = np.flatnonzero((again > 0) & ~whole[owner])
         place[moved] += _MOVED * np.stack([signed(key[moved], _MOVE + axis) for axis in range(3)], axis=1)
     along = sum(base[:, :, k] * place[:, k, None] for k in range(3))
     place = gathered(subplants.position, owner) + subplants.length[owner, None] * along
-    return pick, place, base
+    return pick, place, base, area if share is None else area * share
 
 
 def _turned(base: NDArray[np.float64], again: NDArray[np.int64], some: NDArray[np.intp]) -> None:
@@ -243,7 +242,7 @@ def _leaves_of_subplants(
     one = flora.one_leaf_area(subplants)
     facet = np.maximum(side**2, one)
     owner, index, key, area = facet_numbers(subplants.key, totals.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
-    pick, place, base = _picked(flora, points, subplants, owner, index, key)
+    pick, place, base, area = _picked(flora, points, subplants, owner, index, key, area)
     leaf_row = points.row[pick]
     frame = products(base, gathered(points.frame, pick).astype(np.float64))
     frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
@@ -326,7 +325,7 @@ def _wood_of_subplants(
     points = flora.samples.wood
     wood = totals.wood_area / 2
     owner, index, key, area = facet_numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, real)
-    pick, centre, base = _picked(flora, points, subplants, owner, index, key)
+    pick, centre, base, area = _picked(flora, points, subplants, owner, index, key, area)
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     colour = flora.rows["branch_colour"][points.row[pick], 0]
     velocity = _carried(flora, subplants, owner, centre)

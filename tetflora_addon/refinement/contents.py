@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..compiled.placed import bounds, extents
 from ..growth.branches import Branches
 from ..growth.envelopes import are_solids, reaches
 from ..growth.growth import fullness
@@ -157,7 +158,7 @@ class PlantParts(Arrays):
     @classmethod
     def of_subplants(cls, flora: Flora, branches: Branches) -> PlantParts:
         """Whole sub-plants (n,)."""
-        bound = flora.sampled_bound[branches.row]
+        bound = extents(flora, branches)
         extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * branches.length
         # Leaves of a solid have places of their own, however few of them are asked for.
         alone = are_solids(flora.rows)[branches.row]
@@ -300,12 +301,13 @@ def bounding_bodies(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
         A cylinder, and how far whatever is not within it reaches beyond: centre (3), axis (3), radius, half of the
         height, and that pad. Metres, world space.
     """
-    bound = (flora.bound[subplants.row] * subplants.length[:, None]).T
+    bound, pad = bounds(flora, subplants)
+    bound = bound.T
     out = np.empty((9, len(subplants)))
     out[3:6] = subplants.frame[:, :, 2].T
     out[:3] = subplants.position.T + (bound[1] + bound[2]) / 2 * out[3:6]
     out[6], out[7] = bound[0], (bound[2] - bound[1]) / 2
-    out[8] = subplants.radius * flora.widest[subplants.row] + flora.leaf_reach[subplants.row] * subplants.scale
+    out[8] = pad
     return out
 
 

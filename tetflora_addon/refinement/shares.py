@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..arrays import spread
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..compiled.placed import placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
@@ -97,7 +98,9 @@ def share_points(
                 even = even * thick / np.maximum(mean, 1e-300)[owner]
                 position = lines.at(owner, t)[0]
         else:
-            position = _sampled(flora.samples.leaves if leafy else flora.samples.wood, parts.branches, owner, index)
+            points = flora.samples.leaves if leafy else flora.samples.wood
+            position, share = _sampled(flora, points, parts.branches, owner, index)
+            even = even if share is None else even * share
             some = np.flatnonzero(solid[owner])
             if leafy and len(some):  # more places than samples
                 given = owner[some], index[some], (index[some] + 0.5) / count[owner[some]]
@@ -123,19 +126,20 @@ def _along_leaves(
 
 
 def _sampled(
-    points: Points, branches: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Places (m, 3) of samples of sub-plants; runs of samples are spread over them."""
+    flora: Flora, points: Points, branches: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Places (m, 3) of samples of sub-plants, and what they stand for; runs of samples are spread over them."""
     first, number = points.runs(branches)
     start = (uniform(branches.key, _START) * number).astype(np.int64)
     pick = first[owner] + (start[owner] + index) % np.maximum(number[owner], 1)
-    local = points.position[pick] * branches.length[owner, None].astype(np.float32)
+    local, share = placed_samples(flora, points, branches, owner, pick)
+    local = local.astype(np.float32) * branches.length[owner, None].astype(np.float32)
     frame = branches.frame.astype(np.float32)
     out = np.take(branches.position, owner, axis=0)
     for axis in range(3):
         for column_ in range(3):
             out[:, axis] += np.take(frame[:, axis, column_], owner) * local[:, column_]
-    return out
+    return out, share
 
 
 def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, NDArray[np.int64], Axes | None]]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import spread
 from ..compiled.flora import Flora
+from ..compiled.placed import bounds
 from ..growth.branches import Branches
 from ..growth.growth import branch_counts
 from ..growth.hashing import Draw, child_key, uniform
@@ -145,8 +146,8 @@ def keep_inside(flora: Flora, branches: Branches, owner: NDArray[np.int64], poin
 
     Hardly any: bounds are those of whole sub-plants, and wider than what a foot or a collar adds to wood.
     """
-    radius, low, high = (flora.bound[branches.row] * branches.length[:, None]).T
-    pad = branches.radius * flora.widest[branches.row] + flora.leaf_reach[branches.row] * branches.scale
+    bound, pad = bounds(flora, branches)
+    radius, low, high = bound.T
     offset = points - branches.position[owner]
     along = np.einsum("ni,ni->n", offset, branches.frame[owner, :, 2])
     aside = offset - along[:, None] * branches.frame[owner, :, 2]

@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the samples of given sub-plants are, how far these reach, and within which bounds they stay.
+
+Without crown forms that is what is known of their rows. A form moves the place where a limb leaves the trunk up, and
+what is on the limb away from there, as it does when plants grow. Where limbs are longer, more is on each: samples there
+stand for more, but all together for as much as is expected.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import gathered
+from ..growth.branches import Branches
+from ..growth.crown_forms import BASE, WIDTH
+from ..growth.formed import LIGHT, MOST_LEANING, along, are_stools, bare_part, first_forks, raised
+from ..growth.rows import FORK, LATERAL
+from .flora import Flora
+from .limbs import LIMB, STEM, STEM_LIMB, Limbs, Shares
+from .samples import Points
+
+
+def formed_subplants(rows: NDArray[np.void], subplants: Branches) -> NDArray[np.intp]:
+    """Sub-plants (k,) of (n,) that are trunks, or stems of these, with a crown form other than the plain one."""
+    crown = subplants.crown
+    if crown is None:
+        return np.zeros(0, np.intp)
+    trunk = np.flatnonzero((rows["order"] == 0)[subplants.row])
+    return trunk[(crown[trunk, WIDTH] != 1) | crown[trunk, BASE : LIGHT.stop].any(axis=1)]
+
+
+def one_sided(subplants: Branches) -> NDArray[np.bool_]:
+    """Whether sub-plants (n,) have crowns that reach farther to one side."""
+    crown = subplants.crown
+    return np.zeros(len(subplants), bool) if crown is None else crown[:, LIGHT].any(axis=1)
+
+
+def placed_samples(
+    flora: Flora, points: Points, subplants: Branches, owner: NDArray[np.integer], pick: NDArray[np.integer]
+) -> tuple[NDArray[np.floating], NDArray[np.float64] | None]:
+    """Samples of sub-plants: places in units of their lengths and in their axes, and what each stands for.
+
+    Parameters
+    ----------
+    flora : Flora
+    points : Points
+        Leaves or wood of its samples.
+    subplants : Branches of n
+    owner, pick : (m,) int
+        Sub-plants, and samples of these.
+
+    Returns
+    -------
+    (m, 3) float
+    (m,) float64 or None
+        Area over that of other samples of the same sub-plant, 1 on the mean; None where all stand for as much.
+    """
+    place, rows = gathered(points.position, pick), flora.rows
+    some = formed_subplants(rows, subplants)
+    if not len(some):
+        return place, None
+    place, share = place.astype(np.float64), np.ones(len(owner))
+    number = np.full(len(subplants), -1)
+    number[some] = np.arange(len(some))
+    mine = np.flatnonzero(number[owner] >= 0)
+    own, which = subplants.take(some), number[owner[mine]]
+    at, reach, sparse = _moved(rows, own, points.limbs.take(pick[mine]), place[mine], which)
+    place[mine] = at / along(rows, own.row, own.crown)[which, None]
+    leafy = points is flora.samples.leaves
+    share[mine] = _shares(flora, own, points.shares, points.limbs.take(pick[mine]), which, reach, sparse, leafy)
+    return place, share
+
+
+def _moved(
+    rows: NDArray[np.void], own: Branches, on: Limbs, place: NDArray[np.float64], which: NDArray[np.integer]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Places (m, 3) of samples on limbs, ``which`` (m,) of sub-plants (n,), in lengths of those as described.
+
+    Also how far the limbs reach over what they do as described (m,), and how many of them are left (n, 4) by class.
+    """
+    row, root = own.row, np.where((on.kind >= LIMB)[:, None], on.root, place)
+    crown = own.crown.astype(np.float64)
+    start = rows["start"][row, LATERAL, 0]
+    bare = np.maximum(start, bare_part(rows, row, crown[:, BASE]))
+    left = (1 - bare) / np.maximum(1 - start, 1e-9)
+    below, above = raised(crown[:, BASE], first_forks(rows, row))
+    stretch = np.where(rows["continues"][row], above, below)
+    stool, limb, stem = are_stools(rows, row)[which], on.kind >= LIMB, (on.kind == STEM) | (on.kind == STEM_LIMB)
+
+    def reach(way: NDArray[np.float64]) -> NDArray[np.float64]:
+        level = way[:, :2] / np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-9)[:, None]
+        light = crown[:, LIGHT][which]
+        return crown[which, WIDTH] * (1 + level[:, 0] * light[:, 0] + level[:, 1] * light[:, 1])
+
+    height = root[:, 2]
+    higher = 1 - (1 - height) * left[which]
+    lower = height * (bare / np.maximum(start, 1e-9))[which]  # dead branches
+    begins = start[which]
+    moved = root.copy()
+    moved[:, 2] = np.where(limb & ~stool & ~stem, np.where(height >= begins, higher, np.minimum(lower, higher)), height)
+    moved *= stretch[which, None]
+    fork = np.array([0.0, 0.0, 1.0])  # about where the stems begin
+    stems = above[which, None] * _tilted(root - fork, np.minimum(reach(root - fork), 1.0)) + stretch[which, None] * fork
+    moved = np.where(stem[:, None], stems, moved)
+    way = place - root
+    longer = np.where(limb & ~stool, reach(way), 1.0)
+    leaning = np.sqrt(np.minimum(reach(way), MOST_LEANING))  # half of what is aside is on stems that lean
+    moved += np.where(stool[:, None], _tilted(way, leaning), longer[:, None] * way)
+    # Trunks and stems are longer or shorter themselves, limbs are fewer.
+    return moved, longer, np.stack([stretch, above, np.where(rows["continues"][row], above, left), above], axis=1)
+
+
+def _tilted(way: NDArray[np.float64], factor: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vectors (m, 3) of the same lengths whose level parts are so many times (m,) as long, as far as they can be."""
+    level = way[:, :2] * factor[:, None]
+    rest = (way**2).sum(axis=1) - (level**2).sum(axis=1)
+    upright = np.sign(way[:, 2]) * np.sqrt(np.maximum(rest, 0.09 * way[:, 2] ** 2))
+    return np.concatenate([level, upright[:, None]], axis=1)
+
+
+def _shares(
+    flora: Flora,
+    own: Branches,
+    shares: Shares,
+    on: Limbs,
+    which: NDArray[np.integer],
+    reach: NDArray[np.float64],
+    sparse: NDArray[np.float64],
+    leafy: bool,
+) -> NDArray[np.float64]:
+    """What samples (m,) stand for, 1 on the mean; see `_moved`."""
+    totals, crown = flora.formed_totals, own.crown.astype(np.float64)
+    ratio = np.where(totals.formed[own.row], totals.leaves(own) if leafy else totals.wood(own)[0], 1.0)
+    follows, width = shares.follows[own.row], crown[:, WIDTH]
+    bears = 1 - follows + follows * width
+    if leafy:
+        sparse = sparse.copy()
+        sparse[:, :LIMB] = 1.0
+    else:
+        ratio = ratio * along(flora.rows, own.row, own.crown)
+        square = 1 + (crown[:, LIGHT][:, :2] ** 2).sum(axis=1) / 2
+        bears = width * (1 - follows) + width**2 * square * follows
+    each = shares.kinds[own.row] * sparse
+    trunk, limbs = each[:, :LIMB].sum(axis=1), each[:, LIMB:].sum(axis=1) * bears
+    # How many limbs there are is known exactly, by the sum that is expected.
+    more = np.maximum(ratio - trunk, 0.0) / np.maximum(limbs, 1e-9)
+    many = np.where(np.arange(4) < LIMB, 1.0, more[:, None]) * sparse / np.maximum(ratio, 1e-9)[:, None]
+    bearing = 1 - on.follows + on.follows * reach
+    bearing = np.where(on.kind < LIMB, 1.0, bearing if leafy else bearing * reach)
+    return np.where(are_stools(flora.rows, own.row)[which], 1.0, many[which, on.kind] * bearing)
+
+
+def extents(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
+    """`Flora.sampled_bound` of sub-plants (n, 3), in units of their lengths."""
+    bound = flora.sampled_bound[subplants.row]
+    some = formed_subplants(flora.rows, subplants)
+    if len(some):
+        own, rows = subplants.take(some), flora.rows
+        width, stretch = own.crown[:, WIDTH].astype(np.float64), along(rows, own.row, own.crown)
+        forks = rows["next"][own.row, FORK] >= 0
+        radius, low, high = bound[some].T
+        # Limbs reach over the top as far as they are long; where trunks fork, who knows what does.
+        over = np.where(forks, 0.0, np.maximum(high - 1.0, 0.0) * (width - 1.0))
+        bound[some] = np.stack([radius * width, low, high + over], axis=1) / stretch[:, None]
+    return bound
+
+
+def bounds(flora: Flora, subplants: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Bounds of sub-plants (n, 3) as `Flora.bound`, and how far (n,) these may reach beyond that; metres."""
+    bound = flora.bound[subplants.row] * subplants.length[:, None]
+    out = subplants.radius * flora.widest[subplants.row] + flora.leaf_reach[subplants.row] * subplants.scale
+    some = formed_subplants(flora.rows, subplants)
+    if len(some):
+        own, rows = subplants.take(some), flora.rows
+        crown = own.crown.astype(np.float64)
+        stretch = along(rows, own.row, own.crown)
+        longer = crown[:, WIDTH] * (1 + np.linalg.norm(crown[:, LIGHT], axis=1))
+        longer = np.where(are_stools(rows, own.row), np.minimum(longer, MOST_LEANING), longer)
+        # Nothing on a limb moves farther than that is longer, and nothing else than the trunk is to its fork.
+        reach = flora.limb_reach[own.row] * np.maximum(longer - 1, 0.0)
+        out[some] += (reach + 3 * np.abs(stretch - 1)) * own.length / stretch
+        bound[some] /= stretch[:, None]
+    return bound, out
