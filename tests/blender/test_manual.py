@@ -16,6 +16,7 @@ from tetflora_addon.blender.cli.command import main
 from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraMixEntry, TetFloraPopulation
 from tetflora_addon.blender.results import output_properties
 from tetflora_addon.blender.settings import TetFloraWind, TetFloraYear
+from tetflora_addon.blender.stands.properties import TetFloraStand, TetFloraStandEntry
 from tetflora_addon.blender.viewport import state
 
 MANUAL = (build.ROOT / "docs" / "manual.md").read_text(encoding="utf-8")
@@ -37,6 +38,8 @@ GROUPS = (
     TetFloraBrush,
     TetFloraWind,
     TetFloraYear,
+    TetFloraStand,
+    TetFloraStandEntry,
     preferences.TetFloraPreferences,
 )
 
