@@ -49,6 +49,7 @@ NAMES = (
     "animation",
     "wind",
     "year",
+    "stands",
     "dolly",
     "endurance",
     "farm",

@@ -23,8 +23,8 @@ from .records import LYING, Records
 
 #: Height for the girth over that in a closed stand: where the light beside the crown is full, and where there is none.
 _SLENDER_LIT, _SLENDER_DARK = 0.72, 1.14
-#: Light beside a crown in which it begins to widen, for shade tolerance 0 and 5: crowns of tolerant trees reach into each
-#: other; how much more than that lets it widen as fast as it can; and where that is, in lengths of a dome and of a cone.
+#: Light beside a crown in which it begins to widen, for shade tolerance 0 and 5 (crowns of tolerant trees reach into
+#: each other); how much more lets it widen as fast as it can; where that is, in lengths of a dome and of a cone.
 _SIDE, _SIDE_MORE, _BESIDE = (0.62, 0.23), 0.35, (0.35, 0.15)
 #: Light beside it, over that in which limbs die, below which it narrows.
 _DARK = 1.5

@@ -30,6 +30,8 @@ from .site import StandSite
 #: Plants that are looked at together.
 _BLOCK = 1 << 15
 _GIVEN = 2
+#: Metres of open ground beyond open edges.
+_MARGIN = 12.0
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,12 @@ class StandSettings:
         soft_max=5.0,
         **LENGTH,
     )
+    open_edges: bool = setting(
+        False,
+        "Open Edges",
+        "Light comes in from all sides, as at the edge of a wood. Otherwise the stand goes on beyond the ground, and "
+        "what grows at one side shades what grows at the opposite one",
+    )
 
 
 def grow(
@@ -102,12 +110,17 @@ def grow(
     TetFloraError
         A setting cannot be, or the ground is too large; names it.
     """
-    _check(settings)
-    stand = _Stand(site, Guilds(guilds), settings, given)
+    stand = begun(site, guilds, settings, given)
     for year in range(settings.years):
         yield Progress(year / settings.years, f"Growing the stand: year {year} of {settings.years}")
         stand.step(year)
     return stand.finished()
+
+
+def begun(site: StandSite, guilds: Sequence[Guild], settings: StandSettings, given: Records | None = None) -> Stand:
+    """A stand at its beginning, which whoever has it steps from year to year; see `grow`."""
+    _check(settings)
+    return Stand(site, Guilds(guilds), settings, given)
 
 
 def _check(settings: StandSettings) -> None:
@@ -124,15 +137,24 @@ def _check(settings: StandSettings) -> None:
             raise TetFloraError(f"{name} of a stand must be from {low:g} to {high:g}, not {value:g}")
 
 
-class _Stand:
-    """A stand in a year."""
+class Stand:
+    """A stand in a year.
+
+    Attributes
+    ----------
+    plants : Plants
+        Those that live.
+    dead : DeadPlants
+    """
 
     def __init__(self, site: StandSite, guilds: Guilds, settings: StandSettings, given: Records | None) -> None:
         self.site, self.guilds, self.settings = site, guilds, settings
         width, depth = site.size
-        rows, columns = (max(round(size / settings.cell), 3) for size in (depth, width))
+        margin = _MARGIN if settings.open_edges else 0.0
+        rows, columns = (max(round((size + 2.0 * margin) / settings.cell), 3) for size in (depth, width))
         # Columns are square: the last row and column may lie a little beyond the ground.
-        self.light = LightGrid(rows, columns, max(width / columns, depth / rows))
+        cell = max((width + 2.0 * margin) / columns, (depth + 2.0 * margin) / rows)
+        self.light = LightGrid(rows, columns, cell, margin)
         suits = np.stack([site.suits(needs) for needs in guilds.needs])
         if not suits.any():
             raise TetFloraError(
@@ -183,7 +205,7 @@ class _Stand:
         crowns = plants.crowns(self.guilds)
         strips = self.light.fill(crowns)
         taken = np.zeros(len(plants))
-        for index, own in zip(strips, on_all_cores(lambda i: self.light.taken(crowns, i), strips), strict=True):
+        for index, own in zip(strips, on_all_cores(self.light.taken, range(len(strips))), strict=True):
             taken[index] = own
 
         def changed(block: slice) -> tuple[Plants, NDArray[np.bool_]]:

@@ -14,13 +14,14 @@ Leaves are whole numbers of a small unit, so that sums do not depend on their or
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TetFloraError
 from ..parallel import blocks, each_on_all_cores, on_all_cores
-from .discs import CrownCells, covered
+from .discs import covered
 
 #: Layers: the n-th begins at first × n + second × n² metres, finer near the ground, where small plants are.
 _LAYERS = (0.5, 0.025)
@@ -28,6 +29,8 @@ _LAYERS = (0.5, 0.025)
 _UNIT = 1.0 / 65536.0
 #: Rows of a strip at least, and cells about; strips do not depend on anything but the grid.
 _STRIP_ROWS, _STRIP_CELLS = 16, 1 << 15
+#: Cells that light passes together; nothing depends on it.
+_BAND_CELLS = 1 << 17
 #: Most numbers of the grid at once, 4 bytes each and twice.
 MOST_VOXELS = 400_000_000
 #: Square metres of sideways variance that light gains for a metre downwards, and the most of it that goes to each of
@@ -75,6 +78,18 @@ class Crowns:
     top: NDArray[np.float64]
 
 
+class _Columns(NamedTuple):
+    """Columns (m,) of the crowns of a strip: of which, places of foot and top in the grid of light, and leaves."""
+
+    number: int
+    crown: NDArray[np.int32]
+    foot: NDArray[np.int32]
+    head: NDArray[np.int32]
+    under: NDArray[np.float32]
+    over: NDArray[np.float32]
+    density: NDArray[np.float32]
+
+
 @dataclass
 class LightGrid:
     """Columns of a ground; light that leaves it on one side enters on the other.
@@ -84,6 +99,8 @@ class LightGrid:
     rows, columns : int
     cell : float
         Metres.
+    margin : float
+        Metres of open ground around that of the plants.
     light : (layers + 1, rows × columns) float32
         Light summed from above down to where each layer begins, metres of full light.
     """
@@ -91,6 +108,7 @@ class LightGrid:
     rows: int
     columns: int
     cell: float
+    margin: float = 0.0
     light: NDArray[np.float32] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -107,47 +125,60 @@ class LightGrid:
         layers = int(layer_of(np.array([tallest + 0.01]))[0][0]) + 1
         if (layers + 1) * self.rows * self.columns > MOST_VOXELS:
             raise TetFloraError(
-                "The ground is too large for columns this narrow; make Cell larger, or the ground smaller"
+                "The ground is too large for columns this narrow; raise Cell, or choose a smaller ground"
             )
-        row = np.clip((crowns.y / self.cell).astype(np.int64), 0, self.rows - 1)
+        row = np.clip(((crowns.y + self.margin) / self.cell).astype(np.int64), 0, self.rows - 1)
         strip = row // self.strip
         order = np.argsort(strip, kind="stable")
         ends = np.searchsorted(strip[order], np.arange(len(self.strips) + 1))
-        self.of_strip = [order[ends[i] : ends[i + 1]] for i in range(len(self.strips))]
+        of_strip = [order[ends[i] : ends[i + 1]] for i in range(len(self.strips))]
         leaves = np.zeros((layers, self.rows, self.columns), np.int32)
-        jobs = list(zip(self.strips, self.of_strip, strict=True))
-        for rows, part in on_all_cores(lambda job: self._leaves(crowns, *job, layers), jobs):
+        self._columns: list[_Columns] = []
+        jobs = list(zip(self.strips, of_strip, strict=True))
+        for columns, rows, part in on_all_cores(lambda job: self._leaves(crowns, *job, layers), jobs):
+            self._columns.append(columns)
             # Twice where the strip reaches around the whole grid: never add with repeated rows at once.
             for start in range(0, len(rows), self.rows):
                 leaves[:, rows[start : start + self.rows]] += part[:, start : start + self.rows]
         self._shine(leaves)
-        return self.of_strip
+        return of_strip
 
-    def _columns(self, crowns: Crowns, index: NDArray) -> tuple[CrownCells, NDArray, NDArray, NDArray]:
-        """Columns of some crowns, cells, and in each where the crown begins and ends, and its leaves for each metre."""
+    def _leaves(
+        self, crowns: Crowns, strip: slice, index: NDArray, layers: int
+    ) -> tuple[_Columns, NDArray, NDArray[np.int32]]:
+        """Columns of some crowns, and differences of their leaves along these: rows (r,), (layers, r, columns)."""
         size = self.cell
-        found = covered(crowns.x[index] / size, crowns.y[index] / size, crowns.radius[index] / size)
-        base, height, top = (np.take(values[index], found.crown) for values in (crowns.base, crowns.height, crowns.top))
+        x, y = ((values[index] + self.margin) / size for values in (crowns.x, crowns.y))
+        found = covered(x, y, crowns.radius[index] / size)
+        low, high = int(found.row.min(initial=strip.start)), int(found.row.max(initial=strip.start)) + 1
+        base, height, top = (values[index] for values in (crowns.base, crowns.height, crowns.top))
+        length = np.take(height - base, found.crown)
         # A cone loses its height with the distance from the middle, a dome half of it with the square of that.
-        lost = top * np.sqrt(found.far) + (1.0 - top) * 0.6 * found.far
-        end = height - (height - base) * np.minimum(lost, 1.0 - _THIN)
-        leaves = np.take(crowns.leaves[index], found.crown) * found.part / size**2
-        density = np.rint(leaves / np.maximum(end - base, 1e-3) / _UNIT)
-        return found, base, end, density
-
-    def _leaves(self, crowns: Crowns, strip: slice, index: NDArray, layers: int) -> tuple[NDArray, NDArray]:
-        """Differences of the leaves of some crowns along columns: rows (r,) and (layers, r, columns) int32."""
-        found, base, end, density = self._columns(crowns, index)
-        low, high = (int(found.row.min(initial=strip.start)), int(found.row.max(initial=strip.start)) + 1)
-        place = (found.row - low) * self.columns + found.column % self.columns
-        area, total = (high - low) * self.columns, np.zeros(layers * (high - low) * self.columns)
-        for sign, z in ((1.0, end), (-1.0, base)):
-            layer, part = layer_of(z)
-            upper = np.rint(density * part)
-            total += np.bincount(layer * area + place, sign * upper, len(total))
-            below = layer > 0
-            total += np.bincount(((layer - 1) * area + place)[below], (sign * (density - upper))[below], len(total))
-        return np.arange(low, high) % self.rows, total.astype(np.int32).reshape(layers, high - low, self.columns)
+        cone = np.take(top, found.crown)
+        lost = cone * np.sqrt(found.far) + (1.0 - cone) * 0.6 * found.far
+        length *= 1.0 - np.minimum(lost, 1.0 - _THIN)
+        leaves = np.take(crowns.leaves[index] / (size**2 * _UNIT), found.crown) * found.part
+        density = np.rint(leaves / np.maximum(length, 1e-3))
+        foot, under = (np.take(values, found.crown) for values in layer_of(base))
+        length += np.take(base, found.crown)
+        head, over = layer_of(length)
+        column, area = found.column % self.columns, (high - low) * self.columns
+        place = (found.row - low) * self.columns + column
+        total = np.zeros(layers * area)
+        for sign, layer, part in ((1.0, head, over), (-1.0, foot, under)):
+            upper = np.rint(density * part) * sign
+            index_in = layer * area + place
+            total += np.bincount(index_in, upper, len(total))
+            below = np.flatnonzero(layer > 0)
+            total += np.bincount(index_in[below] - area, (sign * density - upper)[below], len(total))
+        cells, of_layer = (found.row % self.rows) * self.columns + column, self.rows * self.columns
+        columns = _Columns(
+            len(index), found.crown.astype(np.int32), (foot * of_layer + cells).astype(np.int32),
+            (head * of_layer + cells).astype(np.int32), under.astype(np.float32), over.astype(np.float32),
+            density.astype(np.float32),
+        )  # fmt: skip
+        rows = np.arange(low, high) % self.rows
+        return columns, rows, total.astype(np.int32).reshape(layers, high - low, self.columns)
 
     def _shine(self, leaves: NDArray[np.int32]) -> None:
         layers, rows, columns = leaves.shape
@@ -158,6 +189,7 @@ class LightGrid:
         now, after = (np.ones((rows, columns), np.float32) for _ in range(2))
         density = np.zeros((rows, columns), np.int32)
         edges = layer_edge(np.arange(layers + 1))
+        bands = blocks(rows, max(_BAND_CELLS // columns, 1))
         for layer in range(layers - 1, -1, -1):
             thick = float(edges[layer + 1] - edges[layer])
             step = max(1, round(np.sqrt(_SIDEWAYS * thick / (2.0 * _MOST_SIDE)) / self.cell))
@@ -168,33 +200,37 @@ class LightGrid:
             def part(block: slice, args: tuple = args, wide: int = wide, high: int = high) -> None:
                 _through(block, wide, high, *args)
 
-            each_on_all_cores(part, self.strips)
+            each_on_all_cores(part, bands)
             now, after = after, now
 
     def at(self, x: NDArray, y: NDArray, height: NDArray) -> NDArray[np.float64]:
         """Light (n,) at places (n,), mean of the layer there, over that in the open."""
-        cell = self._cell(np.floor(y / self.cell).astype(np.int64), np.floor(x / self.cell).astype(np.int64))
+        row, column = (np.floor((values + self.margin) / self.cell).astype(np.int64) for values in (y, x))
+        cell = self._cell(row, column)
         layer = np.minimum(layer_of(height)[0], len(self.light) - 2)
         place = layer * (self.rows * self.columns) + cell
         flat = self.light.ravel()
         thick = _LAYERS[0] + _LAYERS[1] * (2 * layer + 1)
         return (np.take(flat, place) - np.take(flat, place + self.rows * self.columns)) / thick
 
-    def taken(self, crowns: Crowns, index: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Light that some crowns (k,) take, m² of full light; of all that `fill` was given, no more than there is."""
-        found, base, end, density = self._columns(crowns, index)
-        cell = self._cell(found.row, found.column)
-        light = density * (self._summed(cell, base) - self._summed(cell, end))
-        return np.bincount(found.crown, light, len(index)) * (_UNIT * self.cell**2)
+    def taken(self, strip: int) -> NDArray[np.float64]:
+        """Light that the crowns (k,) of a strip take, m² of full light; all together no more than there is."""
+        own = self._columns[strip]
+        light = self._summed(own.foot, own.under)
+        light -= self._summed(own.head, own.over)
+        light *= own.density
+        return np.bincount(own.crown, light, own.number) * (_UNIT * self.cell**2)
 
     def _cell(self, row: NDArray, column: NDArray) -> NDArray[np.int64]:
         return (row % self.rows) * self.columns + column % self.columns
 
-    def _summed(self, cell: NDArray, height: NDArray) -> NDArray[np.float64]:
-        layer, part = layer_of(height)
-        place, flat = layer * (self.rows * self.columns) + cell, self.light.ravel()
-        low, high = np.take(flat, place), np.take(flat, place + self.rows * self.columns)
-        return low + (high - low) * part
+    def _summed(self, place: NDArray[np.int32], part: NDArray[np.float32]) -> NDArray[np.float32]:
+        flat = self.light.ravel()
+        low, high = np.take(flat, place), np.take(flat, place + np.int32(self.rows * self.columns))
+        high -= low
+        high *= part
+        high += low
+        return high
 
 
 def _through(

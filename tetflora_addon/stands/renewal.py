@@ -112,16 +112,18 @@ class SeedRain:
 
     def plants(self, plants: Plants, light: LightGrid, year: int, first: int, seed: int) -> Plants:
         """Plants that come in a year; ``light`` is what there is below the others."""
-        site, cells = self.site, light.rows * light.columns
+        site = self.site
         width, depth = site.size
+        rows, columns = (max(round(size / light.cell), 1) for size in (depth, width))
+        cells = rows * columns
         key = child_key(keys_of(seed, _SOWN), np.arange(cells) + year * cells)
         come = uniform(key, StandDraw.COME)
         # One plant at most in each cell and year: only where the dice allow it, all else is asked.
-        most = min(self.most * light.cell**2 / 1e4, 1.0)
+        most = min(self.most * (width * depth / cells) / 1e4, 1.0)
         index = np.flatnonzero(come < most)
         key, come = key[index], come[index] / most
-        x = (index % light.columns + uniform(key, StandDraw.X)) * (width / light.columns)
-        y = (index // light.columns + uniform(key, StandDraw.Y)) * (depth / light.rows)
+        x = (index % columns + uniform(key, StandDraw.X)) * (width / columns)
+        y = (index // columns + uniform(key, StandDraw.Y)) * (depth / rows)
         here = site.cells(x, y)
         ground = light.at(x, y, np.zeros(len(x)))
         column = np.minimum((x * (self.columns / width)).astype(np.int64), self.columns - 1)
