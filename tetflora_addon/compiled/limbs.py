@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, column
 from ..growth.branches import Branches
 from ..growth.rows import DEAD, LATERAL
 
@@ -32,9 +32,9 @@ class Limbs(Arrays):
         Fraction of what is there that follows the limb's length.
     """
 
-    root: NDArray[np.float32]
-    kind: NDArray[np.int8]
-    follows: NDArray[np.float32]
+    root: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    kind: NDArray[np.int8] = field(metadata=column(dtype=np.int8))
+    follows: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
 
 
 @dataclass(frozen=True)

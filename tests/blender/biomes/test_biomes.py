@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
-from tetflora_addon.blender.biomes import adding, files, ground, library, saving
+from tetflora_addon.blender.biomes import adding, files, ground, library, saving, stands
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.preferences import preferences
 from tetflora_addon.blender.species.edits import catalogue
@@ -49,6 +49,17 @@ SMALL = {
         },
     ],
 }  # fmt: skip
+
+
+STAND = {
+    "kind": "stand",
+    "name": "Birches",
+    "years": 14,
+    "interval": 0,
+    "density": 900.0,
+    "slope_max": 35.0,
+    "species": [{"species": "birch", "planted": 2.0, "rain": 0.0}],
+}
 
 
 @pytest.fixture(autouse=True)
@@ -152,6 +163,25 @@ def test_what_is_saved_comes_back():
         library.delete("meadow")
 
 
+def test_a_stand_is_a_layer():
+    """It grows before the others, keeps to the limits, comes back from a file, and goes with the biome."""
+    land = add_mesh("ground", size=10.0)
+    group = land.vertex_groups.new(name="west")
+    group.add([0, 3], 1.0, 'ADD')
+    added = add(small(layers=[STAND, *SMALL["layers"]]), land)
+    assert [name for name, _ in added.layers] == ["Birches", "Bushes", "Floor"] and added.layers[0][1] > 5
+    (biome,) = scene().tetflora.biomes
+    (field,) = stands.stands_of(scene(), biome.uid)
+    path = saving.save_biome(scene(), "With a stand", "", picture=False, replace=False)
+    assert files.read_biome(path).layers[0] == STAND
+    biome.vertex_group = "west"
+    number = len(field.data.vertices)
+    at_once(adding.plant_biome_steps(scene(), depsgraph(), biome))
+    assert 0 < len(field.data.vertices) < number
+    adding.remove_biome(scene(), scene().tetflora.biomes[0])
+    assert [o for o in scene().objects if o.tetflora.is_field] == []
+
+
 def test_neighbours_blend():
     """A biome with limits takes its part; one without leaves it, as much as the mask says; nothing else changes."""
     land = add_mesh("ground", size=10.0)
@@ -211,6 +241,8 @@ def _broken():
         (changed(species={"a": {"of": 3}}), '"of"'),
         (changed(species={"a": {"name": "A"}}), "missing"),
         (in_layer(kind="tree"), '"kind"'),
+        (changed(layers=[{**STAND, "years": 0}]), '"years"'),
+        (changed(layers=[{**STAND, "species": [{"species": "birch", "rain": "some"}]}]), '"rain"'),
         (in_layer(density="many"), '"density"'),
         (in_layer(species=[]), 'no "species"'),
         (in_layer(species=[{"species": "bush", "weight": -1}]), '"weight"'),
@@ -244,7 +276,7 @@ def test_nothing_is_left_of_what_fails(monkeypatch):
             add(small(**changes), land)
         assert (datablocks(), len(scene().tetflora.species_edits)) == before
         assert not scene().tetflora.populations and not scene().tetflora.biomes
-    steps = adding.add_biome_steps(scene(), depsgraph(), small(), [land])
+    steps = adding.add_biome_steps(scene(), depsgraph(), small(layers=[STAND, *SMALL["layers"]]), [land])
     for step in steps:
         if step.message.startswith("Floor"):
             break

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import bpy
 
@@ -21,14 +22,20 @@ from ...jobs import Progress
 from ...species.fallen import KIND as FALLEN_LEAVES
 from ...species.litter import FALLEN
 from ..placing.cover import fallen_from
+from ..placing.plant_objects import remove_fields
 from ..placing.population_files import fill_population
-from ..placing.populations import Made, add_population, make_plants_steps, remove_population, set_grounds
+from ..placing.populations import add_population, make_plants_steps, remove_population, set_grounds
 from ..runtime import GoneError, JobData, guarded, is_there
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
+from ..stands.growing import again_steps, is_stand
 from .files import Biome, pages_of, set_limits
 from .ground import lay_soil, make_line
+from .stands import grow_layer_steps, stands_of
 
-_SOIL = 0.06  # fraction of the work at the end
+_STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
+
+
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -109,7 +116,10 @@ def _add_steps(
         if "path_max" in biome.limits:
             made.paths = make_line(scene, f"{made.name} line", grounds)
         group.biomes_index = len(group.biomes) - 1
+        made_stands = yield from _grow(scene, depsgraph, uid, biome, renamed, grounds, seed)
         for number, layer in enumerate(biome.layers):
+            if layer["kind"] == "stand":
+                continue
             population = add_population(scene, grounds, name=layer["name"])
             fill_population(population, {k: v for k, v in layer.items() if k != "kind"}, scene, [])
             set_grounds(population, grounds)
@@ -122,7 +132,7 @@ def _add_steps(
             for entry in population.mix:
                 entry.species = renamed.get(entry.species, entry.species)
                 entry.shed_by = renamed.get(entry.shed_by, entry.shed_by)
-        return (yield from _plant(scene, depsgraph, uid))
+        return (yield from _plant(scene, depsgraph, uid, made_stands))
 
 
 def plant_biome_steps(
@@ -137,14 +147,48 @@ def plant_biome_steps(
     """
     data, uid = JobData("Planting the biome", scene), biome.uid
     data.add_objects(entry.object for entry in biome.grounds if is_there(entry.object))
-    return guarded(data, _plant(scene, depsgraph, uid))
+    return guarded(data, _plant_again(scene, depsgraph, uid))
 
 
-def _plant(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str) -> Generator[Progress, object, Added]:
+def _grow(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    uid: str,
+    biome: Biome,
+    renamed: Mapping[str, str],
+    grounds: Sequence[bpy.types.Object],
+    seed: int,
+) -> Generator[Progress, object, list[tuple[str, int]]]:
+    """Stands of a biome: their names, and how many plants each has."""
+    stands, made = [layer for layer in biome.layers if layer["kind"] == "stand"], []
+    for number, layer in enumerate(stands):
+        begin, end = (_STANDS * n / len(stands) for n in (number, number + 1))
+        with closing(grow_layer_steps(scene, depsgraph, uid, layer, renamed, grounds, seed)) as steps:
+            grown = yield from _within(steps, begin, end, layer["name"])
+        made.append((layer["name"], grown.plants))
+    return made
+
+
+def _plant_again(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str
+) -> Generator[Progress, object, Added]:
+    stands, made = stands_of(scene, uid), []
+    for number, field in enumerate(stands):
+        begin, end = (_STANDS * n / len(stands) for n in (number, number + 1))
+        with closing(again_steps(scene, depsgraph, field)) as steps:
+            grown = yield from _within(steps, begin, end, field.name)
+        made.append((field.name, grown.plants))
+    return (yield from _plant(scene, depsgraph, uid, made))
+
+
+def _plant(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str, stands: list[tuple[str, int]]
+) -> Generator[Progress, object, Added]:
     """Plants of all layers, one after the other, and the soil under them."""
-    yield Progress(0.0, "Planting")
+    first = _STANDS if stands else 0.0
+    yield Progress(first, "Planting")
     names = [population.uid for population in layers_of(scene, uid) if not population.frozen]
-    layers, bare = [], []
+    layers, bare = list(stands), []
     for number, name in enumerate(names):
         depsgraph.update()  # plants of the layers before shade the ground, and keep others away
         population = _layer(scene, name)
@@ -153,7 +197,7 @@ def _plant(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str) -> 
         for entry in population.mix:
             _make_litter(scene, entry)
         title = population.name
-        begin, end = (n / len(names) * (1.0 - _SOIL) for n in (number, number + 1))
+        begin, end = (first + n / len(names) * (1.0 - _SOIL - first) for n in (number, number + 1))
         try:
             with closing(make_plants_steps(scene, depsgraph, population)) as steps:
                 made = yield from _within(steps, begin, end, title)
@@ -178,8 +222,8 @@ def _layer(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
 
 
 def _within(
-    steps: Generator[Progress, object, Made], begin: float, end: float, title: str
-) -> Generator[Progress, object, Made]:
+    steps: Generator[Progress, object, _Result], begin: float, end: float, title: str
+) -> Generator[Progress, object, _Result]:
     """Steps that are a part of others."""
     while True:
         try:
@@ -247,6 +291,7 @@ def _restored(scene: bpy.types.Scene) -> Iterator[None]:
                 if group.biomes[index].paths is not None:
                     bpy.data.batch_remove([*group.biomes[index].paths.objects, group.biomes[index].paths])
                 group.biomes.remove(index)
+            remove_fields([o for o in scene.objects if is_stand(o) and o.tetflora.stand.biome not in {"", *before}])
             group.populations_index, group.biomes_index = active
             for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
                 revert_species(identifier)
@@ -258,6 +303,7 @@ def remove_biome(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> int:
     uid, group, number = biome.uid, scene.tetflora, 0
     for index in [i for i, p in enumerate(group.populations) if p.biome == uid][::-1]:
         number += remove_population(scene, index)
+    remove_fields(stands_of(scene, uid))
     group.biomes.remove(next(i for i, b in enumerate(group.biomes) if b.uid == uid))
     group.biomes_index = max(min(group.biomes_index, len(group.biomes) - 1), 0)
     return number

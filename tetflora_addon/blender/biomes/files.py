@@ -36,7 +36,7 @@ from ..placing.zones import limits_of_zone
 from ..species.edits import find_edit, species_data
 from .library import MAX_FILE_BYTES
 from .properties import TetFloraBiome, data_of
-from .stands import check_stand
+from .stands import check_stand, stand_data, stands_of
 
 FORMAT = "TetFlora biome"
 VERSION = 1
@@ -161,7 +161,8 @@ def biome_data(
     stored = data_of(biome) if biome is not None else {}
     data |= {key: value for key, value in stored.items() if key in ("ground", "season") and value}
     layers = [_layer_data(population) for population in populations]
-    species = _species_data(scene, [part for layer in layers for part in layer["species"]])
+    stands = [] if biome is None else [stand_data(field) for field in stands_of(scene, biome.uid)]
+    species = _species_data(scene, [part for layer in (*stands, *layers) for part in layer["species"]])
     if species:
         data["species"] = species
     if biome is not None:
@@ -173,7 +174,7 @@ def biome_data(
         }
         data |= {"limits": changed} if changed else {}
         data |= {} if biome.gives_way else {"gives_way": False}
-    data["layers"] = [*layers, *stored.get("stands", [])]
+    data["layers"] = [*stands, *layers]
     return data
 
 

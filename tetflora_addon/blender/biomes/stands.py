@@ -4,10 +4,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Iterable, Mapping
+from math import radians
 from typing import Any
 
+import bpy
+import numpy as np
+
 from ...errors import shown
-from ..placing.population_files import check_keys, check_text
+from ...files import IDENTIFIER_RULE, is_identifier
+from ...jobs import Progress
+from ..placing.plant_objects import link_field
+from ..placing.population_files import check_keys, check_text, check_value, list_of, value_for
+from ..runtime import is_there
+from ..scene.fields import write_field
+from ..stands.growing import GrownStand, again_steps, is_stand
+from ..stands.properties import TetFloraStand, TetFloraStandEntry
+
+#: Keys of a species of a stand.
+_ENTRY = ("species", "planted", "rain")
+
+
+def _settings() -> dict[str, bpy.types.Property]:
+    """Settings of stands that mean something in any file."""
+    found = {p.identifier: p for p in TetFloraStand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN'}}
+    return {name: prop for name, prop in found.items() if name not in ("is_grown", "species_index", "path_distance")}
 
 
 def check_stand(where: str, layer: dict[str, Any]) -> None:
@@ -18,6 +39,82 @@ def check_stand(where: str, layer: dict[str, Any]) -> None:
     ValueError
         Something is not as it must be; names the key.
     """
-    check_keys(where, layer, {"kind", "name"}, {"kind", "name"})
+    known = _settings()
+    check_keys(where, layer, {"kind", "name", "species"}, {"kind", "name", "species", *known})
     check_text(f'{where}: "name"', layer["name"])
-    raise ValueError(f'{where}: "kind" is {shown(layer["kind"])}, which this version of TetFlora does not read')
+    for key in known.keys() & layer.keys():
+        check_value(f'{where}: "{key}"', known[key], layer[key])
+    parts = list_of(f'{where}: "species"', layer["species"])
+    for index, part in enumerate(parts, 1):
+        check_keys(f"{where}: species {index}", part, {"species"}, set(_ENTRY))
+        for key, value in part.items():
+            check_value(f'{where}: species {index}: "{key}"', TetFloraStandEntry.bl_rna.properties[key], value)
+        if not is_identifier(part["species"]):
+            raise ValueError(f'{where}: species {index}: {shown(part["species"])}; use only {IDENTIFIER_RULE}')
+
+
+def stands_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
+    """Fields of a biome that are stands."""
+    return [obj for obj in scene.objects if is_stand(obj) and obj.tetflora.stand.biome == uid]
+
+
+def grow_layer_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    uid: str,
+    layer: Mapping[str, Any],
+    renamed: Mapping[str, str],
+    grounds: Iterable[bpy.types.Object],
+    seed: int,
+) -> Generator[Progress, object, GrownStand]:
+    """Grow a checked layer as a field of the biome; closing the steps, or an error, leaves the scene as it was.
+
+    Raises
+    ------
+    SceneError
+        Nothing can grow.
+    """
+    field = write_field(
+        layer["name"], np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ()
+    )
+    mesh, made = field.data, False
+    try:
+        stand = field.tetflora.stand
+        for name, prop in _settings().items():
+            if name in layer:
+                setattr(stand, name, radians(layer[name]) if prop.subtype == 'ANGLE' else layer[name])
+        stand.biome, stand.seed = uid, (stand.seed + seed) % 2**31
+        for part in layer["species"]:
+            entry = stand.species.add()
+            for key, value in part.items():
+                setattr(entry, key, renamed.get(value, value) if key == "species" else value)
+        for obj in grounds:
+            stand.grounds.add().object = obj
+        grown = yield from again_steps(scene, depsgraph, field)
+        group = field.tetflora
+        group.stand.is_grown, made = True, True
+        group.stand_year = float(group.stand.years)
+        field.display_type = 'BOUNDS'  # its points are plants of all years
+        link_field(scene, field)
+        return grown
+    finally:
+        if not made:
+            if is_there(field):
+                bpy.data.objects.remove(field)
+            if is_there(mesh) and not mesh.users:
+                bpy.data.meshes.remove(mesh)
+
+
+def stand_data(field: bpy.types.Object) -> dict[str, Any]:
+    """A stand as a layer of a file: what differs from a new one."""
+    stand = field.tetflora.stand
+    data: dict[str, Any] = {"kind": "stand", "name": field.name}
+    for name, prop in _settings().items():
+        value = value_for(prop, getattr(stand, name))
+        if value != value_for(prop, prop.default):
+            data[name] = value
+    properties = TetFloraStandEntry.bl_rna.properties
+    data["species"] = [
+        {key: value_for(properties[key], getattr(entry, key)) for key in _ENTRY} for entry in stand.species
+    ]
+    return data

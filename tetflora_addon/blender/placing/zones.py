@@ -14,8 +14,11 @@ from math import inf
 from typing import Any
 
 import bpy
+import numpy as np
 
-from ...planting.zones import Limits, Zone, distance_lines
+from ...planting.terrain import Terrain
+from ...planting.wetness import wet_ground
+from ...planting.zones import Limits, Spots, Zone, distance_lines
 from .terrain import lines_within, read_ground
 
 #: Settings of a biome's mask, by the names that `read_ground` has for them.
@@ -94,6 +97,33 @@ def read_zones(
     own = [_zone(biome, grounds, depsgraph)] if is_limited(biome) else []
     others = [replace(_zone(other, grounds, depsgraph), inverse=True) for other in come_before(scene, biome)]
     return (*own, *others)
+
+
+def zoned(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    owner: bpy.types.PropertyGroup,
+    grounds: Sequence[bpy.types.Object],
+    ground: Terrain,
+) -> Terrain:
+    """A ground with the zones of a layer, a population or a stand, in its weights: as they are at the corners.
+
+    Raises
+    ------
+    SceneError
+        As `read_zones`.
+    """
+    zones = read_zones(scene, depsgraph, owner, grounds)
+    if not zones:
+        return ground
+    corners, count = ground.triangles, len(ground.triangles)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = np.abs(normal) / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    each = np.repeat(np.arange(count), 3)
+    spots = Spots(each, np.tile(np.eye(3), (count, 1)), corners.reshape(-1, 3), normal[each])
+    wet = wet_ground(corners) if any(zone.asks_for_water for zone in zones) else None
+    share = np.prod([zone.share(spots, wet) for zone in zones], axis=0).reshape(count, 3)
+    return replace(ground, weight=share if ground.weight is None else share * ground.weight)
 
 
 def _zone(biome: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Zone:

@@ -20,6 +20,7 @@ from ...stands.site import StandSite
 from ..attributes import write
 from ..placing.plant_objects import link_field
 from ..placing.terrain import read_ground
+from ..placing.zones import zoned
 from ..runtime import JobData, guarded, is_there
 from ..scene.field_points import read_points
 from ..scene.field_sizes import (
@@ -51,7 +52,7 @@ MIXED_WOOD = {
     "hazel": (0.5, 1.0),
 }
 #: Settings that a stand hands on; identity and state are its own.
-_OWN = {"rna_type", "name", "is_grown", "grounds", "species", "species_index"}
+_OWN = {"rna_type", "name", "is_grown", "biome", "grounds", "species", "species_index"}
 _MASKS = ("vertex_group", "areas", "paths", "path_distance")
 _YEAR_PATH = "tetflora.stand_year"
 _GROWING = (0.08, 0.85)  # fractions of the job: before, and while it grows
@@ -168,6 +169,7 @@ def _again_steps(
     soil = Soil(**{f.name: getattr(stand, f.name) for f in fields(Soil)})
     settings = StandSettings(**{f.name: getattr(stand, f.name) for f in fields(StandSettings)})
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
+    ground = zoned(scene, depsgraph, stand, grounds, ground)
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
     records = yield from _growing(site, guilds, settings)
     if not len(records):
