@@ -78,7 +78,9 @@ class TETFLORA_PT_stand_detail(_PartOfStand, bpy.types.Panel):
     bl_label = "Detail"
 
     def draw(self, context: bpy.types.Context) -> None:
-        draw_properties(split_layout(self).column(), shown_stand(context), "interval", "least_height", "cell")
+        draw_properties(
+            split_layout(self).column(), shown_stand(context), "interval", "least_height", "cell", "open_edges"
+        )
 
 
 CLASSES = (TETFLORA_PT_stand, TETFLORA_PT_stand_site, TETFLORA_PT_stand_detail)

@@ -63,6 +63,8 @@ class TetFloraStand(bpy.types.PropertyGroup):
     interval: _GROWTH.interval
     least_height: _GROWTH.least_height
     cell: _GROWTH.cell
+    # Woods of a scene end where their ground does.
+    open_edges: properties_of(StandSettings, options=set(), default=True).open_edges
 
     warmth: FloatProperty(
         name="Warmth",
