@@ -50,6 +50,7 @@ NAMES = (
     "wind",
     "year",
     "stands",
+    "biomes",
     "dolly",
     "endurance",
     "farm",
