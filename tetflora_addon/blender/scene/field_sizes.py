@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ..attributes import values_of
 from .field_points import FieldPoints, Points, joined, point_count, refuse
-from .own_ages import Sizes
+from .own_ages import Lives, Sizes
 
 HEIGHT = "tf_height"
 #: Attributes of numbers, with the most that is sound: metres, and years since death.
@@ -188,25 +188,18 @@ def in_year(
     )
     if sizes is None:
         return chosen, None
-    columns = {f.name: _between(getattr(sizes, f.name), a, b, part) for f in fields(sizes) if f.name != "life"}
+    columns = {
+        f.name: _between(getattr(sizes, f.name), a, b, part) for f in fields(sizes) if f.name not in {"plant", "lives"}
+    }
     for name in ("height", "diameter", "width"):  # what is known of one of them only holds for both
         one, other = getattr(sizes, name)[a], getattr(sizes, name)[b]
         columns[name] = np.where((one > 0.0) & (other > 0.0), columns[name], np.maximum(one, other))
     left = (1.0 - part) * (records.year[b] - records.year[a])
     columns["dead"] = np.where(sizes.dead[b] > 0.0, np.maximum(sizes.dead[b] - left, 0.0), sizes.dead[a])
     if smooth:
-        columns["life"] = _lives(sizes, records, float(now))[a]
+        columns["plant"] = records.first[a]
+        columns["lives"] = Lives(now, records.year, sizes.height, sizes.dead, records.first, points.species)
     return chosen, Sizes(**columns)
-
-
-def _lives(sizes: Sizes, records: History, now: float) -> NDArray[np.float64]:
-    """`Sizes.life` (n, 5) of all records."""
-    first, alive = records.first, np.flatnonzero(sizes.dead <= 0.0)
-    last = first.copy()
-    last[first[alive]] = alive  # the last one written stays
-    last = last[first]
-    year, height = records.year, sizes.height
-    return np.stack([np.full(len(first), now), year[first], height[first], year[last], height[last]], axis=1)
 
 
 def _between(values: NDArray, a: NDArray[np.int64], b: NDArray[np.int64], part: NDArray[np.float64]) -> NDArray:

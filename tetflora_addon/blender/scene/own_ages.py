@@ -59,6 +59,29 @@ def sound_ages(ages: NDArray[np.floating]) -> NDArray[np.bool_]:
 
 
 @dataclass(frozen=True)
+class Lives:
+    """All records (n,) of a history, and the year that is looked at.
+
+    Attributes
+    ----------
+    now : float
+    year, height, dead : (n,) float64
+        As of `Sizes`.
+    first : (n,) int64
+        First record of the same plant; its records follow each other.
+    species : (n,) int64
+        Number of the kind in the field.
+    """
+
+    now: float
+    year: NDArray[np.float64]
+    height: NDArray[np.float64]
+    dead: NDArray[np.float64]
+    first: NDArray[np.int64]
+    species: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
 class Sizes(Arrays):
     """Sizes of plants (n,), metres in the field's space; 0 is not known.
 
@@ -72,9 +95,10 @@ class Sizes(Arrays):
         By which fraction limbs to the east and north are longer.
     fit : (n, 2) float64
         Factors on height and crown width that make up for what is random in the plant.
-    life : (n, 5) float64 or None
-        Of a history that is to be animated: present year, year and height of the first record and of the last one in
-        life, and nothing depends on the present year but the first column; see `sizes`.
+    plant : (n,) int64 or None
+        First record of the plant among those of ``lives``, where a history is to be animated.
+    lives : Lives or None
+        All of that history.
     """
 
     height: NDArray[np.float64]
@@ -84,4 +108,5 @@ class Sizes(Arrays):
     dead: NDArray[np.float64]
     offset: NDArray[np.float64]
     fit: NDArray[np.float64]
-    life: NDArray[np.float64] | None = None
+    plant: NDArray[np.int64] | None = None
+    lives: Lives | None = None

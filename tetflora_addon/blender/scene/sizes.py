@@ -5,8 +5,8 @@
 A plant that stands still is of the class of heights that is nearest: each is 1.5 times the one below, and the scale
 makes up for what is left. Classes belong to the species alone, so that no plant depends on others.
 
-Where a stand grows in an animation, plants must not jump from class to class. There, plants that were born at about the
-same time and grow at about the same pace are a kind, whose age goes on with the year; scales make up for the
+Where a stand grows in an animation, plants must not jump from class to class. There, plants that are born, die and end
+up alike are a *cohort*: one kind, whose age goes on as those of its plants do on the mean; scales make up for the
 difference in height. What a plant belongs to follows from its whole life and not from the present year, so that a frame
 alone is that of the film.
 """
@@ -31,7 +31,7 @@ from ...growth.seeds import Seeds
 from ...species.ages import ages_of, with_age
 from ...species.growing import Ages
 from ...species.species import Species
-from .own_ages import MOST_YEARS, Sizes
+from .own_ages import MOST_YEARS, Lives, Sizes
 from .skeletons import aged_kind, form_of, species_of
 
 #: Height of a class over that of the one below, and classes below that of full-grown plants.
@@ -39,8 +39,9 @@ _STEP, _BELOW = 1.5, 9
 _NODES = 512  # of heights by age, from a thousandth of a year on
 #: Years since death that stand for others, as far as plants change: leaves, twigs, boughs and limbs are gone.
 _SINCE = np.array([1.0, 6.0, 25.0])
-#: Of plants that grow: years between classes of birth and of death, and ratio of the paces of classes.
-_BIRTHS, _DEATHS, _PACE = 20.0, 5.0, 1.6
+#: Of plants that grow: cohorts of a species at most; what counts as far apart: years of birth, ratio of the ages at the
+#: end and of lengths of life; years between points of the curve of a cohort, and between classes of death.
+_COHORTS, _APART, _STRETCH, _DEATHS = 12, (20.0, np.log(1.6), np.log(1.8)), 5.0, 20.0
 _BREAST, _TALL = 1.3, 1.5  # height of the diameter, and least height of a plant that has one, metres
 _DIES = 0.999  # part of its life after which a plant that dies early no longer grows
 _PLANTS = 16  # over which the length of trunks is averaged, as `compiled.crowns` does
@@ -96,7 +97,7 @@ def sized(
                 scale[own] *= measured(species).fitted(seeds.take(own), sizes.take(own))[0]
                 continue
             some = sizes.take(own)
-            stages, which = np.unique(_stages(species, some), return_inverse=True)
+            stages, which = np.unique(_stages(species, some, index), return_inverse=True)
             for n, stage in enumerate(stages.tolist()):
                 here = which == n
                 these = own[here]
@@ -112,26 +113,57 @@ def sized(
     ), None if left is None or not left.any() else left
 
 
-def _stages(species: Species, sizes: Sizes) -> NDArray[np.complex128]:
-    """Age (n,) as the real part, and years since death as the imaginary one, of the kind that each plant belongs to."""
+def _stages(species: Species, sizes: Sizes, number: int) -> NDArray[np.complex128]:
+    """Age (n,) as the real part, and years since death as the imaginary one, of the kind that each plant belongs to.
+
+    ``number`` is that of their kind in the field.
+    """
     ages = ages_of(species)
     full = measured(species).height
     dead, height = sizes.dead, np.where(sizes.height > 0.0, sizes.height, full)
     if ages.scaled:
         return np.full(len(height), ages.full, complex)
-    if sizes.life is None:
-        years = _class_ages(species, height / full, 1)
+    if sizes.lives is None:
+        years, older = _class_ages(species, height / full, 1), _class_ages(species, height / full, 2)
         gone = _SINCE[np.argmin(np.abs(np.log(np.maximum(dead, 0.1)[:, None] / _SINCE)), axis=1)]
     else:
-        now, born, small, end, tall = sizes.life.T
-        small, tall = (ages_of_heights(species, np.maximum(h, 1e-3) / full) for h in (small, tall))
-        birth = _BIRTHS * np.rint((born - small) / _BIRTHS)
-        pace = tall / np.maximum(end - (born - small), 1.0)
-        pace = _PACE ** np.clip(np.rint(np.log(pace) / np.log(_PACE)), -5, 2)
-        years = np.clip(pace * (now - birth), 0.5, ages.decline * ages.lifespan)
+        years = _cohort_ages(species, sizes.lives, number, full)[sizes.plant]
+        now, older = sizes.lives.now, _class_ages(species, height / full, 3)  # leafless, they differ less
         gone = np.maximum(now - _DEATHS * np.rint((now - dead) / _DEATHS), 0.01)
-    older = _class_ages(species, height / full, 2)  # leafless, they differ less
     return np.where(dead > 0.0, older + 1j * gone, years + 0j)
+
+
+def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> NDArray[np.float64]:
+    """Present age of the cohort of each plant of a kind, at its first record; of all records (n,)."""
+    own = np.flatnonzero((lives.species == number) & (lives.dead <= 0.0) & (lives.height > 0.0))
+    out = np.ones(len(lives.year))
+    if not len(own):
+        return out
+    year, age = lives.year[own], ages_of_heights(species, np.maximum(lives.height[own], 1e-3) / full)
+    begins = np.flatnonzero(np.diff(lives.first[own], prepend=-1))
+    ends = np.append(begins[1:], len(own)) - 1
+    birth = year[begins] - age[begins]
+    life = np.stack([birth, np.log(age[ends]), np.log(np.maximum(year[ends] - birth, 1.0))], axis=1) / _APART
+    # The most frequent lives are cohorts, and each plant is of the nearest one.
+    cells, count = np.unique(np.rint(life), axis=0, return_counts=True)
+    main = cells[np.argsort(-count, kind="stable")[:_COHORTS]]
+    away = np.stack([((life - one) ** 2).sum(axis=1) for one in main])
+    cohort = np.argmin(away, axis=0)
+    # Mean ages by spans of years, of all records; they only rise.
+    lengths = np.diff(np.append(begins, len(own)))
+    spans = int((year.max() - year.min()) / _STRETCH) + 1
+    cell = np.repeat(cohort, lengths) * spans + ((year - year.min()) / _STRETCH).astype(np.int64)
+    weight, at, log_age = (
+        np.bincount(cell, values, len(main) * spans).reshape(-1, spans) for values in (None, year, np.log(age))
+    )
+    present = np.ones(len(main))
+    for n in range(len(main)):
+        some = weight[n] > 0
+        if some.any():
+            curve = np.maximum.accumulate(log_age[n, some] / weight[n, some])
+            present[n] = np.exp(np.interp(lives.now, at[n, some] / weight[n, some], curve))
+    out[lives.first[own[begins]]] = present[cohort]
+    return out
 
 
 def _class_ages(species: Species, ratio: NDArray[np.float64], every: int) -> NDArray[np.float64]:
