@@ -94,7 +94,8 @@ def limbs_of(
     within = (number >= 0) & (number < [len(some) for some in branches])
     out.kind[within[:, trunks[trunks > i]].any(axis=1)] = STEM
     for limb in np.unique(species["next"][trunks][:, (LATERAL, DEAD)]) - first:
-        some = np.flatnonzero(within[:, limb]) if limb >= 0 else np.zeros(0, np.intp)
+        # What is on a dead branch of a limb is on that limb: rows of living branches come first.
+        some = np.flatnonzero(within[:, limb] & (out.kind < LIMB)) if limb >= 0 else np.zeros(0, np.intp)
         if len(some):
             own = branches[limb].take(number[some, limb])
             way = own.position - base.position[some]
