@@ -171,7 +171,7 @@ def facet_numbers(
     From 1 on they divide the area evenly; below, one facet stands for several sub-plants. Facets are left out by the
     fraction (n,) of their owner that is real.
     """
-    expected = area / facet
+    expected = area / np.maximum(facet, 1e-300)  # leafless plants have no size of leaves
     counts = np.floor(expected + uniform(key, draw)).astype(np.int64)
     owner, index = spread(counts)
     one = facet * np.where(expected >= 1.0, expected / np.maximum(counts, 1), 1.0)
