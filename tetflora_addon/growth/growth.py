@@ -156,13 +156,13 @@ def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERA
         start = rows["start"][row, DEAD, 0] if sort == DEAD else _started(rows, branches, sort)
         wanted = wanted * numbers(rows, row, branches.crown[:, BASE], sort, start)
     nodes = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64)
-    grown = _grown(rows, branches, sort)
+    grown = living_nodes(rows, branches, sort)
     if grown is not None:
         nodes = np.where(grown.on, grown.number.sum(axis=0), nodes)
     return np.where(child >= 0, nodes * whorl, 0)
 
 
-def _grown(rows: NDArray[np.void], branches: Branches, sort: int) -> Grown | None:
+def living_nodes(rows: NDArray[np.void], branches: Branches, sort: int) -> Grown | None:
     """Living nodes of branches that are not full-grown; None where all are."""
     row, key = branches.row, branches.key
     if sort == FORK or not rows["growing"][row, sort, NOW].any():
@@ -233,7 +233,7 @@ def chosen_children(
     parent = parents.take(owner)
     path = int(_PATHS[sort])
     row = rows["next"][parent.row, sort]
-    grown = _grown(rows, parents, sort)
+    grown = living_nodes(rows, parents, sort)
     if grown is not None:
         index, more, extra = grown.chosen(owner, index, rows["whorl"][row])
         path = path + more
