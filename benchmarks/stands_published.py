@@ -18,8 +18,8 @@ from tetflora_addon.growth.hashing import key_of_seed, uniform
 from .report import ROOT
 
 DATA = ROOT / "tests" / "data" / "stands_published.json"
-#: Trees on a hectare whose mean is the height of a stand; diameters that count in distributions, cm.
-_TOP, _COUNTED = 100, 7.0
+#: Trees on a hectare whose mean is the height of a stand; diameters that count, cm; hectares of a plot.
+_TOP, _COUNTED, _PLOT = 100, 7.0, 0.1
 
 
 class Figure(NamedTuple):
@@ -108,7 +108,8 @@ def _by_diameter(trees: Trees) -> tuple[NDArray, NDArray]:
 def spread_of_diameters(species: str, trees: Trees) -> float:
     """Published standard deviation of the diameters over 7 cm, over their mean."""
     a, b, c, e, f = published()["diameters"]["species"][species]
-    scale, shape = a + b * trees.mean, max(c + e * trees.mean + f * float(trees.diameter.max()), 0.8)
+    largest = np.quantile(trees.diameter, 1.0 - trees.area / (_PLOT * len(trees.diameter)))
+    scale, shape = a + b * trees.mean, c + e * trees.mean + f * float(largest)
     least = (_COUNTED - 0.1) / scale
     drawn = scale * (least**shape - np.log1p(-uniform(key_of_seed(np.arange(20_000)), 1))) ** (1.0 / shape)
     return float(drawn.std() / drawn.mean())
@@ -126,7 +127,7 @@ def figures(species: str, years: int, trees: Trees) -> list[Figure]:
     if species in data["height"]["species"] and thick.any():
         tolerance = data["height"]["tolerance"]
         ratio = np.exp(np.log(trees.height[thick] / height(species, diameter, trees)).mean())
-        add("height by diameter", 1 - tolerance, 1 + tolerance, ratio)
+        add("height by diameter", 1 - tolerance, 1 + tolerance, ratio, False)
     for mean, tall, _ in data["measured_heights"]["species"].get(species, ()):
         near = np.abs(trees.diameter / mean - 1.0) < 0.1
         if near.sum() >= 10:
@@ -136,8 +137,8 @@ def figures(species: str, years: int, trees: Trees) -> list[Figure]:
     if species in data["crown_width"]["species"] and thick.any():
         tolerance = data["crown_width"]["tolerance"]
         ratio = np.exp(np.log(trees.width[thick] / crown_width(species, diameter)).mean())
-        add("crown width by diameter", 1 - tolerance, 1 + tolerance, ratio)
-    if species in data["crown_base"]["species"]:
+        add("crown width by diameter", 1 - tolerance, 1 + tolerance, ratio, False)
+    if species in data["crown_base"]["species"] and trees.mean >= data["crown_base"]["from"]:
         tolerance, middle = data["crown_base"]["tolerance"], crown_ratio(species, trees)
         near = np.abs(trees.diameter / trees.mean - 1.0) < 0.25
         add("crown ratio", middle - tolerance, middle + tolerance, (1.0 - trees.base / trees.height)[near].mean())
@@ -146,11 +147,35 @@ def figures(species: str, years: int, trees: Trees) -> list[Figure]:
         most = a - b * np.exp(-np.exp(-c) * trees.top**p)
         low, high = data["basal_area"]["within"]
         add("basal area over the largest", low, high, trees.basal_area / most)
-    if species in data["diameters"]["species"]:
+    if species in data["diameters"]["species"] and trees.mean >= data["diameters"]["from"]:
         counted = trees.diameter[trees.diameter >= _COUNTED]
         tolerance, middle = data["diameters"]["tolerance"], spread_of_diameters(species, trees)
         add("spread of diameters", middle - tolerance, middle + tolerance, counted.std() / counted.mean())
     low, high = data["leaf_area"]["range"]
     own = data["leaf_area"]["species"].get(species, (low, high))
     add("leaf area index", max(low, own[0]), min(high, own[1]), trees.leaves / (1e4 * trees.area))
+    return found
+
+
+def curves(species: str, stands: list[Trees]) -> list[Figure]:
+    """Height and crown width over published ones, of the trees of all years together, as they were measured.
+
+    Each class of 5 cm counts once, where it has ten trees.
+    """
+    data, found = published(), []
+    diameter = np.concatenate([trees.diameter for trees in stands])
+    ratios = {}
+    if species in data["height"]["species"]:
+        own = [trees.height / height(species, trees.diameter, trees) for trees in stands]
+        ratios["height by diameter, all years"] = "height", np.concatenate(own)
+    if species in data["crown_width"]["species"]:
+        width = np.concatenate([trees.width for trees in stands])
+        ratios["crown width by diameter, all years"] = "crown_width", width / crown_width(species, diameter)
+    thick = diameter >= data["crown_width"]["from"]
+    of = (diameter[thick] / 5.0).astype(np.int64)
+    number = np.bincount(of)
+    for name, (key, ratio) in ratios.items():
+        means = np.exp(np.bincount(of, np.log(ratio[thick])) / np.maximum(number, 1))[number >= 10]
+        tolerance = data[key]["tolerance"]
+        found.append(Figure(species, 0, name, 1 - tolerance, 1 + tolerance, float(np.exp(np.log(means).mean()))))
     return found

@@ -24,20 +24,24 @@ from .records import LYING, Records
 #: Height for the girth over that in a closed stand: where the light beside the crown is full, and where there is none.
 _SLENDER_LIT, _SLENDER_DARK = 0.72, 1.14
 #: Light beside a crown in which it begins to widen, for shade tolerance 0 and 5 (crowns of tolerant trees reach into
-#: each other); how much more lets it widen as fast as it can; where that is, in lengths of a dome and of a cone.
-_SIDE, _SIDE_MORE, _BESIDE = (0.62, 0.23), 0.35, (0.35, 0.15)
+#: each other); how much more lets it widen as fast as it can.
+_SIDE, _SIDE_MORE = (0.61, 0.26), 0.35
+#: Where that is: in lengths of a dome and of a cone below the top, and so much of the height at most counts as length.
+_BESIDE, _LONG = (0.65, 0.85), 0.45
 #: Light beside it, over that in which limbs die, below which it narrows.
 _DARK = 1.5
 #: Fractions of the radius, or of what is lacking, by which a crown narrows and widens in a year.
-_NARROWS, _WIDENS = 0.05, 0.15
+_NARROWS, _WIDENS = 0.05, 0.12
 #: Fraction of the crown that dies from below in a year where it is quite dark; shortest crown, over the height.
 _RISES, _SHORTEST = 0.3, 0.12
 #: Offset for the difference of light on two sides over its sum, the most of it, and what of it comes in a year.
 _LEANS, _MOST_OFFSET, _TURNS = 1.0, 0.6, 0.08
+#: Light over that of a free plant in which plants grow about half as fast as they can at all.
+_HALF_LIT = 0.1
 #: Part of the vigour that is this year's.
 _RECENT = 0.3
 #: Vigour below which plants are likely to die, for shade tolerance 0 and 5, and the chance where it is 0.
-_WEAK, _DIES = (0.17, 0.025), 0.15
+_WEAK, _DIES = (0.2, 0.025), 0.15
 #: Chance to die for other reasons: of so many in a lifespan, for each that is left; when the old die, in lifespans.
 _OTHERS, _OLD = 1.0, (0.8, 1.15)
 #: Trees that stand dead: least diameter and height, and years until they fall, and are gone, for 40 cm.
@@ -66,7 +70,8 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
         return np.take(values, guild)
 
     away = radius + 0.5 * light.cell
-    middle = base + (_BESIDE[0] + (_BESIDE[1] - _BESIDE[0]) * own(guilds.top)) * (height - base)
+    deep = _BESIDE[0] + (_BESIDE[1] - _BESIDE[0]) * own(guilds.top)
+    middle = height - deep * np.minimum(height - base, _LONG * height)
     places = ((away, 0.0), (-away, 0.0), (0.0, away), (0.0, -away))
     east, west, north, south = (light.at(x + dx, y + dy, middle) for dx, dy in places)
     side = 0.25 * (east + west + north + south)
@@ -77,9 +82,10 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
 
     free = np.pi * guilds.radii(guild, one.girth) ** 2 * own(guilds.free)
     net = taken - own(guilds.cost) * crowns.leaves[block]
-    vigour = (1.0 - _RECENT) * one.vigour + _RECENT * np.clip(net / np.maximum(free, 1e-9), 0.0, 1.5)
+    lit = np.clip(net / np.maximum(free, 1e-9), 0.0, 1.5)
+    vigour = (1.0 - _RECENT) * one.vigour + _RECENT * lit
     rate = own(guilds.yields) * one.quality * one.strength
-    girth = one.girth + _thickening(one, np.maximum(net, 0.0) * rate, guilds)
+    girth = one.girth + _thickening(one, np.maximum(net, 0.0) * rate, lit, guilds)
     dark = 1.0 - np.clip(side, 0.0, 1.0)
     slender = _SLENDER_LIT + (_SLENDER_DARK - _SLENDER_LIT) * dark
     short = 0.4 + 0.6 * np.sqrt(one.quality)
@@ -106,12 +112,13 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
     )  # fmt: skip
 
 
-def _thickening(one: Plants, wood: NDArray[np.float64], guilds: Guilds) -> NDArray[np.float64]:
-    """By how much plants (n,) become thicker that make so much wood, kg."""
+def _thickening(one: Plants, wood: NDArray, lit: NDArray, guilds: Guilds) -> NDArray[np.float64]:
+    """By how much plants (n,) become thicker that make so much wood, kg, and have so much of the light of free ones."""
     step = 0.002
     rise = np.maximum(guilds.heights(one.guild, one.girth + step) - guilds.heights(one.guild, one.girth), 0.0) / step
     more = np.take(guilds.solid, one.guild) * one.girth * (2.0 * one.height + one.girth * rise)
     most = np.take(guilds.thickening, one.guild) * one.quality * one.strength
+    most *= np.minimum((1.0 + _HALF_LIT) * lit / (lit + _HALF_LIT), 1.0)
     return np.minimum(wood / np.maximum(more, 1e-9), most)
 
 

@@ -38,7 +38,7 @@ class Guild:
     planted : float
         Share of what is planted, over those of the others.
     rain : float
-        Share of the seeds that come from outside, over those of the others.
+        Seeds that come from outside, over those where a tenth of the ground beyond is below its crowns.
     ecology : Ecology, optional
         In place of that of the species.
     """

@@ -23,8 +23,8 @@ _PLANTED_AGE, _SOWN_AGE = 3.0, 3.0
 #: Metres of the grid on which seeds are spread, at least; and seeds on a square metre that make half as many plants as
 #: can come at all.
 _SEED_CELL, _HALF = 4.0, 20.0
-#: Seeds on a square metre where all that comes from outside is of one species.
-_OUTSIDE = 4.0
+#: Part of the ground beyond that is below crowns of each species that bear seeds.
+_OUTSIDE = 0.1
 
 
 def planted(site: StandSite, guilds: Guilds, suits: NDArray[np.float64], density: float, seed: int) -> Plants:
@@ -87,8 +87,7 @@ class SeedRain:
         self.site, self.guilds, self.suits, self.most = site, guilds, suits, most
         width, depth = site.size
         self.columns, self.rows = max(round(width / _SEED_CELL), 1), max(round(depth / _SEED_CELL), 1)
-        share = guilds.rain / guilds.rain.sum() if guilds.rain.sum() > 0 else 0.0 * guilds.rain
-        self.outside = outside * _OUTSIDE * share
+        self.outside = outside * _OUTSIDE * guilds.rain * guilds.seeds
 
     def fallen(self, plants: Plants) -> NDArray[np.float64]:
         """Seeds (g, cells) on a square metre and year."""

@@ -15,7 +15,7 @@ from ..species.ecology import Ecology
 #: Kelvin by which it is colder for each metre of altitude, and degree days that a kelvin is worth: days of the season.
 _LAPSE, _DAYS = 0.006, 190.0
 #: Degree days, beyond those that a species needs at least, that let it grow at two thirds of its rate.
-_WARM = 450.0
+_WARM = 300.0
 #: Moisture at which species of drought tolerance 0 and 5 begin to grow, and from there to full growth; wetness at
 #: which those of waterlogging tolerance 0 and 5 cease to.
 _DRY, _DRY_WIDTH = (0.42, 0.02), 0.25

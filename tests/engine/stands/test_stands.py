@@ -1,0 +1,208 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stands: light is shared and not made, plants grow and die for good, and all is the same in any number of threads."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tetflora_addon import parallel
+from tetflora_addon.errors import TetFloraError
+from tetflora_addon.jobs import at_once
+from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.ecology import Ecology
+from tetflora_addon.stands.change import grown
+from tetflora_addon.stands.grow import StandSettings, begun, grow
+from tetflora_addon.stands.guilds import Guild, Guilds
+from tetflora_addon.stands.light import Crowns, LightGrid
+from tetflora_addon.stands.records import LYING, Records
+from tetflora_addon.stands.renewal import planted
+from tetflora_addon.stands.site import StandSite, even_site
+
+SIDE = 40.0
+MIXED = [Guild(load_species(name)) for name in ("beech", "birch")]
+YEARS = StandSettings(years=60, interval=10, density=6000.0, recruits=500.0, seed=3)
+
+
+def half_planted(settings: StandSettings = YEARS) -> StandSite:
+    """Ground on a slope, of which the western half can be planted."""
+    rows = np.linspace(0.0, 8.0, 20)[:, None] * np.ones(20)
+    plantable = (np.arange(20) < 10) * np.ones((20, 1))
+    return StandSite(-10.0, 5.0, SIDE / 20, rows, plantable)
+
+
+@cache
+def records() -> Records:
+    return at_once(grow(half_planted(), MIXED, YEARS))
+
+
+def crowns(number: int, seed: int) -> Crowns:
+    """Crowns of all sizes in a grid of 24 x 17 columns of a metre, and around it."""
+    draw = np.random.default_rng(seed).random((7, number))
+    height = 0.2 + 20 * draw[0] ** 2
+    base = height * 0.9 * draw[1]
+    return Crowns(
+        24 * draw[2], 17 * draw[3], 0.05 + 5 * draw[4], base, height, 40 * draw[5] ** 3, (draw[6] > 0.5).astype(float)
+    )
+
+
+def same(a: Records, b: Records) -> bool:
+    return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(Records))
+
+
+@settings(max_examples=12, deadline=None)
+@given(number=st.integers(1, 120), seed=st.integers(0, 2**30))
+def test_crowns_take_all_light_that_does_not_reach_the_ground(number: int, seed: int) -> None:
+    grid, some = LightGrid(17, 24, 1.0), crowns(number, seed)
+    strips = grid.fill(some)
+    taken = np.concatenate([grid.taken(i) for i in range(len(strips))])
+    assert sorted(np.concatenate(strips)) == list(range(number))
+    assert (taken >= 0).all()
+    # Light of each column in the open, less what is left of it below everything.
+    ground = grid.at(np.arange(24.0).repeat(17) + 0.5, np.tile(np.arange(17.0) + 0.5, 24), np.zeros(24 * 17))
+    assert (ground <= 1.0 + 1e-5).all() and (ground >= 0).all()
+    assert taken.sum() <= 24 * 17 * (1.0 + 1e-5)
+
+
+def test_the_order_of_crowns_does_not_matter() -> None:
+    grid, other, some = LightGrid(17, 24, 1.0), LightGrid(17, 24, 1.0), crowns(80, 1)
+    turned = Crowns(*(getattr(some, f.name)[::-1] for f in fields(Crowns)))
+    grid.fill(some)
+    other.fill(turned)
+    assert np.array_equal(grid.light, other.light)
+
+
+def test_less_light_never_makes_more() -> None:
+    guilds = Guilds([MIXED[0]])
+    site = even_site(SIDE)
+    suits = np.stack([site.suits(needs) for needs in guilds.needs])
+    plants = planted(site, guilds, suits, 400.0, 1)
+    open_, closed = LightGrid(40, 40, 1.0), LightGrid(40, 40, 1.0)
+    own = plants.crowns(guilds)
+    roof = Crowns(*(np.array([v]) for v in (20.0, 20.0, 22.0, 9.0, 12.0, 3000.0, 0.0)))
+    joined = Crowns(*(np.concatenate([getattr(own, f.name), getattr(roof, f.name)]) for f in fields(Crowns)))
+    after = []
+    for grid, some in ((open_, own), (closed, joined)):
+        strips = grid.fill(some)
+        taken = np.zeros(len(some.x))
+        for i, index in enumerate(strips):
+            taken[index] = grid.taken(i)
+        after.append(grown(plants, own, taken[: len(plants)], grid, guilds, slice(0, len(plants))))
+    assert (after[0].girth >= after[1].girth).all() and after[0].girth.sum() > 1.05 * after[1].girth.sum()
+    assert (after[0].vigour >= after[1].vigour).all()
+    assert (after[1].girth >= plants.girth).all() and (after[1].height >= plants.height).all()
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_the_same_bytes_in_any_number_of_threads(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tetflora_addon.stands.light._BAND_CELLS", 300)
+    monkeypatch.setattr("tetflora_addon.stands.grow._BLOCK", 100 * threads)
+    parallel.use(threads)
+    try:
+        assert same(at_once(grow(half_planted(), MIXED, YEARS)), records())
+    finally:
+        parallel.use(0)
+
+
+def test_plants_stay_where_they_may_be_and_are_sound() -> None:
+    rows = records()
+    x, y, z = rows.position.T
+    assert (x >= -10.0).all() and (x <= 10.0 + 1e-4).all() and (y >= 5.0).all() and (y <= 45.0 + 1e-4).all()
+    assert z.min() >= 0.0 and z.max() <= 8.0
+    assert (rows.height >= YEARS.least_height - 1e-5).all()
+    assert (rows.crown_base < rows.height).all() and (rows.crown_width > 0).all()
+    assert (np.abs(rows.offset) <= 0.6 + 1e-6).all()
+    assert {0, 1} == set(rows.species.tolist())
+
+
+def test_the_dead_stay_dead_and_fall_once() -> None:
+    rows = records()
+    again = rows.plant[1:] == rows.plant[:-1]
+    assert (rows.plant[1:] >= rows.plant[:-1]).all() and rows.plant[0] == 0
+    assert (rows.year[1:][again] > rows.year[:-1][again]).all()
+    assert (rows.dead[1:] >= rows.dead[:-1])[again].all()
+    assert (rows.lying[1:] >= rows.lying[:-1])[again].all()
+    assert rows.lying.any() and (rows.dead[rows.lying] > 0).all()
+    assert np.allclose(np.linalg.norm(rows.lean[rows.lying], axis=1), 1.05 * LYING, rtol=1e-4)
+    alive = rows.dead == 0
+    grows = again & alive[1:] & alive[:-1]
+    assert (rows.height[1:] >= rows.height[:-1])[grows].all() and (rows.diameter[1:] >= rows.diameter[:-1])[grows].all()
+    # What is dead has the size that it died with.
+    assert np.array_equal(rows.height[1:][again & ~alive[1:]], rows.height[:-1][again & ~alive[1:]])
+
+
+def test_a_year_between_two_records_lies_between_them() -> None:
+    rows = records()
+    for year in (0.0, 10.0, 33.0, 60.0):
+        there = rows.at(year)
+        assert len(set(there.plant.tolist())) == len(there)
+        exact = rows.take(np.flatnonzero(rows.year == year))
+        assert set(exact.plant.tolist()) <= set(there.plant.tolist())
+        known = there.take(np.isin(there.plant, exact.plant))
+        assert np.allclose(known.height, exact.height) and np.array_equal(known.dead, exact.dead)
+    before, now, after = (rows.at(year) for year in (33.0, 33.5, 34.0))
+    all_there = np.intersect1d(np.intersect1d(before.plant, now.plant), after.plant)
+    low, middle, high = (one.take(np.isin(one.plant, all_there)).height for one in (before, now, after))
+    assert ((middle >= low - 1e-4) & (middle <= high + 1e-4)).all()
+    assert len(rows.at(-1.0)) == 0 and len(rows.at(61.0)) == 0
+
+
+def test_dense_stands_thin_themselves() -> None:
+    stand = begun(even_site(60.0), MIXED[:1], StandSettings(years=70, interval=0, density=8000.0, recruits=0.0))
+    guilds, thinned = stand.guilds, []
+    for year in range(70):
+        stand.step(year)
+        plants = stand.plants
+        thinned.append((len(plants), guilds.masses(plants.guild, plants.girth, plants.height).mean()))
+    number, mass = np.log(np.array(thinned)[25:]).T
+    assert -1.8 < np.polyfit(number, mass, 1)[0] < -1.2
+    leaves = plants.leaf_area(guilds).sum() / 3600.0
+    assert 4.5 < leaves < 8.0
+
+
+def test_plants_that_are_given_grow_on() -> None:
+    rows = records().at(60.0)
+    alive = rows.take(np.flatnonzero(rows.dead == 0))
+    bare = StandSettings(years=5, interval=0, density=0.0, recruits=0.0)
+    later = at_once(grow(half_planted(), MIXED, bare, alive))
+    later = later.take(np.flatnonzero(later.dead == 0))
+    assert 0.6 * len(alive) < len(later) <= len(alive)
+    assert later.height.mean() > 0.98 * alive.height.mean()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"years": 0}, "Years"),
+        ({"density": np.nan}, "Planted"),
+        ({"cell": 0.0}, "Cell"),
+        ({"density": 1e6}, "Density"),
+        ({"density": 0.0, "recruits": 0.0}, "Nothing is planted"),
+    ],
+)
+def test_what_cannot_be_is_refused(changes: dict[str, float], words: str) -> None:
+    with pytest.raises(TetFloraError, match=words):
+        at_once(grow(even_site(500.0), MIXED, replace(YEARS, **changes)))
+
+
+def test_sites_that_cannot_be_are_refused() -> None:
+    with pytest.raises(TetFloraError, match="moisture"):
+        StandSite(0, 0, 1.0, np.zeros((3, 3)), moisture=np.zeros((2, 3)))
+    with pytest.raises(TetFloraError, match="climate"):
+        at_once(grow(even_site(20.0, winter=-40.0), MIXED[:1], YEARS))
+
+
+def test_species_suit_their_climate() -> None:
+    needs = Ecology(warmth=600.0, winter=-10.0, drought=3.0, waterlogging=1.0)
+    high = StandSite(0, 0, 1.0, np.linspace(0, 2500, 50)[None, :], warmth=1700.0, winter=0.0)
+    suits = high.suits(needs)
+    assert (np.diff(suits) <= 0).all() and suits[0] > 0.8 and suits[-1] == 0.0
+    wet = np.linspace(0, 1, 50)[None, :]
+    fresh = StandSite(0, 0, 1.0, 0 * wet, moisture=wet).suits(needs)
+    assert fresh[0] == 0.0 and fresh[-1] < 0.5 < fresh.max()
