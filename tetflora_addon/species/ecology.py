@@ -127,9 +127,11 @@ def ecology_of(species: Any) -> Ecology:
         return species.ecology
     lengths = np.cumprod([order.length.mean for order in species.orders])
     first = species.orders[0]
-    stool = len(lengths) > 1 and lengths[0] < 1.0 and lengths[1] > 2.0
-    tall = float(lengths[1] + lengths[0] if stool else lengths[0])
-    height = 1.33 * max(tall, 0.02)
+    # Stems of a stool are longer than it; leaves stand up beyond stems that are next to nothing.
+    stool = len(lengths) > 1 and lengths[1] > lengths[0]
+    leaf = max((order.leaf_size.mean for order in species.orders if order.leaves.high > 0), default=0.0)
+    tall = float(lengths[0] + (lengths[1] if stool else 0.0))
+    height = 1.33 * max(tall, leaf)
     if height < 3.0:
         # Herbs and low shrubs: the crown is as wide as two thirds of the height, whatever the diameter is.
         thick = 0.01 * height
@@ -146,7 +148,7 @@ def ecology_of(species: Any) -> Ecology:
         height=height,
         diameter=largest,
         slenderness=(2.2 / (0.5 * largest), 0.9),
-        crown=(0.3 + 0.02 * height, min(20.0, 0.45 * height / largest)),
+        crown=(0.3 + 0.02 * height, min(20.0, 0.8 * height / largest)),
         thickening=min(largest / (0.35 * lifespan), 0.02),
         yields=0.5 if shrub else 0.9,
         leaves=4.0 if shrub else 6.0,

@@ -38,6 +38,8 @@ _RISES, _SHORTEST = 0.3, 0.12
 _LEANS, _MOST_OFFSET, _TURNS = 1.0, 0.6, 0.08
 #: Light over that of a free plant in which plants grow about half as fast as they can at all.
 _HALF_LIT = 0.1
+#: Girth at which plants cease to become thicker, over the largest that are known.
+_LARGEST = 1.3
 #: Part of the vigour that is this year's.
 _RECENT = 0.3
 #: Vigour below which plants are likely to die, for shade tolerance 0 and 5, and the chance where it is 0.
@@ -119,6 +121,8 @@ def _thickening(one: Plants, wood: NDArray, lit: NDArray, guilds: Guilds) -> NDA
     more = np.take(guilds.solid, one.guild) * one.girth * (2.0 * one.height + one.girth * rise)
     most = np.take(guilds.thickening, one.guild) * one.quality * one.strength
     most *= np.minimum((1.0 + _HALF_LIT) * lit / (lit + _HALF_LIT), 1.0)
+    large = (one.girth / (_LARGEST * np.take(guilds.diameter, one.guild))) ** 2
+    wood = wood * np.maximum(1.0 - large**2, 0.0)
     return np.minimum(wood / np.maximum(more, 1e-9), most)
 
 
