@@ -101,7 +101,9 @@ def sized(
             for n, stage in enumerate(stages.tolist()):
                 here = which == n
                 these = own[here]
-                own_scale, own_crown = measured(at_age(species, stage.real)).fitted(seeds.take(these), some.take(here))
+                still = some.lives is None or stage.imag
+                measure = measured(at_age(species, stage.real)) if still else _grown(species, stage.real)
+                own_scale, own_crown = measure.fitted(seeds.take(these), some.take(here))
                 scale[these] *= own_scale
                 crown[these], number[these] = own_crown, len(kinds)
                 kinds.append(aged_kind(kind, stage.real, stage.imag))
@@ -111,6 +113,12 @@ def sized(
     return replace(
         seeds, identifiers=tuple(kinds), species=number, scale=scale, crown=None if plain else crown
     ), None if left is None or not left.any() else left
+
+
+def kinds_of_sizes(species: Species, sizes: Sizes) -> list[Species]:
+    """A species in all stages that plants of recorded sizes (n,) are shown in when they stand still."""
+    stages = np.unique(_stages(species, sizes, 0)).tolist()
+    return [at_age(species, stage.real, dead) for stage in stages for dead in {0.0, stage.imag}]
 
 
 def _stages(species: Species, sizes: Sizes, number: int) -> NDArray[np.complex128]:
@@ -168,12 +176,16 @@ def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> ND
 
 def _class_ages(species: Species, ratio: NDArray[np.float64], every: int) -> NDArray[np.float64]:
     """Ages (n,) of the nearest classes to heights (n,) over that at the full age; one of so many classes counts."""
+    classes = _classes(species, every)
+    return ages_of_heights(species, classes[np.searchsorted(np.sqrt(classes[1:] * classes[:-1]), ratio)])
+
+
+def _classes(species: Species, every: int) -> NDArray[np.float64]:
+    """Heights of classes over that at the full age."""
     ages = ages_of(species)
     highest = ages.heights(ages.decline * ages.lifespan)
     classes = _STEP ** np.arange(-_BELOW // every * every, np.log(highest) / np.log(_STEP) - 0.3, every)
-    classes = np.append(classes, highest) if highest > 1.0 else classes
-    nearest = np.searchsorted(np.sqrt(classes[1:] * classes[:-1]), ratio)
-    return ages_of_heights(species, classes[nearest])
+    return np.append(classes, highest) if highest > 1.0 else classes
 
 
 class Measure:
@@ -183,21 +195,27 @@ class Measure:
     ----------
     flora : Flora
         Of this species alone.
+    ratios : tuple of float
+        Height and radius of the crown over the typical length of a trunk. They are measured at samples, which differ
+        from one age to the next.
     height, radius : float
         Of the plant and its crown on average, metres.
     """
 
-    def __init__(self, species: Species) -> None:
-        crown = crown_of(species)
+    def __init__(self, species: Species, ratios: tuple[float, float] | None = None) -> None:
         self.flora = compile_species([species])
         number = np.arange(_PLANTS)
         place, upright, one = np.zeros((_PLANTS, 3)), np.tile(np.eye(3), (_PLANTS, 1, 1)), np.ones(_PLANTS)
         some = Seeds((species.name,), np.zeros(_PLANTS, np.int32), number, place, upright, one)
-        trunk = trunks(self.flora.rows, some)
+        trunk, typical = trunks(self.flora.rows, some), species.orders[0].length.mean
         self.length = float(trunk.length.mean())
-        # The shoot of this year bears leaves nowhere but at its tip.
-        self.height = max(crown.height, float(axes(self.flora.rows, trunk).knots[:, -1, 2].mean()))
-        self.radius = crown.radius
+        if ratios is None:
+            crown = crown_of(species)
+            # The shoot of this year bears leaves nowhere but at its tip.
+            height = max(crown.height, float(axes(self.flora.rows, trunk).knots[:, -1, 2].mean()))
+            ratios = height / typical, crown.radius / typical
+        self.ratios = ratios
+        self.height, self.radius = (typical * ratio for ratio in ratios)
 
     def fitted(self, seeds: Seeds, sizes: Sizes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Scales (n,) and crown forms (n, 5) with which plants have their recorded sizes."""
@@ -228,6 +246,16 @@ class Measure:
 def measured(species: Species) -> Measure:
     """What is known of a species at its age; found once."""
     return Measure(species)
+
+
+def _grown(species: Species, years: float) -> Measure:
+    """The same of a species at some age of an animation, where nothing may jump: between those of two classes."""
+    ages = ages_of_heights(species, _classes(species, 1))
+    high = int(np.clip(np.searchsorted(ages, years), 1, len(ages) - 1))
+    low = ages[high - 1]
+    part = float(np.clip(np.log(years / low) / np.log(ages[high] / low), 0.0, 1.0))
+    ends = np.log([measured(at_age(species, float(age))).ratios for age in ages[high - 1 : high + 1]])
+    return Measure(at_age(species, years), tuple(np.exp(ends[0] + part * (ends[1] - ends[0])).tolist()))
 
 
 @lru_cache(maxsize=64)

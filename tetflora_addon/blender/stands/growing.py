@@ -4,15 +4,18 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Generator, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SceneError
+from ...errors import SceneError, SpeciesError
 from ...jobs import Progress
+from ...species.species import Species
 from ...stands.grow import StandSettings, grow
 from ...stands.guilds import Guild
 from ...stands.records import Records
@@ -36,6 +39,7 @@ from ..scene.field_sizes import (
 )
 from ..scene.fields import field_kinds, quaternions, write_field
 from ..scene.own_ages import Sizes
+from ..scene.sizes import kinds_of_sizes, measured
 from ..settings import check_limits
 from ..species.edits import catalogue, species_for
 from ..worker import call_in_thread, steps_in_thread
@@ -55,6 +59,7 @@ MIXED_WOOD = {
 _OWN = {"rna_type", "name", "is_grown", "biome", "grounds", "species", "species_index"}
 _MASKS = ("vertex_group", "areas", "paths", "path_distance")
 _YEAR_PATH = "tetflora.stand_year"
+_PATIENCE = 5.0  # seconds for what the viewport will ask at once
 _GROWING = (0.08, 0.85)  # fractions of the job: before, and while it grows
 
 
@@ -177,9 +182,9 @@ def _again_steps(
             "Nothing is left of the stand: no plant is as tall as Min Height; grow it longer, plant more, or change "
             "the species, Warmth or Moisture"
         )
-    progress = Progress(sum(_GROWING), "Writing the stand")
-    yield progress
+    progress = Progress(sum(_GROWING), "Measuring plants")
     columns = yield from call_in_thread(progress, _columns, records, site, corner)
+    yield from steps_in_thread(_measuring([guild.species for guild in guilds], records), progress)
     data.check()
     _replace(field, names, *columns)
     last = int(records.year.max())
@@ -196,6 +201,21 @@ def _growing(site: StandSite, guilds: list[Guild], settings: StandSettings) -> G
         return stop.value
     finally:
         steps.close()
+
+
+def _measuring(species: list[Species], records: Records) -> Generator[Progress, object, None]:
+    """Compile species in the stages that the stand shows, last year first, as far as there is time."""
+    end = time.monotonic() + _PATIENCE
+    for some in (records.at(records.year.max()), records):
+        for number, one in enumerate(species):
+            own = some.take(np.flatnonzero(some.species == number))
+            none, pair = np.zeros(len(own)), np.zeros((len(own), 2))
+            with suppress(SpeciesError):
+                for kind in kinds_of_sizes(one, Sizes(own.height, none, none, none, own.dead, pair, pair)):
+                    yield Progress(sum(_GROWING), "Measuring plants")
+                    if time.monotonic() > end:
+                        return
+                    measured(kind)
 
 
 def _columns(
