@@ -28,7 +28,7 @@ YEARS, SIDE, DENSITY = (30, 60, 100), 141.4, 10_000.0
 #: Thinning counts from where so many are left, until plants die of age, in lifespans; so do figures.
 _THINNED, _OLD = 0.75, 0.75
 #: Plants at the beginning of the stands that are timed, 5,000 on a hectare.
-PLANTS = (25_000, 100_000, 250_000, 1_000_000)
+PLANTS = (25_000, 100_000, 1_000_000)
 QUICK_PLANTS = (5_000, 25_000)
 
 TARGETS: Targets = {

@@ -117,10 +117,12 @@ def grow(
     return stand.finished()
 
 
-def begun(site: StandSite, guilds: Sequence[Guild], settings: StandSettings, given: Records | None = None) -> Stand:
+def begun(
+    site: StandSite, guilds: Sequence[Guild], settings: StandSettings, given: Records | None = None
+) -> GrowingStand:
     """A stand at its beginning, which whoever has it steps from year to year; see `grow`."""
     _check(settings)
-    return Stand(site, Guilds(guilds), settings, given)
+    return GrowingStand(site, Guilds(guilds), settings, given)
 
 
 def _check(settings: StandSettings) -> None:
@@ -137,7 +139,7 @@ def _check(settings: StandSettings) -> None:
             raise TetFloraError(f"{name} of a stand must be from {low:g} to {high:g}, not {value:g}")
 
 
-class Stand:
+class GrowingStand:
     """A stand in a year.
 
     Attributes

@@ -21,8 +21,10 @@ from ..species.ecology import Ecology, ecology_of
 from ..species.species import Species
 
 BREAST_HEIGHT = 1.3
-#: Metres of girth between two numbers of the table of heights, and of the girth at which a trunk reaches breast height.
-_STEP, _LEAST = 0.002, 0.004
+#: Heights in a table, up to so many of the largest diameter.
+_HEIGHTS, _UPTO = 1000, 1.6
+#: Girth that trunks have at breast height, metres, at least and at most; and that of which its slope is taken.
+_LEAST, _MOST, _SLOPE = 0.004, 0.03, 0.01
 #: Crowns as long as this fraction of the height have all leaves of a free one.
 FULL = 0.75
 _DIGITS = 5
@@ -91,12 +93,12 @@ class Guilds:
             -np.expm1(-self.extinction * self.leaves) - self.cost * self.extinction * self.leaves, _DIGITS
         )
         # As slender below breast height as just above it.
-        thin = np.array([one.thickening for one in self.needs])
-        slope = (self.height - self.breast) * (-np.expm1(-rate * 0.01)) ** power / 0.01
-        self.first = np.round(np.clip(self.breast / slope, np.minimum(_LEAST, thin), 0.03), _DIGITS)
-        number = int(np.ceil(1.6 * self.diameter.max() / _STEP)) + 2
-        girth = _STEP * np.arange(number)
-        dbh = np.maximum(girth[None, :] - self.first[:, None], 0.0)
+        near = np.minimum(_SLOPE, 0.05 * self.diameter)
+        slope = (self.height - self.breast) * (-np.expm1(-rate * near)) ** power / near
+        self.first = np.round(np.clip(self.breast / slope, np.minimum(_LEAST, near), _MOST), 2 * _DIGITS)
+        self._step = _UPTO * self.diameter / _HEIGHTS
+        girth = self._step[:, None] * np.arange(_HEIGHTS + 1)
+        dbh = np.maximum(girth - self.first[:, None], 0.0)
         grown = (
             self.breast[:, None]
             + (self.height - self.breast)[:, None] * (-np.expm1(-rate[:, None] * dbh)) ** power[:, None]
@@ -108,9 +110,9 @@ class Guilds:
     def heights(self, guild: NDArray, girth: NDArray) -> NDArray[np.float64]:
         """Heights (n,) in a closed stand, metres."""
         first = np.take(self.first, guild)
-        place = np.minimum(girth / _STEP, self._heights.shape[1] - 1.001)
+        place = np.minimum(girth / np.take(self._step, guild), _HEIGHTS - 0.001)
         index = place.astype(np.int64)
-        flat, start = self._heights.ravel(), guild * self._heights.shape[1] + index
+        flat, start = self._heights.ravel(), guild * (_HEIGHTS + 1) + index
         low = np.take(flat, start)
         tall = low + (np.take(flat, start + 1) - low) * (place - index)
         return np.where(girth < first, np.take(self.breast, guild) * girth / first, tall)

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ecology of species: read with errors that name the key, there for all, and without effect on plants."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.engine import support
+from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.errors import SpeciesError
+from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.ecology import Ecology, ecology_of
+from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.stands.guilds import Guild, Guilds
+
+
+@pytest.mark.parametrize(
+    ("ecology", "words"),
+    [
+        ({"shad": 3}, 'ecology.shad: unknown key; did you mean "shade"'),
+        ({"shade": 6}, "ecology.shade: must be from 0 to 5"),
+        ({"crown": 3}, "ecology.crown: must be a pair"),
+        ({"slenderness": [1, "x"]}, r"ecology.slenderness\[1\]: must be a number"),
+        (7, "ecology: must be an object"),
+    ],
+)
+def test_mistakes_are_named(ecology: object, words: str) -> None:
+    with pytest.raises(SpeciesError, match=words):
+        species_from_dict(support.small(ecology=ecology), "small", "small.json")
+
+
+def test_a_file_may_say_some_of_it() -> None:
+    species = species_from_dict(support.small(ecology={"shade": 1, "crown": [1, 20]}), "small", "small.json")
+    assert species.ecology == Ecology(shade=1.0, crown=(1.0, 20.0)) == ecology_of(species)
+    assert species_from_dict(support.small(), "small", "small.json").ecology is None
+
+
+@pytest.mark.parametrize("name", support.SPECIES)
+def test_every_species_can_grow_in_a_stand(name: str) -> None:
+    species = load_species(name)
+    needs, guilds = ecology_of(species), Guilds([Guild(species)])
+    girth = np.linspace(0.0, 1.2 * needs.diameter, 200)
+    zero = np.zeros(200, np.int64)
+    heights, radii = guilds.heights(zero, girth), guilds.radii(zero, girth)
+    assert heights[0] == 0 and (np.diff(heights) >= 0).all() and 0.5 * needs.height < heights[-1] <= needs.height
+    assert (np.diff(radii) >= 0).all() and radii[-1] < 0.8 * needs.height + 4.0
+    assert guilds.free[0] > 0.1
+    # What is described is no larger than the largest, where the file says more than its size.
+    assert species.ecology is None or needs.source
+
+
+def test_it_changes_no_plant() -> None:
+    species = load_species("beech")
+    other = replace(species, ecology=None)
+    assert compile_species([species]).rows.tobytes() == compile_species([other]).rows.tobytes()
