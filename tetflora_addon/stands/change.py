@@ -35,7 +35,7 @@ _NARROWS, _WIDENS = 0.05, 0.12
 #: Fraction of the crown that dies from below in a year where it is quite dark; shortest crown, over the height.
 _RISES, _SHORTEST = 0.3, 0.12
 #: Offset for the difference of light on two sides over its sum, the most of it, and what of it comes in a year.
-_LEANS, _MOST_OFFSET, _TURNS = 1.0, 0.6, 0.08
+_LEANS, _MOST_OFFSET, _TURNS = 0.7, 0.6, 0.08
 #: Light over that of a free plant in which plants grow about half as fast as they can at all.
 _HALF_LIT = 0.1
 #: Girth at which plants cease to become thicker, over the largest that are known.
@@ -75,11 +75,11 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
     deep = _BESIDE[0] + (_BESIDE[1] - _BESIDE[0]) * own(guilds.top)
     middle = height - deep * np.minimum(height - base, _LONG * height)
     places = ((away, 0.0), (-away, 0.0), (0.0, away), (0.0, -away))
-    east, west, north, south = (light.at(x + dx, y + dy, middle) for dx, dy in places)
+    east, west, north, south = (light.at(x + dx, y + dy, middle, (x, y)) for dx, dy in places)
     side = 0.25 * (east + west + north + south)
     below = light.at(x, y, base)
     for dx, dy in places:
-        below += light.at(x + 0.5 * dx, y + 0.5 * dy, base)
+        below += light.at(x + 0.5 * dx, y + 0.5 * dy, base, (x, y))
     below *= 0.2
 
     free = np.pi * guilds.radii(guild, one.girth) ** 2 * own(guilds.free)

@@ -32,6 +32,8 @@ _BLOCK = 1 << 15
 _GIVEN = 2
 #: Metres of open ground beyond open edges.
 _MARGIN = 12.0
+#: Metres between the highest and the lowest ground up to which it counts as level.
+_LEVEL = 0.5
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,11 @@ class GrowingStand:
         rows, columns = (max(round((size + 2.0 * margin) / settings.cell), 3) for size in (depth, width))
         # Columns are square: the last row and column may lie a little beyond the ground.
         cell = max((width + 2.0 * margin) / columns, (depth + 2.0 * margin) / rows)
-        self.light = LightGrid(rows, columns, cell, margin)
+        ground = None
+        if np.ptp(site.height) > _LEVEL:
+            x, y = np.meshgrid((np.arange(columns) + 0.5) * cell - margin, (np.arange(rows) + 0.5) * cell - margin)
+            ground = site.ground(x.ravel(), y.ravel())
+        self.light = LightGrid(rows, columns, cell, margin, ground)
         suits = np.stack([site.suits(needs) for needs in guilds.needs])
         if not suits.any():
             raise TetFloraError(

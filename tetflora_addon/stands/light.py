@@ -36,6 +36,8 @@ MOST_VOXELS = 400_000_000
 #: Square metres of sideways variance that light gains for a metre downwards, and the most of it that goes to each of
 #: four sides at once.
 _SIDEWAYS, _MOST_SIDE = 1.0, 0.15
+#: Metres by which the ground below a crown counts at most as higher or lower than at its trunk.
+_STEEP = 6.0
 #: Thinnest crown in a column, over its length.
 _THIN = 0.15
 
@@ -101,6 +103,8 @@ class LightGrid:
         Metres.
     margin : float
         Metres of open ground around that of the plants.
+    ground : (rows × columns,) float64, optional
+        Altitudes; level where it is None.
     light : (layers + 1, rows × columns) float32
         Light summed from above down to where each layer begins, metres of full light.
     """
@@ -109,6 +113,7 @@ class LightGrid:
     columns: int
     cell: float
     margin: float = 0.0
+    ground: NDArray[np.float64] | None = None
     light: NDArray[np.float32] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -121,7 +126,7 @@ class LightGrid:
 
     def fill(self, crowns: Crowns) -> list[NDArray[np.intp]]:
         """Put the leaves of crowns (n,) on the grid and let light through; returns the crowns of each strip."""
-        tallest = float(crowns.height.max(initial=0.5))
+        tallest = float(crowns.height.max(initial=0.5)) + (0.0 if self.ground is None else _STEEP)
         layers = int(layer_of(np.array([tallest + 0.01]))[0][0]) + 1
         if (layers + 1) * self.rows * self.columns > MOST_VOXELS:
             raise TetFloraError(
@@ -159,11 +164,19 @@ class LightGrid:
         length *= 1.0 - np.minimum(lost, 1.0 - _THIN)
         leaves = np.take(crowns.leaves[index] / (size**2 * _UNIT), found.crown) * found.part
         density = np.rint(leaves / np.maximum(length, 1e-3))
-        foot, under = (np.take(values, found.crown) for values in layer_of(base))
-        length += np.take(base, found.crown)
-        head, over = layer_of(length)
         column, area = found.column % self.columns, (high - low) * self.columns
         place = (found.row - low) * self.columns + column
+        cells, of_layer = (found.row % self.rows) * self.columns + column, self.rows * self.columns
+        length += np.take(base, found.crown)
+        if self.ground is None:
+            foot, under = (np.take(values, found.crown) for values in layer_of(base))
+        else:
+            own = np.take(self._ground(crowns.x[index], crowns.y[index]), found.crown)
+            higher = np.clip(own - np.take(self.ground, cells), -_STEEP, _STEEP)
+            higher[(found.row != cells // self.columns) | (found.column != column)] = 0.0  # around the edge
+            foot, under = layer_of(np.take(base, found.crown) + higher)
+            length += higher
+        head, over = layer_of(length)
         total = np.zeros(layers * area)
         for sign, layer, part in ((1.0, head, over), (-1.0, foot, under)):
             upper = np.rint(density * part) * sign
@@ -171,7 +184,6 @@ class LightGrid:
             total += np.bincount(index_in, upper, len(total))
             below = np.flatnonzero(layer > 0)
             total += np.bincount(index_in[below] - area, (sign * density - upper)[below], len(total))
-        cells, of_layer = (found.row % self.rows) * self.columns + column, self.rows * self.columns
         columns = _Columns(
             len(index), found.crown.astype(np.int32), (foot * of_layer + cells).astype(np.int32),
             (head * of_layer + cells).astype(np.int32), under.astype(np.float32), over.astype(np.float32),
@@ -203,15 +215,29 @@ class LightGrid:
             each_on_all_cores(part, bands)
             now, after = after, now
 
-    def at(self, x: NDArray, y: NDArray, height: NDArray) -> NDArray[np.float64]:
-        """Light (n,) at places (n,), mean of the layer there, over that in the open."""
+    def at(
+        self, x: NDArray, y: NDArray, height: NDArray, of: tuple[NDArray, NDArray] | None = None
+    ) -> NDArray[np.float64]:
+        """Light (n,) at places (n,), mean of the layer there, over that in the open.
+
+        Heights are above the ground there, or above that of other places, x and y (n,).
+        """
         row, column = (np.floor((values + self.margin) / self.cell).astype(np.int64) for values in (y, x))
         cell = self._cell(row, column)
+        if self.ground is not None and of is not None:
+            inside = (row == cell // self.columns) & (column == cell % self.columns)
+            higher = np.clip(self._ground(*of) - np.take(self.ground, cell), -_STEEP, _STEEP)
+            height = height + np.where(inside, higher, 0.0)
         layer = np.minimum(layer_of(height)[0], len(self.light) - 2)
         place = layer * (self.rows * self.columns) + cell
         flat = self.light.ravel()
         thick = _LAYERS[0] + _LAYERS[1] * (2 * layer + 1)
         return (np.take(flat, place) - np.take(flat, place + self.rows * self.columns)) / thick
+
+    def _ground(self, x: NDArray, y: NDArray) -> NDArray[np.float64]:
+        """Altitude (n,) of the columns at places (n,)."""
+        row, column = (np.floor((values + self.margin) / self.cell).astype(np.int64) for values in (y, x))
+        return np.take(self.ground, self._cell(row, column))
 
     def taken(self, strip: int) -> NDArray[np.float64]:
         """Light that the crowns (k,) of a strip take, m² of full light; all together no more than there is."""

@@ -121,6 +121,15 @@ def test_plants_stay_where_they_may_be_and_are_sound() -> None:
     assert {0, 1} == set(rows.species.tolist())
 
 
+def test_crowns_reach_down_the_slope_and_into_the_open() -> None:
+    # It rises to the north, and the eastern half is bare.
+    last = records().at(60.0)
+    tall = last.take(np.flatnonzero((last.height > 8.0) & (last.dead == 0)))
+    assert tall.offset[:, 1].mean() < -0.03
+    edge = tall.take(np.flatnonzero(tall.position[:, 0] > 8.0))
+    assert edge.offset[:, 0].mean() > 0.1
+
+
 def test_the_dead_stay_dead_and_fall_once() -> None:
     rows = records()
     again = rows.plant[1:] == rows.plant[:-1]
