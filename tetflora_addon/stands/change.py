@@ -34,8 +34,9 @@ _DARK = 1.5
 _NARROWS, _WIDENS = 0.05, 0.12
 #: Fraction of the crown that dies from below in a year where it is quite dark; shortest crown, over the height.
 _RISES, _SHORTEST = 0.3, 0.12
-#: Offset for the difference of light on two sides over its sum, the most of it, and what of it comes in a year.
-_LEANS, _MOST_OFFSET, _TURNS = 0.7, 0.6, 0.08
+#: Offset for the difference of light on two sides over its sum where that is small, over the most; the most of it; and
+#: what of it comes in a year.
+_LEANS, _MOST_OFFSET, _TURNS = 6.0, 0.6, 0.08
 #: Light over that of a free plant in which plants grow about half as fast as they can at all.
 _HALF_LIT = 0.1
 #: Girth at which plants cease to become thicker, over the largest that are known.
@@ -105,13 +106,19 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
     died = np.clip(1.0 - below / limit, 0.0, 1.0) * (tall - height + _RISES * (height - base))
     low = np.minimum(base + died, (1.0 - _SHORTEST) * tall)
     old_east, old_north = (
-        before + _TURNS * (np.clip(_LEANS * (a - b) / (a + b + 0.2), -_MOST_OFFSET, _MOST_OFFSET) - before)
+        before + _TURNS * (_offset(a, b) - before)
         for before, a, b in ((one.east, east, west), (one.north, north, south))
     )
     return replace(
         one, girth=girth, height=tall, base=low, radius=wide, east=old_east, north=old_north, vigour=vigour,
         age=one.age + 1.0,
     )  # fmt: skip
+
+
+def _offset(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Offset (n,) towards the light on one side, where there is such light on two."""
+    more = _LEANS * (a - b) / (a + b + 0.2)
+    return _MOST_OFFSET * more / (1.0 + np.abs(more))
 
 
 def _thickening(one: Plants, wood: NDArray, lit: NDArray, guilds: Guilds) -> NDArray[np.float64]:
