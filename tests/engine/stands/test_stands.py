@@ -100,8 +100,10 @@ def test_less_light_never_makes_more() -> None:
 
 
 @pytest.mark.parametrize("threads", [1, 3])
-def test_the_same_bytes_in_any_number_of_threads(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_bytes_in_any_number_of_threads_and_chunks(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tetflora_addon.stands.light._BAND_CELLS", 300)
+    monkeypatch.setattr("tetflora_addon.stands.light._STRIP_CELLS", 400)
+    monkeypatch.setattr("tetflora_addon.stands.light._STRIP_ROWS", 4 + threads)
     monkeypatch.setattr("tetflora_addon.stands.grow._BLOCK", 100 * threads)
     parallel.use(threads)
     try:
