@@ -101,6 +101,7 @@ def grow(
     settings : StandSettings
     given : Records, optional
         Plants that are there at the beginning, besides those that are planted; their species are indices of guilds.
+        The dead are left out.
 
     Returns
     -------
@@ -170,8 +171,9 @@ class GrowingStand:
             )
         self.slope = site.slope()
         self.plants = planted(site, guilds, suits, settings.density, settings.seed)
-        if given is not None and len(given):
-            self.plants = Plants.concatenate([self.plants, self._given(given, suits)])
+        if given is not None:
+            alive = given.take(np.flatnonzero(given.dead == 0))
+            self.plants = Plants.concatenate([self.plants, self._given(alive, suits)])
         if not len(self.plants) and settings.recruits * settings.outside * guilds.rain.sum() <= 0.0:
             raise TetFloraError(
                 "Nothing is planted and no seeds come; raise Planted, or Seedlings and Seeds from Outside"
