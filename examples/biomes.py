@@ -49,6 +49,16 @@ class View:
         x, y and height over the ground, of the camera and of what is in the middle of the picture; meters.
     sun : tuple of float
         Height over the horizon and azimuth where the light comes from, from north to the east; degrees.
+    grey : float
+        Mean that the exposure aims at.
+    haze : tuple
+        As of `seasons.Look`.
+    free : float
+        Meters in front of the camera without trees and shrubs.
+    beside : str
+        A biome whose low plants cover the ground that this one leaves.
+    water : float
+        Of a brook in the valley, meters over its bed; 0 for none.
     """
 
     eye: tuple[float, float, float] = (0.0, -42.0, 1.65)
@@ -59,22 +69,26 @@ class View:
     grey: float = 0.34
     haze: tuple[float, Rgb] = (0.0004, (0.5, 0.62, 0.8))
     clouds: float = 0.5
-    free: float = 6.0  # meters in front of the camera without trees and shrubs
+    free: float = 6.0
+    beside: str = ""
+    water: float = 0.0
 
 
 _COOL, _GOLD = (1.0, 0.95, 0.88), (1.0, 0.86, 0.66)
 VIEWS = {
-    "alpine_treeline": View((6.0, -44.0, 1.7), (-6.0, 0.0, 3.2), 24.0, (38.0, 250.0), grey=0.42, clouds=0.6),
+    "alpine_treeline": View((-34.0, -26.0, 1.8), (18.0, 2.0, 3.0), 24.0, (38.0, 215.0), grey=0.42, clouds=0.6),
     "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (50.0, 215.0), grey=0.32),
     "birch_pine": View((0.0, -42.0, 1.6), (4.0, 0.0, 4.6), 26.0, (36.0, 240.0), _GOLD, grey=0.38),
     "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), grey=0.38, clouds=0.8),
-    "hedgerow": View((-44.0, -9.0, 1.7), (0.0, 2.0, 2.2), 28.0, (36.0, 200.0), _COOL, grey=0.42),
+    "hedgerow": View((-46.0, -10.0, 1.7), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, grey=0.42, beside="meadow"),
     "meadow": View((0.0, -44.0, 1.5), (-2.0, 0.0, 2.6), 28.0, (42.0, 245.0), grey=0.44),
     "mediterranean_scrub": View((0.0, -44.0, 1.7), (2.0, 0.0, 2.2), 28.0, (46.0, 240.0), _COOL, grey=0.44, clouds=0.3),
     "oak_savanna": View((0.0, -46.0, 1.9), (0.0, 0.0, 3.8), 28.0, (24.0, 245.0), _GOLD, grey=0.42),
     "park": View((0.0, -46.0, 1.65), (0.0, 0.0, 4.0), 28.0, (40.0, 240.0), grey=0.42),
-    "riparian_willow": View((30.0, -4.0, 1.7), (0.0, 2.0, 2.2), 26.0, (40.0, 230.0), grey=0.38, free=4.0),
-    "spruce_forest": View((0.0, -38.0, 1.6), (0.0, 0.0, 3.4), 26.0, (42.0, 210.0), grey=0.3, free=4.5),
+    "riparian_willow": View(
+        (44.0, -12.0, 2.2), (8.0, 4.0, 3.2), 24.0, (44.0, 200.0), grey=0.42, free=7.0, beside="meadow", water=0.3
+    ),
+    "spruce_forest": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), grey=0.33, free=5.0),
     "tropical_understorey": View((0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), grey=0.32, free=4.5),
 }
 
@@ -87,6 +101,9 @@ def build(identifier: str, view: View) -> None:
     scene = bpy.context.scene
     biome = files.read_biome(SHIPPED / f"{identifier}.json")
     land = ground.make_land(scene, biome.ground)
+    if view.beside:
+        other = files.read_biome(SHIPPED / f"{view.beside}.json")
+        _add(at_once, adding, scene, replace(other, layers=[o for o in other.layers if o["kind"] == "cover"]), land)
     added = _add(at_once, adding, scene, biome, land)
     around = _around(biome, ground)
     scene.collection.objects.link(around)
@@ -96,6 +113,10 @@ def build(identifier: str, view: View) -> None:
         _add(at_once, adding, scene, far, around)
     else:
         around.data.materials.append(land.data.materials[0])
+    if view.beside:
+        at_once(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.biomes[0]))
+    if view.water:
+        _brook(scene, ground, biome, view.water)
     print(identifier, ", ".join(f"{name} {number:,}" for name, number in added.layers), *added.bare, flush=True)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.lens, camera.data.clip_start, camera.data.clip_end = view.lens, 0.05, 3000.0
@@ -156,6 +177,26 @@ def _around(biome: object, ground: object) -> bpy.types.Object:
     around = bpy.data.objects.new("Ground", mesh)
     around.tetflora.is_occluder = True
     return around
+
+
+def _brook(scene: bpy.types.Scene, ground: object, biome: object, deep: float) -> None:
+    """Water in the bed of a valley, which falls as the bed does."""
+    from tetflora_addon.blender.compat import shader_tree
+
+    along = np.linspace(-0.5 * _LAND, 0.5 * _LAND, 300)
+    middle = ground.brook(along)
+    bed = ground.heights(along, middle, biome.ground) + deep
+    points = np.concatenate([np.stack([along, middle + side, bed], axis=1) for side in (-4.0, 4.0)])
+    first = np.arange(len(along) - 1)
+    faces = np.stack([first, first + 1, first + len(along) + 1, first + len(along)], axis=1)
+    mesh = bpy.data.meshes.new("Brook")
+    mesh.from_pydata(points.tolist(), [], faces.tolist(), shade_flat=False)
+    water = bpy.data.materials.new("Water")
+    surface = next(n for n in shader_tree(water).nodes if n.type == 'BSDF_PRINCIPLED')
+    surface.inputs["Base Color"].default_value = (0.012, 0.02, 0.016, 1.0)
+    surface.inputs["Roughness"].default_value = 0.06
+    mesh.materials.append(water)
+    scene.collection.objects.link(bpy.data.objects.new("Brook", mesh))
 
 
 def _mean(land: bpy.types.Object) -> list[float]:

@@ -32,7 +32,9 @@ SIDE, STEP = 100.0, 1.0
 _CELL, _MOST = 0.5, 400_000  # of the map of the soil
 #: Waves of hills: meters from one to the next, and their height over that of the hills.
 _WAVES = ((46.0, 0.42), (17.0, 0.1), (5.0, 0.016))
-_BED, _BANK = 1.6, 22.0  # meters from the middle of a valley: its bed, and to where it has a third of its depth left
+#: Of a valley, meters: half of its level floor, and from there to where it has half of its depth left; half the width
+#: and the depth of its brook.
+_FLOOR, _BANK, _BROOK, _DEEP = 7.0, 22.0, 4.5, 0.16
 #: How bright low plants are together, of how bright one blade is: they shade each other.
 _SHADED = 0.72
 
@@ -45,10 +47,12 @@ def heights(
     points, key = np.stack([x, y], axis=-1).reshape(-1, 2), key_of_seed(seed)
     waves = sum(part * gradient_noise(points / size, key).reshape(x.shape) for size, part in _WAVES)
     aside = np.abs(y - brook(x))
-    deep = 1.0 / (1.0 + (np.maximum(aside - _BED, 0.0) / _BANK) ** 2)
+    deep = 1.0 / (1.0 + (np.maximum(aside - _FLOOR, 0.0) / _BANK) ** 2)
+    bed = _DEEP * np.exp(-((aside / _BROOK) ** 2))
     rough = waves * (1.0 - 0.85 * deep * (value["valley"] > 0.0))
-    fall = 0.012 * x * (value["valley"] > 0.0)  # water runs west
-    return value["hills"] * 2.0 * rough + tan(radians(value["slope"])) * y - value["valley"] * deep + fall
+    # Water runs west.
+    low = (value["valley"] > 0.0) * (0.012 * x - bed) - value["valley"] * deep
+    return value["hills"] * 2.0 * rough + tan(radians(value["slope"])) * y + low
 
 
 def brook(x: NDArray[np.float64]) -> NDArray[np.float64]:
