@@ -15,8 +15,10 @@ from tetflora_addon import errors
 from tetflora_addon.blender.scene.ages import kind_species
 from tetflora_addon.blender.scene.fields import read_aged_field
 from tetflora_addon.blender.scene.plants import read_plants
+from tetflora_addon.blender.scene.sizes import fits_of, measure_of
 from tetflora_addon.blender.scene.skeletons import age_of, dead_of
 from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.compiled.measured import measured
 from tetflora_addon.growth.crown_forms import BASE, EAST
 from tetflora_addon.growth.growth import radius_at, trunks
 from tetflora_addon.species.catalogue import load_species
@@ -74,7 +76,30 @@ def test_plants_have_the_sizes_that_are_recorded():
         if tall > 2.0:
             girth = 2.0 * radius_at(flora.rows, trunk, 1.3 / trunk.length)[0]
             assert girth == pytest.approx(tall / 80.0, rel=1e-3)
-        print(tall, one.scale, trunk.length, one.crown)
+
+
+@pytest.mark.parametrize(("species", "fits"), [("birch", False), ("beech", False), ("beech", True), ("hazel", True)])
+def test_plants_grow_to_their_recorded_heights_and_widths(species, fits):
+    rng = np.random.default_rng(4)
+    full = measure_of(load_species(species)).height
+    height = full * rng.uniform(0.2, 1.2, 24)
+    width, seed = rng.uniform(0.8, 1.1, 24) * height * (0.4 if species != "hazel" else 1.0), np.arange(24)
+    obj = field_of(24, (species,), tf_height=('FLOAT', height), tf_crown_width=('FLOAT', width), seed=('INT', seed))
+    if fits:
+        seeds, _, sizes = read_aged_field(obj, depsgraph(), np.eye(4)[None])
+        found = np.pad(fits_of(seeds, sizes, load_species), ((0, 0), (0, 1))).astype(np.float32)
+        obj.data.attributes.new("tf_fit", 'FLOAT_VECTOR', 'POINT').data.foreach_set("vector", found.reshape(-1))
+    read = plants()
+    flora = compile_species([kind_species(load_species(species), kind) for kind in read.identifiers])
+    tall, wide = measured(flora, read)
+    off = np.abs(np.log([tall / height, wide / width]))
+    if fits:
+        assert off[0].max() < 0.02
+        assert (off[1] < 0.05).mean() >= 0.9
+    else:
+        assert np.median(off[0]) < 0.04
+        assert off[0].max() < 0.15
+        assert np.median(off[1]) < 0.1
 
 
 def history():

@@ -16,15 +16,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled.crowns import crown_of
 from ...compiled.flora import compile_species
+from ...compiled.measured import fitted, measured
 from ...errors import SpeciesError
-from ...growth.axes import axes
 from ...growth.crown_forms import GIRTH, PLAIN, crown_forms
 from ...growth.growth import radius_at, trunks
 from ...growth.seeds import Seeds
@@ -32,7 +31,7 @@ from ...species.ages import ages_of, with_age
 from ...species.growing import Ages
 from ...species.species import Species
 from .own_ages import MOST_YEARS, Lives, Sizes
-from .skeletons import aged_kind, form_of, species_of
+from .skeletons import age_of, aged_kind, dead_of, form_of, is_aged, species_of
 
 #: Height of a class over that of the one below, and classes below that of full-grown plants.
 _STEP, _BELOW = 1.5, 9
@@ -44,7 +43,7 @@ _SINCE = np.array([1.0, 6.0, 25.0])
 _COHORTS, _APART, _STRETCH, _DEATHS = 12, (20.0, np.log(1.6), np.log(1.8)), 5.0, 20.0
 _BREAST, _TALL = 1.3, 1.5  # height of the diameter, and least height of a plant that has one, metres
 _DIES = 0.999  # part of its life after which a plant that dies early no longer grows
-_PLANTS = 16  # over which the length of trunks is averaged, as `compiled.crowns` does
+_PLANTS = 32  # that are measured of each class
 
 
 def heights(species: Species, years: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -94,7 +93,7 @@ def sized(
         with suppress(SpeciesError):
             species = find(species_of(kind))
             if form_of(kind) is not None:  # it is as it was drawn
-                scale[own] *= measured(species).fitted(seeds.take(own), sizes.take(own))[0]
+                scale[own] *= measure_of(species).fitted(seeds.take(own), sizes.take(own))[0]
                 continue
             some = sizes.take(own)
             stages, which = np.unique(_stages(species, some, index), return_inverse=True)
@@ -102,7 +101,7 @@ def sized(
                 here = which == n
                 these = own[here]
                 still = some.lives is None or stage.imag
-                measure = measured(at_age(species, stage.real)) if still else _grown(species, stage.real)
+                measure = measure_of(at_age(species, stage.real)) if still else _grown(species, stage.real)
                 own_scale, own_crown = measure.fitted(seeds.take(these), some.take(here))
                 scale[these] *= own_scale
                 crown[these], number[these] = own_crown, len(kinds)
@@ -113,6 +112,23 @@ def sized(
     return replace(
         seeds, identifiers=tuple(kinds), species=number, scale=scale, crown=None if plain else crown
     ), None if left is None or not left.any() else left
+
+
+def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> NDArray[np.float64]:
+    """Factors (n, 2) with which plants (n,) have exactly the heights and crown widths of their sizes (`Sizes.fit`)."""
+    out = np.ones((len(seeds), 2))
+    plain, _ = sized(seeds, None, replace(sizes, fit=out), find)
+    crown = np.tile(PLAIN, (len(seeds), 1)) if plain.crown is None else plain.crown
+    for number, kind in enumerate(plain.identifiers):
+        own = np.flatnonzero((plain.species == number) & (sizes.height > 0.0))
+        if len(own) and is_aged(kind) and not dead_of(kind):
+            flora = measure_of(at_age(find(species_of(kind)), age_of(kind))).flora
+            one = replace(plain.take(own), identifiers=(kind,), species=np.zeros(len(own), np.int32), crown=crown[own])
+            tall, wide = (sizes.height * seeds.scale)[own], (sizes.width * seeds.scale)[own]
+            # What has no width keeps that of its kind.
+            scale, limbs = fitted(flora, one, tall, np.where(wide > 0.0, wide, measured(flora, one)[1])).T
+            out[own] = np.stack([scale, np.where(wide > 0.0, scale * limbs, 1.0)], axis=1)
+    return out
 
 
 def kinds_of_sizes(species: Species, sizes: Sizes) -> list[Species]:
@@ -127,7 +143,7 @@ def _stages(species: Species, sizes: Sizes, number: int) -> NDArray[np.complex12
     ``number`` is that of their kind in the field.
     """
     ages = ages_of(species)
-    full = measured(species).height
+    full = measure_of(species).height
     dead, height = sizes.dead, np.where(sizes.height > 0.0, sizes.height, full)
     if ages.scaled:
         return np.full(len(height), ages.full, complex)
@@ -195,27 +211,34 @@ class Measure:
     ----------
     flora : Flora
         Of this species alone.
-    ratios : tuple of float
-        Height and radius of the crown over the typical length of a trunk. They are measured at samples, which differ
-        from one age to the next.
-    height, radius : float
-        Of the plant and its crown on average, metres.
     """
 
     def __init__(self, species: Species, ratios: tuple[float, float] | None = None) -> None:
-        self.flora = compile_species([species])
+        self.flora, self._ratios = compile_species([species]), ratios
         number = np.arange(_PLANTS)
         place, upright, one = np.zeros((_PLANTS, 3)), np.tile(np.eye(3), (_PLANTS, 1, 1)), np.ones(_PLANTS)
-        some = Seeds((species.name,), np.zeros(_PLANTS, np.int32), number, place, upright, one)
-        trunk, typical = trunks(self.flora.rows, some), species.orders[0].length.mean
-        self.length = float(trunk.length.mean())
-        if ratios is None:
-            crown = crown_of(species)
-            # The shoot of this year bears leaves nowhere but at its tip.
-            height = max(crown.height, float(axes(self.flora.rows, trunk).knots[:, -1, 2].mean()))
-            ratios = height / typical, crown.radius / typical
-        self.ratios = ratios
-        self.height, self.radius = (typical * ratio for ratio in ratios)
+        self._some = Seeds((species.name,), np.zeros(_PLANTS, np.int32), number, place, upright, one)
+        self._lengths = trunks(self.flora.rows, self._some).length
+        self.length = float(self._lengths.mean())
+        self._typical = species.orders[0].length.mean
+
+    @cached_property
+    def ratios(self) -> tuple[float, float]:
+        """Height and crown width over the typical length of a trunk."""
+        if self._ratios is not None:
+            return self._ratios
+        part = self.length / self._typical
+        return tuple(part * float((size / self._lengths).mean()) for size in measured(self.flora, self._some))
+
+    @property
+    def height(self) -> float:
+        """Of a plant on average, metres."""
+        return self._typical * self.ratios[0]
+
+    @property
+    def width(self) -> float:
+        """Of a crown on average, metres."""
+        return self._typical * self.ratios[1]
 
     def fitted(self, seeds: Seeds, sizes: Sizes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Scales (n,) and crown forms (n, 5) with which plants have their recorded sizes."""
@@ -224,7 +247,7 @@ class Measure:
         chance = trunks(self.flora.rows, one).length / self.length
         known = sizes.height > 0.0
         scale = np.where(known, sizes.height * sizes.fit[:, 0] / (self.height * chance), 1.0)
-        width = sizes.width * sizes.fit[:, 1] / (2.0 * self.radius * chance * scale)
+        width = sizes.width * sizes.fit[:, 1] / (self.width * chance * scale)
         wide = known & (sizes.width > 0.0)
         forms = crown_forms(
             len(seeds),
@@ -243,7 +266,7 @@ class Measure:
 
 
 @lru_cache(maxsize=512)
-def measured(species: Species) -> Measure:
+def measure_of(species: Species) -> Measure:
     """What is known of a species at its age; found once."""
     return Measure(species)
 
@@ -254,7 +277,7 @@ def _grown(species: Species, years: float) -> Measure:
     high = int(np.clip(np.searchsorted(ages, years), 1, len(ages) - 1))
     low = ages[high - 1]
     part = float(np.clip(np.log(years / low) / np.log(ages[high] / low), 0.0, 1.0))
-    ends = np.log([measured(at_age(species, float(age))).ratios for age in ages[high - 1 : high + 1]])
+    ends = np.log([measure_of(at_age(species, float(age))).ratios for age in ages[high - 1 : high + 1]])
     return Measure(at_age(species, years), tuple(np.exp(ends[0] + part * (ends[1] - ends[0])).tolist()))
 
 

@@ -39,7 +39,7 @@ from ..scene.field_sizes import (
 )
 from ..scene.fields import field_kinds, quaternions, write_field
 from ..scene.own_ages import Sizes
-from ..scene.sizes import kinds_of_sizes, measured
+from ..scene.sizes import kinds_of_sizes, measure_of
 from ..settings import check_limits
 from ..species.edits import catalogue, species_for
 from ..worker import call_in_thread, steps_in_thread
@@ -215,7 +215,7 @@ def _measuring(species: list[Species], records: Records) -> Generator[Progress, 
                     yield Progress(sum(_GROWING), "Measuring plants")
                     if time.monotonic() > end:
                         return
-                    measured(kind)
+                    _ = measure_of(kind).flora.samples
 
 
 def _columns(

@@ -31,7 +31,7 @@ from ..scene.field_sizes import stand_years
 from ..scene.objects import taking_part
 from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
 from ..scene.scatterers import is_drop
-from ..scene.sizes import measured
+from ..scene.sizes import measure_of
 from ..settings import season_of, years_of
 from ..species import edits
 from ..worker import call_in_thread, steps_in_thread
@@ -154,7 +154,7 @@ def _grown(
         own = some.take(np.flatnonzero(some.species == number))
         if len(own):
             one = replace(own, identifiers=(kinds[number],), species=np.zeros(len(own), np.int32))
-            out.append(make(in_year(scene, measured(species).flora), one))
+            out.append(make(in_year(scene, measure_of(species).flora), one))
     left = len(seeds) - len(some)
     return [replace(out[0], of=out[0].of + left), *out[1:]]
 
