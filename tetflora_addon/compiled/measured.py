@@ -21,6 +21,8 @@ from .outermost import Beyond, Outermost, beyond_limbs, outermost
 
 _AT_ONCE = 2_000
 _BISECTIONS = 16
+#: Factors that would change by less are found.
+_CLOSE = 0.015
 _known: WeakKeyDictionary[Flora, dict[int, Beyond]] = WeakKeyDictionary()
 
 
@@ -42,7 +44,7 @@ def measured(flora: Flora, seeds: Seeds) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def fitted(
-    flora: Flora, seeds: Seeds, height: NDArray[np.float64], width: NDArray[np.float64], times: int = 2
+    flora: Flora, seeds: Seeds, height: NDArray[np.float64], width: NDArray[np.float64], times: int = 4
 ) -> NDArray[np.float64]:
     """Factors that give plants the heights and crown widths that were measured.
 
@@ -53,7 +55,7 @@ def fitted(
     height, width : (n,) float64
         Metres.
     times : int
-        How often plants are measured.
+        How often plants are measured at most.
 
     Returns
     -------
@@ -68,13 +70,20 @@ def fitted(
         crown = np.tile(PLAIN, (len(own), 1)) if own.crown is None else own.crown
         row = flora.first_row[own.species]
         most = np.where(are_stools(flora.rows, row), MOST_LEANING, MOST[WIDTH])
+        tall, left = np.ones(len(own)), np.arange(len(own))
         for _ in range(times):
-            formed = crown.copy()
-            formed[:, WIDTH] *= factor
-            tall, _, found = _sizes(flora.in_leaf, replace(own, crown=formed))
-            if found is not None:
-                more = _solved(found, wanted, LEAST[WIDTH] / formed[:, WIDTH], most / formed[:, WIDTH])
-                tall, factor = found.sizes(len(own), more)[0], factor * more
+            formed = crown[left]
+            formed[:, WIDTH] *= factor[left]
+            tall[left], _, found = _sizes(flora.in_leaf, replace(own.take(left), crown=formed))
+            if found is None:
+                break
+            more = _solved(found, wanted[left], LEAST[WIDTH] / formed[:, WIDTH], most[left] / formed[:, WIDTH])
+            far = np.abs(more - 1) > _CLOSE  # plants that are close are left alone, whatever others need
+            tall[left] = np.where(far, found.sizes(more)[0], tall[left])
+            factor[left] *= np.where(far, more, 1.0)
+            left = left[far]
+            if not len(left):
+                break
         out[some] = np.stack([height[some] / tall, factor], axis=1)
 
     _by_kind(flora, seeds, work)
@@ -106,7 +115,7 @@ def _sizes(flora: Flora, seeds: Seeds) -> tuple[NDArray[np.float64], NDArray[np.
         length = plants.length if plants.crown is None else plants.length / along(flora.rows, plants.row, plants.crown)
         return beyond.whole[0] * length, beyond.whole[1] * length, None
     found = outermost(flora.rows, plants, beyond)
-    return *found.sizes(len(plants), np.ones(len(plants))), found
+    return *found.sizes(), found
 
 
 def _solved(
@@ -116,7 +125,7 @@ def _solved(
     low, high = least, np.maximum(most, least)
     for _ in range(_BISECTIONS):
         middle = np.sqrt(low * high)
-        height, width = found.sizes(len(wanted), middle)
+        height, width = found.sizes(middle)
         narrow = width < wanted * height
         low, high = np.where(narrow, middle, low), np.where(narrow, high, middle)
     return np.sqrt(low * high)

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from ..arrays import spread
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
-from ..growth.crown_forms import BASE
+from ..growth.crown_forms import BASE, WIDTH
 from ..growth.foliage import leaf_keys, leaf_places, place_leaves, settled
 from ..growth.formed import along, are_stools, bare_part, fractions, reaches
-from ..growth.grown_rows import lengths
+from ..growth.grown_rows import FADES, lengths
 from ..growth.growth import (
     branch_counts,
     children,
@@ -31,16 +31,19 @@ from ..growth.growth import (
 from ..growth.hashing import Draw, uniform
 from ..growth.rows import FORK, LATERAL
 from ..growth.seeds import Seeds
+from ..species.growing import faded
 
 #: East, west, north, south and up.
 WAYS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
 UP = 4
 #: Limbs that are grown for each of these.
-_LIKELY = 5
-#: Plants, and their limbs, from which it is known how far twigs and leaves reach; factors on the lengths of these limbs.
+_LIKELY = (6, 6, 6, 6, 8)
+#: Plants, and limbs of these, that tell how far twigs and leaves reach; factors on the lengths of the limbs.
 _PLANTS, _LONG, _HIGH, _FACTORS = 8, 27, 15, (0.6, 1.0, 1.7)
 #: Of limbs that reach almost as far, that one wins whose twigs do: so many standard deviations more than on the mean.
-_LUCK = 0.5
+_LUCK = 0.6
+#: Part of the way that stems of shrubs reach to the sides which is not their own lean.
+_ASIDE = 0.4
 
 
 @dataclass(frozen=True)
@@ -66,20 +69,31 @@ class Outermost:
 
     Attributes
     ----------
-    plant : (m,) int64
+    plant : (m,) int32
         Whose limb it is.
     root, limb : (m, 5) float64
         How far limbs begin in each of `WAYS`, and how much farther they lead; metres.
+    stem : (m,) bool
+        Whether they begin on stems beyond a fork, which lean more or less.
+    width : (n,) float64
+        Factor on the lengths of limbs that plants have already.
     """
 
-    plant: NDArray[np.int64]
+    plant: NDArray[np.int32]
     root: NDArray[np.float64]
     limb: NDArray[np.float64]
+    stem: NDArray[np.bool_]
+    width: NDArray[np.float64]
 
-    def sizes(self, n: int, factor: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Heights and crown widths (n,), (n,) if limbs were so many times (n,) as long, metres."""
-        far = np.full((n, len(WAYS)), -np.inf)
-        np.maximum.at(far, self.plant, self.root + factor[self.plant, None] * self.limb)
+    def sizes(self, factor: NDArray[np.float64] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Heights and crown widths (n,), (n,) if limbs were so many times (n,) as long, about; metres."""
+        far, reach = np.full((len(self.width), len(WAYS)), -np.inf), self.root + self.limb
+        if factor is not None:
+            lean = np.minimum(factor * self.width, 1.0) / np.minimum(self.width, 1.0)
+            reach = self.root.copy()
+            reach[:, :UP] *= np.where(self.stem, lean[self.plant], 1.0)[:, None]
+            reach += factor[self.plant, None] * self.limb
+        np.maximum.at(far, self.plant, reach)
         return far[:, UP], far[:, :UP].sum(axis=1) / 2
 
 
@@ -87,30 +101,35 @@ def outermost(rows: NDArray[np.void], plants: Branches, beyond: Beyond) -> Outer
     """What reaches farthest on plants (n) of one species, trunks of which are given."""
     stems = _stems(rows, plants)
     chosen = _likely(rows, stems, len(plants))
-    owner, root, limb = [], [], []
+    owner, root, limb, stem = [], [], [], []
     for (grown, lines), (counts, which, index) in zip(stems, chosen, strict=True):
         origin = plants.position[grown.plant]
         owner.append(grown.plant)
         own = np.where(rows["leaves"][grown.row, 0] > 0, rows["leaf_size"][grown.row, 0] * grown.scale, 0.0)
         root.append(_farthest(lines, origin) + own[:, None])
         limb.append(np.zeros((len(grown), len(WAYS))))
+        stem.append(rows["continues"][grown.row])
         limbs = chosen_children(rows, grown, lines, which, index, counts)
         if not len(limbs):
             continue
         origin, axis = plants.position[limbs.plant], axes(rows, limbs)
-        begin = (limbs.position - origin) @ WAYS.T
+        begin = _in_ways(limbs.position - origin)
         leads = _farthest(axis, origin) - begin
         end = axis.knot(np.arange(len(limbs)), axis.segments) - limbs.position
         level = end[:, :2] / np.maximum(np.hypot(end[:, 0], end[:, 1]), 1e-9)[:, None]
         side, up = (a * limbs.scale + b * limbs.length for a, b in (beyond.side, beyond.up))
         leads[:, :UP] += np.maximum(level @ WAYS[:UP, :2].T, 0.0) * side[:, None]
         leads[:, UP] += up
-        lean = are_stools(rows, grown.row[which])  # longer crowns are stems that lean more
-        begin[lean, UP], leads[lean, UP] = begin[lean, UP] + leads[lean, UP], 0.0
+        # Wider crowns of shrubs are stems that lean more, which bear as much to the sides as before.
+        lean, part = are_stools(rows, grown.row[which]), np.array([_ASIDE] * UP + [1.0])
+        begin[lean], leads[lean] = begin[lean] + part * leads[lean], (1 - part) * leads[lean]
+        stem.append(rows["continues"][grown.row[which]])
         owner.append(limbs.plant)
         root.append(begin)
         limb.append(leads)
-    return Outermost(np.concatenate(owner).astype(np.int64), np.concatenate(root), np.concatenate(limb))
+    width = np.ones(len(plants)) if plants.crown is None else plants.crown[:, WIDTH].astype(np.float64)
+    reach = (np.concatenate(some) for some in (owner, root, limb, stem))
+    return Outermost(*reach, width)
 
 
 def _stems(rows: NDArray[np.void], plants: Branches) -> list[tuple[Branches, Axes]]:
@@ -127,13 +146,19 @@ def _stems(rows: NDArray[np.void], plants: Branches) -> list[tuple[Branches, Axe
 
 def _farthest(lines: Axes, origin: NDArray[np.float64]) -> NDArray[np.float64]:
     """How far axes (n,) reach in each of `WAYS` (n, 5) from places (n, 3)."""
-    return np.stack([(lines.knots[:, s] - origin) @ WAYS.T for s in range(lines.knots.shape[1])]).max(axis=0)
+    return np.maximum(_in_ways(lines.knots.max(axis=1) - origin), _in_ways(lines.knots.min(axis=1) - origin))
+
+
+def _in_ways(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places (n, 3) along each of `WAYS` (n, 5)."""
+    x, y, z = place.T
+    return np.stack([x, -x, y, -y, z]).T
 
 
 def _likely(
     rows: NDArray[np.void], stems: list[tuple[Branches, Axes]], n: int
 ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]]:
-    """Limbs of stems that are likely to reach farthest: of each generation counts, stems (m,) and limbs of these (m,)."""
+    """Limbs of stems that are likely to reach farthest: by generation counts, stems (m,) and limbs (m,) of these."""
     found = [_mean_tips(rows, *one) for one in stems]
     tree = np.concatenate([grown.plant[owner] for (grown, _), (_, owner, _, _) in zip(stems, found, strict=True)])
     tips = np.concatenate([tip for *_, tip in found])
@@ -142,13 +167,12 @@ def _likely(
     place = np.arange(len(tree)) - (np.cumsum(number) - number)[tree[order]]
     most = int(number.max(initial=0))
     chosen = np.zeros((n, most), bool)
-    if most > _LIKELY:
-        for way in range(len(WAYS)):
+    if most > max(_LIKELY):
+        for way, likely in enumerate(_LIKELY):
             padded = np.full((n, most), -np.inf, np.float32)
             padded[tree[order], place] = tips[order, way]
-            np.put_along_axis(
-                chosen, np.argpartition(padded, most - _LIKELY, axis=1)[:, most - _LIKELY :], True, axis=1
-            )
+            best = np.argpartition(padded, most - likely, axis=1)[:, most - likely :]
+            np.put_along_axis(chosen, best, True, axis=1)
     else:
         chosen[:] = True
     some = np.zeros(len(tree), bool)
@@ -176,37 +200,39 @@ def _mean_tips(
     base = np.zeros(len(stems)) if crown is None else crown[:, BASE]
     start = np.maximum(rows["start"][row, LATERAL, 0], bare_part(rows, row, base))
     part = (index // whorl + 0.5) / np.maximum(counts[owner] // whorl, 1)
-    t, number = start[owner] + (1 - start[owner]) * part, index
+    t, number, fading = start[owner] + (1 - start[owner]) * part, index, 1.0
     grown = living_nodes(rows, stems, LATERAL)
     if grown is not None:
         number, _, extra = grown.chosen(owner, index, whorl)
-        there, among, _ = grown.places(owner, number // whorl, np.full(len(owner), 0.5), extra)
+        there, among, described = grown.places(owner, number // whorl, np.full(len(owner), 0.5), extra)
         on = grown.on[owner]
-        t, part = np.where(on, there, t), np.where(on, among, part)
+        least = whorl / np.maximum(counts, 1)[owner]  # the lowest may be anywhere in their node
+        t, part = np.where(on, there, t), np.where(on, np.maximum(among, least), part)
+        first, last = rows["fraction"][row, LATERAL].T
+        described = first[owner] + (last - first)[owner] * described
+        fading = faded(described, rows["growing"][row, LATERAL, FADES][owner], extra)
     low, high = fractions(rows, row, base).T
     fraction = low[owner] + (high - low)[owner] * part
     angle = rows["angle"][child, 0][owner]
     angle = angle + (rows["angle_tip"][child][owner] - angle) * fraction
     turn = 2 * np.pi * uniform(stems.key, Draw.AZIMUTH)
     azimuth = turn[owner] + 2 * np.pi * (number % whorl) / whorl + number // whorl * rows["azimuth"][child, 0][owner]
-    length = (stems.length * rows["nominal"][row] * rows["length"][child, 0])[owner] * lengths(
-        rows, row[owner], fraction
-    )
+    length = (stems.length * rows["nominal"][row] * rows["length"][child, 0])[owner]
+    length = length * lengths(rows, row[owner], fraction) * fading
     if crown is not None:
         length /= along(rows, row, crown)[owner]
         few = replace(Branches.empty(), row=row[owner], crown=crown[owner])
         lean, reach = reaches(rows, few, azimuth, LATERAL)
         length, angle = length * reach, angle * lean
     sine, cosine = length * np.sin(angle), length * np.cos(angle)
-    end = lines.knot(np.arange(len(stems)), lines.segments)
-    origin, rise = stems.position, end - stems.position
-    across, aside, upright = (stems.frame[:, :, k] @ WAYS.T for k in range(3))
-    first, way = origin @ WAYS.T, rise @ WAYS.T
-    tips = np.empty((len(owner), len(WAYS)), np.float32)
+    rise = lines.knot(np.arange(len(stems)), lines.segments) - stems.position
     c, s = sine * np.cos(azimuth), sine * np.sin(azimuth)
-    for k in range(len(WAYS)):
-        tips[:, k] = first[owner, k] + t * way[owner, k]
-        tips[:, k] += c * across[owner, k] + s * aside[owner, k] + cosine * upright[owner, k]
+    tips = np.empty((len(owner), 3))
+    for k in range(3):
+        across, aside, upright = stems.frame[:, k].T
+        tips[:, k] = stems.position[owner, k] + t * rise[owner, k]
+        tips[:, k] += c * across[owner] + s * aside[owner] + cosine * upright[owner]
+    tips = _in_ways(tips).astype(np.float32)
     return counts, owner, index, tips
 
 

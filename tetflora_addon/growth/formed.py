@@ -56,14 +56,14 @@ def are_formed(rows: NDArray[np.void], branches: Branches) -> bool:
 
 def are_stools(rows: NDArray[np.void], row: NDArray[np.integer]) -> NDArray[np.bool_]:
     """Whether rows (n,) are those of stools."""
-    child = rows["next"][row, LATERAL]
-    return (rows["order"][row] == 0) & (child >= 0) & (rows["length"][child, 0] > _STEMS)
+    child = rows["next"][:, LATERAL]
+    return ((rows["order"] == 0) & (child >= 0) & (rows["length"][child, 0] > _STEMS))[row]
 
 
 def first_forks(rows: NDArray[np.void], row: NDArray[np.integer]) -> NDArray[np.float64]:
     """Where on the trunks of the plants of rows (n,) the first fork is, fractions of their height; 1 without any."""
     first = np.flatnonzero(np.diff(rows["species"], prepend=-1))
-    return rows["part"][first[rows["species"][row]], 1]
+    return rows["part"][first[rows["species"]], 1][row]
 
 
 def raised(base: ArrayLike, fork: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
