@@ -13,7 +13,7 @@ from ..errors import TetFloraError
 from ..species.ecology import Ecology
 
 #: Kelvin by which it is colder for each metre of altitude, and degree days that a kelvin is worth: days of the season.
-_LAPSE, _DAYS = 0.006, 190.0
+_LAPSE, _DAYS = 0.006, 165.0
 #: Degree days, beyond those that a species needs at least, that let it grow at two thirds of its rate.
 _WARM = 300.0
 #: Moisture at which species of drought tolerance 0 and 5 begin to grow, and from there to full growth; wetness at
