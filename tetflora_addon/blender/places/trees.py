@@ -15,8 +15,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SceneError
+from ...errors import SceneError, SpeciesError
 from ...growth.hashing import child_key, key_of_seed, uniform
+from ...growth.seeds import Seeds
 from ...jobs import Progress
 from ...places.canopy import find_trees
 from ...places.inventories import Inventory, read_inventory
@@ -24,10 +25,13 @@ from ...places.projection import Place
 from ...places.species_names import GENUS, KIN, KIND, species_named
 from ...planting.places import Placement
 from ...planting.rules import species_by_weight
+from ...species.species import Species
 from ..attributes import write
 from ..placing.plant_objects import add_field
 from ..runtime import JobData, guarded
-from ..species.edits import catalogue, species_for
+from ..scene.own_ages import Sizes
+from ..scene.sizes import fits_of
+from ..species.edits import catalogue, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .completion import complete
 from .origin import in_scene, origin_for, remember
@@ -282,7 +286,7 @@ def _plant(
     placement = Placement(np.column_stack([flat, z]), turns, np.ones(len(flat)), kinds, seeds, len(flat))
     age = sizes.get("age")
     ages = None if age is None else np.where(sizes["height"] > 0.0, 0.0, age)
-    fit = _fit(scene, identifiers, kinds, seeds, sizes)
+    fit = yield from _fit_steps(scene, placement, identifiers, sizes)
     yield Progress(0.95, "Making the field")
     made.object = add_field(scene, placement, identifiers, ages=ages)
     made.object.name = made.object.data.name = name
@@ -296,12 +300,27 @@ def _plant(
     remember(scene, place)
 
 
-def _fit(
-    scene: bpy.types.Scene,
-    identifiers: list[str],
-    kinds: NDArray[np.int32],
-    seeds: NDArray[np.int32],
-    sizes: dict[str, NDArray[np.float32]],
-) -> NDArray[np.float32] | None:
+def _fit_steps(
+    scene: bpy.types.Scene, placement: Placement, identifiers: list[str], sizes: dict[str, NDArray[np.float32]]
+) -> Generator[Progress, Any, NDArray[np.float32] | None]:
     """Factors on height and crown width, (n, 3), that make up for what is random in each plant; None for none."""
-    return None
+    none, number = np.zeros(len(placement)), len(placement)
+    columns = [sizes.get(key, none).astype(np.float64) for key in ATTRIBUTES]
+    if not columns[0].any():
+        return None
+    offset = sizes["offset"][:, :2] if "offset" in sizes else np.zeros((number, 2))
+    own = Sizes(*columns, offset, np.ones((number, 2)))
+    turn, frame = placement.azimuth, np.zeros((number, 3, 3))
+    frame[:, 0, 0] = frame[:, 1, 1] = np.cos(turn)
+    frame[:, 1, 0], frame[:, 0, 1], frame[:, 2, 2] = np.sin(turn), -np.sin(turn), 1.0
+    given = placement.species, placement.seed.astype(np.int64), np.zeros((number, 3)), frame, np.ones(number)
+    species = {name: species_for(scene, name) for name in set(identifiers) & grown().keys()}
+
+    def find(name: str) -> Species:
+        if name not in species:  # an asset
+            raise SpeciesError(name)
+        return species[name]
+
+    progress = Progress(0.85, "Fitting plants to their sizes")
+    found = yield from call_in_thread(progress, fits_of, Seeds(tuple(identifiers), *given), own, find)
+    return np.pad(found, ((0, 0), (0, 1))).astype(np.float32)

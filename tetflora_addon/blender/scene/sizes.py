@@ -44,6 +44,7 @@ _COHORTS, _APART, _STRETCH, _DEATHS = 12, (20.0, np.log(1.6), np.log(1.8)), 5.0,
 _BREAST, _TALL = 1.3, 1.5  # height of the diameter, and least height of a plant that has one, metres
 _DIES = 0.999  # part of its life after which a plant that dies early no longer grows
 _PLANTS = 32  # that are measured of each class
+_MEASURED = 1  # times that a plant is, to fit it
 
 
 def heights(species: Species, years: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -126,8 +127,10 @@ def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> NDArr
             one = replace(plain.take(own), identifiers=(kind,), species=np.zeros(len(own), np.int32), crown=crown[own])
             tall, wide = (sizes.height * seeds.scale)[own], (sizes.width * seeds.scale)[own]
             # What has no width keeps that of its kind.
-            scale, limbs = fitted(flora, one, tall, np.where(wide > 0.0, wide, measured(flora, one)[1])).T
-            out[own] = np.stack([scale, np.where(wide > 0.0, scale * limbs, 1.0)], axis=1)
+            bare, known = np.flatnonzero(wide <= 0.0), np.flatnonzero(wide > 0.0)
+            out[own[bare], 0] = tall[bare] / measured(flora, one.take(bare))[0]
+            scale, limbs = fitted(flora, one.take(known), tall[known], wide[known], _MEASURED).T
+            out[own[known]] = np.stack([scale, scale * limbs], axis=1)
     return out
 
 
