@@ -53,6 +53,8 @@ class View:
         Mean that the exposure aims at.
     haze : tuple
         As of `seasons.Look`.
+    light : float
+        Of the sun and the sky over that of open land: woods are longer exposed.
     free : float
         Meters in front of the camera without trees and shrubs.
     beside : str
@@ -69,15 +71,17 @@ class View:
     grey: float = 0.34
     haze: tuple[float, Rgb] = (0.0004, (0.5, 0.62, 0.8))
     clouds: float = 0.5
+    light: float = 1.0
     free: float = 6.0
     beside: str = ""
     water: float = 0.0
 
 
 _COOL, _GOLD = (1.0, 0.95, 0.88), (1.0, 0.86, 0.66)
+_CLEAR = (0.0002, (0.4, 0.5, 0.5))
 VIEWS = {
     "alpine_treeline": View((-34.0, -26.0, 1.8), (18.0, 2.0, 3.0), 24.0, (38.0, 215.0), grey=0.42, clouds=0.6),
-    "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (50.0, 215.0), grey=0.32),
+    "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (56.0, 215.0), grey=0.34, haze=_CLEAR, light=2.5),
     "birch_pine": View((0.0, -42.0, 1.6), (4.0, 0.0, 4.6), 26.0, (36.0, 240.0), _GOLD, grey=0.38),
     "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), grey=0.38, clouds=0.8),
     "hedgerow": View((-46.0, -10.0, 1.7), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, grey=0.42, beside="meadow"),
@@ -88,8 +92,12 @@ VIEWS = {
     "riparian_willow": View(
         (44.0, -12.0, 2.2), (8.0, 4.0, 3.2), 24.0, (44.0, 200.0), grey=0.42, free=7.0, beside="meadow", water=0.3
     ),
-    "spruce_forest": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), grey=0.33, free=5.0),
-    "tropical_understorey": View((0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), grey=0.32, free=4.5),
+    "spruce_forest": View(
+        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), grey=0.34, haze=_CLEAR, light=2.5, free=5.0
+    ),
+    "tropical_understorey": View(
+        (0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), grey=0.34, haze=_CLEAR, light=1.6, free=4.5
+    ),
 }
 
 
@@ -214,8 +222,8 @@ def _light(scene: bpy.types.Scene, view: View, around: bpy.types.Object) -> None
 
     add_daylight(scene, elevation=view.sun[0], azimuth=view.sun[1] - 180.0)
     sun = next(o for o in scene.objects if o.type == 'LIGHT').data
-    sun.energy, sun.color, sun.angle = 5.0, view.tint, radians(0.8)
-    look: Look = replace(LOOKS["summer"], clouds=view.clouds, haze=view.haze)
+    sun.energy, sun.color, sun.angle = 5.0 * view.light, view.tint, radians(0.8)
+    look: Look = replace(LOOKS["summer"], clouds=view.clouds, strength=LOOKS["summer"].strength * view.light)
     scene.world = sky(look)
     around.name = "Ground"
     add_haze(scene, *view.haze)

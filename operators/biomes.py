@@ -11,11 +11,11 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..tetflora_addon.blender.biomes.adding import (
     Added,
-    active_biome,
     add_biome_steps,
     plant_biome_steps,
     remove_biome,
 )
+from ..tetflora_addon.blender.biomes.biome import active_biome
 from ..tetflora_addon.blender.biomes.files import read_biome
 from ..tetflora_addon.blender.biomes.ground import make_land
 from ..tetflora_addon.blender.biomes.library import ENDING, NO_BIOME, biome_property, biomes, delete

@@ -17,9 +17,8 @@ from ..tetflora_addon.blender.placing.populations import (
     own_objects,
     remove_population,
     reroll_steps,
-    set_grounds,
 )
-from ..tetflora_addon.blender.placing.rules import active_population, copy_settings
+from ..tetflora_addon.blender.placing.rules import active_population, copy_settings, set_grounds
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import readable
 from ..tetflora_addon.jobs import Progress

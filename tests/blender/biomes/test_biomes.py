@@ -14,6 +14,7 @@ import pytest
 
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
 from tetflora_addon.blender.biomes import adding, files, ground, library, saving, stands
+from tetflora_addon.blender.biomes import biome as parts
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.preferences import preferences
 from tetflora_addon.blender.species.edits import catalogue
@@ -76,18 +77,18 @@ def scene():
     return bpy.context.scene
 
 
-def small(**changes) -> files.Biome:
+def small(**changes) -> parts.Biome:
     return files.checked(copy.deepcopy({**SMALL, **changes}), "small")
 
 
-def add(biome: files.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.Added:
+def add(biome: parts.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.Added:
     return at_once(adding.add_biome_steps(scene(), depsgraph(), biome, list(grounds), seed))
 
 
 def places(uid: str) -> np.ndarray:
     """Where the plants of a biome stand, (n, 3)."""
     found = [np.zeros((0, 3))]
-    for layer in adding.layers_of(scene(), uid):
+    for layer in parts.layers_of(scene(), uid):
         for obj in populations.own_objects(scene(), layer):
             own = np.zeros((len(obj.data.vertices), 3)) if obj.tetflora.is_field else np.array([obj.location])
             if obj.tetflora.is_field:
@@ -101,7 +102,7 @@ def places(uid: str) -> np.ndarray:
 def test_shipped_biomes_are_sound(path):
     """They pass the checks, need only species that there are, and have a small picture."""
     biome, known = files.read_biome(path), catalogue()
-    pages = files.pages_of(scene(), biome)
+    pages = parts.pages_of(scene(), biome)
     for layer in biome.layers:
         for part in layer["species"]:
             name, shed_by = part["species"], part.get("shed_by", "")
@@ -128,7 +129,7 @@ def test_a_biome_makes_what_its_file_says():
     assert [name for name, _ in added.layers] == ["Bushes", "Floor"]
     assert 10 <= added.layers[0][1] <= 60 and 100 <= added.layers[1][1] <= 900
     (biome,) = scene().tetflora.biomes
-    bushes, floor = adding.layers_of(scene(), biome.uid)
+    bushes, floor = parts.layers_of(scene(), biome.uid)
     assert [entry.object for entry in bushes.grounds] == [land] and not bushes.covers and floor.covers
     assert {"blue_bush", "blue_bush_litter"} <= {edit.identifier for edit in scene().tetflora.species_edits}
     assert bushes.min_distance == pytest.approx(0.8) and bushes.slope_max == pytest.approx(np.radians(30.0))
@@ -154,7 +155,7 @@ def test_what_is_saved_comes_back():
     assert path == library.biomes()["small"].path and library.biomes()["small"].is_own
     assert [{k: v for k, v in layer.items() if k != "seed"} for layer in read.layers] == given.layers
     assert read.limits == {"slope_max": 42.0, "altitude_max": 30.0} and read.ground == given.ground
-    assert files.pages_of(scene(), read) == files.pages_of(scene(), given)
+    assert parts.pages_of(scene(), read) == parts.pages_of(scene(), given)
     with pytest.raises(SceneError, match="already has"):
         saving.save_biome(scene(), "Small", "", picture=False, replace=False)
     library.delete("small")
@@ -191,21 +192,21 @@ def test_neighbours_blend():
     add(floor, land)
     meadow = scene().tetflora.biomes[0].uid
     before = places(meadow)
-    at_once(adding.plant_biome_steps(scene(), depsgraph(), adding.find_biome(scene(), meadow)))
+    at_once(adding.plant_biome_steps(scene(), depsgraph(), parts.find_biome(scene(), meadow)))
     assert np.array_equal(places(meadow), before), "planting again changes nothing"
     add(replace(floor, name="Other"), land)
     other = scene().tetflora.biomes[1]
     other.vertex_group = "west"
     from tetflora_addon.blender.placing.rules import awaits_update
 
-    assert awaits_update(adding.layers_of(scene(), meadow)[0]), "the mask of one is the other's limit"
+    assert awaits_update(parts.layers_of(scene(), meadow)[0]), "the mask of one is the other's limit"
     for uid in (meadow, other.uid):
-        at_once(adding.plant_biome_steps(scene(), depsgraph(), adding.find_biome(scene(), uid)))
-    east, west = places(meadow), places(adding.find_biome(scene(), scene().tetflora.biomes[1].uid).uid)
+        at_once(adding.plant_biome_steps(scene(), depsgraph(), parts.find_biome(scene(), uid)))
+    east, west = places(meadow), places(parts.find_biome(scene(), scene().tetflora.biomes[1].uid).uid)
     assert abs(len(east) + len(west) - len(before)) < 5.0 * np.sqrt(len(before))
     assert east[:, 0].mean() > 2.0 and west[:, 0].mean() < -2.0
-    adding.find_biome(scene(), meadow).gives_way = False
-    at_once(adding.plant_biome_steps(scene(), depsgraph(), adding.find_biome(scene(), meadow)))
+    parts.find_biome(scene(), meadow).gives_way = False
+    at_once(adding.plant_biome_steps(scene(), depsgraph(), parts.find_biome(scene(), meadow)))
     assert np.array_equal(places(meadow), before)
 
 

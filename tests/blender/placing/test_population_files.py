@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from tests.attack import material
 from tests.blender.scenes import add_mesh, select
 from tetflora_addon import errors
-from tetflora_addon.blender.placing import population_files, populations, properties
+from tetflora_addon.blender.placing import population_data, population_files, populations, properties
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -33,8 +33,8 @@ def _add(**values):
 
 def _values(population):
     """All settings as Blender stores them."""
-    simple = {p.identifier: getattr(population, p.identifier) for p in population_files._simple_settings(population)}
-    mix = [tuple(getattr(e, name) for name in population_files._MIX) for e in population.mix]
+    simple = {p.identifier: getattr(population, p.identifier) for p in population_data.simple_settings(population)}
+    mix = [tuple(getattr(e, name) for name in population_data.MIX) for e in population.mix]
     return simple, mix, [e.object for e in population.grounds]
 
 
@@ -50,7 +50,7 @@ def _numbers(name):
 @given(data=st.data())
 def test_what_is_written_comes_back(tmp_path, data):
     population = _add(name=data.draw(st.text(st.characters(exclude_categories=("C",)), max_size=20)))
-    for prop in population_files._simple_settings(population):
+    for prop in population_data.simple_settings(population):
         if prop.type in {'INT', 'FLOAT'} and data.draw(st.booleans()):
             # Bounds that are no single-precision numbers are left to their ends.
             value = data.draw(_numbers(prop.identifier) if prop.subtype != 'ANGLE' else st.floats(0.0, 1.5))

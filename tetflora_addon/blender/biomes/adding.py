@@ -23,12 +23,13 @@ from ...species.fallen import KIND as FALLEN_LEAVES
 from ...species.litter import FALLEN
 from ..placing.cover import fallen_from
 from ..placing.plant_objects import remove_fields
-from ..placing.population_files import fill_population
-from ..placing.populations import add_population, make_plants_steps, remove_population, set_grounds
+from ..placing.population_data import fill_population
+from ..placing.populations import add_population, make_plants_steps, remove_population
+from ..placing.rules import set_grounds
 from ..runtime import GoneError, JobData, guarded, is_there
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
 from ..stands.growing import again_steps, is_stand
-from .files import Biome, pages_of, set_limits
+from .biome import Biome, find_biome, layers_of, pages_of, set_limits
 from .ground import lay_soil, make_line
 from .stands import grow_layer_steps, stands_of
 
@@ -57,22 +58,6 @@ class Added:
     layers: list[tuple[str, int]]
     bare: list[str]
     kept: list[str]
-
-
-def find_biome(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
-    """A biome of a scene by its identity."""
-    return next((biome for biome in scene.tetflora.biomes if biome.uid == uid), None)
-
-
-def active_biome(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
-    """The biome that buttons act on; None where there is none."""
-    group = scene.tetflora
-    return group.biomes[group.biomes_index] if 0 <= group.biomes_index < len(group.biomes) else None
-
-
-def layers_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.PropertyGroup]:
-    """Populations of a biome, in their order."""
-    return [population for population in scene.tetflora.populations if population.biome == uid]
 
 
 def add_biome_steps(

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
-from math import radians
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -21,21 +20,14 @@ from ...errors import SceneError, SpeciesError, shown
 from ...files import IDENTIFIER_RULE, is_identifier, json_of, read_whole
 from ...planting.zones import Limits
 from ...species.schema import species_from_dict
-from ..placing.population_files import (
-    check_format,
-    check_keys,
-    check_population,
-    check_text,
-    check_value,
-    list_of,
-    population_data,
-    value_for,
-)
+from ..placing.file_checks import check_format, check_keys, check_text, check_value, list_of, refuse_constant, value_for
+from ..placing.population_data import check_population, population_data
 from ..placing.properties import TetFloraPopulation
 from ..placing.zones import limits_of_zone
 from ..species.edits import find_edit, species_data
+from .biome import GROUND, Biome, data_of
 from .library import MAX_FILE_BYTES
-from .properties import TetFloraBiome, data_of
+from .properties import TetFloraBiome
 from .stands import check_stand, stand_data, stands_of
 
 FORMAT = "TetFlora biome"
@@ -43,46 +35,12 @@ VERSION = 1
 #: What a layer is: plants that keep their distance from others and shade the ground; what grows and lies under them,
 #: and does neither; a stand that grows.
 KINDS = ("population", "cover", "stand")
-#: Ground: linear RGB of bare soil and of turf, the share that turf hides; and the shape of ground that is made for it:
-#: hills in meters, slope in degrees, depth of a brook's valley in meters. Least and most of each number.
-GROUND = {
-    "earth": ((0.036, 0.025, 0.016), 0.0, 1.0),
-    "turf": ((0.05, 0.08, 0.02), 0.0, 1.0),
-    "turf_share": (0.0, 0.0, 1.0),
-    "hills": (2.0, 0.0, 30.0),
-    "slope": (0.0, 0.0, 45.0),
-    "valley": (0.0, 0.0, 30.0),
-}
 #: When a biome is as its picture shows it.
 SEASON = {"day": (1.0, 365.0), "latitude": (-66.0, 66.0)}
 _KEYS = {"format", "version", "name", "layers"}
 _MORE = {"description", "species", "limits", "gives_way", "ground", "season"}
 #: Settings of populations that mean something in one file only.
 _LOCAL = ("grounds", "ground_collection", "vertex_group", "image", "uv_layer", "areas", "paths")
-
-
-@dataclass(frozen=True)
-class Biome:
-    """A biome as its file has it, checked.
-
-    Attributes
-    ----------
-    layers : list of dict
-        Each with ``kind`` and the keys of that.
-    species : dict
-        Species of its own by identifier: whole pages, or what differs from one ``of`` the catalog, and what differs
-        in ``every_order`` of that.
-    """
-
-    identifier: str
-    name: str
-    layers: list[dict[str, Any]]
-    description: str = ""
-    species: dict[str, dict[str, Any]] = field(default_factory=dict)
-    limits: dict[str, float] = field(default_factory=dict)
-    gives_way: bool = True
-    ground: dict[str, Any] = field(default_factory=dict)
-    season: dict[str, float] = field(default_factory=dict)
 
 
 def read_biome(path: Path) -> Biome:
@@ -94,7 +52,7 @@ def read_biome(path: Path) -> Biome:
         It cannot be read, or breaks a rule of the format; names file and key.
     """
     try:
-        return checked(json_of(read_whole(path, MAX_FILE_BYTES), _refuse_constant), path.stem)
+        return checked(json_of(read_whole(path, MAX_FILE_BYTES), refuse_constant), path.stem)
     except OSError as error:
         raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
     except (ValueError, SpeciesError) as error:
@@ -202,28 +160,6 @@ def _species_data(scene: bpy.types.Scene, parts: Iterable[Mapping[str, Any]]) ->
     return {name: dict(species_data(scene, name)) for name in sorted(names) if find_edit(scene, name) is not None}
 
 
-def pages_of(scene: bpy.types.Scene, biome: Biome) -> dict[str, dict[str, Any]]:
-    """Pages of the species of a biome's own, complete.
-
-    Raises
-    ------
-    SceneError, SpeciesError
-        One is made from a species that the catalog does not have, or is broken.
-    """
-    pages: dict[str, dict[str, Any]] = {}
-    for identifier, given in biome.species.items():
-        page = dict(given)
-        if "of" in page:
-            of = page.pop("of")
-            each = page.pop("every_order", {})
-            page = {**(pages[of] if of in pages else species_data(scene, of)), **page}
-            # Where an order has the key already: what bears no leaves has no color of leaves.
-            page["orders"] = [{**order, **{k: each[k] for k in each.keys() & order.keys()}} for order in page["orders"]]
-            species_from_dict(page, identifier, f'{biome.name}: species "{identifier}"')
-        pages[identifier] = page
-    return pages
-
-
 def _check_limits(limits: Any) -> None:
     known = {one.name for one in fields(Limits)}
     check_keys('"limits"', limits, set(), known)
@@ -277,15 +213,3 @@ def _check_layer(where: str, layer: Any) -> None:
         check_population(where, layer, ("kind",))
         if not layer.get("species"):
             raise ValueError(f'{where} has no "species"')
-
-
-def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is not a number")
-
-
-def set_limits(biome: bpy.types.PropertyGroup, limits: Mapping[str, float]) -> None:
-    """Give a biome of a scene checked limits."""
-    for key, value in limits.items():
-        angle = TetFloraBiome.bl_rna.properties[key].subtype == 'ANGLE'
-        setattr(biome, key, radians(value) if angle else value)
-    biome.use_altitude = bool({"altitude_min", "altitude_max"} & limits.keys())

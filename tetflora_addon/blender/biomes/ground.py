@@ -17,14 +17,12 @@ from ...growth.hashing import key_of_seed
 from ...planting.canopy import Sheet
 from ...planting.plane import gradient_noise
 from ..attributes import world_matrix
-from ..materials.soil import is_soil, soil_material
-from ..placing.cover import may_have_soil, put_soil
+from ..materials.soil import is_soil, may_have_soil, put_soil, soil_material
 from ..placing.populations import own_objects
 from ..placing.terrain import read_ground
 from ..scene.crowns import crown_for
 from ..scene.fields import fields_of, read_field
-from .files import GROUND
-from .properties import data_of
+from .biome import GROUND, data_of
 
 NAME = "Land"
 #: Side of land that is made, and of its squares, meters.

@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Biomes of a scene: where each lies, and which comes first. Its layers are populations that know its identity."""
 
-from typing import Any
-
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, PointerProperty, StringProperty
 
-from ...files import json_of
 from ...planting.zones import Limits
 from ..placing.properties import TetFloraGround, listeners
 from ..settings import properties_of
@@ -79,15 +76,6 @@ class TetFloraBiome(bpy.types.PropertyGroup):
     path_min: _LIMITS.path_min
     path_max: _LIMITS.path_max
     path_softness: _LIMITS.path_softness
-
-
-def data_of(biome: bpy.types.PropertyGroup) -> dict[str, Any]:
-    """What a biome keeps of its file beside its layers; nothing where that cannot be read."""
-    try:
-        data = json_of(biome.data) if biome.data else {}
-    except ValueError:
-        data = {}
-    return data if isinstance(data, dict) else {}
 
 
 CLASSES = (TetFloraBiome,)

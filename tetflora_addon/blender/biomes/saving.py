@@ -14,7 +14,7 @@ from ...files import read_whole
 from ..placing.rules import active_population, grounds_of
 from ..species.edits import new_identifier
 from . import library
-from .adding import active_biome, layers_of
+from .biome import active_biome, layers_of
 from .files import as_text, biome_data, checked, read_biome
 
 #: Pixels of a picture, and its quality as a JPEG.

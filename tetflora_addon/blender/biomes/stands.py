@@ -14,20 +14,24 @@ import numpy as np
 from ...errors import shown
 from ...files import IDENTIFIER_RULE, is_identifier
 from ...jobs import Progress
+from ..placing.file_checks import check_keys, check_text, check_value, list_of, value_for
 from ..placing.plant_objects import link_field
-from ..placing.population_files import check_keys, check_text, check_value, list_of, value_for
 from ..runtime import is_there
 from ..scene.fields import write_field
 from ..stands.growing import GrownStand, again_steps, is_stand
-from ..stands.properties import TetFloraStand, TetFloraStandEntry
 
 #: Keys of a species of a stand.
 _ENTRY = ("species", "planted", "rain")
 
 
+def _properties() -> Any:
+    """Properties of a stand, by way of Blender: files of biomes need none of what grows them."""
+    return bpy.types.Object.bl_rna.properties["tetflora"].fixed_type.properties["stand"].fixed_type.properties
+
+
 def _settings() -> dict[str, bpy.types.Property]:
     """Settings of stands that mean something in any file."""
-    found = {p.identifier: p for p in TetFloraStand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN'}}
+    found = {p.identifier: p for p in _properties() if p.type in {'INT', 'FLOAT', 'BOOLEAN'}}
     return {name: prop for name, prop in found.items() if name not in ("is_grown", "species_index", "path_distance")}
 
 
@@ -44,11 +48,11 @@ def check_stand(where: str, layer: dict[str, Any]) -> None:
     check_text(f'{where}: "name"', layer["name"])
     for key in known.keys() & layer.keys():
         check_value(f'{where}: "{key}"', known[key], layer[key])
-    parts = list_of(f'{where}: "species"', layer["species"])
+    parts, entry = list_of(f'{where}: "species"', layer["species"]), _properties()["species"].fixed_type.properties
     for index, part in enumerate(parts, 1):
         check_keys(f"{where}: species {index}", part, {"species"}, set(_ENTRY))
         for key, value in part.items():
-            check_value(f'{where}: species {index}: "{key}"', TetFloraStandEntry.bl_rna.properties[key], value)
+            check_value(f'{where}: species {index}: "{key}"', entry[key], value)
         if not is_identifier(part["species"]):
             raise ValueError(f'{where}: species {index}: {shown(part["species"])}; use only {IDENTIFIER_RULE}')
 
@@ -113,7 +117,7 @@ def stand_data(field: bpy.types.Object) -> dict[str, Any]:
         value = value_for(prop, getattr(stand, name))
         if value != value_for(prop, prop.default):
             data[name] = value
-    properties = TetFloraStandEntry.bl_rna.properties
+    properties = _properties()["species"].fixed_type.properties
     data["species"] = [
         {key: value_for(properties[key], getattr(entry, key)) for key in _ENTRY} for entry in stand.species
     ]

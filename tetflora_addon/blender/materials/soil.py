@@ -9,6 +9,7 @@ fits meshes of any resolution, with or without UV maps.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
@@ -26,6 +27,23 @@ _PLACE, _SIZE, _MAP, _GREEN = "Soil Corner", "Soil Size", "Soil Map", "Soil Gree
 def is_soil(material: bpy.types.Material | None) -> bool:
     """Whether a material is one that `soil_material` made and may bring up to date."""
     return material is not None and bool(material.get(MARK)) and material.library is None
+
+
+def put_soil(grounds: Iterable[bpy.types.Object], material: bpy.types.Material) -> None:
+    """Give grounds that may have it a material for their soil."""
+    for obj in grounds:
+        if obj.material_slots:
+            slot = next((s for s in obj.material_slots if s.material is None or is_soil(s.material)), None)
+            if slot is not None:
+                slot.material = material
+        else:
+            obj.data.materials.append(material)
+
+
+def may_have_soil(obj: bpy.types.Object) -> bool:
+    """Whether a ground is of this file and has no material but soil."""
+    local = obj.library is None and obj.data.library is None and obj.override_library is None
+    return local and all(slot.material is None or is_soil(slot.material) for slot in obj.material_slots)
 
 
 def soil_material(

@@ -25,7 +25,7 @@ from ...planting.canopy import Canopy
 from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
 from ...species.fallen import KIND, leaves_page
 from ...species.litter import FALLEN
-from ..materials.soil import is_soil, soil_material
+from ..materials.soil import is_soil, may_have_soil, put_soil, soil_material
 from ..runtime import JobData, guarded, is_there
 from ..scene.crowns import crown_for, crown_steps
 from ..species.edits import catalogue, revert_species, species_data, species_for, store_species
@@ -352,23 +352,6 @@ def _lay_soil(
     if kept:
         material.use_fake_user = True  # for the artist to use
     return kept
-
-
-def put_soil(grounds: Iterable[bpy.types.Object], material: bpy.types.Material) -> None:
-    """Give grounds that may have it a material for their soil."""
-    for obj in grounds:
-        if obj.material_slots:
-            slot = next((s for s in obj.material_slots if s.material is None or is_soil(s.material)), None)
-            if slot is not None:
-                slot.material = material
-        else:
-            obj.data.materials.append(material)
-
-
-def may_have_soil(obj: bpy.types.Object) -> bool:
-    """Whether a ground is of this file and has no material but soil."""
-    local = obj.library is None and obj.data.library is None and obj.override_library is None
-    return local and all(slot.material is None or is_soil(slot.material) for slot in obj.material_slots)
 
 
 def _strata(

@@ -41,7 +41,7 @@ from .plant_objects import (
     remove_fields,
 )
 from .properties import MOST_EMPTIES, TetFloraPopulation
-from .rules import copy_settings, fingerprint, makes_field, read_search
+from .rules import copy_settings, fingerprint, makes_field, read_search, set_grounds
 
 NAME = "Population"
 
@@ -104,13 +104,6 @@ def add_population(
     copy_settings(settings or group.populate, population)
     set_grounds(population, grounds)
     return population
-
-
-def set_grounds(population: TetFloraPopulation, grounds: Iterable[bpy.types.Object]) -> None:
-    """Let a population grow on these meshes instead."""
-    population.grounds.clear()
-    for obj in grounds:
-        population.grounds.add().object = obj
 
 
 def own_objects(scene: bpy.types.Scene, population: TetFloraPopulation) -> list[bpy.types.Object]:

@@ -9,7 +9,7 @@ a radius and the x and y of the centers of its circles.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import blake2b
@@ -207,6 +207,13 @@ def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> l
         named += objects_within(population.ground_collection)
     meshes = dict.fromkeys(o for o in named if o is not None and o.type == 'MESH' and not o.tetflora.is_field)
     return [o for o in meshes if scene in o.users_scene]
+
+
+def set_grounds(population: bpy.types.PropertyGroup, grounds: Iterable[bpy.types.Object]) -> None:
+    """Let a population grow on these meshes instead."""
+    population.grounds.clear()
+    for obj in grounds:
+        population.grounds.add().object = obj
 
 
 def place_population(
