@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...camera.camera import origin_near
 from ...growth.seeds import Seeds
 from ..attributes import write
+from ..species.asset_species import find_asset
 from .field_points import FieldPoints, parts_of, placed_frames, read_points, refuse
 from .field_sizes import in_year, read_records, read_sizes
 from .objects import geometry_of
@@ -136,7 +137,7 @@ def read_field_matrices(
     kinds = field_kinds(obj)
     if not any(species_of(kind) in wanted for kind in kinds):
         return
-    points, _ = _read(obj, depsgraph, geometry)
+    points, sizes = _read(obj, depsgraph, geometry)
     seeds = points.seeds(keys).reshape(-1, len(points.species))
     seeds = np.broadcast_to(seeds, (len(matrices), seeds.shape[1]))
     for number, kind in enumerate(kinds):
@@ -144,13 +145,24 @@ def read_field_matrices(
         if species_of(kind) not in wanted or not len(own):
             continue
         local = np.zeros((len(own), 4, 4))
-        local[:, :3, :3] = np.moveaxis(points.rotation[:, :, own] * points.scale[:, own], 2, 0)
+        stretch = points.scale[:, own] * (1.0 if sizes is None else _stretch(kind, sizes.take(own)))
+        local[:, :3, :3] = np.moveaxis(points.rotation[:, :, own] * stretch, 2, 0)
         local[:, :3, 3], local[:, 3, 3] = points.position[own], 1.0
         placed = matrices.astype(np.float64)[:, None] @ local
         bad = np.zeros(len(points.species), bool)
         bad[own] = ~np.isfinite(placed).all(axis=(0, 2, 3))
         refuse(obj, bad, "an invalid position or rotation")
         yield kind, seeds[:, own].reshape(-1), placed.reshape(-1, 4, 4)
+
+
+def _stretch(kind: str, sizes: Sizes) -> NDArray[np.float64]:
+    """Scales along their axes (3, n) with which assets have their recorded sizes; 1 where there are none."""
+    asset, known = find_asset(None, species_of(kind)), sizes.height > 0.0
+    if asset is None:
+        return np.ones((3, len(known)))
+    tall = sizes.height / asset.height
+    wide = np.where(sizes.width > 0.0, sizes.width / (2.0 * asset.radius), tall)
+    return np.where(known, np.stack([wide, wide, tall]), 1.0)
 
 
 def _read(
