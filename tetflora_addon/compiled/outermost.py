@@ -54,12 +54,15 @@ class Beyond:
     ----------
     side, up : pair of float
         Metres at plant scale 1, and fraction of the limb's length.
+    top : float
+        How far leaves of trunks and stems reach beyond these, metres at plant scale 1.
     whole : pair of float
         Height and crown width of plants without limbs, in lengths of their trunks; 0 where there are limbs.
     """
 
     side: tuple[float, float] = (0.0, 0.0)
     up: tuple[float, float] = (0.0, 0.0)
+    top: float = 0.0
     whole: tuple[float, float] = (0.0, 0.0)
 
 
@@ -105,8 +108,9 @@ def outermost(rows: NDArray[np.void], plants: Branches, beyond: Beyond) -> Outer
     for (grown, lines), (counts, which, index) in zip(stems, chosen, strict=True):
         origin = plants.position[grown.plant]
         owner.append(grown.plant)
-        own = np.where(rows["leaves"][grown.row, 0] > 0, rows["leaf_size"][grown.row, 0] * grown.scale, 0.0)
-        root.append(_farthest(lines, origin) + own[:, None])
+        own = _farthest(lines, origin)
+        own[:, UP] += beyond.top * grown.scale
+        root.append(own)
         limb.append(np.zeros((len(grown), len(WAYS))))
         stem.append(rows["continues"][grown.row])
         limbs = chosen_children(rows, grown, lines, which, index, counts)
@@ -242,8 +246,13 @@ def beyond_limbs(rows: NDArray[np.void], first: int, species: int) -> Beyond:
     upright = np.tile(np.eye(3), (n, 1, 1))
     seeds = Seeds(("",), np.full(n, species, np.int32), np.arange(n), np.zeros((n, 3)), upright, np.ones(n))
     plants = trunks(rows, seeds)
-    limbs, high = [], []
+    limbs, over = [], 0.0
     for grown, lines in [] if rows["phantom"][first] else _stems(rows, plants):
+        owner, tip = _leaf_tips(rows, grown, lines)
+        own = lines.knots[:, :, 2].max(axis=1)
+        highest = own.copy()
+        np.maximum.at(highest, owner, tip[:, 2])
+        over = max(over, float((highest - own).mean()))
         if (rows["next"][grown.row, LATERAL] >= 0).any():
             counts = branch_counts(rows, grown)
             owner, index = spread(counts)
@@ -257,7 +266,7 @@ def beyond_limbs(rows: NDArray[np.void], first: int, species: int) -> Beyond:
     side = order[longest[np.linspace(0, len(longest) - 1, _LONG).astype(np.int64)]]
     top = np.argsort(limbs.position[:, 2] + limbs.length * limbs.frame[:, 2, 2], kind="stable")
     high = top[np.linspace(len(top) - 1 - min(4 * n, len(top) - 1), len(top) - 1, _HIGH).astype(np.int64)]
-    return Beyond(_fitted(rows, limbs.take(side), False), _fitted(rows, limbs.take(high), True))
+    return Beyond(_fitted(rows, limbs.take(side), False), _fitted(rows, limbs.take(high), True), over)
 
 
 def _fitted(rows: NDArray[np.void], limbs: Branches, up: bool) -> tuple[float, float]:
@@ -276,6 +285,19 @@ def _fitted(rows: NDArray[np.void], limbs: Branches, up: bool) -> tuple[float, f
     return float(metres), float(part + luck)
 
 
+def _leaf_tips(
+    rows: NDArray[np.void], branches: Branches, lines: Axes
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Branch (m,) and end (m, 3) of the leaves of branches."""
+    counts = leaf_counts(rows, branches)
+    owner, index = spread(counts)
+    key = leaf_keys(branches, owner, index)
+    t = leaf_places(rows, branches, owner, index, counts, key)
+    leaves = place_leaves(rows, branches, lines, owner, index, key, t)
+    frame = settled(rows, branches.row[owner], leaves.frame, leaves.light, leaves.sky)
+    return owner, leaves.position + leaves.size[:, None] * frame[:, :, 1]
+
+
 def _all_extremes(rows: NDArray[np.void], base: Branches, ways: NDArray[np.float64]) -> NDArray[np.float64]:
     """How far wood and leaves of sub-plants (n,) reach from their bases in directions (n, k, 3) of each."""
     out = np.zeros(ways.shape[:2])
@@ -292,12 +314,7 @@ def _all_extremes(rows: NDArray[np.void], base: Branches, ways: NDArray[np.float
         lines = axes(rows, bodies)
         for s in range(lines.knots.shape[1]):
             meet(bodies.plant, lines.knots[:, s])
-        counts = leaf_counts(rows, bodies)
-        owner, index = spread(counts)
-        key = leaf_keys(bodies, owner, index)
-        t = leaf_places(rows, bodies, owner, index, counts, key)
-        leaves = place_leaves(rows, bodies, lines, owner, index, key, t)
-        frame = settled(rows, bodies.row[owner], leaves.frame, leaves.light, leaves.sky)
-        meet(bodies.plant[owner], leaves.position + leaves.size[:, None] * frame[:, :, 1])
+        owner, tip = _leaf_tips(rows, bodies, lines)
+        meet(bodies.plant[owner], tip)
         grown, _ = children(rows, bodies, lines)
     return out

@@ -167,6 +167,31 @@ def extents(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
     return bound
 
 
+def outlines(
+    flora: Flora, plants: Branches, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """About how the crowns of plants (n,) differ from those of their species, whose ends are at heights (n,), (n,).
+
+    Returns
+    -------
+    length : (n,) float64
+        Unit of heights and widths of the species, metres.
+    low : (n,) float64
+        Where the crown begins, in such units.
+    width : (n,) float64
+        Factor on its width.
+    light : (n, 2) float64
+        By how much it reaches farther along the first two of the plant's axes.
+    """
+    if plants.crown is None:
+        return plants.length, low, np.ones(len(plants)), np.zeros((len(plants), 2))
+    rows, crown = flora.rows, plants.crown.astype(np.float64)
+    start = rows["start"][plants.row, LATERAL, 0] * first_forks(rows, plants.row)
+    left = np.minimum((1 - crown[:, BASE]) / (1 - start), 1.0)
+    length = plants.length / along(rows, plants.row, plants.crown)
+    return length, high - (high - low) * left, crown[:, WIDTH], crown[:, LIGHT][:, :2]
+
+
 def bounds(flora: Flora, subplants: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Bounds of sub-plants (n, 3) as `Flora.bound`, and how far (n,) these may reach beyond that; metres."""
     bound = flora.bound[subplants.row] * subplants.length[:, None]

@@ -267,7 +267,7 @@ def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) ->
     """Polygons of all plants, seen or not; for comparison. A camera sees what is near as finely as everywhere."""
     plants = trunks(flora.rows, seeds)
     detail = None if camera is None else LeafDetail(flora, camera)
-    full = flora.polygons[plants.row]
+    full = flora.polygons[plants.row] if plants.crown is None else flora.face_counts(plants)
     parts = list(chunks(full, BLOCK_POLYGONS))
     runs = ((number, (number + 1) / len(parts), plants.take(run)) for number, run in enumerate(parts))
     worth = len(parts) > 1 and float(full.sum()) > WORTH_PROCESSES

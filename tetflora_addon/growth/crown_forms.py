@@ -21,6 +21,13 @@ LEAST = np.array([0.2, 0.0, -0.8, -0.8, 0.2])
 MOST = np.array([3.0, 0.95, 0.8, 0.8, 5.0])
 
 
+def farthest(forms: NDArray[np.float64] | None) -> NDArray[np.float64] | float:
+    """How many times as far as described plants (n,) reach at most, by their crown forms (n, 5)."""
+    if forms is None:
+        return 1.0
+    return np.maximum(forms[:, WIDTH] * (1.0 + np.hypot(forms[:, EAST], forms[:, NORTH])), 1.0)
+
+
 def crown_forms(
     number: int,
     width: ArrayLike = 1.0,

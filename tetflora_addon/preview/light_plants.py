@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..camera.camera import origin_near
 from ..compiled.flora import Flora
+from ..compiled.placed import extents, outlines
 from ..compiled.samples import Points
 from ..growth.branches import Branches
 from ..growth.growth import trunks
@@ -73,7 +74,10 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
     low, high, *radii = profile.T
+    length, low, wider, light = outlines(flora, trunk, low, high)
+    rings = (1.0 + light @ around[:, :2].T)[:, :, None] * around
     wood, leaves = flora.wood_colour[trunk.row], flora.leaf_colours(trunk)
+    radii = [radius * wider for radius in radii]
     if trunk.year is not None:
         left = np.minimum(flora.day.leaf_share(trunk), 1.0)
         radii = [radius * (_BARE + (1.0 - _BARE) * left) for radius in radii]
@@ -82,15 +86,15 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     outward = [np.broadcast_to([0.0, 0.0, -1.0], (len(trunk), 1, 3))]
     for fraction, radius, up in zip(_RINGS, radii[:2], (-0.1, 0.5), strict=True):
         height = (low + fraction * (high - low))[:, None, None] * [0.0, 0.0, 1.0]
-        crown.append(radius[:, None, None] * around + height)
+        crown.append(radius[:, None, None] * rings + height)
         outward.append(np.broadcast_to((around + [0.0, 0.0, up]) / np.hypot(1.0, up), (len(trunk), SIDES, 3)))
     crown.append(np.stack([0 * high, 0 * high, high], axis=1)[:, None])
     outward.append(np.broadcast_to([0.0, 0.0, 1.0], (len(trunk), 1, 3)))
     # The wood's own radius would be less than a pixel in the view of a forest.
-    radius = np.maximum(trunk.radius / trunk.length, 0.012)[:, None, None]
+    radius = np.maximum(trunk.radius / length, 0.012)[:, None, None]
     foot = radius * around
     middle = (low + 0.5 * (high - low))[:, None, None] * np.array([[0.0, 0.0, 1.0]])
-    local = np.concatenate([*crown, foot, middle], axis=1) * trunk.length[:, None, None]
+    local = np.concatenate([*crown, foot, middle], axis=1) * length[:, None, None]
     normals = np.concatenate([*outward, np.broadcast_to(around, foot.shape), 0 * middle], axis=1)
     positions = np.einsum("nij,nvj->nvi", trunk.frame, local) + trunk.position[:, None]
     light = np.clip(np.einsum("nij,nvj->nvi", trunk.frame, normals) @ (_SUN / np.linalg.norm(_SUN)), 0.0, 1.0)
@@ -112,7 +116,7 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
 def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     """Compiled bounds of plants as edges of boxes: the extent of their samples in the direction of their trunks."""
     of, origin, trunk = _shown(flora, seeds, most)
-    radius, low, high = flora.sampled_bound[trunk.row].T * trunk.length
+    radius, low, high = extents(flora, trunk).T * trunk.length
     corner = np.array([(x, y, z) for z in (0, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float)
     local = corner * [1.0, 1.0, 0.0] * radius[:, None, None]
     local[:, :, 2] = np.where(corner[:, 2] > 0.0, high[:, None], low[:, None])

@@ -100,7 +100,7 @@ class Given:
 
 def expected_polygons(flora: Flora, seeds: Seeds) -> float:
     """Approximate number of faces of plants."""
-    if flora.day is not None:
+    if flora.day is not None or seeds.crown is not None:
         return float(flora.face_counts(trunks(flora.rows, seeds)).sum())
     return float(flora.polygons[trunks(flora.rows, seeds).row].sum())
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...camera.camera import Camera
 from ...camera.view_cells import Around, ViewCells, cell_camera
+from ...growth.crown_forms import farthest
 from ...species.species import Species
 from ..assets.measures import reach_of
 from ..assets.target import digest_of
@@ -191,7 +192,7 @@ def _around(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: Given
     grown = [grown_species(scene, kind, species_for(scene, species_of(kind))) for kind in seeds.identifiers]
     orders = [species.orders for species in grown]
     heights = np.array([np.cumprod([order.length.mean for order in own]).sum() for own in orders])
-    centres, radii = [seeds.position], [heights[seeds.species] * seeds.scale]
+    centres, radii = [seeds.position], [heights[seeds.species] * seeds.scale * farthest(seeds.crown)]
     if meshes is not None:
         reach = [np.linalg.norm(surface.positions, axis=1).max() for surface in meshes.surfaces]
         centres.append(meshes.origin)

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known of plants with crown forms before they grow: totals, bounds, samples and sizes of grown ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from numpy.typing import NDArray
+
+from tests.engine.support import RICH, compiled, expanded, leaves_of, meshes, plants, small_flora, whole_of
+from tetflora_addon.arrays import spread
+from tetflora_addon.compiled.flora import Flora, compile_species
+from tetflora_addon.compiled.measured import fitted, measured
+from tetflora_addon.compiled.placed import extents, placed_samples
+from tetflora_addon.growth.branches import Branches
+from tetflora_addon.growth.crown_forms import LEAST, MOST, PLAIN, WIDTH, crown_forms
+from tetflora_addon.growth.growth import leaf_counts, trunks
+from tetflora_addon.growth.seasons import Season
+from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.refinement.contents import bounding_cylinders
+from tetflora_addon.species.ages import with_age
+from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.quality import with_quality
+from tetflora_addon.subplants.pieces import wood_areas
+
+KINDS = ("rich", "spruce 30", "beech")
+FORMS = ({"width": 2.0, "girth": 1.5}, {"width": 0.5, "base": 0.5}, {"base": 0.35, "east": 0.5, "north": -0.4})
+
+
+@cache
+def flora_of(kind: str, quality: float = 0.004) -> Flora:
+    if kind == "rich":
+        return compiled(RICH)
+    name, _, years = kind.partition(" ")
+    species = load_species(name)
+    return compile_species([with_quality(with_age(species, float(years)) if years else species, quality)])
+
+
+def formed(n: int, **form: float) -> Seeds:
+    return replace(plants(np.arange(n)), crown=crown_forms(n, **form))
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_expected_totals_are_means_of_grown_plants(kind: str, form: dict[str, float]) -> None:
+    flora, n = flora_of(kind), 160
+    own = trunks(flora.rows, formed(n, **form))
+    pieces = expanded(flora, own)
+    branches = whole_of(flora, pieces).branches
+    owner, _, size = leaves_of(flora, branches)
+    leaf = size**2 * flora.leaf.area[branches.row][owner]
+    faces = leaf_counts(flora.rows, branches) @ flora.leaf.polygons[branches.row]
+    rows = flora.rows[branches.row]
+    wood_faces = (rows["sides"] * (rows["segments"] + rows["rings"])).sum()
+    assert_allclose(flora.leaf_areas(own).sum(), leaf.sum(), rtol=0.05)
+    assert_allclose(flora.wood_areas(own).sum(), wood_areas(flora, pieces).sum(), rtol=0.05)
+    assert_allclose(flora.branch_faces(own).sum(), wood_faces, rtol=0.05)
+    assert_allclose(flora.face_counts(own).sum(), wood_faces + faces, rtol=0.05)
+
+
+def test_days_leave_as_much_of_formed_crowns_as_of_others() -> None:
+    flora = compile_species([load_species("beech")])
+    bare = flora.in_year(Season(day=285.0))
+    summer, autumn = (trunks(some.rows, formed(50, width=0.6, base=0.4)) for some in (flora, bare))
+    plain = [trunks(some.rows, plants(np.arange(50))) for some in (flora, bare)]
+    left = [some.leaf_areas(own) for some, own in zip((bare, flora), (autumn, summer), strict=True)]
+    assert_allclose(left[0] / left[1], bare.leaf_areas(plain[1]) / flora.leaf_areas(plain[0]), rtol=1e-6)
+    assert left[0].sum() < 0.95 * left[1].sum()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_plain_forms_have_the_same_totals_and_samples(kind: str) -> None:
+    flora, n = flora_of(kind), 20
+    own, plain = trunks(flora.rows, formed(n)), trunks(flora.rows, plants(np.arange(n)))
+    for name in ("leaf_areas", "wood_areas", "face_counts", "branch_faces"):
+        assert_array_equal(getattr(flora, name)(own), getattr(flora, name)(plain))
+    assert_array_equal(extents(flora, own), extents(flora, plain))
+    for one, other in zip(bounding_cylinders(flora, own), bounding_cylinders(flora, plain), strict=True):
+        assert_array_equal(one, other)
+
+
+@given(seed=st.integers(0, 1000), part=st.tuples(*[st.floats(0.0, 1.0)] * 5), kind=st.sampled_from((*KINDS, "small")))
+@settings(max_examples=12, deadline=None)
+def test_all_vertices_are_within_the_bounds(seed: int, part: tuple[float, ...], kind: str) -> None:
+    flora = small_flora() if kind == "small" else flora_of(kind, 0.001)
+    form = LEAST + np.array(part) * (MOST - LEAST)
+    whole = trunks(flora.rows, replace(plants(seed), crown=form[None]))
+    tubes, leaves = meshes(flora, expanded(flora, whole))
+    centre, radius, half = bounding_cylinders(flora, whole)
+    axis = whole.frame[0, :, 2]
+    for mesh in (*tubes, *leaves):
+        offset = mesh.positions - centre[0]
+        along = offset @ axis
+        across = np.linalg.norm(offset - along[:, None] * axis, axis=1)
+        assert np.abs(along).max() <= half[0] + 1e-4
+        assert across.max() <= radius[0] + 1e-4
+
+
+def sampled(flora: Flora, own: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places of leaves of plants by their samples, and what each stands for."""
+    points = flora.samples.leaves
+    first, number = points.runs(own)
+    owner, index = spread(number)
+    place, share = placed_samples(flora, points, own, owner, first[owner] + index)
+    world = np.einsum("nij,nj->ni", own.frame[owner], place) * own.length[owner, None]
+    return world, np.ones(len(owner)) if share is None else share
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_samples_are_where_leaves_grow(kind: str, form: dict[str, float]) -> None:
+    flora = flora_of(kind)
+    own = trunks(flora.rows, formed(40, **form))
+    branches = whole_of(flora, expanded(flora, own)).branches
+    _, place, size = leaves_of(flora, branches)
+    there, share = sampled(flora, own)
+    assert_allclose(share.mean(), 1.0, rtol=0.05)
+    height = np.average(place[:, 2], weights=size**2)
+    spread_ = np.sqrt(np.average((place[:, :2] ** 2).sum(axis=1), weights=size**2))
+    assert_allclose(np.average(there[:, 2], weights=share), height, rtol=0.08)
+    assert_allclose(np.sqrt(np.average((there[:, :2] ** 2).sum(axis=1), weights=share)), spread_, rtol=0.15)
+    assert_allclose(
+        np.average(there[:, :2], axis=0, weights=share),
+        np.average(place[:, :2], axis=0, weights=size**2),
+        atol=0.12 * spread_,
+    )
+
+
+def grown_sizes(flora: Flora, seeds: Seeds) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Heights and crown widths of plants, when all of them has grown."""
+    own = trunks(flora.rows, seeds)
+    sizes = []
+    for i in range(len(own)):
+        tubes, leaves = meshes(flora, expanded(flora, own.take(np.array([i]))))
+        points = np.concatenate([mesh.positions for mesh in (*tubes, *leaves)])
+        extent = np.ptp(points, axis=0)
+        sizes.append((points[:, 2].max(), extent[:2].mean()))
+    return tuple(np.array(sizes).T)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_sizes_are_measured_and_fitted_as_plants_grow(kind: str) -> None:
+    flora, n = flora_of(kind, 0.02), 12
+    rng = np.random.default_rng(3)
+    seeds = replace(plants(np.arange(n)), crown=crown_forms(n, rng.uniform(0.6, 1.6, n), rng.uniform(0, 0.5, n)))
+    height, width = measured(flora, seeds)
+    real = grown_sizes(flora, seeds)
+    assert_allclose(height, real[0], rtol=0.08)
+    assert_allclose(width, real[1], rtol=0.16)
+    assert_allclose(np.mean(width / real[1]), 1.0, rtol=0.05)
+    wanted = height * rng.uniform(0.9, 1.1, n), width * rng.uniform(0.8, 1.2, n)
+    factors = fitted(flora, seeds, *wanted)
+    crown = seeds.crown.copy()
+    crown[:, WIDTH] *= factors[:, 1]
+    found = measured(flora, replace(seeds, scale=seeds.scale * factors[:, 0], crown=crown))
+    for own, other in zip(found, wanted, strict=True):
+        assert (np.abs(own / other - 1) < 0.05).mean() > 0.8
+
+
+def test_sizes_depend_on_no_other_plants() -> None:
+    flora, n = flora_of("beech"), 30
+    seeds = replace(plants(np.arange(n)), crown=np.tile(PLAIN, (n, 1)))
+    some = np.arange(0, n, 3)
+    for all_of, one in zip(measured(flora, seeds), measured(flora, seeds.take(some)), strict=True):
+        assert_array_equal(all_of[some], one)
+    wanted = np.linspace(8, 14, n), np.linspace(4, 9, n)
+    few = fitted(flora, seeds.take(some), *(one[some] for one in wanted))
+    assert_array_equal(fitted(flora, seeds, *wanted)[some], few)
