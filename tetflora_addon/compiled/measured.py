@@ -20,7 +20,7 @@ from .flora import Flora
 from .outermost import Beyond, Outermost, beyond_limbs, outermost
 
 _AT_ONCE = 2_000
-_BISECTIONS = 16
+_BISECTIONS = 11
 #: Factors that would change by less are found.
 _CLOSE = 0.015
 _known: WeakKeyDictionary[Flora, dict[int, Beyond]] = WeakKeyDictionary()

@@ -73,8 +73,8 @@ class Outermost:
     Attributes
     ----------
     plant : (m,) int32
-        Whose limb it is.
-    root, limb : (m, 5) float64
+        Whose limb it is; in order.
+    root, limb : (5, m) float64
         How far limbs begin in each of `WAYS`, and how much farther they lead; metres.
     stem : (m,) bool
         Whether they begin on stems beyond a fork, which lean more or less.
@@ -90,14 +90,15 @@ class Outermost:
 
     def sizes(self, factor: NDArray[np.float64] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Heights and crown widths (n,), (n,) if limbs were so many times (n,) as long, about; metres."""
-        far, reach = np.full((len(self.width), len(WAYS)), -np.inf), self.root + self.limb
-        if factor is not None:
+        if factor is None:
+            reach = self.root + self.limb
+        else:
             lean = np.minimum(factor * self.width, 1.0) / np.minimum(self.width, 1.0)
-            reach = self.root.copy()
-            reach[:, :UP] *= np.where(self.stem, lean[self.plant], 1.0)[:, None]
-            reach += factor[self.plant, None] * self.limb
-        np.maximum.at(far, self.plant, reach)
-        return far[:, UP], far[:, :UP].sum(axis=1) / 2
+            reach = factor[self.plant] * self.limb
+            reach[:UP] += np.where(self.stem, lean[self.plant], 1.0) * self.root[:UP]
+            reach[UP] += self.root[UP]
+        far = np.maximum.reduceat(reach, np.flatnonzero(np.diff(self.plant, prepend=-1)), axis=1)
+        return far[UP], far[:UP].sum(axis=0) / 2
 
 
 def outermost(rows: NDArray[np.void], plants: Branches, beyond: Beyond) -> Outermost:
@@ -132,8 +133,10 @@ def outermost(rows: NDArray[np.void], plants: Branches, beyond: Beyond) -> Outer
         root.append(begin)
         limb.append(leads)
     width = np.ones(len(plants)) if plants.crown is None else plants.crown[:, WIDTH].astype(np.float64)
-    reach = (np.concatenate(some) for some in (owner, root, limb, stem))
-    return Outermost(*reach, width)
+    plant, root, limb, stem = (np.concatenate(some) for some in (owner, root, limb, stem))
+    order = np.argsort(plant, kind="stable")
+    root, limb = (np.ascontiguousarray(some[order].T) for some in (root, limb))
+    return Outermost(plant[order], root, limb, stem[order], width)
 
 
 def _stems(rows: NDArray[np.void], plants: Branches) -> list[tuple[Branches, Axes]]:
