@@ -15,8 +15,8 @@ from devtools import build, rooms
 
 AT_THE_ROOT = {"__init__.py", "blender_manifest.toml", "LICENSE"}
 FOLDERS = {"tetflora_addon", "operators", "panels"}
-KINDS = {".py", ".json", ".svg", ".png", ".dat"}
-LARGEST = 1_800_000  # species have pictures of four seasons
+KINDS = {".py", ".json", ".svg", ".png", ".jpg", ".dat"}
+LARGEST = 2_200_000  # species have pictures of four seasons, biomes one each
 
 
 @pytest.fixture(scope="module")
