@@ -31,14 +31,13 @@ def formed_subplants(rows: NDArray[np.void], subplants: Branches) -> NDArray[np.
     return trunk[(crown[trunk, WIDTH] != 1) | crown[trunk, BASE : LIGHT.stop].any(axis=1)]
 
 
-def one_sided(subplants: Branches) -> NDArray[np.bool_]:
-    """Whether sub-plants (n,) have crowns that reach farther to one side."""
-    crown = subplants.crown
-    return np.zeros(len(subplants), bool) if crown is None else crown[:, LIGHT].any(axis=1)
-
-
 def placed_samples(
-    flora: Flora, points: Points, subplants: Branches, owner: NDArray[np.integer], pick: NDArray[np.integer]
+    flora: Flora,
+    points: Points,
+    subplants: Branches,
+    owner: NDArray[np.integer],
+    pick: NDArray[np.integer],
+    turn: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.floating], NDArray[np.float64] | None]:
     """Samples of sub-plants: places in units of their lengths and in their axes, and what each stands for.
 
@@ -50,6 +49,8 @@ def placed_samples(
     subplants : Branches of n
     owner, pick : (m,) int
         Sub-plants, and samples of these.
+    turn : (m,) float64, optional
+        By how much the axes of the sub-plant are turned about the third for each.
 
     Returns
     -------
@@ -66,7 +67,11 @@ def placed_samples(
     number[some] = np.arange(len(some))
     mine = np.flatnonzero(number[owner] >= 0)
     own, which = subplants.take(some), number[owner[mine]]
-    at, reach, sparse = _moved(rows, own, points.limbs.take(pick[mine]), place[mine], which)
+    light = own.crown[which][:, LIGHT].astype(np.float64)[:, :2]
+    if turn is not None:
+        c, s = np.cos(turn[mine]), np.sin(turn[mine])
+        light = np.stack([c * light[:, 0] + s * light[:, 1], c * light[:, 1] - s * light[:, 0]], axis=1)
+    at, reach, sparse = _moved(rows, own, points.limbs.take(pick[mine]), place[mine], which, light)
     place[mine] = at / along(rows, own.row, own.crown)[which, None]
     leafy = points is flora.samples.leaves
     share[mine] = _shares(flora, own, points.shares, points.limbs.take(pick[mine]), which, reach, sparse, leafy)
@@ -74,9 +79,16 @@ def placed_samples(
 
 
 def _moved(
-    rows: NDArray[np.void], own: Branches, on: Limbs, place: NDArray[np.float64], which: NDArray[np.integer]
+    rows: NDArray[np.void],
+    own: Branches,
+    on: Limbs,
+    place: NDArray[np.float64],
+    which: NDArray[np.integer],
+    light: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Places (m, 3) of samples on limbs, ``which`` (m,) of sub-plants (n,), in lengths of those as described.
+
+    ``light`` (m, 2) is where crowns reach farther.
 
     Also how far the limbs reach over what they do as described (m,), and how many of them are left (n, 4) by class.
     """
@@ -91,7 +103,6 @@ def _moved(
 
     def reach(way: NDArray[np.float64]) -> NDArray[np.float64]:
         level = way[:, :2] / np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-9)[:, None]
-        light = crown[:, LIGHT][which]
         return crown[which, WIDTH] * (1 + level[:, 0] * light[:, 0] + level[:, 1] * light[:, 1])
 
     height = root[:, 2]

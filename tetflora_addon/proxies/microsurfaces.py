@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, gathered, perpendicular, products, spread
 from ..compiled.flora import Flora
-from ..compiled.placed import one_sided, placed_samples
+from ..compiled.placed import placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import axes
 from ..growth.branches import Branches
@@ -207,12 +207,13 @@ def _picked(
     first, number = points.runs(subplants)
     start = (uniform(subplants.key, _START) * number).astype(np.int64)
     pick = first[owner] + (start[owner] + index) % number[owner]
-    place, share = placed_samples(flora, points, subplants, owner, pick)
-    place = place.astype(np.float64)
     base = gathered(subplants.frame, owner)
     again = index // number[owner]
+    whole = ((flora.rows["order"] == 0) & ~flora.rows["phantom"])[subplants.row]
+    turn = None if subplants.crown is None else again * whole[owner] * _GOLDEN_ANGLE
+    place, share = placed_samples(flora, points, subplants, owner, pick, turn)
+    place = place.astype(np.float64)
     if again.any():
-        whole = ((flora.rows["order"] == 0) & ~flora.rows["phantom"])[subplants.row] & ~one_sided(subplants)
         _turned(base, again, np.flatnonzero((again > 0) & whole[owner]))
         moved = np.flatnonzero((again > 0) & ~whole[owner])
         place[moved] += _MOVED * np.stack([signed(key[moved], _MOVE + axis) for axis in range(3)], axis=1)

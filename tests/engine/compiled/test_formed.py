@@ -133,6 +133,22 @@ def test_samples_are_where_leaves_grow(kind: str, form: dict[str, float]) -> Non
     )
 
 
+def test_turned_samples_reach_to_the_light_as_others_do() -> None:
+    flora = flora_of("beech")
+    own = trunks(flora.rows, formed(30, east=0.6))
+    points, turn = flora.samples.leaves, 2.0
+    first, number = points.runs(own)
+    owner, index = spread(number)
+    place, share = placed_samples(flora, points, own, owner, first[owner] + index, np.full(len(owner), turn))
+    c, s = np.cos(turn), np.sin(turn)
+    place = place @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    world = np.einsum("nij,nj->ni", own.frame[owner], place) * own.length[owner, None]
+    straight = np.average(*sampled(flora, own)[:1], axis=0, weights=sampled(flora, own)[1])
+    turned = np.average(world, axis=0, weights=share)
+    assert turned[0] > 0.5
+    assert_allclose(turned, straight, atol=0.3)
+
+
 def grown_sizes(flora: Flora, seeds: Seeds) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Heights and crown widths of plants, when all of them has grown."""
     own = trunks(flora.rows, seeds)
