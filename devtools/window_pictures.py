@@ -43,6 +43,7 @@ PANELS = {
     "preview": ("TETFLORA_PT_preview",),
     "statistics": ("TETFLORA_PT_statistics",),
     "species": ("TETFLORA_PT_species", "TETFLORA_PT_species_whole"),
+    "stand": ("TETFLORA_PT_stand", "TETFLORA_PT_stand_site", "TETFLORA_PT_stand_detail"),
 }
 
 
@@ -100,6 +101,8 @@ def steps(ui: Any) -> Iterator[float | None]:
     for cls in sorted(registered, key=lambda cls: not hasattr(cls, "bl_parent_id")):
         bpy.utils.unregister_class(cls)
     for name, shown in PANELS.items():
+        if name == "stand":
+            yield from _stand(ui, scene)
         opened = _register_open([cls for wanted in shown for cls in registered if cls.__name__ == wanted])
         yield from ui.show_sidebar("TetFlora")
         yield from ui.picture(f"panel-{name}")
@@ -128,6 +131,21 @@ def _preview(ui: Any, scene: Any) -> Iterator[float | None]:
     yield 2.0
     yield from ui.picture("previewed")
     settings.plants, output.show_viewport = 'NONE', True
+
+
+def _stand(ui: Any, scene: Any) -> Iterator[float | None]:
+    """A stand on the hill, which is then active."""
+    import bpy
+
+    bpy.context.view_layer.objects.active = None
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    bpy.data.objects["Hill"].select_set(True)
+    with ui.override():
+        bpy.ops.tetflora.grow_stand('INVOKE_DEFAULT')
+    yield from ui.until(lambda: not ui.window.modal_operators, 60, "stand")
+    bpy.context.active_object.tetflora.stand_year = 60.0
+    yield 1.0
 
 
 def _hill(scene: Any) -> None:

@@ -31,6 +31,7 @@ from ..scene.explicit import Explicit, read_explicit
 from ..scene.lights import read_lights, read_sources, sky_suns
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants_of
+from ..scene.skeletons import plain_kind
 from ..settings import check_limits, season_of, wind_of
 
 
@@ -149,7 +150,9 @@ def load_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bp
     """The species that `compile_for` compiles, at their ages; it alone needs the scene."""
     if not identifiers:
         return [load_species(min(list_species()))]
-    return [grown_species(scene, kind, resolved_species(scene, kind, depsgraph)) for kind in identifiers]
+    # Each species is looked up once, of however many ages there are plants.
+    plain = {kind: resolved_species(scene, kind, depsgraph) for kind in {plain_kind(kind) for kind in identifiers}}
+    return [grown_species(scene, kind, plain[plain_kind(kind)]) for kind in identifiers]
 
 
 def in_year(scene: bpy.types.Scene, flora: Flora) -> Flora:
