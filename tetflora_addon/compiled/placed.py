@@ -16,6 +16,7 @@ from ..arrays import gathered
 from ..growth.branches import Branches
 from ..growth.crown_forms import BASE, WIDTH
 from ..growth.formed import LIGHT, MOST_LEANING, along, are_stools, bare_part, first_forks, raised
+from ..growth.grown_rows import lengths
 from ..growth.rows import FORK, LATERAL
 from .flora import Flora
 from .limbs import LIMB, STEM, STEM_LIMB, Limbs, Shares
@@ -111,16 +112,46 @@ def _moved(
     begins = start[which]
     moved = root.copy()
     moved[:, 2] = np.where(limb & ~stool & ~stem, np.where(height >= begins, higher, np.minimum(lower, higher)), height)
-    moved *= stretch[which, None]
+    described = moved
+    moved = moved * stretch[which, None]
     fork = np.array([0.0, 0.0, 1.0])  # about where the stems begin
     stems = above[which, None] * _tilted(root - fork, np.minimum(reach(root - fork), 1.0)) + stretch[which, None] * fork
     moved = np.where(stem[:, None], stems, moved)
     way = place - root
     longer = np.where(limb & ~stool, reach(way), 1.0)
+    along_limb = longer * np.where(limb, _other_lengths(rows, own, which, root, described[:, 2], stem), 1.0)
     leaning = np.sqrt(np.minimum(reach(way), MOST_LEANING))  # half of what is aside is on stems that lean
-    moved += np.where(stool[:, None], _tilted(way, leaning), longer[:, None] * way)
+    moved += np.where(stool[:, None], _tilted(way, leaning), along_limb[:, None] * way)
     # Trunks and stems are longer or shorter themselves, limbs are fewer.
     return moved, longer, np.stack([stretch, above, np.where(rows["continues"][row], above, left), above], axis=1)
+
+
+def _other_lengths(
+    rows: NDArray[np.void],
+    own: Branches,
+    which: NDArray[np.integer],
+    root: NDArray[np.float64],
+    height: NDArray[np.float64],
+    stem: NDArray[np.bool_],
+) -> NDArray[np.float64] | float:
+    """Factors (m,) on the lengths of limbs of trunks that fork, because these are higher or lower in the crown.
+
+    ``height`` (m,) is where limbs at ``root`` (m, 3) are on the trunk, if they are not on a ``stem`` (m,).
+    """
+    if not ((rows["next"][own.row, FORK] >= 0) | rows["continues"][own.row]).any():
+        return 1.0
+    first = np.flatnonzero(np.diff(rows["species"], prepend=-1))[rows["species"][own.row]]
+    start = rows["start"][first, LATERAL, 0] * first_forks(rows, own.row)
+    base = np.maximum(start, np.minimum(own.crown[:, BASE], first_forks(rows, own.row)))
+    low, high = rows["part"][own.row].T[:, which]
+    above = np.linalg.norm(root - [0.0, 0.0, 1.0], axis=1) * (high - low) / np.maximum(1 - high, 1e-9)
+    above = high + (1 - high) * np.minimum(above, 1.0)
+    ratio = []
+    for place, begin in ((height, base[which]), (root[:, 2], start[which])):
+        place = np.where(stem, above, low + (high - low) * np.clip(place, 0.0, 1.0))
+        fraction = np.clip((place - begin) / np.maximum(1 - begin, 1e-9), 0.0, 1.0)
+        ratio.append(np.maximum(lengths(rows, own.row[which], fraction), 0.1))
+    return np.clip(ratio[0] / ratio[1], 0.5, 2.0)
 
 
 def _tilted(way: NDArray[np.float64], factor: NDArray[np.float64]) -> NDArray[np.float64]:
