@@ -37,6 +37,8 @@ SIZE, SAMPLES, COLUMNS = (480, 300), 48, 3
 SMALL, LARGEST = (320, 200), 20_000
 #: Side of all land, meters.
 _LAND = 460.0
+#: Fraction below which space counts as hidden: through grass one sees far.
+_HIDDEN = 0.004
 
 
 @dataclass(frozen=True)
@@ -81,19 +83,19 @@ _COOL, _GOLD = (1.0, 0.95, 0.88), (1.0, 0.86, 0.66)
 _CLEAR = (0.0002, (0.4, 0.5, 0.5))
 VIEWS = {
     "alpine_treeline": View((-34.0, -26.0, 1.8), (18.0, 2.0, 3.0), 24.0, (38.0, 215.0), grey=0.42, clouds=0.6),
-    "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (56.0, 215.0), grey=0.34, haze=_CLEAR, light=1.5),
+    "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (56.0, 215.0), grey=0.34, haze=_CLEAR, light=2.2),
     "birch_pine": View((0.0, -42.0, 1.6), (4.0, 0.0, 4.6), 26.0, (36.0, 240.0), _GOLD, grey=0.38),
     "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), grey=0.38, clouds=0.8),
     "hedgerow": View((-46.0, -10.0, 1.7), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, grey=0.42, beside="meadow"),
-    "meadow": View((0.0, -44.0, 1.5), (-2.0, 0.0, 2.6), 28.0, (42.0, 245.0), grey=0.44),
+    "meadow": View((0.0, -44.0, 1.5), (4.0, 0.0, 1.7), 34.0, (42.0, 245.0), grey=0.44),
     "mediterranean_scrub": View((0.0, -44.0, 1.7), (2.0, 0.0, 2.2), 28.0, (46.0, 240.0), _COOL, grey=0.44, clouds=0.3),
-    "oak_savanna": View((0.0, -46.0, 1.9), (0.0, 0.0, 3.8), 28.0, (24.0, 245.0), _GOLD, grey=0.42),
+    "oak_savanna": View((0.0, -46.0, 1.9), (2.0, 0.0, 3.0), 34.0, (24.0, 245.0), _GOLD, grey=0.42),
     "park": View((0.0, -46.0, 1.65), (0.0, 0.0, 4.0), 28.0, (40.0, 240.0), grey=0.42),
     "riparian_willow": View(
         (44.0, -12.0, 2.2), (8.0, 4.0, 3.2), 24.0, (44.0, 200.0), grey=0.42, free=7.0, beside="meadow", water=0.3
     ),
     "spruce_forest": View(
-        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), grey=0.34, haze=_CLEAR, light=1.8, free=5.0
+        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), grey=0.3, haze=_CLEAR, light=1.0, free=5.0
     ),
     "tropical_understorey": View(
         (0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), grey=0.34, haze=_CLEAR, light=1.3, free=4.5
@@ -136,6 +138,7 @@ def build(identifier: str, view: View) -> None:
     scene.collection.objects.link(camera)
     scene.camera = camera
     _light(scene, view, around)
+    scene.tetflora.hidden = _HIDDEN
 
 
 def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
