@@ -146,7 +146,7 @@ def _notify_auto_refine(self: bpy.types.PropertyGroup, _context: bpy.types.Conte
     auto_refine_switched.notify(self.id_data)
 
 
-class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.PropertyGroup):
+class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoice, bpy.types.PropertyGroup):
     """Settings of a scene."""
 
     version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
@@ -250,7 +250,6 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         type=biome_properties.TetFloraBiome,
     )
     biomes_index: IntProperty(name="Active Biome", options={'HIDDEN', 'SKIP_SAVE'})
-    new_biome: library.biome_property(options=set())
     output: PointerProperty(type=output_properties.TetFloraOutput)
     brush: PointerProperty(type=properties.TetFloraBrush)
     wind: PointerProperty(type=settings.TetFloraWind)

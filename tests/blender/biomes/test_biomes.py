@@ -119,7 +119,14 @@ def test_shipped_biomes_are_sound(path):
 
 
 def test_there_are_twelve():
+    """And the panel always has one to add, whatever the file says."""
     assert len(SHIPPED) == 12
+    group = scene().tetflora
+    assert group.new_biome == next(iter(library.biomes()))
+    group.new_biome = "park"
+    assert (group.new_biome, group.biome_file) == ("park", "park")
+    group.biome_file = "gone"
+    assert group.new_biome in library.biomes()
 
 
 def test_a_biome_makes_what_its_file_says():

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, StringProperty
 from bpy.utils import previews
 
 from ...errors import NAME, SceneError, readable
@@ -114,6 +114,29 @@ def items(_owner: object = None, _context: bpy.types.Context | None = None) -> l
 def biome_property(**options: Any) -> Any:
     """An enumeration of all biomes, for property groups and operators."""
     return EnumProperty(name="Biome", description="Biome from the library", items=items, **options)
+
+
+class BiomeChoice:
+    """Mix-in for property groups: a stored identifier, and an enumeration over it for panels, the first if none."""
+
+    biome_file: StringProperty(name="Biome File", options={'HIDDEN'})
+    new_biome: EnumProperty(
+        name="Biome",
+        description="Biome from the library",
+        items=items,
+        get=lambda self: _number(self.biome_file),
+        set=lambda self, number: _choose(self, number),
+        options={'SKIP_SAVE'},
+    )
+
+
+def _number(identifier: str) -> int:
+    known = biomes()
+    return number_of(identifier if identifier in known else next(iter(known))) if known else 0
+
+
+def _choose(group: BiomeChoice, number: int) -> None:
+    group.biome_file = next((one for one in biomes() if number_of(one) == number), "")
 
 
 def own_place(identifier: str) -> Path:
