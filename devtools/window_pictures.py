@@ -44,6 +44,7 @@ PANELS = {
     "statistics": ("TETFLORA_PT_statistics",),
     "species": ("TETFLORA_PT_species", "TETFLORA_PT_species_whole"),
     "stand": ("TETFLORA_PT_stand", "TETFLORA_PT_stand_site", "TETFLORA_PT_stand_detail"),
+    "biomes": ("TETFLORA_PT_biomes", "TETFLORA_PT_biome_limits"),
 }
 
 
@@ -103,6 +104,10 @@ def steps(ui: Any) -> Iterator[float | None]:
     for name, shown in PANELS.items():
         if name == "stand":
             yield from _stand(ui, scene)
+        elif name == "biomes":
+            with ui.override():
+                bpy.ops.tetflora.add_biome('INVOKE_DEFAULT', biome="dead_forest")
+            yield from ui.until(lambda: not ui.window.modal_operators, 60, "biome")
         opened = _register_open([cls for wanted in shown for cls in registered if cls.__name__ == wanted])
         yield from ui.show_sidebar("TetFlora")
         yield from ui.picture(f"panel-{name}")
