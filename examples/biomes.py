@@ -241,7 +241,7 @@ def render_biome(
     build(identifier, view)
     if keep is not None:
         bpy.ops.wm.save_as_mainfile(filepath=str(keep))
-    render(path, size, samples, grey=view.grey)
+    render(path, size, samples, grey=view.grey, beyond=0.3)
 
 
 def save_small(source: Path, identifier: str) -> Path:
