@@ -17,6 +17,7 @@ import operators
 import panels
 from devtools import build
 from panels.menus import TETFLORA_MT_object, draw_in_add_menu
+from panels.places import draw_in_import_menu
 from panels.preferences import KEYMAP, KEYS
 from tests.blender.layouts import Layout
 from tests.blender.scenes import add_camera, add_plant
@@ -26,6 +27,8 @@ from tetflora_addon.blender.settings import MONTHS
 from tetflora_addon.species.ages import STAGES
 
 pytestmark = pytest.mark.usefixtures("clean_file")
+
+PLACES = ("terrain", "canopy", "inventory", "outlines")
 
 # Keymaps that hear keys over a 3D view in Object Mode.
 HEARD = {
@@ -148,10 +151,16 @@ def test_new_tools_are_in_menus_so_that_search_finds_them():
         "keep_results",
         "preview_levels",
     )
-    files = ("import_populations", "export_populations")
+    files = ("import_populations", "export_populations", *(f"import_{name}" for name in PLACES))
     assert {f"tetflora.{name}" for name in tools + files} <= drawn <= _ids()
     assert "TETFLORA_MT_place_plant" in menus
     assert all(hasattr(bpy.types, menu) for menu in menus)
+
+
+def test_places_are_in_the_import_menu_of_files():
+    layout = Layout()
+    draw_in_import_menu(SimpleNamespace(layout=layout), bpy.context)
+    assert layout.names("operator") == [f"tetflora.import_{name}" for name in PLACES]
 
 
 def test_the_search_for_refine_plants_has_one_answer():

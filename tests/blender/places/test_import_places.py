@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Import of real places: pixels as Blender reads them, layers that align, sizes that fields have, nothing half done."""
+
+from __future__ import annotations
+
+import random
+import shutil
+
+import bpy
+import numpy as np
+import pytest
+
+from benchmarks import places_files as files
+from devtools import session
+from tests.blender.digests import difference, everything
+from tests.blender.scenes import depsgraph, select
+from tetflora_addon.blender.attributes import read
+from tetflora_addon.blender.places import trees
+from tetflora_addon.blender.places.completion import curves_of
+from tetflora_addon.blender.places.origin import KEY, origin_of
+from tetflora_addon.blender.places.rasters import read_raster
+from tetflora_addon.blender.placing.terrain import lines_of, read_ground
+from tetflora_addon.blender.species.edits import species_for
+from tetflora_addon.errors import SceneError
+from tetflora_addon.jobs import at_once
+from tetflora_addon.places.projection import System, to_degrees
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _call(operator, path, **options):
+    assert getattr(bpy.ops.tetflora, operator)(filepath=str(path), **options) == {'FINISHED'}
+    return bpy.context.view_layer.objects.active
+
+
+def _vertices(obj):
+    return read(obj.data, "position").astype(np.float64) + np.array(obj.location)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint16, np.int16, np.uint8, np.uint32])
+def test_pixels_of_tiff_are_what_was_written(tmp_path, dtype, order):
+    values = np.rint(files.hills(6) - (300.0 if np.dtype(dtype).itemsize == 1 else 0.0)).astype(dtype)
+    if np.dtype(dtype).kind != "u":
+        values[1, 2] = -9999
+        values[3, 3] = -250
+    path = tmp_path / "a.tif"
+    path.write_bytes(files.geotiff(values, order=order))
+    raster = at_once(read_raster(path, 0, 1.0, 0.0))
+    expected = values.astype(np.float64)
+    expected[expected == -9999] = np.nan
+    np.testing.assert_allclose(raster.values, expected, atol=1e-2 if dtype != np.uint32 else 200.0)
+    assert not bpy.data.images
+
+
+def test_pixels_of_png_and_ascii_grids(tmp_path):
+    """The same heights, to the centimetre, from both; a factor and a shift make metres of other values."""
+    values = np.rint(files.hills(6) * 100.0).astype(np.uint16)
+    path = tmp_path / "a.png"
+    path.write_bytes(files.png(values))
+    path.with_suffix(".pgw").write_bytes(files.WORLD)
+    image = at_once(read_raster(path, 25832, 0.01, -5.0))
+    grid = tmp_path / "a.asc"
+    grid.write_text(files.ascii_grid(values / 100.0 - 5.0, 5.0, 499_997.5, 5_315_972.5))
+    text = at_once(read_raster(grid, 25832, 1.0, 0.0))
+    np.testing.assert_allclose(image.values, text.values, atol=1e-3)
+    np.testing.assert_allclose(image.outline, text.outline)
+    path.with_suffix(".pgw").unlink()
+    with pytest.raises(SceneError, match="no world file"):
+        at_once(read_raster(path, 0, 1.0, 0.0))
+
+
+def test_terrain_trees_and_outlines_align(tmp_path):
+    values = files.hills()
+    path = tmp_path / "dem.tif"
+    path.write_bytes(files.geotiff(values, 5.0))
+    ground = _call("import_terrain", path)
+    mesh = ground.data
+    assert (len(mesh.vertices), len(mesh.polygons)) == (values.size, 23 * 23)
+    assert all(p.normal.z > 0.5 and p.use_smooth for p in mesh.polygons)
+    assert ground.tetflora.is_occluder
+    assert mesh.materials[0] is not None
+    uv = read(mesh, mesh.uv_layers[0].name)
+    assert (uv.min(), uv.max()) == (0.0, 1.0)
+    assert not mesh.validate()
+    place = origin_of(bpy.context.scene)
+    assert place.system.code == files.CODE
+    found = _vertices(ground)
+    # The first row is the northernmost, and heights are those of the file.
+    first = found[np.lexsort((found[:, 0], -found[:, 1]))]
+    np.testing.assert_allclose(first[:, 2], values.ravel(), atol=1e-3)
+    np.testing.assert_allclose(first[0, :2] + [place.east, place.north], [files.EAST + 2.5, files.NORTH - 2.5])
+    # Trees by longitude and latitude stand on it, where the raster says.
+    spots = np.array([[files.EAST + 30.0, files.NORTH - 40.0], [files.EAST + 81.0, files.NORTH - 77.0]])
+    degrees = to_degrees(System(files.CODE), spots)
+    table = tmp_path / "trees.csv"
+    rows = "".join(f"Quercus robur,{12 + n},{x:.9f},{y:.9f}\n" for n, (x, y) in enumerate(degrees))
+    table.write_text("species,height,lon,lat\n" + rows)
+    select()
+    field = _call("import_inventory", table)
+    found = _vertices(field)
+    np.testing.assert_allclose(found[:, :2], spots - [place.east, place.north], atol=2e-3)
+    column, row = (spots[:, 0] - files.EAST) / 5.0 - 0.5, (files.NORTH - spots[:, 1]) / 5.0 - 0.5
+    raster = at_once(read_raster(path, 0, 1.0, 0.0))
+    np.testing.assert_allclose(found[:, 2], raster.at(column, row), atol=0.1)
+    # Outlines too; a road is a path of its width, a wood with a hole one closed curve.
+    ring = [[0.0, 0.0], [50.0, 0.0], [50.0, 50.0], [0.0, 50.0]]
+    wood, hole, line = (
+        to_degrees(System(files.CODE), np.array(points) + [files.EAST + 30.0, files.NORTH - 90.0]).tolist()
+        for points in (ring, [[20.0, 20.0], [30.0, 20.0], [30.0, 30.0]], [[0.0, 10.0], [60.0, 10.0]])
+    )
+    features = (
+        files.feature("Polygon", [wood, hole], landuse="forest"),
+        files.feature("LineString", line, highway="track"),
+        files.feature("Polygon", [hole], building="yes"),
+    )
+    path = tmp_path / "map.geojson"
+    path.write_text(files.collection(*features))
+    _call("import_outlines", path)
+    woods, roads = bpy.data.collections["Woods"], bpy.data.collections["Roads"]
+    assert [o.dimensions.z > 6.0 for o in bpy.data.collections["Buildings"].objects] == [True]
+    (road,) = lines_of(roads.objects[0], depsgraph())
+    assert road.half_width == pytest.approx(1.5)
+    assert np.ptp(road.points[:, 0]) == pytest.approx(60.0, abs=0.01)
+    ground_in = read_ground([ground], depsgraph(), areas=woods, paths=roads)
+    (area,) = ground_in.areas
+    low = np.array([30.0, -90.0]) + [files.EAST - place.east, files.NORTH - place.north]
+    np.testing.assert_allclose([area.min(axis=0), area.max(axis=0)], [low, low + 50.0], atol=2e-3)
+    assert ground_in.paths[0].half_width == pytest.approx(1.5)
+
+
+def test_terrain_is_made_coarser_and_has_holes(tmp_path):
+    values = files.hills(40)
+    values[:10, :10] = np.nan
+    path = tmp_path / "a.asc"
+    path.write_text(files.ascii_grid(values))
+    ground = _call("import_terrain", path, most=150)
+    assert 70 < len(ground.data.polygons) < 150
+    assert bpy.context.scene[KEY]["code"] == 0
+    other = _call("import_terrain", path, new_origin=True, most=60)
+    assert len(other.data.polygons) < len(ground.data.polygons)
+
+
+def test_an_inventory_becomes_a_field_of_recorded_sizes(tmp_path):
+    operator, path = files.write(tmp_path, "csv")
+    field = _call(operator, path)
+    kinds = [entry.species for entry in field.tetflora.field_species]
+    species = [kinds[n] for n in read(field.data, "species")]
+    assert species == ["oak", "lime", "broadleaf_tree", "spruce"]
+    heights = read(field.data, "tf_height")
+    assert heights[[0, 1, 3]].tolist() == [14.5, 9.0, 22.0]
+    # The height of the third follows from its trunk.
+    curves = curves_of(species_for(None, "broadleaf_tree"))
+    assert np.interp(0.88 / np.pi, curves.diameter, curves.height) == pytest.approx(heights[2], rel=0.02)
+    assert read(field.data, "tf_crown_width").tolist() == [11.0, 6.0, 0.0, 5.5]
+    assert read(field.data, "tf_diameter") == pytest.approx(np.array([2.1, 0.0, 0.88, 1.3]) / np.pi)
+    assert len(set(read(field.data, "seed").tolist())) == 4
+    assert np.ptp(_vertices(field)[:, :2], axis=0) == pytest.approx([19.5, 8.0], abs=1e-3)
+    _call(operator, path, unknown='SPECIES', species="fern")
+    _call(operator, path, unknown='LEAVE_OUT')
+    assert len(bpy.context.view_layer.objects.active.data.vertices) == 3
+
+
+def test_what_is_unknown_or_of_kin_is_told(tmp_path, capfd):
+    operator, path = files.write(tmp_path, "csv", files.INVENTORY.replace("Tilia cordata", "Ulmus glabra").encode())
+    _call(operator, path)
+    told = capfd.readouterr().out
+    assert "4 trees imported; 1 of unknown species: Foo bar (1)" in told
+    assert "1 stand as their nearest kin: Ulmus glabra" in told
+
+
+def test_canopy_heights_become_trees(tmp_path):
+    operator, path = files.write(tmp_path, "big_tiff")
+    field = _call(operator, path, species="beech:1, spruce:2")
+    assert read(field.data, "tf_height").tolist() == pytest.approx(
+        [14.0 + (i + j) % 5 for j in (4, 12, 20) for i in (4, 12, 20)]
+    )
+    assert read(field.data, "tf_crown_width").min() > 5.0
+    assert [entry.species for entry in field.tetflora.field_species] == ["beech", "spruce"]
+    place, found = origin_of(bpy.context.scene), _vertices(field)
+    np.testing.assert_allclose(
+        found[0, :2] + [place.east, place.north], [files.EAST + 4.5, files.NORTH - 4.5], atol=1e-3
+    )
+
+
+@pytest.mark.parametrize("kind", files.FILES)
+def test_broken_files_leave_everything_as_it_was(tmp_path, kind):
+    before = everything()
+    for seed in range(6):
+        operator, path = files.write(tmp_path, kind, files.mutated(random.Random(seed), files.FILES[kind][2]))
+        try:
+            getattr(bpy.ops.tetflora, operator)(filepath=str(path))
+        except RuntimeError as error:
+            assert path.stem in str(error)
+            assert difference(before, everything()) == []
+        else:
+            session.clean_file()
+            before = everything()
+
+
+@pytest.mark.parametrize("kind", ["grid", "csv", "outlines"])
+def test_closing_the_steps_leaves_everything_as_it_was(tmp_path, kind):
+    from tetflora_addon.blender.places import outlines, terrain
+
+    scene, path = bpy.context.scene, files.write(tmp_path, kind)[1]
+    before = everything()
+    for number in (1, 2, 4, 6):
+        steps = {
+            "grid": lambda: terrain.terrain_steps(scene, path, 1000, 0, 1.0, 0.0, False),
+            "csv": lambda: trees.inventory_steps(scene, depsgraph(), path, [], "GENERIC", 0, "METRIC", False, False),
+            "outlines": lambda: outlines.outline_steps(scene, depsgraph(), path, [], 0, False),
+        }[kind]()
+        for _ in range(number):
+            if next(steps, None) is None:
+                break
+        else:
+            steps.close()
+            assert difference(before, everything()) == []
+
+
+def test_places_on_a_path_that_is_not_plain(tmp_path):
+    folder = tmp_path / "Straße 漢字"
+    folder.mkdir()
+    operator, path = files.write(tmp_path, "grid")
+    _call(operator, shutil.copy(path, folder / "Gelände.asc"))
+    assert bpy.context.view_layer.objects.active.name == "Gelände"
+
+
+def test_a_stored_place_that_is_none_is_told(tmp_path):
+    bpy.context.scene[KEY] = {"code": "x"}
+    operator, path = files.write(tmp_path, "grid")
+    with pytest.raises(RuntimeError, match="is no place; remove it"):
+        _call(operator, path)
+    _call(operator, path, new_origin=True)
