@@ -11,6 +11,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
 from tetflora_addon.blender.biomes import adding, files, ground, library, saving, stands
@@ -19,7 +21,7 @@ from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.preferences import preferences
 from tetflora_addon.blender.species.edits import catalogue
 from tetflora_addon.blender.worker import at_once
-from tetflora_addon.errors import SceneError
+from tetflora_addon.errors import SceneError, TetFloraError
 from tetflora_addon.species.fallen import KIND
 from tetflora_addon.species.litter import FALLEN
 
@@ -266,6 +268,35 @@ def test_broken_files_are_refused(tmp_path, data, said):
     with pytest.raises(SceneError, match=r"broken\.json") as error:
         saving.import_biome(path, replace=False)
     assert said in str(error.value) and "broken" not in library.biomes()
+
+
+_JUNK = (None, True, -1, 1e308, float("nan"), 10**400, "", "x" * 2000, "\0", [], {}, [None], {"of": "bush"})
+
+
+def _nodes(data, path=()):
+    """Ways to all values of decoded JSON."""
+    keys = data.keys() if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ()
+    for key in keys:
+        yield (*path, key)
+        yield from _nodes(data[key], (*path, key))
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_mutated_files_are_read_or_refused(tmp_path, data):
+    """Whatever one value is replaced with: a biome whose species can be made, or an error that says why not."""
+    mutated = copy.deepcopy({**SMALL, "layers": [STAND, *SMALL["layers"]], "limits": {"slope_max": 40.0}})
+    *way, last = data.draw(st.sampled_from(sorted(_nodes(mutated), key=repr)))
+    at = mutated
+    for key in way:
+        at = at[key]
+    at[last] = data.draw(st.sampled_from(_JUNK))
+    path = tmp_path / "mutated.json"
+    path.write_text(json.dumps(mutated), encoding="utf-8")
+    try:
+        parts.pages_of(scene(), files.read_biome(path))
+    except TetFloraError as error:
+        assert str(error)
 
 
 def test_nothing_is_left_of_what_fails(monkeypatch):

@@ -99,8 +99,12 @@ def pages_of(scene: bpy.types.Scene, biome: Biome) -> dict[str, dict[str, Any]]:
             of = page.pop("of")
             each = page.pop("every_order", {})
             page = {**(pages[of] if of in pages else species_data(scene, of)), **page}
-            # Where an order has the key already: what bears no leaves has no color of leaves.
-            page["orders"] = [{**order, **{k: each[k] for k in each.keys() & order.keys()}} for order in page["orders"]]
+            if each and isinstance(page.get("orders"), list):
+                # Where an order has the key already: what bears no leaves has no color of leaves.
+                page["orders"] = [
+                    {**order, **{k: each[k] for k in each.keys() & order.keys()}} if isinstance(order, dict) else order
+                    for order in page["orders"]
+                ]
             species_from_dict(page, identifier, f'{biome.name}: species "{identifier}"')
         pages[identifier] = page
     return pages
