@@ -50,6 +50,7 @@ NAMES = (
     "wind",
     "year",
     "stands",
+    "places",
     "biomes",
     "dolly",
     "endurance",

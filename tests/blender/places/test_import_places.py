@@ -135,10 +135,10 @@ def test_terrain_is_made_coarser_and_has_holes(tmp_path):
     values[:10, :10] = np.nan
     path = tmp_path / "a.asc"
     path.write_text(files.ascii_grid(values))
-    ground = _call("import_terrain", path, most=150)
-    assert 70 < len(ground.data.polygons) < 150
+    ground = _call("import_terrain", path, most=400)
+    assert 300 < len(ground.data.polygons) < 400
     assert bpy.context.scene[KEY]["code"] == 0
-    other = _call("import_terrain", path, new_origin=True, most=60)
+    other = _call("import_terrain", path, new_origin=True, most=100)
     assert len(other.data.polygons) < len(ground.data.polygons)
 
 
