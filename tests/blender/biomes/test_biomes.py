@@ -57,7 +57,7 @@ SMALL = {
 STAND = {
     "kind": "stand",
     "name": "Birches",
-    "years": 14,
+    "years": 9,
     "interval": 0,
     "density": 900.0,
     "slope_max": 35.0,
