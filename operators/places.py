@@ -12,7 +12,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..tetflora_addon.blender.places.outlines import Drawn, outline_steps, told
 from ..tetflora_addon.blender.places.rasters import PATTERN
-from ..tetflora_addon.blender.places.terrain import Ground, terrain_steps
+from ..tetflora_addon.blender.places.terrain import ImportedGround, terrain_steps
 from ..tetflora_addon.blender.places.trees import GENERIC, LEFT_OUT, Planted, canopy_steps, inventory_steps
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
 from ..tetflora_addon.errors import readable
@@ -116,10 +116,10 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
         options=_UNLINKED,
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Ground]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, ImportedGround]:
         return terrain_steps(context.scene, self.path, self.most, self.code, self.factor, self.shift, self.new_origin)
 
-    def finish(self, context: bpy.types.Context, result: Ground) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: ImportedGround) -> set[str]:
         select_only(context, [result.object])
         faces = counted(len(result.object.data.polygons), "face")
         coarser = "; the file is finer, see Most Faces" if result.coarser else ""

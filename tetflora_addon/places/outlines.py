@@ -53,7 +53,7 @@ _MOST_WIDTH, _MOST_HEIGHT = 200.0, 1000.0
 
 
 @dataclass(frozen=True)
-class Outline:
+class MapFeature:
     """One feature of a map.
 
     Attributes
@@ -77,7 +77,7 @@ class Outline:
     height: float = 0.0
 
 
-def read_outlines(path: Path, code: int = 0) -> tuple[list[Outline], System]:
+def read_outlines(path: Path, code: int = 0) -> tuple[list[MapFeature], System]:
     """Read areas and lines of a GeoJSON file; points are left out.
 
     Parameters
@@ -94,7 +94,7 @@ def read_outlines(path: Path, code: int = 0) -> tuple[list[Outline], System]:
     """
     features, own = read_features(path)
     system = system_of(code or own, f"{path.name}: ")
-    found: list[Outline] = []
+    found: list[MapFeature] = []
     points = 0
     for number, feature in enumerate(features, 1):
         where = f"{path.name}: feature {number:,}"
@@ -153,7 +153,7 @@ def _ring(values: Any, where: str) -> NDArray[np.float64]:
     return ring
 
 
-def _outline(properties: dict[str, Any], rings: tuple[NDArray[np.float64], ...], closed: bool) -> Outline:
+def _outline(properties: dict[str, Any], rings: tuple[NDArray[np.float64], ...], closed: bool) -> MapFeature:
     kind, value = _kind(properties)
     width = height = 0.0
     if not closed:
@@ -165,7 +165,7 @@ def _outline(properties: dict[str, Any], rings: tuple[NDArray[np.float64], ...],
         height = min(_measure(properties.get("height")) or storeys or _BUILDING_HEIGHT, _MOST_HEIGHT)
     name = properties.get("name")
     name = name if isinstance(name, str) and name.strip() else value or kind
-    return Outline(kind, readable(name.strip(), NAME), rings, closed, width, height)
+    return MapFeature(kind, readable(name.strip(), NAME), rings, closed, width, height)
 
 
 def _kind(properties: dict[str, Any]) -> tuple[str, str]:

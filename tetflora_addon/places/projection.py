@@ -198,7 +198,7 @@ def _conformal(tangent: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class Place:
+class MapOrigin:
     """Where on a map the world's origin is.
 
     Attributes
@@ -242,7 +242,7 @@ class Place:
 MOST_AWAY = 250_000.0
 
 
-def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float64], what: str = "") -> Place:
+def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float64], what: str = "") -> MapOrigin:
     """The place for a scene whose first data lie between two corners, (2,) each; in whole metres.
 
     Raises
@@ -253,8 +253,8 @@ def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float
     middle = (np.asarray(low, np.float64) + high) / 2.0
     if system.metric:
         east, north = np.round(middle).tolist()
-        return Place(system, east, north)
+        return MapOrigin(system, east, north)
     longitude, latitude = np.round(to_degrees(system, middle[None])[0], 6).tolist()
     if not (abs(longitude) <= 360.0 and abs(latitude) < 89.0):
         raise SceneError(readable(f"{what}{longitude:g}, {latitude:g} is no longitude and latitude with room about it"))
-    return Place(System(-1, longitude, latitude), 0.0, 0.0)
+    return MapOrigin(System(-1, longitude, latitude), 0.0, 0.0)

@@ -10,7 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tetflora_addon.errors import SceneError
-from tetflora_addon.places.projection import Place, System, between, from_degrees, place_about, system_of, to_degrees
+from tetflora_addon.places.projection import (
+    MapOrigin,
+    System,
+    between,
+    from_degrees,
+    place_about,
+    system_of,
+    to_degrees,
+)
 
 _A, _F = 6378137.0, 1.0 / 298.257223563
 _E2 = _F * (2.0 - _F)
@@ -73,7 +81,7 @@ def test_layers_of_different_systems_align():
 def test_what_is_refused_says_what_to_do():
     with pytest.raises(SceneError, match=r"EPSG:31468 is none.*-t_srs"):
         system_of(31468)
-    plane, utm = Place(System(), 0.0, 0.0), Place(System(32632), 500_000.0, 5_300_000.0)
+    plane, utm = MapOrigin(System(), 0.0, 0.0), MapOrigin(System(32632), 500_000.0, 5_300_000.0)
     for place, system in ((plane, System(4326)), (utm, System())):
         with pytest.raises(SceneError, match="not known; set Coordinate System"):
             place.local(np.zeros((1, 2)), system, "a.csv: ")

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...places.projection import Place, System, place_about, system_of
+from ...places.projection import MapOrigin, System, place_about, system_of
 
 #: Custom property of the scene.
 KEY = "tetflora_place"
 
 
-def origin_of(scene: bpy.types.Scene) -> Place | None:
+def origin_of(scene: bpy.types.Scene) -> MapOrigin | None:
     """The place of a scene; None before its first import.
 
     Raises
@@ -37,10 +37,10 @@ def origin_of(scene: bpy.types.Scene) -> Place | None:
         raise SceneError(
             f'The custom property "{KEY}" of the scene "{scene.name}" is no place; remove it in the Scene properties'
         ) from None
-    return Place(system, *numbers[2:])
+    return MapOrigin(system, *numbers[2:])
 
 
-def origin_for(scene: bpy.types.Scene, system: System, points: NDArray[np.float64], new: bool, what: str) -> Place:
+def origin_for(scene: bpy.types.Scene, system: System, points: NDArray[np.float64], new: bool, what: str) -> MapOrigin:
     """The scene's place, or one in the middle of some points (n, 2), if the scene has none or another is asked for.
 
     Raises
@@ -55,20 +55,20 @@ def origin_for(scene: bpy.types.Scene, system: System, points: NDArray[np.float6
     return place
 
 
-def in_scene(place: Place, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
+def in_scene(place: MapOrigin, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
     """Metres from the scene's origin, (n, 2), of points of a file.
 
     Raises
     ------
     SceneError
-        As `Place.local`; ``what`` begins the message.
+        As `MapOrigin.local`; ``what`` begins the message.
     """
     if system.code == 0 and place.system.code > 0:
         system = place.system
     return place.local(points, system, what)
 
 
-def remember(scene: bpy.types.Scene, place: Place) -> None:
+def remember(scene: bpy.types.Scene, place: MapOrigin) -> None:
     """Store the place of a scene."""
     scene[KEY] = {
         "code": place.system.code,

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...jobs import Progress
-from ...places.outlines import BUILDING, KINDS, WATER, Outline, denser, one_ring, read_outlines
+from ...places.outlines import BUILDING, KINDS, WATER, MapFeature, denser, one_ring, read_outlines
 from ...planting.height_grid import HeightGrid
 from ..compat import shader_tree
 from ..placing.terrain import HALF_WIDTH
@@ -136,7 +136,10 @@ def _remove(collections: list[bpy.types.Collection], materials: list[bpy.types.M
 
 
 def _curve(
-    outline: Outline, rings: list[NDArray[np.float64]], heights: HeightGrid | None, looks: dict[str, bpy.types.Material]
+    outline: MapFeature,
+    rings: list[NDArray[np.float64]],
+    heights: HeightGrid | None,
+    looks: dict[str, bpy.types.Material],
 ) -> bpy.types.Object:
     """One outline as an object; its points count from its first one, so that far ones are exact."""
     data = bpy.data.curves.new(outline.name, 'CURVE')

@@ -33,7 +33,7 @@ _FINEST, _MOST_CELLS = 0.5, 4_000_000  # of the grid that heights are read from:
 
 
 @dataclass(frozen=True)
-class Ground:
+class ImportedGround:
     """What importing made.
 
     Attributes
@@ -52,7 +52,7 @@ class Ground:
 
 def terrain_steps(
     scene: bpy.types.Scene, path: Path, most: int, code: int, factor: float, shift: float, new: bool
-) -> Generator[Progress, Any, Ground]:
+) -> Generator[Progress, Any, ImportedGround]:
     """Make ground; yields progress. Closing the steps leaves all as it was.
 
     Parameters
@@ -74,7 +74,7 @@ def terrain_steps(
 
 def _steps(
     scene: bpy.types.Scene, path: Path, most: int, code: int, factor: float, shift: float, new: bool
-) -> Generator[Progress, Any, Ground]:
+) -> Generator[Progress, Any, ImportedGround]:
     raster = yield from read_raster(path, code, factor, shift)
     what = f"{path.name}: "
     place = origin_for(scene, raster.system, raster.outline, new, what)
@@ -95,7 +95,7 @@ def _steps(
     scene.collection.objects.link(made)
     remember(scene, place)
     step = float(np.linalg.norm(points[faces[:, 0], :2] - points[faces[:, 1], :2], axis=1).mean())
-    return Ground(made, step, coarse is not raster)
+    return ImportedGround(made, step, coarse is not raster)
 
 
 def _faces(raster: Raster) -> NDArray[np.int64]:

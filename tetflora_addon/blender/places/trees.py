@@ -21,7 +21,7 @@ from ...growth.seeds import Seeds
 from ...jobs import Progress
 from ...places.canopy import find_trees
 from ...places.inventories import Inventory, read_inventory
-from ...places.projection import Place
+from ...places.projection import MapOrigin
 from ...places.species_names import GENUS, KIN, KIND, species_named
 from ...planting.places import Placement
 from ...planting.rules import species_by_weight
@@ -262,7 +262,7 @@ def _plant(
     depsgraph: bpy.types.Depsgraph,
     name: str,
     grounds: list[bpy.types.Object],
-    place: Place,
+    place: MapOrigin,
     flat: NDArray[np.float64],
     kinds: NDArray[np.int32],
     identifiers: list[str],
