@@ -86,7 +86,7 @@ VIEWS = {
     "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (56.0, 215.0), grey=0.34, haze=_CLEAR, light=2.2),
     "birch_pine": View((0.0, -42.0, 1.6), (4.0, 0.0, 4.6), 26.0, (36.0, 240.0), _GOLD, grey=0.38),
     "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), grey=0.38, clouds=0.8),
-    "hedgerow": View((-46.0, -10.0, 1.7), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, grey=0.42, beside="meadow"),
+    "hedgerow": View((-45.0, -12.0, 1.75), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, grey=0.42, beside="meadow"),
     "meadow": View((0.0, -44.0, 1.5), (4.0, 0.0, 1.7), 34.0, (42.0, 245.0), grey=0.44),
     "mediterranean_scrub": View((0.0, -44.0, 1.7), (2.0, 0.0, 2.2), 28.0, (46.0, 240.0), _COOL, grey=0.44, clouds=0.3),
     "oak_savanna": View((0.0, -46.0, 1.9), (2.0, 0.0, 3.0), 34.0, (24.0, 245.0), _GOLD, grey=0.42),
@@ -241,7 +241,7 @@ def render_biome(
     build(identifier, view)
     if keep is not None:
         bpy.ops.wm.save_as_mainfile(filepath=str(keep))
-    render(path, size, samples, grey=view.grey, beyond=0.3)
+    render(path, size, samples, grey=view.grey, beyond=0.1)
 
 
 def save_small(source: Path, identifier: str) -> Path:
