@@ -38,7 +38,15 @@ SAMPLE, QUICK_SAMPLE = 120, 24
 #: Side of the stand in metres, and of the strip within its border that does not count.
 STAND, QUICK_STAND, BORDER = 50, 30, 4
 MUTATED, QUICK_MUTATED = 500, 80
-SPECIES = ("Quercus robur", "Fagus sylvatica", "Tilia cordata", "Picea abies", "Acer platanoides", "Betula pendula")
+#: Species, and how wide their crowns are over their height, from trees in a row to those by themselves.
+SPECIES = {
+    "Quercus robur": (0.5, 1.0),
+    "Fagus sylvatica": (0.35, 0.7),
+    "Tilia cordata": (0.35, 0.65),
+    "Picea abies": (0.2, 0.4),
+    "Acer platanoides": (0.4, 0.7),
+    "Betula pendula": (0.3, 0.5),
+}
 _CLOSE = 0.05
 
 TARGETS: Targets = {
@@ -54,14 +62,15 @@ QUICK_TARGETS: Targets = {name: t for name, t in TARGETS.items() if name not in 
 
 
 def inventory(number: int, rng: np.random.Generator) -> str:
-    """Trees of six species along streets: heights 4 to 28 m, crowns .25 to .6 as wide, at longitude and latitude."""
+    """Trees of six species in equal parts: heights 4 to 28 m, crowns as `SPECIES` has them, longitude and latitude."""
     height = rng.uniform(4.0, 28.0, number)
-    width = height * rng.uniform(0.25, 0.6, number)
     girth = np.pi * height * rng.uniform(1.2, 2.2, number)
     name = rng.integers(0, len(SPECIES), number)
+    width = height * rng.uniform(*np.array(list(SPECIES.values()))[name].T)
     x, y = rng.uniform(9.0, 9.05, number), rng.uniform(48.0, 48.04, number)
     rows = zip(name.tolist(), *(v.tolist() for v in (height, girth, width, x, y)), strict=True)
-    lines = (f"{n},{SPECIES[s]},{h:.1f},{g:.0f},{w:.1f},{a:.7f},{b:.7f}" for n, (s, h, g, w, a, b) in enumerate(rows))
+    names = tuple(SPECIES)
+    lines = (f"{n},{names[s]},{h:.1f},{g:.0f},{w:.1f},{a:.7f},{b:.7f}" for n, (s, h, g, w, a, b) in enumerate(rows))
     return "id,species,height_m,girth_cm,crown_width_m,lon,lat\n" + "\n".join(lines) + "\n"
 
 

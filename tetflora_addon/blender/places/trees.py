@@ -22,7 +22,7 @@ from ...jobs import Progress
 from ...places.canopy import find_trees
 from ...places.inventories import Inventory, read_inventory
 from ...places.projection import MapOrigin
-from ...places.species_names import GENUS, KIN, KIND, species_named
+from ...places.species_names import GENUS, KIN, KIND, species_named, words_of
 from ...planting.places import Placement
 from ...planting.rules import species_by_weight
 from ...species.species import Species
@@ -165,7 +165,8 @@ def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[st
             made.left_out += 0 if kind else count
         else:
             kind = match.species
-            if match.certainty in (GENUS, KIN):
+            # A bare genus says no more than what it gets.
+            if match.certainty == KIN or (match.certainty == GENUS and len(words_of(name)) > 1):
                 made.kin[name] += count
         chosen.append(kind)
     identifiers = sorted({kind for kind in chosen if kind})
