@@ -36,7 +36,7 @@ TREES, QUICK_TREES = 100_000, 10_000
 #: Trees that are grown in full, and those of the stand.
 SAMPLE, QUICK_SAMPLE = 120, 24
 #: Side of the stand in metres, and of the strip within its border that does not count.
-STAND, QUICK_STAND, BORDER = 50, 30, 4
+STAND, QUICK_STAND, BORDER = 36, 30, 4
 MUTATED, QUICK_MUTATED = 500, 80
 #: Species, and how wide their crowns are over their height, from trees in a row to those by themselves.
 SPECIES = {
