@@ -31,8 +31,10 @@ def main() -> int:
     import bpy
 
     from .ages import render_ages
+    from .biomes import render_sheet as render_biomes
     from .close_ups import render_sheet as render_close_ups
     from .demo import run
+    from .grown import render_grown
     from .landscape import render_landscape
     from .million import render_million
     from .scattered import main as render_scattered
@@ -58,9 +60,11 @@ def main() -> int:
     build_wood(bpy.context.scene)
     render_dolly(IMAGES / "dolly.jpg")
     render_interior(IMAGES / "interior.jpg")
-    for render, name in ((render_seasons, "seasons"), (render_ages, "ages")):
+    for render, name in ((render_seasons, "seasons"), (render_ages, "ages"), (render_grown, "grown")):
         session.clean_file()
         render(IMAGES / f"{name}.jpg")
+    with tempfile.TemporaryDirectory() as folder:
+        render_biomes(IMAGES / "biomes.jpg", Path(folder))
     session.clean_file()
     render_scattered([])
     session.stop()

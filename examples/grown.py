@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One hectare that nobody plants, in four years: seeds arrive on bare ground, and a wood comes of it.
+
+    python -m examples.grown            # docs/images/grown.jpg
+    python -m examples.grown --out out/grown.jpg --width 480 --samples 16
+
+Birches, aspens and pines come first; oaks, ashes, maples and beeches grow up below them. All pictures are of the same
+stand, at four places of the slider.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from math import radians
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from devtools import session
+
+from .close_ups import render
+from .paper.pictures import save_sheet
+from .seasons import LOOKS, sky
+
+ROOT = Path(__file__).resolve().parent.parent
+YEARS = (8, 25, 70, 160)
+SIZE, SAMPLES = (740, 420), 64
+#: Species and their shares of the seeds that arrive.
+SEEDS = {
+    "birch": 5.0,
+    "aspen": 2.0,
+    "scots_pine": 1.5,
+    "rowan": 1.0,
+    "oak": 1.0,
+    "ash": 1.0,
+    "maple": 1.0,
+    "hornbeam": 1.0,
+    "beech": 2.0,
+    "hazel": 1.0,
+}
+#: Sides of the stand and of the land, and how high the land rolls, metres.
+_SIDE, _LAND, _ROLL = 100.0, 340.0, 1.4
+_EYE, _AHEAD, _LENS = (-22.0, -112.0, 15.0), (0.0, 0.0, 9.0), 34.0
+_SUN = (36.0, 238.0)
+
+
+def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
+    """Fill an empty scene; the stand."""
+    from tetflora_addon.blender.placing.cover import cover_steps
+    from tetflora_addon.blender.stands.growing import new_stand_steps
+    from tetflora_addon.blender.worker import at_once
+
+    from .haze import add_haze
+
+    land, plot = _grid("Ground", _LAND, 4.0), _grid("Plot", _SIDE, 2.0)
+    for ground in (land, plot):
+        scene.collection.objects.link(ground)
+    plot.hide_render = True  # it only says where the stand grows
+    stand = scene.tetflora.stand
+    stand.years, stand.density, stand.recruits, stand.seed = years, 0.0, 500.0, 3
+    for species, share in SEEDS.items():
+        entry = stand.species.add()
+        entry.species, entry.planted, entry.rain = species, 0.0, share
+    bpy.context.view_layer.update()
+    grown = at_once(new_stand_steps(scene, bpy.context.evaluated_depsgraph_get(), [plot]))
+    print(f"{grown.plants:,} plants after {grown.years} years, {grown.records:,} records", flush=True)
+    at_once(cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[land]))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.lens, camera.data.clip_end = _LENS, 2000.0
+    camera.location = _EYE
+    camera.rotation_euler = (Vector(_AHEAD) - Vector(_EYE)).to_track_quat('-Z', 'Y').to_euler()
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", 'SUN'))
+    sun.data.energy, sun.data.angle, sun.data.color = 5.0, radians(0.6), (1.0, 0.94, 0.85)
+    sun.rotation_euler = (radians(90 - _SUN[0]), 0.0, radians(180.0 - _SUN[1]))
+    scene.collection.objects.link(sun)
+    scene.world = sky(LOOKS["summer"])
+    add_haze(scene, 0.00025, LOOKS["summer"].haze[1])
+    return grown.field
+
+
+def _grid(name: str, side: float, step: float) -> bpy.types.Object:
+    """A square that rolls a little."""
+    count = round(side / step)
+    at = np.linspace(-side / 2, side / 2, count + 1)
+    x, y = (grid.ravel() for grid in np.meshgrid(at, at))
+    z = _ROLL * (np.sin(0.045 * x + 0.6) * np.cos(0.038 * y) + 0.3 * np.sin(0.11 * (x - y)))
+    corner = (np.arange(count)[:, None] * (count + 1) + np.arange(count)).ravel()
+    faces = corner[:, None] + [0, 1, count + 2, count + 1]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(np.stack([x, y, z], axis=1).tolist(), [], faces.tolist())
+    mesh.shade_smooth()
+    return bpy.data.objects.new(name, mesh)
+
+
+def render_grown(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
+    """The stand in all years, as a sheet."""
+    session.clean_file()
+    field = build(bpy.context.scene)
+    with tempfile.TemporaryDirectory() as folder:
+        made = []
+        for year in YEARS:
+            field.tetflora.stand_year = year
+            bpy.context.view_layer.update()
+            made.append(Path(folder) / f"{year}.png")
+            render(made[-1], size, samples, 0.42)
+        names = [f"{year} years" for year in YEARS]
+        save_sheet(list(zip(made, names, strict=True)), 2, path)
+
+
+def main(arguments: list[str]) -> int:
+    """Render the sheet."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images" / "grown.jpg")
+    parser.add_argument("--width", type=int, default=SIZE[0], help="of one picture, pixels")
+    parser.add_argument("--samples", type=int, default=SAMPLES)
+    chosen = parser.parse_args(arguments)
+    session.start()
+    render_grown(chosen.out, (chosen.width, round(chosen.width * SIZE[1] / SIZE[0])), chosen.samples)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
