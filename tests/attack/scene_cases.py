@@ -137,7 +137,9 @@ def _scene(rng: random.Random) -> bpy.types.Scene:
             field.tetflora.field_species.add().species = rng.choice(["bush", "", "quercus"])
     group = scene.tetflora
     for _ in range(rng.choice([0, 1, 3])):
-        prop = rng.choice([p for p in group.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN', 'ENUM'}])
+        known = [p for p in group.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN', 'ENUM'}]
+        # Menus that a function fills, such as that of biomes, list nothing here.
+        prop = rng.choice([p for p in known if p.type != 'ENUM' or len(p.enum_items)])
         with suppress(TypeError, ValueError, OverflowError, AttributeError):
             if prop.type == 'ENUM':
                 setattr(group, prop.identifier, rng.choice(list(prop.enum_items)).identifier)
