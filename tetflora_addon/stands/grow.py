@@ -30,6 +30,8 @@ from .site import StandSite
 #: Plants that are looked at together.
 _BLOCK = 1 << 15
 _GIVEN = 2
+#: Most records of a stand, some 70 bytes each here and again in the file.
+MOST_RECORDS = 20_000_000
 #: Metres of open ground beyond open edges.
 _MARGIN = 12.0
 #: Metres between the highest and the lowest ground up to which it counts as level.
@@ -232,6 +234,11 @@ class GrowingStand:
             plants = Plants.concatenate([part[0].take(~part[1]) for part in parts])
         self.plants = Plants.concatenate([plants, new])
         self.count += len(new)
+        if sum(map(len, self.kept)) > MOST_RECORDS:
+            raise TetFloraError(
+                f"The stand has more than {MOST_RECORDS:,} records; raise Interval or Min Height, or choose a smaller "
+                "ground"
+            )
         if len(self.plants) > MOST_PLANTS:
             raise TetFloraError(
                 f"The stand has more than {MOST_PLANTS:,} plants; lower Seedlings, or choose a smaller ground"

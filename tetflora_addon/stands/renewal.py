@@ -44,7 +44,7 @@ def planted(site: StandSite, guilds: Guilds, suits: NDArray[np.float64], density
     columns, rows = max(round(width / side), 1), max(round(depth / side), 1)
     if columns * rows > MOST_PLANTS:
         raise TetFloraError(
-            f"{columns * rows:,} plants would be planted, the limit is {MOST_PLANTS:,}; lower Density, or choose a "
+            f"{columns * rows:,} plants would be planted, the limit is {MOST_PLANTS:,}; lower Planted, or choose a "
             "smaller ground"
         )
     index = np.arange(columns * rows)

@@ -138,7 +138,8 @@ def at_year(obj, year, smooth=False):
 @pytest.mark.parametrize(
     ("year", "wanted"),
     [
-        (0.0, ([1], [2.0], [0.0])),  # before the first year of all is that
+        (0.0, ([], [], [])),  # nothing has come up yet
+        (10.0, ([1], [2.0], [0.0])),
         (15.0, ([1], [3.0], [0.0])),
         (20.0, ([1, 2], [4.0, 1.0], [0.0, 0.0])),
         (24.0, ([1, 2], [4.0, 1.4], [0.0, 0.0])),
@@ -165,6 +166,18 @@ def test_years_follow_keys_and_subframes():
         assert read_aged_field(obj, depsgraph(), np.eye(4)[None])[2].height[0] == pytest.approx(
             2.0 + (year - 10.0) / 5.0
         )
+
+
+def test_years_follow_keys_where_blender_does_not_evaluate_the_field():
+    obj, scene = history(), bpy.context.scene
+    obj.tetflora.stand_year = 15.0
+    for frame, year in ((1, 10.0), (21, 20.0)):
+        obj.tetflora.stand_year = year
+        obj.tetflora.keyframe_insert("stand_year", frame=frame)
+    obj.hide_viewport = True
+    scene.frame_set(21)
+    found = read_aged_field(obj, depsgraph(), np.eye(4)[None])[2]
+    assert found.height == pytest.approx([4.0, 1.0])
 
 
 def test_the_dead_are_dead_at_the_size_of_their_death():

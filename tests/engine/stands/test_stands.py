@@ -193,7 +193,7 @@ def test_plants_that_are_given_grow_on() -> None:
         ({"years": 0}, "Years"),
         ({"density": np.nan}, "Planted"),
         ({"cell": 0.0}, "Cell"),
-        ({"density": 1e6}, "Density"),
+        ({"density": 1e6}, "Planted"),
         ({"density": 0.0, "recruits": 0.0}, "Nothing is planted"),
     ],
 )

@@ -32,6 +32,8 @@ NUMBERS = {
 OFFSET, FIT = "tf_crown_offset", "tf_fit"
 #: Attributes of histories: the year of the stand that a point is a record of, and the plant whose record it is.
 YEAR, PLANT = "tf_year", "tf_plant"
+#: Where an object has the year at which its history is shown.
+YEAR_PATH = "tetflora.stand_year"
 #: All of them with their types, in the order in which they are written.
 SIZE_ATTRIBUTES = {
     **dict.fromkeys(NUMBERS, 'FLOAT'),
@@ -79,7 +81,8 @@ class History:
 
     def chosen(self, now: float) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Records (m,) before and after a year of those plants that are there, and how far it is from the first."""
-        now = float(np.clip(now, self.year.min(initial=np.inf), self.year.max(initial=-np.inf)))
+        first, last = self.year.min(initial=np.inf), self.year.max(initial=-np.inf)
+        now = last if first == last else min(float(now), last)  # what has one year has no others
         plant, before = self.first, self.year <= now
         following = np.append(plant[1:] == plant[:-1], False)
         there = before & (self.year == now)
@@ -97,6 +100,26 @@ def has_sizes(points: Points) -> bool:
 def has_history(obj: bpy.types.Object) -> bool:
     """Whether the points that a field stores are records of a history; cheap."""
     return isinstance(obj.data, Points) and YEAR in obj.data.attributes
+
+
+def year_curves(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """Curves of keys of a stand's year."""
+    animation = obj.animation_data
+    if animation is None or animation.action is None or animation.action_slot is None:
+        return []
+    slot = animation.action_slot.handle
+    strips = [strip for layer in animation.action.layers for strip in layer.strips]
+    bags = [bag for strip in strips for bag in strip.channelbags if bag.slot_handle == slot]
+    return [curve for bag in bags for curve in bag.fcurves if curve.data_path == YEAR_PATH]
+
+
+def year_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
+    """Year in which a history is shown; also where the object is disabled in viewports, and Blender evaluates none."""
+    evaluated = obj.evaluated_get(depsgraph) if obj.animation_data else obj
+    curve = next((curve for curve in year_curves(obj) if not curve.mute), None)
+    if curve is None or evaluated.is_evaluated:
+        return evaluated.tetflora.stand_year
+    return max(curve.evaluate(depsgraph.scene.frame_current_final), 0.0)
 
 
 def stand_years(scene: bpy.types.Scene) -> list[float]:

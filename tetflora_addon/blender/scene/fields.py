@@ -21,7 +21,7 @@ from ...growth.seeds import Seeds
 from ..attributes import write
 from ..species.asset_species import find_asset
 from .field_points import FieldPoints, parts_of, placed_frames, read_points, refuse
-from .field_sizes import in_year, read_records, read_sizes
+from .field_sizes import in_year, read_records, read_sizes, year_now
 from .objects import geometry_of
 from .own_ages import AGE, Sizes
 from .skeletons import kind_of, kind_of_choice, species_of
@@ -174,8 +174,7 @@ def _read(
     points, sizes, records = read_points(obj, field_kinds(obj), parts), read_sizes(obj, parts), read_records(obj, parts)
     if records is not None:
         refuse(obj, ~np.isfinite(points.position).all(axis=1), "an invalid position")
-        group = (obj.evaluated_get(depsgraph) if obj.animation_data else obj).tetflora
-        points, sizes = in_year(points, sizes, records, group.stand_year, group.stand_smooth)
+        points, sizes = in_year(points, sizes, records, year_now(obj, depsgraph), obj.tetflora.stand_smooth)
     if sizes is not None and (sizes.height > 0.0).any():
         points = replace(points, scale=np.where(sizes.height > 0.0, 1.0, points.scale))
     return points, sizes

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SceneError, SpeciesError
+from ...errors import SceneError, SpeciesError, TetFloraError
 from ...jobs import Progress
 from ...species.species import Species
 from ...stands.grow import StandSettings, grow
@@ -32,10 +32,12 @@ from ..scene.field_sizes import (
     PLANT,
     SIZE_ATTRIBUTES,
     YEAR,
+    YEAR_PATH,
     has_history,
     in_year,
     read_records,
     read_sizes,
+    year_curves,
 )
 from ..scene.fields import field_kinds, quaternions, write_field
 from ..scene.own_ages import Sizes
@@ -58,7 +60,6 @@ MIXED_WOOD = {
 #: Settings that a stand hands on; identity and state are its own.
 _OWN = {"rna_type", "name", "is_grown", "biome", "grounds", "species", "species_index"}
 _MASKS = ("vertex_group", "areas", "paths", "path_distance")
-_YEAR_PATH = "tetflora.stand_year"
 _PATIENCE = 5.0  # seconds for what the viewport will ask at once
 _GROWING = (0.08, 0.85)  # fractions of the job: before, and while it grows
 
@@ -111,7 +112,7 @@ def new_stand_steps(
         No ground, a species that the catalogue does not have, or settings with which nothing grows.
     """
     grounds = list(grounds)
-    data = JobData("Growing the stand", scene)
+    data = JobData("Growing the stand", scene, depsgraph.view_layer)
     data.add_objects(grounds)
     return guarded(data, _new_stand_steps(data, scene, depsgraph, grounds))
 
@@ -121,7 +122,7 @@ def again_steps(
 ) -> Generator[Progress, object, GrownStand]:
     """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
     grounds = [e.object for e in field.tetflora.stand.grounds if e.object is not None and scene in e.object.users_scene]
-    data = JobData("Growing the stand", scene)
+    data = JobData("Growing the stand", scene, depsgraph.view_layer)
     data.add_objects([*grounds, field])
     return guarded(data, _again_steps(data, scene, depsgraph, field, grounds))
 
@@ -176,7 +177,10 @@ def _again_steps(
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
     ground = zoned(scene, depsgraph, stand, grounds, ground)
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
-    records = yield from _growing(site, guilds, settings)
+    try:
+        records = yield from _growing(site, guilds, settings)
+    except TetFloraError as error:
+        raise SceneError(f'"{field.name}": {error}') from None
     if not len(records):
         raise SceneError(
             "Nothing is left of the stand: no plant is as tall as Min Height; grow it longer, plant more, or change "
@@ -262,9 +266,11 @@ def _replace(
     old, field.data = field.data, other.data
     field.matrix_world = other.matrix_world.copy()
     group = field.tetflora
+    forms = {entry.species: entry.form for entry in group.field_species}
     group.field_species.clear()
     for name in names:
-        group.field_species.add().species = name
+        entry = group.field_species.add()
+        entry.species, entry.form = name, forms.get(name)
     bpy.data.objects.remove(other)
     if not old.users:
         bpy.data.meshes.remove(old)
@@ -335,23 +341,18 @@ def animate(field: bpy.types.Object, first: int, last: int) -> tuple[float, floa
     """
     if not has_history(field):
         raise SceneError(f'"{field.name}" has no years; select a stand that was grown')
+    animation = field.animation_data
+    if animation is not None and animation.action is not None and animation.action.library is not None:
+        raise SceneError(f'The keys of "{field.name}" are linked from another file; make them local first')
     begin, end = 0.0, float(read_records(field, [field.data]).year.max())
     group = field.tetflora
     group.stand_smooth = True
-    for curve in _year_curves(field):
+    for curve in year_curves(field):
         curve.keyframe_points.clear()
     for frame, at in ((first, begin), (last, end)):
         group.stand_year = at
-        field.keyframe_insert(_YEAR_PATH, frame=frame)
-    for curve in _year_curves(field):
+        field.keyframe_insert(YEAR_PATH, frame=frame)
+    for curve in year_curves(field):
         for point in curve.keyframe_points:
             point.interpolation = 'LINEAR'
     return begin, end
-
-
-def _year_curves(field: bpy.types.Object) -> list[bpy.types.FCurve]:
-    """Curves of keys of a stand's year."""
-    animation = field.animation_data
-    layers = animation.action.layers if animation is not None and animation.action is not None else ()
-    bags = [bag for layer in layers for strip in layer.strips for bag in strip.channelbags]
-    return [curve for bag in bags for curve in bag.fcurves if curve.data_path == _YEAR_PATH]
