@@ -8,7 +8,7 @@ from ..tetflora_addon.blender.job import render
 from . import base, biomes, menus, places, plants, populate, preferences, refine, results, species, stands
 
 # In the order of registration, which is that of the panels in the tab: as an artist works, a panel after its parent.
-_MODULES = (base, refine, plants, biomes, populate, stands, places, species, results, menus)
+_MODULES = (base, refine, plants, populate, biomes, stands, places, species, results, menus)
 CLASSES = tuple(cls for module in _MODULES for cls in module.CLASSES)
 
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
