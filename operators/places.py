@@ -66,7 +66,10 @@ class _Importing(ModalJob, ImportHelper):
             return ModalJob.execute(self, context)
         # Blender frees what the file browser has called: the steps are those of another call, with its undo step.
         again = getattr(bpy.ops.tetflora, type(self).bl_idname.partition(".")[2])
-        again('INVOKE_DEFAULT', **{**self.as_keywords(), "chosen": True})
+        try:
+            again('INVOKE_DEFAULT', **{**self.as_keywords(), "chosen": True})
+        except RuntimeError as error:  # what that call reported, which must not end as a traceback
+            return self.failed(str(error).strip().removeprefix("Error: "))
         return {'CANCELLED'}
 
     @property

@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
-from ..files import is_regular
 from .projection import System
-from .rasters import checked_size
+from .rasters import check_regular, checked_size
 
 #: Tags: names for messages.
 _WIDTH, _HEIGHT, _BITS, _BANDS, _FORMAT = 256, 257, 258, 277, 339
@@ -98,8 +97,7 @@ def read_head(path: Path) -> Head:
     SceneError
         It is broken, or of a kind that cannot be used; names the tag.
     """
-    if not is_regular(path):
-        raise SceneError(f"{path.name}: it is not a regular file")
+    check_regular(path)
     size = path.stat().st_size
     with path.open("rb") as file:
         tags = _Tags(file, size, path.name)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Generator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
-from ..files import read_whole
+from ..files import is_regular, read_whole
 from ..jobs import Progress
 from .projection import System, code_in
 
@@ -103,6 +104,22 @@ class Raster:
         # The last blocks may be smaller: whoever needs places of their middles moves by less than half a block.
         corner = self.places(np.array([(step - 1) / 2]), np.array([(step - 1) / 2]))[0]
         return replace(self, values=values, corner=corner, along=step * self.along, down=step * self.down)
+
+
+def check_regular(path: Path) -> None:
+    """Refuse folders, links, pipes and devices.
+
+    Raises
+    ------
+    OSError
+        There is nothing, or it cannot be looked at.
+    SceneError
+        It is one of these.
+    """
+    if not is_regular(path):
+        with suppress(ValueError):  # a zero in its name
+            path.lstat()
+        raise SceneError(f"{path.name}: it is not a regular file")
 
 
 def checked_size(width: int, height: int, what: str) -> None:
@@ -205,6 +222,8 @@ def _numbers(piece: bytes, name: str, line: int) -> NDArray[np.float64]:
 
 
 def _split(text: bytes) -> NDArray[np.float64] | None:
+    if not text.strip():  # of which NumPy makes -1
+        return np.empty(0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:

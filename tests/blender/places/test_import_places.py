@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import random
 import shutil
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -13,14 +14,16 @@ import pytest
 
 from benchmarks import places_files as files
 from devtools import session
+from operators import places
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import depsgraph, select
 from tetflora_addon.blender.attributes import read
-from tetflora_addon.blender.places import trees
+from tetflora_addon.blender.places import outlines, trees
 from tetflora_addon.blender.places.completion import curves_of
 from tetflora_addon.blender.places.origin import KEY, origin_of
 from tetflora_addon.blender.places.rasters import read_raster
 from tetflora_addon.blender.placing.terrain import lines_of, read_ground
+from tetflora_addon.blender.runtime import GoneError
 from tetflora_addon.blender.species.edits import species_for
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
@@ -52,6 +55,38 @@ def test_pixels_of_tiff_are_what_was_written(tmp_path, dtype, order):
     expected[expected == -9999] = np.nan
     np.testing.assert_allclose(raster.values, expected, atol=1e-2 if dtype != np.uint32 else 200.0)
     assert not bpy.data.images
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_cells_of_a_tiff_that_are_no_number_are_holes(tmp_path, dtype):
+    values = files.hills(6).astype(dtype)
+    values[0, 1], values[2, 3], values[4, 4] = np.nan, np.inf, -np.inf
+    path = tmp_path / "a.tif"
+    path.write_bytes(files.geotiff(values, nothing=None))
+    found = at_once(read_raster(path, 0, 1.0, 0.0)).values
+    np.testing.assert_allclose(found, np.where(np.isfinite(values), values, np.nan), rtol=1e-6)
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.int16, np.uint8, np.int32])
+def test_whole_numbers_of_a_tiff_stay_whole(tmp_path, dtype):
+    """And each that stands for nothing is found."""
+    limits = np.iinfo(dtype)
+    low, high = max(limits.min, -30_000), min(limits.max, 65_535)
+    values = np.rint(np.linspace(low, high, 64 * 64)).astype(dtype).reshape(64, 64)
+    path = tmp_path / "a.tif"
+    for nothing in (low, 0, int(values[17, 5]), high):
+        path.write_bytes(files.geotiff(values, nothing=f"{nothing}\0".encode()))
+        found = at_once(read_raster(path, 0, 1.0, 0.0)).values
+        np.testing.assert_array_equal(found, np.where(values == nothing, np.nan, values.astype(np.float64)))
+    values[3, 3] = limits.min
+    path.write_bytes(files.geotiff(values, nothing=f"{limits.min}\0".encode()))
+    assert np.isnan(at_once(read_raster(path, 0, 1.0, 0.0)).values[3, 3])
+
+
+@pytest.mark.parametrize("ending", [".asc", ".tif", ".png"])
+def test_a_missing_raster_is_told(tmp_path, ending):
+    with pytest.raises(SceneError, match="No such file or directory"):
+        at_once(read_raster(tmp_path / f"a{ending}", 0, 1.0, 0.0))
 
 
 def test_pixels_of_png_and_ascii_grids(tmp_path):
@@ -201,7 +236,7 @@ def test_broken_files_leave_everything_as_it_was(tmp_path, kind):
 
 @pytest.mark.parametrize("kind", ["grid", "csv", "outlines"])
 def test_closing_the_steps_leaves_everything_as_it_was(tmp_path, kind):
-    from tetflora_addon.blender.places import outlines, terrain
+    from tetflora_addon.blender.places import terrain
 
     scene, path = bpy.context.scene, files.write(tmp_path, kind)[1]
     before = everything()
@@ -217,6 +252,49 @@ def test_closing_the_steps_leaves_everything_as_it_was(tmp_path, kind):
         else:
             steps.close()
             assert difference(before, everything()) == []
+
+
+@pytest.mark.parametrize("kind", ["csv", "big_tiff", "outlines"])
+def test_imports_stop_when_their_view_layer_goes(tmp_path, kind):
+    """Its dependency graph goes with it."""
+    scene, path = bpy.context.scene, files.write(tmp_path, kind)[1]
+    graph = depsgraph()
+    scene.view_layers.new("Other")
+    steps = {
+        "csv": lambda: trees.inventory_steps(scene, graph, path, [], "GENERIC", 0, "METRIC", False, False),
+        "big_tiff": lambda: trees.canopy_steps(scene, graph, path, [], {"beech": 1.0}, 3.0, 0, 1.0, 0.0, False),
+        "outlines": lambda: outlines.outline_steps(scene, graph, path, [], 0, False),
+    }[kind]()
+    next(steps)
+    scene.view_layers.remove(scene.view_layers["ViewLayer"])
+    with pytest.raises(GoneError, match='the view layer "ViewLayer"'):
+        at_once(steps)
+
+
+def test_a_refusal_after_the_file_browser_is_a_report(monkeypatch):
+    """The window's call is one from Python, for which Blender turns reports of errors into exceptions."""
+
+    def again(*_, **__):
+        raise RuntimeError("Error: a.tif: it is broken\n")
+
+    ops = SimpleNamespace(tetflora=SimpleNamespace(import_terrain=again))
+    monkeypatch.setattr(places, "bpy", SimpleNamespace(app=SimpleNamespace(background=False), ops=ops))
+
+    class Browsing:
+        bl_idname = places.TETFLORA_OT_import_terrain.bl_idname
+        _browsing = True
+        reports = ()
+        failed = places.TETFLORA_OT_import_terrain.failed
+
+        def as_keywords(self):
+            return {"filepath": "a.tif"}
+
+        def report(self, kind, text):
+            self.reports += ((kind, text),)
+
+    operator = Browsing()
+    assert places.TETFLORA_OT_import_terrain.execute(operator, None) == {'CANCELLED'}
+    assert operator.reports == (({'ERROR'}, "a.tif: it is broken"),)
 
 
 def test_places_on_a_path_that_is_not_plain(tmp_path):

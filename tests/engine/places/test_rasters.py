@@ -10,6 +10,7 @@ import pytest
 from benchmarks import places_files as files
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
+from tetflora_addon.places import rasters
 from tetflora_addon.places.geotiff import read_head
 from tetflora_addon.places.projection import System
 from tetflora_addon.places.rasters import Raster, read_ascii, world_file
@@ -63,6 +64,22 @@ def test_a_broken_grid_is_told_by_its_line(tmp_path, old, new, message):
     text = files.ascii_grid(_HILLS)
     with pytest.raises(SceneError, match=message):
         _grid(tmp_path, text.replace(old, new, 1))
+
+
+def test_blank_text_holds_no_numbers(tmp_path, monkeypatch):
+    """Also where a piece of the file begins and ends between two blank lines."""
+    monkeypatch.setattr(rasters, "_PIECE", 1)
+    head = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
+    assert _grid(tmp_path, head + "1 2\n\n \n\n3 4\n\n \n").values.tolist() == [[1, 2], [3, 4]]
+
+
+def test_a_file_that_is_missing_or_none(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        read_head(tmp_path / "a.tif")
+    with pytest.raises(SceneError, match="not a regular file"):
+        read_head(tmp_path)
+    with pytest.raises(SceneError, match="not a regular file"):
+        read_head(tmp_path / "a\0.tif")
 
 
 @pytest.mark.parametrize("order", ["<", ">"])

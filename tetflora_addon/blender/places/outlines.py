@@ -82,7 +82,7 @@ def outline_steps(
     SceneError
         The file is broken, or cannot lie in this scene.
     """
-    data = JobData("Importing", scene)
+    data = JobData("Importing", scene, depsgraph.view_layer)
     data.add_objects(grounds)
     return guarded(data, _steps(scene, depsgraph, path, grounds, code, new))
 

@@ -19,12 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...files import is_regular
 from ...jobs import Progress
 from ...places.geotiff import read_head
 from ...places.projection import System, system_of
-from ...places.rasters import Raster, checked_size, read_ascii, without_nodata, world_file
-from ..attributes import image_pixels
+from ...places.rasters import Raster, check_regular, checked_size, read_ascii, without_nodata, world_file
 from ..worker import steps_in_thread
 
 ASCII, TIFF, PNG = (".asc", ".txt", ".grd"), (".tif", ".tiff"), (".png",)
@@ -82,12 +80,13 @@ def _tiff(path: Path) -> Raster:
         corner, along, down, own = beside
         system = system if system.code else own
     values = _pixels(path, head.width, head.height) * np.float32(head.factor)
+    if head.factor != 1.0:  # whole numbers, which must equal the one that stands for nothing
+        values = np.rint(values)
     return Raster(without_nodata(values, head.nothing), corner, along, down, system)
 
 
 def _png(path: Path) -> Raster:
-    if not is_regular(path):
-        raise SceneError(f"{path.name}: it is not a regular file")
+    check_regular(path)
     with path.open("rb") as file:
         start = file.read(_PNG_HEAD.size)
     if len(start) < _PNG_HEAD.size or start[:8] != b"\x89PNG\r\n\x1a\n" or start[12:16] != b"IHDR":
@@ -105,7 +104,7 @@ def _png(path: Path) -> Raster:
 
 
 def _pixels(path: Path, width: int, height: int) -> NDArray[np.float32]:
-    """First channel of the pixels (h, w) of an image, the uppermost row first."""
+    """First channel of the pixels (h, w) of an image, the uppermost row first; nan stays nan."""
     if path.stat().st_size > _MOST_FILE:
         raise SceneError(f"{path.name}: larger than {_MOST_FILE:,} bytes; crop it")
     unreadable = (
@@ -120,6 +119,8 @@ def _pixels(path: Path, width: int, height: int) -> NDArray[np.float32]:
         image.colorspace_settings.name = "Non-Color"
         if tuple(image.size) != (width, height) or not image.channels:
             raise SceneError(unreadable)
-        return np.ascontiguousarray(image_pixels(image)[::-1, :, 0])
+        pixels = np.zeros(width * height * image.channels, np.float32)
+        image.pixels.foreach_get(pixels)
+        return np.ascontiguousarray(pixels.reshape(height, width, -1)[::-1, :, 0])
     finally:
         bpy.data.images.remove(image)

@@ -113,7 +113,7 @@ def inventory_steps(
     SceneError
         The file is broken, or cannot lie in this scene.
     """
-    data = JobData("Importing", scene)
+    data = JobData("Importing", scene, depsgraph.view_layer)
     data.add_objects(grounds)
     given = (scene, depsgraph, path, grounds, unknown, code, units, skip, new, seed)
     return guarded(data, _inventory_steps(*given))
@@ -204,7 +204,7 @@ def canopy_steps(
     SceneError
         The file is broken, has no trees, or cannot lie in this scene.
     """
-    data = JobData("Importing", scene)
+    data = JobData("Importing", scene, depsgraph.view_layer)
     data.add_objects(grounds)
     given = (scene, depsgraph, path, grounds, mix, least, code, factor, shift, new, seed)
     return guarded(data, _canopy_steps(*given))
