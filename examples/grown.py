@@ -28,8 +28,8 @@ from .paper.pictures import save_sheet
 from .seasons import LOOKS, sky
 
 ROOT = Path(__file__).resolve().parent.parent
-YEARS = (8, 25, 70, 160)
-SIZE, SAMPLES = (740, 420), 64
+YEARS = (8, 25, 70, 150)
+SIZE, SAMPLES = (740, 420), 24
 #: Species and their shares of the seeds that arrive.
 SEEDS = {
     "birch": 5.0,
@@ -47,6 +47,8 @@ SEEDS = {
 _SIDE, _LAND, _ROLL = 100.0, 340.0, 1.4
 _EYE, _AHEAD, _LENS = (-22.0, -112.0, 15.0), (0.0, 0.0, 9.0), 34.0
 _SUN = (36.0, 238.0)
+#: Fraction below which space counts as hidden: between trunks one sees far.
+_HIDDEN = 0.001
 
 
 def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
@@ -76,6 +78,7 @@ def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
     camera.rotation_euler = (Vector(_AHEAD) - Vector(_EYE)).to_track_quat('-Z', 'Y').to_euler()
     scene.collection.objects.link(camera)
     scene.camera = camera
+    scene.tetflora.hidden = _HIDDEN
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", 'SUN'))
     sun.data.energy, sun.data.angle, sun.data.color = 5.0, radians(0.6), (1.0, 0.94, 0.85)
     sun.rotation_euler = (radians(90 - _SUN[0]), 0.0, radians(180.0 - _SUN[1]))
@@ -109,7 +112,7 @@ def render_grown(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
             field.tetflora.stand_year = year
             bpy.context.view_layer.update()
             made.append(Path(folder) / f"{year}.png")
-            render(made[-1], size, samples, 0.42)
+            render(made[-1], size, samples, 0.42, beyond=0.05)
         names = [f"{year} years" for year in YEARS]
         save_sheet(list(zip(made, names, strict=True)), 2, path)
 
