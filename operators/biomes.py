@@ -106,12 +106,18 @@ class TETFLORA_OT_add_biome(_Planting, bpy.types.Operator):
 class TETFLORA_OT_update_biome(_Planting, bpy.types.Operator):
     """Plant all layers of the active biome again by their settings, its mask and its limits, and renew the soil.
 
-    Frozen layers stay as they are.
+    Frozen layers, and stands of which a year is kept, stay as they are.
     """
 
     bl_idname = "tetflora.update_biome"
     bl_label = "Update Biome"
     needs = (in_object_mode, _biome_exists)
+    cancelled = "Stopped; layers that were done already keep their new plants"
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        super().cancel(context)
+        if bpy.ops.ed.undo_push.poll():
+            bpy.ops.ed.undo_push(message=self.bl_label)  # what was done so far can be undone
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Added]:
         return plant_biome_steps(context.scene, context.evaluated_depsgraph_get(), active_biome(context.scene))

@@ -166,10 +166,11 @@ _kept: dict[bytes, WetGround] = {}  # the last one, by content: layers of plants
 def wet_ground(triangles: NDArray[np.float64]) -> WetGround:
     """How wet a ground (t, 3, 3) is; that of the last one is kept."""
     key = blake2b(np.ascontiguousarray(triangles).data, digest_size=16).digest()
-    if key not in _kept:
+    made = _kept.get(key)  # other threads may forget it meanwhile
+    if made is None:
         cell = cell_for(triangles, _FINEST, _MOST)
         grid = height_grid(triangles, cell)
         made = WetGround(grid, wetness(grid.height, cell))
         _kept.clear()
         _kept[key] = made
-    return _kept[key]
+    return made

@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import bpy
 
-from ...errors import SceneError
+from ...errors import SceneError, TetFloraError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...species.fallen import KIND as FALLEN_LEAVES
@@ -31,7 +31,7 @@ from ..species.edits import catalogue, new_identifier, revert_species, species_d
 from ..stands.growing import again_steps, is_stand
 from .biome import Biome, find_biome, layers_of, pages_of, set_limits
 from .ground import lay_soil, make_line
-from .stands import grow_layer_steps, stands_of
+from .stands import grow_layer_steps, growing_of
 
 _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
 
@@ -123,7 +123,7 @@ def _add_steps(
 def plant_biome_steps(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, biome: bpy.types.PropertyGroup
 ) -> Generator[Progress, object, Added]:
-    """Plant all layers of a biome again by their settings, but those that are frozen.
+    """Plant all layers of a biome again by their settings, but frozen ones and stands of which a year is kept.
 
     Raises
     ------
@@ -157,23 +157,33 @@ def _grow(
 def _plant_again(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str
 ) -> Generator[Progress, object, Added]:
-    stands, made = stands_of(scene, uid), []
+    stands, made, bare = growing_of(scene, uid), [], []
     for number, field in enumerate(stands):
-        begin, end = (_STANDS * n / len(stands) for n in (number, number + 1))
-        with closing(again_steps(scene, depsgraph, field)) as steps:
-            grown = yield from _within(steps, begin, end, field.name)
-        made.append((field.name, grown.plants))
-    return (yield from _plant(scene, depsgraph, uid, made))
+        (begin, end), name = (_STANDS * n / len(stands) for n in (number, number + 1)), field.name
+        try:
+            with closing(again_steps(scene, depsgraph, field)) as steps:
+                grown = yield from _within(steps, begin, end, name)
+        except GoneError:
+            raise
+        except TetFloraError as error:
+            bare.append(str(error))
+            continue
+        made.append((name, grown.plants))
+    return (yield from _plant(scene, depsgraph, uid, made, bare))
 
 
 def _plant(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str, stands: list[tuple[str, int]]
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    uid: str,
+    stands: Sequence[tuple[str, int]],
+    without: Sequence[str] = (),
 ) -> Generator[Progress, object, Added]:
-    """Plants of all layers, one after the other, and the soil under them."""
+    """Plants of all layers, one after the other, and the soil under them; ``without`` tells of stands that failed."""
     first = _STANDS if stands else 0.0
     yield Progress(first, "Planting")
     names = [population.uid for population in layers_of(scene, uid) if not population.frozen]
-    layers, bare = list(stands), []
+    layers, bare = list(stands), list(without)
     for number, name in enumerate(names):
         depsgraph.update()  # plants of the layers before shade the ground, and keep others away
         population = _layer(scene, name)
@@ -265,6 +275,7 @@ def _restored(scene: bpy.types.Scene) -> Iterator[None]:
     group = scene.tetflora
     before = {p.uid for p in group.populations} | {b.uid for b in group.biomes}
     species = {edit.identifier for edit in group.species_edits}
+    stands = {obj.session_uid for obj in scene.objects if is_stand(obj)}
     active = group.populations_index, group.biomes_index
     try:
         yield
@@ -276,7 +287,8 @@ def _restored(scene: bpy.types.Scene) -> Iterator[None]:
                 if group.biomes[index].paths is not None:
                     bpy.data.batch_remove([*group.biomes[index].paths.objects, group.biomes[index].paths])
                 group.biomes.remove(index)
-            remove_fields([o for o in scene.objects if is_stand(o) and o.tetflora.stand.biome not in {"", *before}])
+            new = (o for o in scene.objects if is_stand(o) and o.session_uid not in stands)
+            remove_fields([o for o in new if o.tetflora.stand.biome not in {"", *before}])
             group.populations_index, group.biomes_index = active
             for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
                 revert_species(identifier)
@@ -284,11 +296,11 @@ def _restored(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 def remove_biome(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> int:
-    """Remove a biome with its populations and their plants; those of frozen ones stay. How many plants went."""
+    """Remove a biome with its plants; those of frozen populations and of kept years stay. How many plants went."""
     uid, group, number = biome.uid, scene.tetflora, 0
     for index in [i for i, p in enumerate(group.populations) if p.biome == uid][::-1]:
         number += remove_population(scene, index)
-    remove_fields(stands_of(scene, uid))
+    remove_fields(growing_of(scene, uid))
     group.biomes.remove(next(i for i, b in enumerate(group.biomes) if b.uid == uid))
     group.biomes_index = max(min(group.biomes_index, len(group.biomes) - 1), 0)
     return number

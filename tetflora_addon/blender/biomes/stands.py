@@ -17,6 +17,7 @@ from ...jobs import Progress
 from ..placing.file_checks import check_keys, check_text, check_value, list_of, value_for
 from ..placing.plant_objects import link_field
 from ..runtime import is_there
+from ..scene.field_sizes import has_history
 from ..scene.fields import write_field
 from ..stands.growing import GrownStand, again_steps, is_stand
 
@@ -60,6 +61,11 @@ def check_stand(where: str, layer: dict[str, Any]) -> None:
 def stands_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
     """Fields of a biome that are stands."""
     return [obj for obj in scene.objects if is_stand(obj) and obj.tetflora.stand.biome == uid]
+
+
+def growing_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
+    """Those of them that have their years, and may be grown again: *Keep Year* makes a stand the artist's own."""
+    return [obj for obj in stands_of(scene, uid) if has_history(obj) and not (obj.library or obj.data.library)]
 
 
 def grow_layer_steps(
