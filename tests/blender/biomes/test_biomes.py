@@ -20,6 +20,7 @@ from tetflora_addon.blender.biomes import biome as parts
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.preferences import preferences
 from tetflora_addon.blender.species.edits import catalogue
+from tetflora_addon.blender.stands.growing import keep_year
 from tetflora_addon.blender.worker import at_once
 from tetflora_addon.errors import SceneError, TetFloraError
 from tetflora_addon.species.fallen import KIND
@@ -190,6 +191,26 @@ def test_a_stand_is_a_layer():
     assert 0 < len(field.data.vertices) < number
     adding.remove_biome(scene(), scene().tetflora.biomes[0])
     assert [o for o in scene().objects if o.tetflora.is_field] == []
+
+
+def test_stands_that_are_not_the_biomes_to_change_stay():
+    """One of which a year was kept, and one that came from elsewhere."""
+    land = add_mesh("ground", size=10.0)
+    add(small(layers=[STAND, SMALL["layers"][0]]), land)
+    (biome,) = scene().tetflora.biomes
+    (field,) = stands.stands_of(scene(), biome.uid)
+    keep_year(field)
+    mesh, foreign = field.data, field.copy()
+    foreign.tetflora.stand.biome = "of another file"
+    scene().collection.objects.link(foreign)
+    at_once(adding.plant_biome_steps(scene(), depsgraph(), biome))
+    assert field.data == mesh
+    steps = adding.add_biome_steps(scene(), depsgraph(), small(), [land], 1)
+    for _ in range(4):
+        next(steps)
+    steps.close()
+    adding.remove_biome(scene(), scene().tetflora.biomes[0])
+    assert {o for o in scene().objects if o.tetflora.is_field} == {field, foreign}
 
 
 def test_neighbours_blend():
