@@ -114,10 +114,15 @@ class TETFLORA_OT_update_biome(_Planting, bpy.types.Operator):
     needs = (in_object_mode, _biome_exists)
     cancelled = "Stopped; layers that were done already keep their new plants"
 
-    def cancel(self, context: bpy.types.Context) -> None:
-        super().cancel(context)
-        if bpy.ops.ed.undo_push.poll():
-            bpy.ops.ed.undo_push(message=self.bl_label)  # what was done so far can be undone
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        result = {'CANCELLED'}
+        try:
+            result = super().modal(context, event)
+        finally:
+            # What was done so far can be undone. Not in `cancel`: Blender calls that also as it loads files and quits.
+            if result == {'CANCELLED'} and bpy.ops.ed.undo_push.poll():
+                bpy.ops.ed.undo_push(message=self.bl_label)
+        return result
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Added]:
         return plant_biome_steps(context.scene, context.evaluated_depsgraph_get(), active_biome(context.scene))
@@ -129,7 +134,7 @@ class TETFLORA_OT_update_biome(_Planting, bpy.types.Operator):
 class TETFLORA_OT_remove_biome(Reporting, bpy.types.Operator):
     """Remove the active biome from the scene, with its layers and their plants.
 
-    Plants of frozen layers remain, and so does the ground.
+    Plants of frozen layers, and stands of which a year is kept, remain, and so does the ground.
     """
 
     bl_idname = "tetflora.remove_biome"

@@ -213,6 +213,27 @@ def test_stands_that_are_not_the_biomes_to_change_stay():
     assert {o for o in scene().objects if o.tetflora.is_field} == {field, foreign}
 
 
+def test_a_stand_that_cannot_grow_keeps_no_other_layer_from_its_plants():
+    """When the biome is added, where nothing of it is left, and when it is updated without the stand's ground."""
+    land, bushes = add_mesh("ground", size=10.0), SMALL["layers"][0]
+    added = add(small(layers=[{**STAND, "density": 0.0, "recruits": 0.0, "outside": 0.0}, bushes]), land)
+    assert [name for name, _ in added.layers] == ["Bushes"]
+    (said,) = added.bare
+    assert "Birches" in said and "Nothing is planted" in said
+    biome = scene().tetflora.biomes[0]
+    assert stands.stands_of(scene(), biome.uid) == []
+    adding.remove_biome(scene(), biome)
+    add(small(layers=[STAND, bushes]), land)
+    (biome,) = scene().tetflora.biomes
+    (field,) = stands.stands_of(scene(), biome.uid)
+    mesh = field.data
+    field.tetflora.stand.grounds.clear()
+    updated = at_once(adding.plant_biome_steps(scene(), depsgraph(), biome))
+    assert [name for name, _ in updated.layers] == ["Bushes"] and field.data == mesh
+    (said,) = updated.bare
+    assert "Birches" in said and "no ground" in said
+
+
 def test_neighbours_blend():
     """A biome with limits takes its part; one without leaves it, as much as the mask says; nothing else changes."""
     land = add_mesh("ground", size=10.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -28,7 +28,7 @@ from ..placing.populations import add_population, make_plants_steps, remove_popu
 from ..placing.rules import set_grounds
 from ..runtime import GoneError, JobData, guarded, is_there
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
-from ..stands.growing import again_steps, is_stand
+from ..stands.growing import GrownStand, again_steps, is_stand
 from .biome import Biome, find_biome, layers_of, pages_of, set_limits
 from .ground import lay_soil, make_line
 from .stands import grow_layer_steps, growing_of
@@ -101,7 +101,7 @@ def _add_steps(
         if "path_max" in biome.limits:
             made.paths = make_line(scene, f"{made.name} line", grounds)
         group.biomes_index = len(group.biomes) - 1
-        made_stands = yield from _grow(scene, depsgraph, uid, biome, renamed, grounds, seed)
+        grown = yield from _grow(scene, depsgraph, uid, biome, renamed, grounds, seed)
         for number, layer in enumerate(biome.layers):
             if layer["kind"] == "stand":
                 continue
@@ -117,7 +117,7 @@ def _add_steps(
             for entry in population.mix:
                 entry.species = renamed.get(entry.species, entry.species)
                 entry.shed_by = renamed.get(entry.shed_by, entry.shed_by)
-        return (yield from _plant(scene, depsgraph, uid, made_stands))
+        return (yield from _plant(scene, depsgraph, uid, *grown))
 
 
 def plant_biome_steps(
@@ -143,33 +143,43 @@ def _grow(
     renamed: Mapping[str, str],
     grounds: Sequence[bpy.types.Object],
     seed: int,
-) -> Generator[Progress, object, list[tuple[str, int]]]:
-    """Stands of a biome: their names, and how many plants each has."""
-    stands, made = [layer for layer in biome.layers if layer["kind"] == "stand"], []
-    for number, layer in enumerate(stands):
-        begin, end = (_STANDS * n / len(stands) for n in (number, number + 1))
-        with closing(grow_layer_steps(scene, depsgraph, uid, layer, renamed, grounds, seed)) as steps:
-            grown = yield from _within(steps, begin, end, layer["name"])
-        made.append((layer["name"], grown.plants))
-    return made
+) -> Generator[Progress, object, tuple[list[tuple[str, int]], list[str]]]:
+    """Stands of a new biome; as `_grown`."""
+    layers = [layer for layer in biome.layers if layer["kind"] == "stand"]
+    return (
+        yield from _grown(
+            [layer["name"] for layer in layers],
+            lambda number: grow_layer_steps(scene, depsgraph, uid, layers[number], renamed, grounds, seed),
+        )
+    )
+
+
+def _grown(
+    names: Sequence[str], grow: Callable[[int], Generator[Progress, object, GrownStand]]
+) -> Generator[Progress, object, tuple[list[tuple[str, int]], list[str]]]:
+    """Grow stands by their numbers: names and numbers of plants of those that grew, and why others did not."""
+    made, bare = [], []
+    for number, name in enumerate(names):
+        begin, end = (_STANDS * n / len(names) for n in (number, number + 1))
+        try:
+            with closing(grow(number)) as steps:
+                grown = yield from _within(steps, begin, end, name)
+        except GoneError:
+            raise
+        except TetFloraError as error:
+            text = str(error)  # some begin with the name of the field
+            bare.append(text if text.startswith(f'"{name}"') else f"{name}: {text}")
+            continue
+        made.append((name, grown.plants))
+    return made, bare
 
 
 def _plant_again(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str
 ) -> Generator[Progress, object, Added]:
-    stands, made, bare = growing_of(scene, uid), [], []
-    for number, field in enumerate(stands):
-        (begin, end), name = (_STANDS * n / len(stands) for n in (number, number + 1)), field.name
-        try:
-            with closing(again_steps(scene, depsgraph, field)) as steps:
-                grown = yield from _within(steps, begin, end, name)
-        except GoneError:
-            raise
-        except TetFloraError as error:
-            bare.append(str(error))
-            continue
-        made.append((name, grown.plants))
-    return (yield from _plant(scene, depsgraph, uid, made, bare))
+    fields = growing_of(scene, uid)
+    grown = yield from _grown([field.name for field in fields], lambda n: again_steps(scene, depsgraph, fields[n]))
+    return (yield from _plant(scene, depsgraph, uid, *grown))
 
 
 def _plant(
