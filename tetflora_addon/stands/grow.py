@@ -283,6 +283,8 @@ class GrowingStand:
         tall = np.flatnonzero(end[0].height >= self.settings.least_height)
         known = Records.concatenate([*self.kept, end[0].take(tall), end[1]])
         first = in_order(known)
+        if not len(first):
+            return first
         # A dead tree that falls in the last year is recorded twice: the same row.
         again = np.flatnonzero(
             np.append(True, (first.plant[1:] != first.plant[:-1]) | (first.year[1:] != first.year[:-1]))

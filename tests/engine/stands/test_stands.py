@@ -209,6 +209,10 @@ def test_sites_that_cannot_be_are_refused() -> None:
         at_once(grow(even_site(20.0, winter=-40.0), MIXED[:1], YEARS))
 
 
+def test_a_stand_in_which_nothing_is_tall_enough_has_no_records() -> None:
+    assert not len(at_once(grow(even_site(20.0), MIXED, replace(YEARS, years=2, least_height=150.0))))
+
+
 def test_species_suit_their_climate() -> None:
     needs = Ecology(warmth=600.0, winter=-10.0, drought=3.0, waterlogging=1.0)
     high = StandSite(0, 0, 1.0, np.linspace(0, 2500, 50)[None, :], warmth=1700.0, winter=0.0)
