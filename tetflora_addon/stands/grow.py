@@ -67,7 +67,7 @@ class StandSettings:
     )
     outside: float = setting(
         1.0,
-        "Seeds from Outside",
+        "Seed Rain",
         "Factor on the seeds that arrive from beyond the ground; at 0, only the stand itself bears seeds",
         min=0.0,
         soft_max=10.0,
@@ -136,7 +136,7 @@ def _check(settings: StandSettings) -> None:
         ("Interval", settings.interval, 0, 2000),
         ("Planted", settings.density, 0, 1e7),
         ("Seedlings", settings.recruits, 0, 1e6),
-        ("Seeds from Outside", settings.outside, 0, 1e6),
+        ("Seed Rain", settings.outside, 0, 1e6),
         ("Min Height", settings.least_height, 0, 200),
         ("Cell", settings.cell, 0.05, 50),
     ):
@@ -177,9 +177,7 @@ class GrowingStand:
             alive = given.take(np.flatnonzero(given.dead == 0))
             self.plants = Plants.concatenate([self.plants, self._given(alive, suits)])
         if not len(self.plants) and settings.recruits * settings.outside * guilds.rain.sum() <= 0.0:
-            raise TetFloraError(
-                "Nothing is planted and no seeds come; raise Planted, or Seedlings and Seeds from Outside"
-            )
+            raise TetFloraError("Nothing is planted and no seeds come; raise Planted, or Seedlings and Seed Rain")
         self.seeds = SeedRain(site, guilds, suits, settings.recruits, settings.outside)
         self.count, self.dead, self.kept = len(self.plants), DeadPlants.empty(), []
 

@@ -9,17 +9,13 @@ from math import radians
 from typing import Any
 
 import bpy
-import numpy as np
 
 from ...errors import shown
 from ...files import IDENTIFIER_RULE, is_identifier
 from ...jobs import Progress
 from ..placing.file_checks import check_keys, check_text, check_value, list_of, value_for
-from ..placing.plant_objects import link_field
-from ..runtime import is_there
 from ..scene.field_sizes import has_history
-from ..scene.fields import write_field
-from ..stands.growing import GrownStand, again_steps, is_stand
+from ..stands.growing import GrownStand, is_stand, new_stand_steps
 
 #: Keys of a species of a stand.
 _ENTRY = ("species", "planted", "rain")
@@ -84,12 +80,8 @@ def grow_layer_steps(
     SceneError
         Nothing can grow.
     """
-    field = write_field(
-        layer["name"], np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ()
-    )
-    mesh, made = field.data, False
-    try:
-        stand = field.tetflora.stand
+
+    def fill(stand: bpy.types.PropertyGroup) -> None:
         for name, prop in _settings().items():
             if name in layer:
                 setattr(stand, name, radians(layer[name]) if prop.subtype == 'ANGLE' else layer[name])
@@ -98,21 +90,8 @@ def grow_layer_steps(
             entry = stand.species.add()
             for key, value in part.items():
                 setattr(entry, key, renamed.get(value, value) if key == "species" else value)
-        for obj in grounds:
-            stand.grounds.add().object = obj
-        grown = yield from again_steps(scene, depsgraph, field)
-        group = field.tetflora
-        group.stand.is_grown, made = True, True
-        group.stand_year = float(group.stand.years)
-        field.display_type = 'BOUNDS'  # its points are plants of all years
-        link_field(scene, field)
-        return grown
-    finally:
-        if not made:
-            if is_there(field):
-                bpy.data.objects.remove(field)
-            if is_there(mesh) and not mesh.users:
-                bpy.data.meshes.remove(mesh)
+
+    return new_stand_steps(scene, depsgraph, grounds, layer["name"], fill)
 
 
 def stand_data(field: bpy.types.Object) -> dict[str, Any]:

@@ -25,8 +25,8 @@ from ...places.outlines import BUILDING, KINDS, WATER, MapFeature, denser, one_r
 from ...planting.height_grid import HeightGrid
 from ..compat import shader_tree
 from ..placing.terrain import HALF_WIDTH
-from ..runtime import JobData, guarded
 from ..worker import call_in_thread
+from .jobs import importing
 from .origin import in_scene, origin_for, remember
 from .terrain import grounds_in, heights_steps
 
@@ -58,6 +58,7 @@ class Drawn:
     number: Counter
 
 
+@importing
 def outline_steps(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
@@ -82,19 +83,6 @@ def outline_steps(
     SceneError
         The file is broken, or cannot lie in this scene.
     """
-    data = JobData("Importing", scene, depsgraph.view_layer)
-    data.add_objects(grounds)
-    return guarded(data, _steps(scene, depsgraph, path, grounds, code, new))
-
-
-def _steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    grounds: list[bpy.types.Object],
-    code: int,
-    new: bool,
-) -> Generator[Progress, Any, Drawn]:
     progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
     yield progress
     try:

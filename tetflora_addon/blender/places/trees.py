@@ -28,12 +28,12 @@ from ...planting.rules import species_by_weight
 from ...species.species import Species
 from ..attributes import write
 from ..placing.plant_objects import add_field
-from ..runtime import JobData, guarded
 from ..scene.own_ages import Sizes
 from ..scene.sizes import fits_of
 from ..species.edits import catalogue, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .completion import complete
+from .jobs import importing
 from .origin import in_scene, origin_for, remember
 from .rasters import read_raster
 from .terrain import grounds_in, heights_steps
@@ -83,6 +83,7 @@ class Planted:
     inventory: Inventory | None = None
 
 
+@importing
 def inventory_steps(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
@@ -113,24 +114,6 @@ def inventory_steps(
     SceneError
         The file is broken, or cannot lie in this scene.
     """
-    data = JobData("Importing", scene, depsgraph.view_layer)
-    data.add_objects(grounds)
-    given = (scene, depsgraph, path, grounds, unknown, code, units, skip, new, seed)
-    return guarded(data, _inventory_steps(*given))
-
-
-def _inventory_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    grounds: list[bpy.types.Object],
-    unknown: str,
-    code: int,
-    units: str,
-    skip: bool,
-    new: bool,
-    seed: int,
-) -> Generator[Progress, Any, Planted]:
     progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
     yield progress
     try:
@@ -174,6 +157,7 @@ def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[st
     return identifiers, np.array([index.get(kind, -1) for kind in chosen], np.int32)[inventory.name]
 
 
+@importing
 def canopy_steps(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
@@ -204,25 +188,6 @@ def canopy_steps(
     SceneError
         The file is broken, has no trees, or cannot lie in this scene.
     """
-    data = JobData("Importing", scene, depsgraph.view_layer)
-    data.add_objects(grounds)
-    given = (scene, depsgraph, path, grounds, mix, least, code, factor, shift, new, seed)
-    return guarded(data, _canopy_steps(*given))
-
-
-def _canopy_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    grounds: list[bpy.types.Object],
-    mix: Mapping[str, float],
-    least: float,
-    code: int,
-    factor: float,
-    shift: float,
-    new: bool,
-    seed: int,
-) -> Generator[Progress, Any, Planted]:
     raster = yield from read_raster(path, code, factor, shift)
     what = f"{path.name}: "
     place = origin_for(scene, raster.system, raster.outline, new, what)

@@ -97,16 +97,16 @@ def sized(
                 scale[own] *= measure_of(species).fitted(seeds.take(own), sizes.take(own))[0]
                 continue
             some = sizes.take(own)
-            stages, which = np.unique(_stages(species, some, index), return_inverse=True)
-            for n, stage in enumerate(stages.tolist()):
-                here = which == n
+            stages, which = np.unique(_stages(species, some, index), axis=0, return_inverse=True)
+            for n, (age, dead) in enumerate(stages.tolist()):
+                here = which.reshape(-1) == n
                 these = own[here]
-                still = some.lives is None or stage.imag
-                measure = measure_of(at_age(species, stage.real)) if still else _grown(species, stage.real)
+                still = some.lives is None or dead
+                measure = measure_of(at_age(species, age)) if still else _grown(species, age)
                 own_scale, own_crown = measure.fitted(seeds.take(these), some.take(here))
                 scale[these] *= own_scale
                 crown[these], number[these] = own_crown, len(kinds)
-                kinds.append(aged_kind(kind, stage.real, stage.imag))
+                kinds.append(aged_kind(kind, age, dead))
             if left is not None:
                 left[own] = 0.0
     plain = (crown == PLAIN).all()
@@ -136,12 +136,12 @@ def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> NDArr
 
 def kinds_of_sizes(species: Species, sizes: Sizes) -> list[Species]:
     """A species in all stages that plants of recorded sizes (n,) are shown in when they stand still."""
-    stages = np.unique(_stages(species, sizes, 0)).tolist()
-    return [at_age(species, stage.real, dead) for stage in stages for dead in {0.0, stage.imag}]
+    stages = np.unique(_stages(species, sizes, 0), axis=0).tolist()
+    return [at_age(species, age, since) for age, dead in stages for since in {0.0, dead}]
 
 
-def _stages(species: Species, sizes: Sizes, number: int) -> NDArray[np.complex128]:
-    """Age (n,) as the real part, and years since death as the imaginary one, of the kind that each plant belongs to.
+def _stages(species: Species, sizes: Sizes, number: int) -> NDArray[np.float64]:
+    """Age and years since death (n, 2) of the kind that each plant belongs to.
 
     ``number`` is that of their kind in the field.
     """
@@ -149,7 +149,7 @@ def _stages(species: Species, sizes: Sizes, number: int) -> NDArray[np.complex12
     full = measure_of(species).height
     dead, height = sizes.dead, np.where(sizes.height > 0.0, sizes.height, full)
     if ages.scaled:
-        return np.full(len(height), ages.full, complex)
+        return np.tile([ages.full, 0.0], (len(height), 1))
     if sizes.lives is None:
         years, older = _class_ages(species, height / full, 1), _class_ages(species, height / full, 2)
         gone = _SINCE[np.argmin(np.abs(np.log(np.maximum(dead, 0.1)[:, None] / _SINCE)), axis=1)]
@@ -157,7 +157,8 @@ def _stages(species: Species, sizes: Sizes, number: int) -> NDArray[np.complex12
         years = _cohort_ages(species, sizes.lives, number, full)[sizes.plant]
         now, older = sizes.lives.now, _class_ages(species, height / full, 3)  # leafless, they differ less
         gone = np.maximum(now - _DEATHS * np.rint((now - dead) / _DEATHS), 0.01)
-    return np.where(dead > 0.0, older + 1j * gone, years + 0j)
+    died = dead > 0.0
+    return np.column_stack([np.where(died, older, years), np.where(died, gone, 0.0)])
 
 
 def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 
@@ -100,9 +100,13 @@ def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup)
 
 
 def new_stand_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Iterable[bpy.types.Object]
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    grounds: Iterable[bpy.types.Object],
+    name: str = NAME,
+    fill: Callable[[bpy.types.PropertyGroup], None] | None = None,
 ) -> Generator[Progress, object, GrownStand]:
-    """Grow a stand on meshes by the scene's settings for new ones.
+    """Grow a stand on meshes, by settings that a function fills in or by those of the scene for new ones.
 
     Closing the steps, or an error, leaves the scene as it was.
 
@@ -114,7 +118,7 @@ def new_stand_steps(
     grounds = list(grounds)
     data = JobData("Growing the stand", scene, depsgraph.view_layer)
     data.add_objects(grounds)
-    return guarded(data, _new_stand_steps(data, scene, depsgraph, grounds))
+    return guarded(data, _new_stand_steps(data, scene, depsgraph, grounds, name, fill))
 
 
 def again_steps(
@@ -128,14 +132,22 @@ def again_steps(
 
 
 def _new_stand_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: list[bpy.types.Object]
+    data: JobData,
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    grounds: list[bpy.types.Object],
+    name: str,
+    fill: Callable[[bpy.types.PropertyGroup], None] | None,
 ) -> Generator[Progress, object, GrownStand]:
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
-    field = write_field(NAME, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ())
+    field = write_field(name, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ())
     mesh, made = field.data, False
     try:
         stand = field.tetflora.stand
-        copy_stand(scene.tetflora.stand, stand)
+        if fill is None:
+            copy_stand(scene.tetflora.stand, stand)
+        else:
+            fill(stand)
         for obj in grounds:
             stand.grounds.add().object = obj
         grown = yield from _again_steps(data, scene, depsgraph, field, grounds)
