@@ -43,7 +43,7 @@ PANELS = {
     "preview": ("TETFLORA_PT_preview",),
     "statistics": ("TETFLORA_PT_statistics",),
     "species": ("TETFLORA_PT_species", "TETFLORA_PT_species_whole"),
-    "stand": ("TETFLORA_PT_stand", "TETFLORA_PT_stand_site", "TETFLORA_PT_stand_detail"),
+    "stand": ("TETFLORA_PT_stand", "TETFLORA_PT_stand_site"),
     "biomes": ("TETFLORA_PT_biomes", "TETFLORA_PT_biome_limits"),
 }
 
