@@ -2,23 +2,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Import real places: terrain, trees that were measured or seen from above, and outlines of a map."""
 
+import json
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
+from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE
 from ..tetflora_addon.blender.places.outlines import Drawn, outline_steps, told
 from ..tetflora_addon.blender.places.rasters import PATTERN
 from ..tetflora_addon.blender.places.terrain import ImportedGround, terrain_steps
 from ..tetflora_addon.blender.places.trees import GENERIC, LEFT_OUT, Planted, canopy_steps, inventory_steps
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
-from ..tetflora_addon.errors import readable
+from ..tetflora_addon.errors import SceneError, TetFloraError, readable
 from ..tetflora_addon.jobs import Progress
-from ..tetflora_addon.places.inventories import IMPERIAL, METRIC
+from ..tetflora_addon.places.inventories import IMPERIAL, METRIC, preview
 from ..tetflora_addon.places.species_names import told as names_told
+from ..tetflora_addon.places.titles import FIELDS
 from .add import mix_in, parse_weights
 from .base import ModalJob, counted, in_object_mode, select_only
 from .populations import selected_grounds
@@ -146,14 +149,44 @@ class _Trees(_Importing):
         inventory = result.inventory
         if inventory is not None and inventory.skipped:
             parts.append(f"{counted(inventory.skipped, 'broken row')} skipped, the first: {inventory.first}")
+        if inventory is not None and inventory.left_out:
+            parts.append(f"rows without a tree left out: {names_told(inventory.left_out)}")
         if result.unknown:
             left = " and left out" if result.left_out else ""
-            parts.insert(1, f"{result.unknown.total():,} of unknown species{left}: {names_told(result.unknown)}")
+            parts.insert(1, f"{result.unknown.total():,} of unknown species{left}: {names_told(result.unknown, 25)}")
         text = readable("; ".join(parts))
         if not result.unknown and not (inventory is not None and inventory.skipped):
             return self.done(text)
         self.report({'WARNING'}, text)
         return {'FINISHED'}
+
+
+class TETFLORA_PG_inventory_column(bpy.types.PropertyGroup):
+    """A column of an inventory, and what it is taken for."""
+
+    field: EnumProperty(
+        name="Meaning",
+        description="What the column holds",
+        items=[(name.upper() or 'NONE', label, "") for name, label in FIELDS.items()],
+    )
+    unit: EnumProperty(
+        name="Unit",
+        description="Unit of its numbers, where they and the title name none",
+        items=[('AUTO', "Automatic", ""), *((unit, unit, "") for unit in ("m", "cm", "mm", "ft", "in"))],
+    )
+    values: StringProperty(name="Values", description="Some of its values")
+
+
+class TETFLORA_UL_inventory_columns(bpy.types.UIList):
+    """Columns of an inventory: title, some values, and what they are taken for."""
+
+    def draw_item(self, _context, layout, _data, item, *_) -> None:
+        row = layout.split(factor=0.25)
+        row.label(text=item.name, translate=False)
+        row = row.split(factor=0.45)
+        row.label(text=item.values, translate=False)
+        row.prop(item, "field", text="")
+        row.prop(item, "unit", text="")
 
 
 class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
@@ -196,14 +229,85 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
         options=_UNLINKED,
     )
 
+    columns: StringProperty(
+        name="Columns",
+        description=(
+            "JSON object of what columns hold, for those whose titles and values do not tell it: "
+            '{"Hoogte dm": "height", "X1": "crown_width ft", "X2": ""}'
+        ),
+        options=_UNLINKED,
+    )
+    crop: EnumProperty(
+        name="Crop",
+        description="What to leave out of a large area",
+        items=(
+            (WHOLE, "Nothing", "All of the file"),
+            (MIDDLE, "To Its Middle", "A square around the middle"),
+            (EXISTING, "To the Scene", "The selected meshes or imported terrain, or else all that the scene has"),
+        ),
+        default=WHOLE,
+        options=_UNLINKED,
+    )
+    crop_size: FloatProperty(
+        name="Side",
+        description="Side of the square",
+        default=2000.0,
+        min=1.0,
+        soft_max=20_000.0,
+        max=500_000.0,
+        unit='LENGTH',
+        options=_UNLINKED,
+    )
+    table: CollectionProperty(type=TETFLORA_PG_inventory_column, options={'HIDDEN', 'SKIP_SAVE'})
+    active: IntProperty(options={'HIDDEN', 'SKIP_SAVE'})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if not self.chosen or self.columns:
+            return super().invoke(context, event)
+        try:
+            self.show(self.path)
+        except (OSError, TetFloraError) as error:
+            return self.failed(str(error))
+        self._browsing = True
+        return context.window_manager.invoke_props_dialog(self, width=720, title="Columns of the Inventory")
+
+    def show(self, path: Path) -> None:
+        """Fill the table with the columns of a file."""
+        self.table.clear()
+        for column in preview(path):
+            row = self.table.add()
+            row.name, row.field = column.title, column.field.upper() or 'NONE'
+            row.values = ", ".join(column.values)
+
+    def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
+        """Settings of another call, which takes columns as the table has them."""
+        found = super().as_keywords(ignore=(*ignore, "table", "active"))
+        chosen = {
+            row.name: ("" if row.field == 'NONE' else row.field.lower())
+            + (f" {row.unit}" if row.unit != 'AUTO' else "")
+            for row in self.table
+        }
+        return found | ({"columns": json.dumps(chosen)} if chosen else {})
+
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
+        if self.table:
+            rows = min(max(len(self.table), 4), 16)
+            layout.template_list(
+                TETFLORA_UL_inventory_columns.__name__, "", self, "table", self, "active", rows=rows, maxrows=rows
+            )
         layout.use_property_split = True
-        for name in ("units", "unknown", "species", "skip", "code", "new_origin"):
-            if name != "species" or self.unknown == 'SPECIES':
+        for name in ("units", "unknown", "species", "skip", "code", "new_origin", "crop", "crop_size"):
+            if (name != "species" or self.unknown == 'SPECIES') and (name != "crop_size" or self.crop == MIDDLE):
                 layout.prop(self, name)
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
+        try:
+            columns = json.loads(self.columns or "{}")
+        except ValueError as error:
+            raise SceneError(f"Columns is not valid JSON: {error}") from None
+        if not isinstance(columns, dict) or not all(isinstance(text, str) for text in columns.values()):
+            raise SceneError('Columns is no JSON object of texts, such as {"H": "height"}')
         chosen = self.species if self.unknown == 'SPECIES' and self.species != NO_SPECIES else self.unknown
         return inventory_steps(
             context.scene,
@@ -215,6 +319,8 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
             self.units,
             self.skip,
             self.new_origin,
+            columns=columns,
+            crop=(self.crop, self.crop_size),
         )
 
     def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
@@ -294,6 +400,8 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
 
 
 CLASSES = (
+    TETFLORA_PG_inventory_column,
+    TETFLORA_UL_inventory_columns,
     TETFLORA_OT_import_terrain,
     TETFLORA_OT_import_canopy,
     TETFLORA_OT_import_inventory,

@@ -4,33 +4,25 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 import re
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
-from .projection import LONGITUDE_LATITUDE, System, system_of
-from .species_names import is_name, key_of, plain_words, species_named, table
+from .cells import NOTHING, NUMBER, RANGE, WORD, cells, place_in
+from .projection import LONGITUDE_LATITUDE, MOST_AWAY, System, between, place_about, system_of
+from .species_names import KIND, is_name, key_of, species_named
 from .tables import Table, read_csv, read_points
+from .titles import FIELDS, NAMES, NEVER, Title, meaning, read_title, said_of
 
-#: Metres of units that a header may name.
-_UNITS = {
-    **dict.fromkeys(("m", "meter", "metre", "meters", "metres", "metri", "metros"), 1.0),
-    **dict.fromkeys(("dm",), 0.1),
-    **dict.fromkeys(("cm", "centimeter", "centimetre", "centimeters", "centimetres", "centimetri"), 0.01),
-    **dict.fromkeys(("mm",), 0.001),
-    **dict.fromkeys(("ft", "feet", "foot"), 0.3048),
-    **dict.fromkeys(("in", "inch", "inches"), 0.0254),
-}
-_FILLERS = {"in", "en", "of", "baum", "tree"}
-#: Texts that stand for a value that nobody knows.
-_MISSING = ("", "-", "--", "?", "na", "n/a", "nan", "none", "null", "unknown", "unbekannt", "k.a.", "n.d.", "nd", ".")
 #: Largest value of each size, metres or years: taller than any tree that lives.
 _MOST = {
     "height": 150.0,
@@ -41,13 +33,18 @@ _MOST = {
     "crown_base": 120.0,
     "age": 10_000.0,
 }
-#: Medians of trunks without a unit, metres, beyond which it was centimetres, and beyond which millimetres.
-_TRUNKS = {"diameter": (2.5, 150.0), "girth": (8.0, 500.0)}
+_TRUNKS = ("diameter", "girth")
+#: Medians without a unit, metres, beyond which it was centimetres, and beyond which millimetres.
+_SMALLER = {"diameter": (2.5, 150.0), "girth": (8.0, 500.0)}
 #: Years since the death of trees of which only is known that they are dead: twigs have fallen, limbs have not.
 DEAD_YEARS = 5.0
 _SPREAD = 2.0  # degrees within which all points of an inventory may lie that calls degrees x and y
 #: Choices of units.
 METRIC, IMPERIAL = 'METRIC', 'IMPERIAL'
+_PREVIEWED, _SAMPLE, _SHOWN = 300, 60, 3  # rows that are looked at, values of them, and values that are shown
+_CLASSES = 12  # the most that a class of sizes is numbered
+_YEAR = re.compile(r"(?<!\d)(1[5-9]\d\d|20\d\d)(?!\d)")
+_NAMED = 6  # rows that a message names
 
 
 @dataclass(frozen=True)
@@ -67,11 +64,13 @@ class Inventory:
         ``height``, ``diameter`` (of the trunk), ``crown_width``, ``crown_base``, ``age`` and ``dead`` (years since
         then), each (n,) float32.
     notes : list of str
-        What was guessed, and which columns were not used.
+        What was guessed, and which columns were used and which not.
     skipped : int
         Rows that were broken.
     first : str
         What was wrong with the first of them.
+    left_out : Counter
+        Rows that are no trees, by what they are.
     """
 
     names: tuple[tuple[str, ...], ...]
@@ -82,9 +81,20 @@ class Inventory:
     notes: list[str] = field(default_factory=list)
     skipped: int = 0
     first: str = ""
+    left_out: Counter = field(default_factory=Counter)
 
 
-def read_inventory(path: Path, code: int = 0, units: str = METRIC, skip: bool = False) -> Inventory:
+class Column(NamedTuple):
+    """A column as a dialog shows it: its title, the field that it was taken for, and some of its values."""
+
+    title: str
+    field: str
+    values: tuple[str, ...]
+
+
+def read_inventory(
+    path: Path, code: int = 0, units: str = METRIC, skip: bool = False, columns: Mapping[str, str] | None = None
+) -> Inventory:
     """Read a file.
 
     Parameters
@@ -95,6 +105,9 @@ def read_inventory(path: Path, code: int = 0, units: str = METRIC, skip: bool = 
         Of columns that do not name theirs: metres, and centimetres for trunks; or feet, and inches for trunks.
     skip : bool
         Leave out broken rows instead of refusing the file.
+    columns : mapping, optional
+        What columns hold by their titles, for those that are not to be told by title and values: one of `FIELDS`, with
+        a unit if the title does not name it, such as ``height ft``; empty for none.
 
     Raises
     ------
@@ -103,50 +116,128 @@ def read_inventory(path: Path, code: int = 0, units: str = METRIC, skip: bool = 
     SceneError
         It is broken; names line or feature, and column.
     """
-    table_ = read_points(path) if path.suffix.lower() in (".geojson", ".json") else read_csv(path)
-    if not len(table_.numbers):
-        raise SceneError(f"{table_.name}: it has no {'points' if table_.points is not None else 'rows'}")
-    return _Reading(table_, units, skip).inventory(code)
+    table_ = _table(path, skip)
+    return _Reading(table_, units, skip, _chosen(table_, columns or {})).inventory(code)
 
 
-@cache
-def _titles() -> dict[str, str]:
-    return {"".join(plain_words(title)): name for name, titles in table()["fields"].items() for title in titles}
+def preview(path: Path) -> list[Column]:
+    """Columns of a file as they are taken from its first rows.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken.
+    """
+    table_ = _table(path, True, _PREVIEWED)
+    taken = taken_for(table_, {})
+    return [
+        Column(title, taken[title].field, tuple(list(dict.fromkeys(filter(None, texts.tolist())))[:_SHOWN]))
+        for title, texts in table_.columns.items()
+    ]
 
 
-def meaning(title: str) -> tuple[str, float]:
-    """What a column holds, empty if unknown, and the metres of its unit, 0 if it names none."""
-    words = re.findall(r"[^\W_]+", title.lower())
-    unit = 0.0
-    if len(words) > 1 and words[-1] in _UNITS:
-        unit = _UNITS[words.pop()]
-        while len(words) > 1 and words[-1] in _FILLERS:
-            words.pop()
-    return _titles().get("".join(plain_words(" ".join(words))), ""), unit
+def _table(path: Path, skip: bool, most: int | None = None) -> Table:
+    read = read_points if path.suffix.lower() in (".geojson", ".json") else read_csv
+    found = read(path, skip, most)
+    if not len(found.numbers):
+        raise SceneError(found.first or f"{found.name}: it has no {'points' if found.points is not None else 'rows'}")
+    return found
+
+
+def _chosen(table_: Table, columns: Mapping[str, str]) -> dict[str, Title]:
+    """What was chosen for columns."""
+    found = {}
+    for title, text in columns.items():
+        name, _, unit = text.strip().partition(" ")
+        metres = meaning(f"height {unit}")[1] if unit else 0.0
+        why = "no such column" if title not in table_.columns else ""
+        if name not in FIELDS or (unit and not metres):
+            why = why or f"{shown(text)} is none of {', '.join(filter(None, FIELDS))}"
+        if why:
+            raise SceneError(f"{table_.name}: column {shown(title)}: {why}; correct Columns")
+        found[title] = Title(name, metres or read_title(title).unit, -1)
+    return found
+
+
+def taken_for(table_: Table, chosen: Mapping[str, Title]) -> dict[str, Title]:
+    """What each column is taken for, by its title and its first values."""
+    found, samples = dict(chosen), {}
+    for title, texts in table_.columns.items():
+        if title not in chosen:
+            sample = samples[title] = np.unique(texts[: 4 * _PREVIEWED])[: 4 * _SAMPLE]
+            sample = samples[title] = sample[sample != ""][:_SAMPLE]
+            found[title] = _confirmed(read_title(title), sample)
+    fields = {title.field for title in found.values()}
+    free = [title for title in samples if not found[title].field and found[title].doubt < NEVER]
+    if table_.points is None and not ({"longitude", "latitude"} <= fields or {"x", "y"} <= fields or "place" in fields):
+        _by_values(found, free, samples, "place", 0.9)
+    if not fields.intersection(NAMES):
+        _by_values(found, free, samples, "name", 0.5)
+    sizes = fields.intersection((*_MOST, *NAMES))
+    for title in [title for title in samples if found[title].field == "z"]:  # treetops of a laser scan
+        found[title] = found[title]._replace(field="" if sizes else "height")
+    return {title: found[title] for title in table_.columns}
+
+
+def _by_values(
+    found: dict[str, Title], free: list[str], samples: Mapping[str, NDArray[np.str_]], name: str, least: float
+) -> None:
+    """Take the column for a field whose values suit best."""
+    shares = {title: _share(name, samples[title]) for title in free}
+    best = max(shares, key=lambda title: shares[title], default="")
+    if best and shares[best] >= least:
+        found[best] = Title(name, 0.0, 1)
+
+
+def _share(name: str, sample: NDArray[np.str_]) -> float:
+    """How many of some values suit a field of names or places, 0 to 1."""
+    if name == "place":
+        fits = [not math.isnan(place_in(text)[0]) for text in sample.tolist()]
+    else:
+        matches = [species_named(text) for text in sample.tolist() if is_name(text)]
+        fits = [match is not None and match.certainty < KIND for match in matches]
+    return sum(fits) / max(len(fits), 1)
+
+
+def _confirmed(title: Title, sample: NDArray[np.str_]) -> Title:
+    """A title, or one for nothing where its values cannot be what it says."""
+    name, none = title.field, title._replace(field="")
+    if not len(sample):
+        return title
+    if name == "place":
+        return title if _share("place", sample) >= 0.5 else none
+    kinds = cells(sample)[2]
+    numbers = np.isin(kinds, (NUMBER, RANGE))
+    if name in NAMES:
+        doubtful = title.doubt > 0 and name != "leaf" and _share(name, sample) < 0.3
+        return none if numbers.all() or doubtful else title
+    if name in _MOST and not numbers.any() and (kinds == WORD).all():
+        return none
+    return title
 
 
 class _Reading:
     """One table on its way to an inventory."""
 
-    def __init__(self, table_: Table, units: str, skip: bool) -> None:
+    def __init__(self, table_: Table, units: str, skip: bool, chosen: Mapping[str, Title]) -> None:
         self.table, self.units, self.skip = table_, units, skip
         self.good = np.ones(len(table_.numbers), bool)
-        self.notes, self.first = [], ""
-        self.found: dict[str, list[tuple[str, float]]] = {}
-        unused = []
-        for title in table_.columns:
-            name, unit = meaning(title)
-            if name:
-                self.found.setdefault(name, []).append((title, unit))
-            else:
-                unused.append(title)
-        if unused:
-            self.notes.append(f"columns not used: {', '.join(unused[:12])}")
+        self.notes, self.first, self.left_out = list(table_.notes), table_.first, Counter()
+        self.found: dict[str, list[tuple[str, Title]]] = {}
+        self.used: set[str] = set()
+        taken = taken_for(table_, chosen)
+        for title, what in sorted(taken.items(), key=lambda pair: pair[1].doubt):
+            if what.field:
+                self.found.setdefault(what.field, []).append((title, what))
 
     def inventory(self, code: int) -> Inventory:
+        self._leave_out()
         sizes = {name: self._size(name) for name in _MOST}
         for name, source, factor in (("diameter", "girth", 1.0 / math.pi), ("crown_width", "crown_radius", 2.0)):
             sizes[name] = np.where(sizes[name] > 0.0, sizes[name], factor * sizes.pop(source))
+        sizes["age"] = np.where(sizes["age"] > 0.0, sizes["age"], self._since_planting())
         base, height = sizes["crown_base"], sizes["height"]
         above = (base >= height) & (height > 0.0) & (base > 0.0)
         self._refuse(above, "crown_base", lambda i: f"{base[i]:g} m is not below the height of {height[i]:g} m")
@@ -154,35 +245,83 @@ class _Reading:
         points, system = self._points(code)
         names, index = self._names()
         if not self.good.any():
-            raise SceneError(self.first or f"{self.table.name}: none of its rows can be used")
+            raise SceneError(self.first or f"{self.table.name}: none of its rows is a tree that can be used")
         kept = {name: values[self.good].astype(np.float32) for name, values in sizes.items()}
-        if not any(values.any() for values in (kept["height"], kept["diameter"], kept["crown_width"])):
+        if not any(values.any() for values in (kept["height"], kept["diameter"], kept["crown_width"], kept["age"])):
             self.notes.append("no column of heights, trunks or crowns: all trees are full-grown")
-        skipped = int((~self.good).sum())
-        return Inventory(names, index[self.good], points[self.good], system, kept, self.notes, skipped, self.first)
+        unused = [title for title in self.table.columns if title not in self.used]
+        if unused:
+            self.notes.append(f"columns not used: {', '.join(unused)}")
+        skipped = int((~self.good).sum()) - self.left_out.total() + self.table.broken
+        return Inventory(
+            names,
+            index[self.good],
+            points[self.good],
+            system,
+            kept,
+            self.notes,
+            skipped,
+            self.first,
+            self.left_out,
+        )
+
+    def _texts(self, title: str) -> NDArray[np.str_]:
+        self.used.add(title)
+        return self.table.columns[title]
 
     def _refuse(self, bad: NDArray[np.bool_], column: str, why: Callable[[int], str]) -> None:
         """Refuse the file, or leave out rows."""
         bad = bad & self.good
         if not bad.any():
             return
-        index = int(np.argmax(bad))
+        index, *more = np.flatnonzero(bad).tolist()
         title = self.found[column][0][0] if column in self.found else column
         text = f"{self.table.where(index, title)}: {why(index)}"
+        if more:
+            also = ", ".join(f"{number:,}" for number in self.table.numbers[more[: _NAMED - 1]].tolist())
+            text += f"; {len(more):,} more, {self.table.row} {also}{' ...' if len(more) >= _NAMED else ''}"
         if not self.skip:
             raise SceneError(f"{text}. Correct it, or turn on Skip Broken Rows")
         self.first = self.first or text
         self.good &= ~bad
 
+    def _leave_out(self) -> None:
+        """Leave out rows that are no trees, by what stands in place of a species or of their condition."""
+        for name in ("status", *NAMES):
+            for title, _ in self.found.get(name, ()):
+                distinct, index = np.unique(self._texts(title), return_inverse=True)
+                said = [_no_tree(text, name == "status") for text in distinct.tolist()]
+                what = np.array(said)[index]
+                self.left_out.update(what[(what != "") & self.good].tolist())
+                self.good &= what == ""
+
     def _size(self, name: str) -> NDArray[np.float64]:
         """Sizes in metres, ages in years; 0 for unknown."""
-        if name not in self.found:
+        read = [(title, what, *cells(self.table.columns[title])) for title, what in self.found.get(name, ())]
+        read = [r for r in read if not self._are_classes(*r[1:])]
+        if not read:
             return np.zeros(len(self.good))
-        title, unit = self.found[name][0]
-        texts = self.table.columns[title]
-        values = self._numbers(name, texts)
+        chosen = read[0]
+        for other in read[1:]:  # classes beside what they stand for
+            (_, _, bare, _, own), middle = chosen, other[2]
+            both = (own == NUMBER) & (other[4] == RANGE) & (middle > 0.0)
+            if both.any() and np.median(np.abs(bare[both] / middle[both] - 1.0)) > 0.5:
+                chosen = other
+        title, what, values, units, kinds = chosen
+        texts = self._texts(title)
+        self.found[name].sort(key=lambda pair: pair[0] != title)  # messages name the one that counts
+        self._refuse(np.isnan(values), name, lambda i: f"{shown(str(texts[i]))} is not a number")
+        words = kinds == WORD
+        if words.any():
+            example = shown(str(texts[np.argmax(words)]))
+            self.notes.append(f'{words.sum():,} of "{title}" are no numbers, such as {example}')
+        known = values[(units == 0.0) & (values > 0.0)]
         if name != "age":
-            values = values * (unit or self._guess(name, values[values > 0.0]))
+            unit = what.unit or (self._guess(title, name, known) if len(known) else 1.0)
+            values = values * np.where(units > 0.0, units, unit)
+        elif len(known) and np.median(known) > 1500.0:  # years of planting
+            self.found.setdefault("planted", []).append((title, what))
+            return np.zeros(len(self.good))
         most = _MOST[name]
         self._refuse(
             ~((values >= 0.0) & (values <= most)),
@@ -191,123 +330,176 @@ class _Reading:
         )
         return np.where(self.good, values, 0.0)
 
-    def _guess(self, name: str, known: NDArray[np.float64]) -> float:
+    def _are_classes(
+        self, what: Title, values: NDArray[np.float64], units: NDArray[np.float64], kinds: NDArray[np.int64]
+    ) -> bool:
+        """Whether a column has numbers of classes, of which nobody tells the sizes."""
+        known = values[kinds == NUMBER]
+        return (
+            what.classes
+            and len(known) > 0
+            and not (kinds == RANGE).any()
+            and not units.any()
+            and bool((known <= _CLASSES).all() and (known == np.round(known)).all())
+        )
+
+    def _guess(self, title: str, name: str, known: NDArray[np.float64]) -> float:
         """Metres of the unit of a column that names none."""
         if self.units == IMPERIAL:
             unit, text = (0.0254, "inches") if name in _TRUNKS else (0.3048, "feet")
-        elif name not in _TRUNKS or not len(known):
-            return 1.0
         else:
-            centimetres, millimetres = _TRUNKS[name]
+            centimetres, millimetres = _SMALLER.get(name, (_MOST[name], 100.0 * _MOST[name]))
             middle = float(np.median(known))
             found = (1.0, "m"), (0.01, "cm"), (0.001, "mm")
             unit, text = found[int(middle > centimetres) + int(middle > millimetres)]
-        self.notes.append(f'"{self.found[name][0][0]}" read as {text}')
+            if name not in _TRUNKS and unit == 1.0:
+                return unit
+        self.notes.append(f'"{title}" read as {text}')
         return unit
 
-    def _numbers(self, name: str, texts: NDArray[np.str_]) -> NDArray[np.float64]:
-        """Numbers of a column, 0 where there is none."""
-        texts = np.char.lower(texts)
-        texts = np.where(np.isin(texts, _MISSING), "0", texts)
-        comma = np.char.find(texts, ",") >= 0
-        if comma.any() and not (np.char.find(texts, ".") >= 0).any():
-            texts = np.char.replace(texts, ",", ".")
-        values = _floats(texts)
-        self._refuse(np.isnan(values), name, lambda i: f"{shown(str(texts[i]))} is not a number")
-        return values
+    def _since_planting(self) -> NDArray[np.float64]:
+        """Ages from years of planting, 0 for unknown."""
+        if "planted" not in self.found:
+            return np.zeros(len(self.good))
+        title = self.found["planted"][0][0]
+        distinct, index = np.unique(self._texts(title), return_inverse=True)
+        years = [int(found[0]) if (found := _YEAR.search(text)) else 0 for text in distinct.tolist()]
+        now = datetime.date.today().year
+        ages = np.array([max(now - year, 1) if year else 0 for year in years], np.float64)
+        self.notes.append(f'ages from "{title}" to {now}')
+        return ages[index]
 
     def _dead(self) -> NDArray[np.float64]:
-        if "dead" not in self.found:
-            return np.zeros(len(self.good))
-        title = self.found["dead"][0][0]
-        texts = self.table.columns[title]
-        distinct, index = np.unique(texts, return_inverse=True)
-        yes = {tuple(plain_words(text)) for text in table()["dead"]}
-        values = np.where([tuple(plain_words(text)) in yes for text in distinct], DEAD_YEARS, 0.0)
-        years = _floats(distinct)
-        if "year" in title.lower():
-            values = np.where((years >= 0.0) & (years <= _MOST["age"]), years, 0.0)
-        return values[index]
+        """Years since death, 0 for those alive."""
+        years = np.zeros(len(self.good))
+        for name in ("dead", "status"):
+            for title, _ in self.found.get(name, ()):
+                distinct, index = np.unique(self._texts(title), return_inverse=True)
+                words = ("dead", "yes") if name == "dead" else ("dead",)
+                values = np.where([said_of(text) in words for text in distinct.tolist()], DEAD_YEARS, 0.0)
+                if name == "dead" and re.search("year|jahr|ann|año", title.lower()):
+                    values = np.nan_to_num(np.clip(cells(distinct)[0], 0.0, _MOST["age"]))
+                years = np.maximum(years, values[index])
+        return years
 
     def _points(self, code: int) -> tuple[NDArray[np.float64], System]:
         """Coordinates and their system."""
-        name, given = self.table.name, self.table.points
+        name, given, found = self.table.name, self.table.points, self.found
+        pair = "coordinates"
         if given is not None:
             points, code = given, code or self.table.code
         else:
-            degrees = "longitude" in self.found and "latitude" in self.found
-            metres = "x" in self.found and "y" in self.found
-            if not degrees and not metres:
+            metres = "x" in found and "y" in found
+            degrees = "longitude" in found and "latitude" in found
+            if not (metres or degrees or "place" in found):
                 raise SceneError(
                     f"{name}: line 1: no columns of coordinates; name them x and y, or longitude and latitude"
                 )
-            metres = metres and (not degrees or (code and not system_of(code).geographic))
-            pair = ("x", "y") if metres else ("longitude", "latitude")
-            points = np.stack([self._coordinate(column) for column in pair], axis=1)
+            if "place" in found and not degrees and not metres:
+                points, own = self._places()
+                pair, metres = "place", False
+                code = code or own
+                metres = not code and bool((np.abs(points[self.good]) > (360.0, 180.0)).any())
+            else:
+                metres = metres and (not degrees or (code and not system_of(code).geographic))
+                columns = ("x", "y") if metres else ("longitude", "latitude")
+                pair = columns[0]
+                points = np.stack([self._coordinate(column) for column in columns], axis=1)
+                if not metres and not code and len(low := points[self.good]) and np.median(np.abs(low[:, 1])) > 360.0:
+                    metres = True
+                    self.notes.append("longitude and latitude read as meters")
             if metres and not code and _are_degrees(points[self.good]):
                 metres = False
                 self.notes.append("x and y read as longitude and latitude")
             code = code or (0 if metres else LONGITUDE_LATITUDE)
         system = system_of(code, f"{name}: ") if code else System()
         if system.geographic:
-            low, high = (-360.0, -90.0), (360.0, 90.0)
+            some = points[self.good]
+            if len(some) and np.median(np.abs(some[:, 1])) > 90.0 and np.median(np.abs(some[:, 0])) <= 90.0:
+                points = points[:, ::-1]
+                self.notes.append("coordinates read as latitude, longitude")
             self._refuse(
-                ~((points >= low) & (points <= high)).all(axis=1),
-                "coordinates" if given is not None else pair[0],
+                ~((points >= (-360.0, -90.0)) & (points <= (360.0, 90.0))).all(axis=1),
+                pair,
                 lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} are no longitude and latitude; set Coordinate System",
             )
+        self._refuse_far(points, system, pair)
         return points, system
 
+    def _refuse_far(self, points: NDArray[np.float64], system: System, column: str) -> None:
+        """Refuse rows that lie far from most others, as those do whose coordinates are 0 or wrong."""
+        good = np.flatnonzero(self.good)
+        if not len(good):
+            return
+        middle, away = np.median(points[good], axis=0), np.zeros(len(points))
+        place = place_about(system, middle, middle, f"{self.table.name}: ")
+        local = between(points[good], system, place.system) - [place.east, place.north]
+        away[good] = np.nan_to_num(np.abs(local).max(axis=1), nan=np.inf)
+        far = away >= MOST_AWAY
+        if 2 * far[good].sum() < len(good):
+            self._refuse(
+                far, column, lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} is {_away(away[i])} most other trees"
+            )
+
+    def _places(self) -> tuple[NDArray[np.float64], int]:
+        """Coordinates that stand in one column, and the EPSG code that stands there too, or 0."""
+        title = self.found["place"][0][0]
+        texts = self._texts(title)
+        found = np.array([place_in(text) for text in texts.tolist()], np.float64).reshape(-1, 3)
+        points, plain = found[:, :2], found[:, 2] < 0.0
+        self._refuse(np.isnan(points).any(axis=1), "place", lambda i: f"{shown(str(texts[i]))} is no place")
+        points = np.where(np.isnan(points), 0.0, points)
+        some = np.abs(points[plain & self.good])
+        first = bool(re.match(r"(?i).*lon.*lat|.*\bx.*y\b", title)) or (len(some) > 0 and (some[:, 0] > 90.0).any())
+        if len(some) and (some <= 180.0).all() and not first:  # latitude comes first, unless it cannot be one
+            points[plain] = points[plain][:, ::-1]
+            self.notes.append(f'"{title}" read as latitude, longitude')
+        return points, int(found[:, 2].max(initial=0.0))
+
     def _coordinate(self, column: str) -> NDArray[np.float64]:
-        title, unit = self.found[column][0]
-        texts = self.table.columns[title]
-        self._refuse(np.isin(np.char.lower(texts), _MISSING), column, lambda _: "a tree without coordinates")
-        values = self._numbers(column, texts)
-        self._refuse(~(np.abs(values) < 1e9), column, lambda i: f"{shown(str(texts[i]))} is not a coordinate")
-        return np.where(self.good, values, 0.0) * (unit or 1.0)
+        title, what = self.found[column][0]
+        texts = self._texts(title)
+        values, _, kinds = cells(texts)
+        self._refuse(np.isin(kinds, (NOTHING, WORD)), column, lambda _: "a tree without coordinates")
+        bad = np.isnan(values) | (kinds == RANGE) | ~(np.abs(values) < 1e9)
+        self._refuse(bad, column, lambda i: f"{shown(str(texts[i]))} is not a coordinate")
+        return np.where(self.good, values, 0.0) * (what.unit or 1.0)
 
     def _names(self) -> tuple[tuple[tuple[str, ...], ...], NDArray[np.int64]]:
         """Names of the trees: each combination once, and the index of each tree."""
-        titles = [title for kind in ("genus", "name", "common", "leaf") for title, _ in self.found.get(kind, ())]
-        genera = len(self.found.get("genus", ()))
+        titles = [title for kind in NAMES for title, _ in self.found.get(kind, ())]
+        genera, names = (len(self.found.get(kind, ())) for kind in NAMES[:2])
         if not titles:
             self.notes.append("no column of species")
             return ((),), np.zeros(len(self.good), np.int64)
         codes = np.zeros(len(self.good), np.int64)
         for title in titles:  # numbers of combinations, column by column
-            distinct, own = np.unique(self.table.columns[title], return_inverse=True)
+            distinct, own = np.unique(self._texts(title), return_inverse=True)
             codes = np.unique(codes * len(distinct) + own, return_inverse=True)[1]
         first = np.unique(codes, return_index=True)[1]
         rows = zip(*(self.table.columns[title][first].tolist() for title in titles), strict=True)
-        return tuple(_ordered(row[:genera], row[genera:]) for row in rows), codes
+        return tuple(_ordered(row[:genera], row[genera : genera + names], row[genera + names :]) for row in rows), codes
 
 
-def _ordered(genera: tuple[str, ...], others: tuple[str, ...]) -> tuple[str, ...]:
+def _ordered(genera: tuple[str, ...], names: tuple[str, ...], others: tuple[str, ...]) -> tuple[str, ...]:
     """Names of one tree: genus and epithet together, the others, the genus alone."""
     genus = next((g for g in genera if is_name(g)), "")
-    joined = [f"{genus} {name}" for name in others if genus and is_name(name) and key_of(genus) not in key_of(name)]
-    scientific = [name for name in joined if (match := species_named(name)) and match.certainty == 0]
-    return tuple(name for name in (*scientific, *others, genus) if is_name(name))
+    joined = [f"{genus} {name}" for name in names if genus and is_name(name) and key_of(genus) not in key_of(name)]
+    return tuple(name for name in (*joined[:1], *names, *others, genus) if is_name(name))
 
 
 def _are_degrees(points: NDArray[np.float64]) -> bool:
     """Whether coordinates that are called x and y are degrees: nobody lists trees of a plot so small."""
-    if len(points) < 3 or (np.abs(points) > (180.0, 90.0)).any():
+    if not len(points) or (np.abs(points) > (180.0, 90.0)).any():
         return False
     return bool((np.ptp(points, axis=0) < _SPREAD).all() and (points != np.round(points, 3)).mean() > 0.5)
 
 
-def _floats(texts: NDArray[np.str_]) -> NDArray[np.float64]:
-    """Numbers of texts, nan for what is none."""
-    try:
-        values = texts.astype(np.float64)
-    except ValueError:
-        values = np.array([_float(text) for text in texts.tolist()])
-    return np.where(np.isfinite(values), values, np.nan)
+def _no_tree(text: str, condition: bool) -> str:
+    """What stands in place of a tree, if a cell of its condition or of its species says so."""
+    what = said_of(text)
+    return what if what in ("vacant", "stump", "planned", "removed") and (condition or not species_named(text)) else ""
 
 
-def _float(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+def _away(metres: float) -> str:
+    return f"{metres / 1000.0:,.0f} km from" if math.isfinite(metres) else "too far from"

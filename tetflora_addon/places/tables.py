@@ -7,7 +7,8 @@ from __future__ import annotations
 import csv
 import io
 import math
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 
 from ..errors import NAME, SceneError, readable, shown
 from ..files import json_of, read_whole
+from .cells import middle_of
 from .projection import LONGITUDE_LATITUDE, code_in
 
 MAX_BYTES, MAX_ROWS, MAX_COLUMNS = 200_000_000, 2_000_000, 500
-_DELIMITERS = ",;\t"
+_DELIMITERS = ",;\t|"
 _MARKS = (b"\xff\xfe", b"\xfe\xff")  # of UTF-16
 #: Most points of all lines of a file of outlines.
 MAX_POINTS = 5_000_000
@@ -43,6 +45,12 @@ class Table:
         Coordinates from geometry.
     code : int, optional
         EPSG code that goes with them.
+    broken : int
+        Rows that were left out because they are not like the others.
+    first : str
+        What is wrong with the first of them.
+    notes : list of str
+        What else was left out.
     """
 
     name: str
@@ -51,6 +59,9 @@ class Table:
     columns: dict[str, NDArray[np.str_]]
     points: NDArray[np.float64] | None = None
     code: int | None = None
+    broken: int = 0
+    first: str = ""
+    notes: list[str] = field(default_factory=list)
 
     def where(self, index: int, column: str = "") -> str:
         """A place in the file, for messages."""
@@ -58,8 +69,15 @@ class Table:
         return f"{text}, column {shown(column)}" if column else text
 
 
-def read_csv(path: Path) -> Table:
-    """Read separated values; the first line names the columns.
+def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
+    """Read separated values; the first line names the columns, or the second after one such as ``sep=;``.
+
+    Parameters
+    ----------
+    skip : bool
+        Leave out rows with other numbers of values than the first line.
+    most : int, optional
+        Rows at most, for a preview.
 
     Raises
     ------
@@ -70,36 +88,47 @@ def read_csv(path: Path) -> Table:
     """
     content = read_whole(path, MAX_BYTES)
     name = path.name
-    if content.startswith(_MARKS) or b"\0" in content:
-        raise SceneError(f"{name}: this is no text in UTF-8; save it as CSV in UTF-8")
+    wide = content.startswith(_MARKS)
+    if b"\0" in content and not wide:
+        raise SceneError(f"{name}: this is no text; save it as CSV in UTF-8")
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("cp1252", errors="replace")
+    told = re.match(r"\"?sep=(.)\"?\r?\n", text)
+    text, above = (text[told.end() :], 1) if told else (text, 0)
     first = text[: text.find("\n") + 1 or len(text)]
-    delimiter = max(_DELIMITERS, key=first.count)
+    delimiter = told[1] if told else max(_DELIMITERS, key=first.count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    rows, numbers = [], []
+    rows, numbers, broken, wrong = [], [], 0, ""
     try:
         header = [readable(cell.strip(), NAME) for cell in next(reader, [])]
         if len(header) < 2 or len(header) > MAX_COLUMNS:
             raise SceneError(f"{name}: line 1: {len(header)} columns; names of columns must stand there")
         before = reader.line_num
         for row in reader:
-            if any(map(str.strip, row)):
-                if len(row) != len(header):
-                    raise SceneError(f"{name}: line {before + 1:,}: {len(row)} values, and line 1 has {len(header)}")
+            while len(row) > len(header) and not row[-1].strip():
+                row.pop()
+            if len(row) == len(header) and any(map(str.strip, row)):
                 rows.append(row)
-                numbers.append(before + 1)
+                numbers.append(above + before + 1)
+            elif any(map(str.strip, row)):
+                broken += 1
+                text = f"{name}: line {above + before + 1:,}: {len(row)} values, and line {above + 1} has {len(header)}"
+                wrong = wrong or text
+                if not skip:
+                    raise SceneError(f"{text}. Correct it, or turn on Skip Broken Rows")
             before = reader.line_num
+            if most is not None and len(rows) >= most:
+                break
             if len(rows) > MAX_ROWS:
                 raise SceneError(f"{name}: more than {MAX_ROWS:,} rows; cut it into pieces")
     except csv.Error as error:
-        raise SceneError(f"{name}: line {reader.line_num:,}: {error}") from None
+        raise SceneError(f"{name}: line {above + reader.line_num:,}: {error}") from None
     columns: dict[str, NDArray[np.str_]] = {}
-    for title, cells in zip(header, zip(*rows, strict=True), strict=False):
-        columns.setdefault(title, _texts(cells))
-    return Table(name, "line", np.array(numbers, np.int64), columns)
+    for title, texts in zip(header, zip(*rows, strict=True), strict=False):
+        columns.setdefault(title, _texts(texts))
+    return Table(name, "line", np.array(numbers, np.int64), columns, broken=broken, first=wrong)
 
 
 def read_features(path: Path) -> tuple[list[dict[str, Any]], int]:
@@ -147,8 +176,13 @@ def _code(crs: Any, name: str) -> int:
     return code
 
 
-def read_points(path: Path) -> Table:
-    """Points of a GeoJSON file with their properties; an area counts as its middle, other features do not.
+def read_points(path: Path, _skip: bool = False, most: int | None = None) -> Table:
+    """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count.
+
+    Parameters
+    ----------
+    most : int, optional
+        Features at most, for a preview.
 
     Raises
     ------
@@ -158,29 +192,54 @@ def read_points(path: Path) -> Table:
         It is broken; names the feature.
     """
     features, code = read_features(path)
-    name = path.name
-    points, numbers, rows = [], [], []
-    for number, feature in enumerate(features, 1):
-        geometry = feature["geometry"]
-        if geometry is None or geometry["type"] not in ("Point", "MultiPoint"):
-            continue
-        where = f"{name}: feature {number:,}"
-        found = coordinates(
-            [geometry.get("coordinates")] if geometry["type"] == "Point" else geometry.get("coordinates"), where
-        )
+    name, without = path.name, 0
+    points, numbers, rows = [np.zeros((0, 2))], [], []
+    for number, feature in enumerate(features[:most], 1):
+        found = _points_of(feature["geometry"], f"{name}: feature {number:,}")
+        without += not len(found)
         points.append(found)
         numbers += [number] * len(found)
-        rows += [feature.get("properties") or {}] * len(found)
+        rows += [_flat(feature.get("properties") or {})] * len(found)
     titles = dict.fromkeys(title for row in rows for title in row)
     if len(titles) > MAX_COLUMNS:
         raise SceneError(f"{name}: {len(titles):,} kinds of properties; {MAX_COLUMNS} is the limit")
     columns = {title: _texts([_text(row.get(title)) for row in rows]) for title in titles}
-    where = np.concatenate(points) if points else np.zeros((0, 2))
-    return Table(name, "feature", np.array(numbers, np.int64), columns, where, code)
+    notes = [f"{without:,} feature{'s' * (without > 1)} without a place"] if without else []
+    return Table(name, "feature", np.array(numbers, np.int64), columns, np.concatenate(points), code, notes=notes)
 
 
-def coordinates(values: Any, where: str) -> NDArray[np.float64]:
-    """Positions of GeoJSON as (n, 2); heights do not count.
+def _points_of(geometry: dict[str, Any] | None, where: str) -> NDArray[np.float64]:
+    """Places (n, 2) of a geometry: its points, or the middle of its first area."""
+    kind = geometry["type"] if geometry else ""
+    if kind == "GeometryCollection":
+        parts = geometry.get("geometries")
+        parts = [part for part in parts if isinstance(part, dict)] if isinstance(parts, list) else []
+        found = (_points_of(part, where) for part in parts if isinstance(part.get("type"), str))
+        return next((points for points in found if len(points)), np.zeros((0, 2)))
+    values = geometry.get("coordinates") if geometry else None
+    if kind in ("Point", "MultiPoint"):
+        return coordinates([values] if kind == "Point" else values, where, texts=True)
+    for _ in range({"Polygon": 1, "MultiPolygon": 2}.get(kind, 0)):
+        values = values[0] if isinstance(values, list) and values else None
+    if kind not in ("Polygon", "MultiPolygon") or values is None:
+        return np.zeros((0, 2))
+    return np.array([middle_of(coordinates(values, where, texts=True))])
+
+
+def _flat(properties: dict[str, Any]) -> dict[str, Any]:
+    """Properties with those that lie within others, as OpenStreetMap's tags do."""
+    out = dict(properties)
+    for title, value in properties.items():
+        if title == "other_tags" and isinstance(value, str):  # as GDAL writes them
+            value = dict(re.findall(r'"((?:[^"\\]|\\.)*)"=>"((?:[^"\\]|\\.)*)"', value))
+        if isinstance(value, dict):
+            out.pop(title)
+            out = _flat(value) | out if len(value) < MAX_COLUMNS else out
+    return out
+
+
+def coordinates(values: Any, where: str, texts: bool = False) -> NDArray[np.float64]:
+    """Positions of GeoJSON as (n, 2); heights do not count, and numbers may be texts if asked for.
 
     Raises
     ------
@@ -189,10 +248,8 @@ def coordinates(values: Any, where: str) -> NDArray[np.float64]:
     """
     try:
         points = np.array([(x, y) for x, y, *_ in values], np.float64).reshape(-1, 2)
-        if (
-            all(type(x) in (int, float) and type(y) in (int, float) for x, y, *_ in values)
-            and np.isfinite(points).all()
-        ):
+        kinds = {type(number) for x, y, *_ in values for number in (x, y)}
+        if kinds <= {int, float, str if texts else int} and np.isfinite(points).all():
             return points
     except (TypeError, ValueError, OverflowError):
         pass

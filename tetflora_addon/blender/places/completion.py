@@ -22,6 +22,7 @@ from ...species.species import Species
 
 _AGES, _BREAST, _PLANTS = 96, 1.3, 16
 _TALLER = 1.6  # at most, than what the curves of a species come to
+_SLENDER = 60.0  # height above breast height over the diameter there, of the thinnest trunks, at most a metre in all
 
 
 @dataclass(frozen=True)
@@ -78,4 +79,6 @@ def complete(
             found = np.interp(np.log(known[some]), np.log(by), np.log(curves.height))
             beyond = np.clip(known[some] / by[-1], 1.0, None) ** 0.5
             height[some] = np.exp(found) * np.minimum(beyond, _TALLER)
+            if name == "diameter":  # it is measured at that height
+                height[some] = np.maximum(height[some], _BREAST + np.minimum(_SLENDER * known[some], 1.0))
     return height, int((height != sizes["height"]).sum())

@@ -6,13 +6,16 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from mathutils import Vector
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...places.projection import MapOrigin, System, place_about, system_of
+from ...places.projection import MOST_AWAY, MapOrigin, System, between, place_about, system_of
 
 #: Custom property of the scene.
 KEY = "tetflora_place"
+#: What an import may be cropped to: nothing, a box around its middle, or what the scene has there already.
+WHOLE, MIDDLE, EXISTING = 'WHOLE', 'MIDDLE', 'EXISTING'
 
 
 def origin_of(scene: bpy.types.Scene) -> MapOrigin | None:
@@ -53,6 +56,51 @@ def origin_for(scene: bpy.types.Scene, system: System, points: NDArray[np.float6
         return place_about(system, points.min(axis=0), points.max(axis=0), what)
     # Plain metres are taken for those of the scene, if it has a map of metres; whether they are near is asked later.
     return place
+
+
+def cropped(
+    scene: bpy.types.Scene,
+    grounds: list[bpy.types.Object],
+    points: NDArray[np.float64],
+    system: System,
+    crop: tuple[str, float],
+    what: str,
+) -> NDArray[np.bool_]:
+    """Which points (n, 2) of a file lie within what it is cropped to.
+
+    Parameters
+    ----------
+    grounds : list of objects
+        What is there already; all of the scene if empty.
+    crop : tuple
+        `WHOLE`, `MIDDLE` or `EXISTING`, and the side of the box around the middle in metres.
+
+    Raises
+    ------
+    SceneError
+        They lie over too large an area, or nothing lies there; ``what`` begins the message.
+    """
+    how, side = crop
+    place = origin_of(scene) if how == EXISTING else None
+    middle = np.median(points, axis=0)
+    own = place or place_about(system, middle, middle, what)
+    known = system if system.code or own.system.code == -1 else own.system
+    local = between(points, known, own.system) - [own.east, own.north]
+    low, high = np.full(2, -side / 2.0), np.full(2, side / 2.0)
+    if how == EXISTING:
+        corners = [obj.matrix_world @ Vector(c) for obj in grounds or scene.objects for c in obj.bound_box]
+        if place is None or not corners:
+            raise SceneError(f"{what}nothing was imported yet; choose a box around its middle as Crop")
+        low, high = np.min(corners, axis=0)[:2], np.max(corners, axis=0)[:2]
+    elif how == WHOLE:
+        width, depth = np.ptp(local, axis=0) / 1000.0
+        if not max(width, depth) < 2.0 * MOST_AWAY / 1000.0:
+            raise SceneError(f"{what}it lies over an area of {width:,.0f} by {depth:,.0f} km; choose a Crop")
+        return np.ones(len(points), bool)
+    inside = ((local >= low) & (local <= high)).all(axis=1)
+    if not inside.any():
+        raise SceneError(f"{what}nothing of it lies within the Crop; choose another one")
+    return inside
 
 
 def in_scene(place: MapOrigin, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Generator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import tau
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from ...jobs import Progress
 from ...places.canopy import find_trees
 from ...places.inventories import Inventory, read_inventory
 from ...places.projection import MapOrigin
-from ...places.species_names import GENUS, KIN, KIND, species_named, words_of
+from ...places.species_names import GENUS, KIN, KIND, best_of, words_of
 from ...planting.places import Placement
 from ...planting.rules import species_by_weight
 from ...species.species import Species
@@ -34,7 +34,7 @@ from ..species.edits import catalogue, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .completion import complete
 from .jobs import importing
-from .origin import in_scene, origin_for, remember
+from .origin import WHOLE, cropped, in_scene, origin_for, remember
 from .rasters import read_raster
 from .terrain import grounds_in, heights_steps
 
@@ -95,6 +95,8 @@ def inventory_steps(
     skip: bool,
     new: bool,
     seed: int = 0,
+    columns: Mapping[str, str] | None = None,
+    crop: tuple[str, float] = (WHOLE, 0.0),
 ) -> Generator[Progress, Any, Planted]:
     """Make a field of the trees of a file; yields progress. Closing the steps leaves all as it was.
 
@@ -104,10 +106,12 @@ def inventory_steps(
         To stand on; imported ground if empty.
     unknown : str
         `GENERIC`, `LEFT_OUT`, or the identifier of a species for trees of species that nobody knows.
-    code, units, skip
+    code, units, skip, columns
         As of `read_inventory`.
     new : bool
         Let its middle be the scene's origin, whatever was imported before.
+    crop : tuple
+        As of `cropped`.
 
     Raises
     ------
@@ -117,9 +121,18 @@ def inventory_steps(
     progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
     yield progress
     try:
-        inventory = yield from call_in_thread(progress, read_inventory, path, code, units, skip)
+        inventory = yield from call_in_thread(progress, read_inventory, path, code, units, skip, columns)
     except OSError as error:
         raise SceneError(f"{what}cannot read the file: {error.strerror or error}") from None
+    inside = cropped(scene, grounds_in(scene, grounds), inventory.points, inventory.system, crop, what)
+    if not inside.all():
+        inventory = replace(
+            inventory,
+            name=inventory.name[inside],
+            points=inventory.points[inside],
+            sizes={name: values[inside] for name, values in inventory.sizes.items()},
+            notes=[*inventory.notes, f"{(~inside).sum():,} beyond the Crop"],
+        )
     place = origin_for(scene, inventory.system, inventory.points, new, what)
     flat = in_scene(place, inventory.points, inventory.system, what)
     made = Planted(notes=list(inventory.notes), inventory=inventory)
@@ -139,8 +152,7 @@ def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[st
     known, counts = catalogue(), np.bincount(inventory.name, minlength=len(inventory.names))
     chosen: list[str] = []
     for names, count in zip(inventory.names, counts.tolist(), strict=True):
-        matches = [(match, name) for name in names if (match := species_named(name)) and match.species in known]
-        match, name = min(matches, key=lambda m: m[0].certainty, default=(None, names[0] if names else ""))
+        match, name = best_of(names, known)
         if match is None or match.certainty == KIND:
             made.unknown[names[0] if names else ""] += count
             kind = match.species if match is not None else _GENERIC

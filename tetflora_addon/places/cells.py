@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cells of inventories: numbers as people write them, with units, as ranges, or as words for nothing; and places."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+_MISSING = ("", "-", "--", "?", ".", "n/a", "#n/a", "nan", "n.a.", "k.a.", "n.d.")
+_NUMBER = r"\d+(?:[.,’' ]\d{3})*(?:[.,]\d+)?(?:e[+-]?\d+)?|[.,]\d+"
+_METRES = {
+    0.3048: r"ft|feet|foot|pieds?|pies|fuss|fuß|′|'",
+    0.0254: r"inch(?:es)?|in|zoll|pouces?|pulgadas|″|''|\"",
+    0.01: r"cm|zentimeter|centim[eè]tr?e?[rs]*|cent[ií]metr[io]s?",
+    0.001: r"mm|millim[eè]tr?e?[rs]*",
+    0.1: r"dm",
+    1.0: r"m(?:tr|ts?)?|met[er]{2}s?|m[eè]tres?|metr[io]s?",
+    0.0: r"years?|yrs?|jahre?|ans?|a[nñ]os?|anni|jaar",
+}
+_UNIT = "|".join(_METRES.values())
+_LESS = r"<=?|≤|bis(?: zu)?|up to|less than|under|below|unter|moins de|jusqu'?[aà]|menos de|hasta|meno di|fino a|tot"
+_MORE = (
+    r">=?|≥|more than|greater than|over|above|at least|[uü]ber|[uü]ebersteigt|ab|mehr als|mindestens|plus de|au moins|"
+    r"m[aá]s de|oltre|pi[uù] di|meer dan|from|von"
+)
+_PLUS = r"\+|(?:and|or|und|oder|et|ou|y|o|e|en) (?:more|above|over|mehr|gr[oö]sser|plus|m[aá]s|oltre|pi[uù]|meer)"
+_SHAPE = re.compile(
+    rf"(?:class|klasse|classe|clase)?\s*(?:ca\.?|circa|approx\.?|~|≈|about|etwa|env\.?|environ)?\s*"
+    rf"(?:(?P<less>{_LESS})|(?P<more>{_MORE}))?\s*(?P<low>-?(?:{_NUMBER}))\s*(?P<first>{_UNIT})?\.?\s*"
+    rf"(?:(?P<sep>-|–|—|/|;|\+|to|bis|[aà]|al|and|und|et|y|tot|hasta|<|…|\.\.\.?)\s*"
+    rf"(?:<=?\s*)?(?P<high>{_NUMBER})\s*(?P<second>{_UNIT})?\.?\s*)?(?P<plus>{_PLUS})?",
+)
+_FLOAT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
+#: What a cell holds.
+NUMBER, RANGE, NOTHING, WORD, WRONG = range(5)
+
+
+class Quantity(NamedTuple):
+    """A number, the metres of the unit that it names, 0 if none, and what the cell holds."""
+
+    value: float
+    unit: float = 0.0
+    kind: int = NUMBER
+
+
+def cell_of(text: str, points: bool = False) -> Quantity:
+    """What a cell says.
+
+    Parameters
+    ----------
+    points : bool
+        Other cells have decimal points, so that a comma before three digits parts thousands.
+    """
+    text = text.strip().lower().strip("*").strip()
+    if text in _MISSING:
+        return Quantity(0.0, kind=NOTHING)
+    if not any(c.isdecimal() for c in text):
+        return Quantity(0.0, kind=WORD)
+    found = _SHAPE.fullmatch(text)
+    if found is None:
+        return Quantity(math.nan, kind=WRONG)
+    low, high = _value(found["low"], points), _value(found["high"], points) if found["high"] else math.nan
+    unit = _unit(found["second"] or found["first"])
+    if found["high"] is None:
+        first = _unit(found["first"])
+        value = low / 2.0 if found["less"] else low
+        return Quantity(value, first, RANGE if found["less"] or found["more"] or found["plus"] else NUMBER)
+    if found["first"] and not found["sep"]:
+        return Quantity(math.nan, kind=WRONG)
+    if found["sep"] in ("/", ";", "+"):  # several stems
+        return Quantity(max(low, high), unit)
+    return Quantity((low + high) / 2.0, unit, RANGE) if high >= low else Quantity(math.nan, kind=WRONG)
+
+
+def _value(text: str, points: bool) -> float:
+    text = re.sub(r"[’' ]", "", text)
+    comma, point = text.rfind(","), text.rfind(".")
+    if min(comma, point) >= 0:  # the last one parts decimals
+        text = text.replace("," if point > comma else ".", "")
+    if text.count(",") > 1 or (points and re.fullmatch(r"-?[1-9]\d{0,2},\d{3}", text)):
+        text = text.replace(",", "")
+    if text.count(".") > 1:
+        text = text.replace(".", "")
+    return float(text.replace(",", "."))
+
+
+def _unit(text: str | None) -> float:
+    return next((metres for metres, forms in _METRES.items() if text and re.fullmatch(forms, text)), 0.0)
+
+
+def cells(texts: NDArray[np.str_]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Numbers (n,), 0 for nothing and nan for what is wrong; metres of their units, 0 if they name none; kinds."""
+    distinct, index = np.unique(texts, return_inverse=True)
+    points = any("." in text for text in distinct.tolist())
+    found = [
+        Quantity(float(text)) if _FLOAT.fullmatch(text) else _feet(text) or cell_of(text, points)
+        for text in distinct.tolist()
+    ]
+    values, units, kinds = (np.array(column) for column in zip(*found, strict=True))
+    values = np.where(np.isfinite(values), values, np.nan)
+    return values[index], units[index].astype(np.float64), kinds[index].astype(np.int64)
+
+
+def _feet(text: str) -> Quantity | None:
+    """Feet and inches."""
+    found = re.fullmatch(r"(\d+)\s*(?:ft|feet|['′])\s*(\d+(?:\.\d+)?)\s*(?:in|inches|\"|″|'')?", text.strip().lower())
+    return Quantity(float(found[1]) + float(found[2]) / 12.0, 0.3048) if found else None
+
+
+_PAIR = re.compile(r"\(?\s*(-?\d+(?:[.,]\d+)?)°?\s*[,;/ ]\s*(-?\d+(?:[.,]\d+)?)°?\s*\)?")
+_WELL_KNOWN = re.compile(
+    r"(?:srid=(\d+);\s*)?(?:multi)?(?:point|polygon|linestring)\s*(?:zm?|m)?\s*\((.*)\)", re.IGNORECASE
+)
+
+
+def place_in(text: str) -> tuple[float, float, int]:
+    """A place in one cell: both numbers, nan for none, and how it says it.
+
+    Returns
+    -------
+    x, y : float
+        The middle of what is larger than a point.
+    way : int
+        -1 for two plain numbers, whose order nobody tells; else the EPSG code that stands there, or 0.
+    """
+    plain = _PAIR.fullmatch(text.strip())
+    if plain is not None:
+        return float(plain[1].replace(",", ".")), float(plain[2].replace(",", ".")), -1
+    known = _WELL_KNOWN.fullmatch(text.strip())
+    try:
+        if known is not None:
+            first = known[2].lstrip("( ").split(")")[0]
+            points = [[float(number) for number in point.strip("() ").split()[:2]] for point in first.split(",")]
+            return *middle_of(points), int(known[1] or 0)
+        if text.strip().startswith("{"):
+            return *middle_of(_positions(json.loads(text).get("coordinates"))), 0
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        pass
+    return math.nan, math.nan, 0
+
+
+def _positions(values: object) -> list[list[float]]:
+    """The first ring of nested coordinates, or the point alone, as a list."""
+    while isinstance(values, list) and values and isinstance(values[0], list) and isinstance(values[0][0], list):
+        values = values[0]
+    return values if isinstance(values, list) and values and isinstance(values[0], list) else [values]  # type: ignore
+
+
+def middle_of(points: Sequence[Sequence[float]]) -> tuple[float, float]:
+    """The centroid of a ring (n, 2), or the mean of less than three points.
+
+    Raises
+    ------
+    ValueError
+        They are no points.
+    """
+    ring = np.array([(x, y) for x, y, *_ in points], np.float64).reshape(-1, 2)
+    if not np.isfinite(ring).all() or not len(ring):
+        raise ValueError
+    foot = ring[0]
+    (x, y), (u, v) = (ring - foot).T, np.roll(ring - foot, -1, axis=0).T
+    cross = x * v - u * y
+    if abs(cross.sum()) < 1e-300:
+        return tuple(ring.mean(axis=0).tolist())
+    return tuple((foot + np.array([((x + u) * cross).sum(), ((y + v) * cross).sum()]) / (3.0 * cross.sum())).tolist())

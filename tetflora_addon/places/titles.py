@@ -1,0 +1,225 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a column of an inventory holds, from the words in its title; and what words in its cells say of a tree.
+
+The words are in `titles.json`. A title is cut into them wherever it hides them: ``crownDiameterM``, ``hauteurenm``,
+``TREE_HEIGH`` of a shapefile, whose names end after ten letters.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from .species_names import plain_words
+
+#: What a column may hold, with its name for artists.
+FIELDS = {
+    "": "Not Used",
+    "name": "Species",
+    "common": "Common Name",
+    "genus": "Genus",
+    "family": "Family",
+    "leaf": "Conifer or Broadleaf",
+    "height": "Height",
+    "diameter": "Trunk Diameter",
+    "girth": "Trunk Girth",
+    "crown_width": "Crown Width",
+    "crown_radius": "Crown Radius",
+    "crown_base": "Crown Base",
+    "age": "Age",
+    "planted": "Year of Planting",
+    "status": "Status",
+    "dead": "Dead",
+    "x": "X, East",
+    "y": "Y, North",
+    "longitude": "Longitude",
+    "latitude": "Latitude",
+    "place": "Both Coordinates",
+}
+#: Fields that may be told by several columns.
+NAMES = ("genus", "name", "common", "leaf", "family")
+_SIZES = {"h": "height", "d": "diameter", "z": "z", "e": "x", "n": "y"}  # of a single letter
+_MOST_UNKNOWN = 4  # letters that may stand beside words that are known
+_SHORTEST = 4  # letters of the beginning of a word, where a name ends after ten
+_STRONG = {"breast", "girth"}
+NEVER = 9
+
+
+class Title(NamedTuple):
+    """What a title says.
+
+    Attributes
+    ----------
+    field : str
+        One of `FIELDS`, or ``z``.
+    unit : float
+        Metres; 0 if it names none.
+    doubt : int
+        0 for what is plain, more for what only values can confirm; `NEVER` for what is known to be something else.
+    classes : bool
+        Whether it speaks of classes, so that whole numbers may be theirs.
+    """
+
+    field: str
+    unit: float
+    doubt: int
+    classes: bool = False
+
+
+@cache
+def table() -> dict:
+    """What `titles.json` holds."""
+    return json.loads(Path(__file__).with_name("titles.json").read_text(encoding="utf-8"))
+
+
+@cache
+def _words() -> tuple[dict[str, str], dict[str, float], dict[str, str]]:
+    """Meanings of words, metres of units, and the words that begin with some letters."""
+    words, begun = {}, {}
+    for meaning, texts in table()["words"].items():
+        for text in texts.split():
+            word = "".join(plain_words(text))
+            if word not in words:
+                words[word] = meaning
+            for end in range(3, len(word)):
+                begun.setdefault(word[:end], word)
+    units = {"".join(plain_words(u)): float(m) for m, us in table()["units"].items() for u in us.split()}
+    return words, units, begun
+
+
+def _cut(text: str) -> list[str]:
+    """A token as words, the fewest of them; what is none stands there as it is."""
+    words, units, begun = _words()
+    best: list[tuple[float, list[str]]] = [(0.0, [])]
+    for end in range(1, len(text) + 1):
+        ways = [(best[end - 1][0] + 4.0, [*best[end - 1][1], "?" + text[end - 1]])]
+        for start in range(end):
+            part, (cost, before) = text[start:end], best[start]
+            whole = start == 0 and end == len(text)
+            if part in words and (len(part) > 2 or whole):
+                ways.append((cost + 1.0, [*before, part]))
+            elif part in units and (whole or (start > 0 and end == len(text))):
+                ways.append((cost + 1.2, [*before, part]))
+            elif part in ("in", "en") and start > 0 and text[end:] in units:
+                ways.append((cost + 0.5, [*before, part]))
+            elif end == len(text) and part in begun and len(part) >= (_SHORTEST if start == 0 else 3):
+                ways.append((cost + 1.5, [*before, begun[part]]))
+        best.append(min(ways, key=lambda way: way[0]))
+    found = best[-1][1]
+    # Short words within others are chance: "age" in "page", "art" in "start".
+    if any(word.startswith("?") for word in found) and max(len(word) for word in found) < _SHORTEST:
+        return ["?" + text]
+    return found
+
+
+@cache
+def read_title(title: str) -> Title:
+    """What a title says."""
+    words, units, _ = _words()
+    title = re.sub(r"(?i)\bd[ _]?1[.,]?30?\b", "dbh", title[:200])  # the diameter at 1.3 m
+    once = re.sub(r"[^\W\d_]+", lambda run: re.sub(r"(?<=[a-z])(?=[A-Z])", " ", run[0]), title)
+    ways = [
+        [part for word in plain_words(text) for part in _cut_or_begun(word)] for text in dict.fromkeys((title, once))
+    ]
+    parts = min(ways, key=lambda way: (sum(part.startswith("?") for part in way), len(way)))
+    unit, meant, unknown = 0.0, [], 0
+    for index, part in enumerate(parts):
+        if part in units and index and not parts[index - 1].isdigit() and (part != "in" or index == len(parts) - 1):
+            unit = units[part]
+        elif part in words:
+            meant.append(words[part])
+        elif not part.isdigit() and part not in units:
+            unknown += len(part.lstrip("?"))
+    if len(parts) == 1 and parts[0].lstrip("?") in _SIZES:
+        return Title(_SIZES[parts[0].lstrip("?")], unit, 0)
+    field, doubt = _field(set(meant) - {"filler"})
+    if unknown > _MOST_UNKNOWN and not _STRONG.intersection(meant):
+        field = ""
+    return Title(field, unit if field else 0.0, doubt + (unknown > 0), "class" in meant)
+
+
+def _cut_or_begun(word: str) -> list[str]:
+    """A whole word, the beginning of three letters of one, or what it is put together from."""
+    words, units, begun = _words()
+    if word in words or word in units or word.isdigit():
+        return [word]
+    found = _cut(word)
+    return [begun[word]] if len(word) == 3 and word in begun and found[0].startswith("?") else found
+
+
+def _field(meant: set[str]) -> tuple[str, int]:
+    """The field that meanings of words make up, and the doubt."""
+    if {"plant", "year"} <= meant:
+        return "planted", 0
+    meant = meant - {"plant"}
+    if "veto" in meant or ("id" in meant and not meant & {"breast", "girth", "crown", "height", "diameter"}):
+        return "", NEVER
+    if meant & {"species", "genus", "name", "latin", "common"} and "lat" in meant:
+        meant = (meant - {"lat"}) | {"latin"}
+    place = meant & {"x", "y", "longitude", "latitude", "lat", "place"}
+    if place and not meant - place - {"grid", "width"}:
+        if len(place) > 1 and place != {"lat", "latitude"}:
+            return "place", 1
+        name = place.pop()
+        return {"lat": "latitude"}.get(name, name), int(name == "place")
+    if meant == {"grid"}:
+        return "place", 2
+    sizes = meant - {"trunk", "class", "name", "type", "id"}
+    if "crown" in sizes:
+        if sizes & {"status", "species", "age"}:
+            return "", 0
+        by = next((name for name in ("radius", "base") if name in sizes), "width")
+        return ("height", 2) if by == "width" and "height" in sizes and "diameter" not in sizes else (f"crown_{by}", 0)
+    if meant & {"planted"} and not meant & {"species", "genus", "name", "height"}:
+        return "planted", 0
+    for name, field in (("girth", "girth"), ("breast", "diameter"), ("diameter", "diameter")):
+        if name in sizes:
+            return field, 0
+    if "base" in sizes:
+        return ("crown_base", 0) if "height" in sizes else ("", 0)
+    for name, field in (("height", "height"), ("width", "crown_width"), ("age", "age")):
+        if name in sizes:
+            return field, 0
+    if meant & {"dead", "status"}:
+        return ("dead" if "dead" in meant else "status"), 0
+    if "family" in meant:
+        return "family", 0
+    if "genus" in meant:
+        return ("common", 0) if "common" in meant else ("name", 0) if "species" in meant else ("genus", 0)
+    if "common" in meant:
+        return "common", int(not meant & {"species", "name", "type"})
+    if meant & {"latin", "species"}:
+        return "name", 0
+    if "leaf" in meant:
+        return "leaf", 0
+    return ("common", 2) if meant & {"name", "type"} else ("", 0)
+
+
+def meaning(title: str) -> tuple[str, float]:
+    """What a column holds, empty if unknown, and the metres of its unit, 0 if it names none."""
+    found = read_title(title)
+    return found.field, found.unit
+
+
+@cache
+def _values() -> dict[tuple[str, ...], str]:
+    values = {what: texts for what, texts in table()["values"].items() if what != "rest"}
+    return {tuple(plain_words(text)): what for what, texts in values.items() for text in texts.split(";")}
+
+
+@cache
+def said_of(text: str) -> str:
+    """What a cell says of a tree: ``dead``, ``vacant``, ``stump``, ``planned``, ``removed``, or ``yes``; else nothing.
+
+    "Dead" and "dead tree" say it, "dead branches" does not; after "vacant" anything may stand.
+    """
+    words, rest = tuple(plain_words(text)), set(table()["values"]["rest"].split())
+    for end in range(min(len(words), 4), 0, -1):
+        what = _values().get(words[:end], "")
+        if what and (what in ("vacant", "stump", "planned") or rest.issuperset(words[end:])):
+            return what
+    return ""
