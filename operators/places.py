@@ -180,7 +180,7 @@ class TETFLORA_PG_inventory_column(bpy.types.PropertyGroup):
 class TETFLORA_UL_inventory_columns(bpy.types.UIList):
     """Columns of an inventory: title, some values, and what they are taken for."""
 
-    def draw_item(self, _context, layout, _data, item, *_) -> None:
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property) -> None:
         row = layout.split(factor=0.25)
         row.label(text=item.name, translate=False)
         row = row.split(factor=0.45)

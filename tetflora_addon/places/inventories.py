@@ -414,8 +414,8 @@ class _Reading:
             code = code or (0 if metres else LONGITUDE_LATITUDE)
         system = system_of(code, f"{name}: ") if code else System()
         if system.geographic:
-            some = points[self.good]
-            if len(some) and np.median(np.abs(some[:, 1])) > 90.0 and np.median(np.abs(some[:, 0])) <= 90.0:
+            some = np.abs(points[self.good])
+            if len(some) and 90.0 < np.median(some[:, 1]) <= 180.0 and np.median(some[:, 0]) <= 90.0:
                 points = points[:, ::-1]
                 self.notes.append("coordinates read as latitude, longitude")
             self._refuse(

@@ -134,8 +134,9 @@ def read_title(title: str) -> Title:
             meant.append(words[part])
         elif not part.isdigit() and part not in units:
             unknown += len(part.lstrip("?"))
-    if len(parts) == 1 and parts[0].lstrip("?") in _SIZES:
-        return Title(_SIZES[parts[0].lstrip("?")], unit, 0)
+    plain = [part.lstrip("?") for part in parts if part not in units or part == parts[0]]
+    if len(plain) == 1 and plain[0] in _SIZES:
+        return Title(_SIZES[plain[0]], unit, 0)
     field, doubt = _field(set(meant) - {"filler"})
     if unknown > _MOST_UNKNOWN and not _STRONG.intersection(meant):
         field = ""

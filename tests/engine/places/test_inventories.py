@@ -4,26 +4,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks import places_files as files
+from benchmarks import places_inventories as inventories
 from tetflora_addon.errors import SceneError
-from tetflora_addon.places.inventories import IMPERIAL, meaning, read_inventory
-from tetflora_addon.places.species_names import (
-    GENUS,
-    KIN,
-    KIND,
-    SPECIES,
-    key_of,
-    plain_words,
-    species_named,
-    table,
-    told,
-)
+from tetflora_addon.places import cells
+from tetflora_addon.places.inventories import IMPERIAL, preview, read_inventory
+from tetflora_addon.places.species_names import GENUS, KIN, KIND, SPECIES, best_of, names_in, species_named, table, told
+from tetflora_addon.places.titles import FIELDS, meaning, said_of
 
 _CATALOGUE = Path(__file__).parents[3] / "tetflora_addon" / "catalogue"
 
@@ -89,9 +82,39 @@ def test_what_columns_mean(title, name, unit):
     assert meaning(title) == (name, unit)
 
 
-def test_no_title_has_two_meanings():
-    titles = Counter("".join(plain_words(title)) for names in table()["fields"].values() for title in names)
-    assert [title for title, number in titles.items() if number > 1] == []
+_TITLES = {
+    "height": "TREE_HEIGH, TREEHEIGHTinMETRES, hauteurenm, height_range_id, 樹高",
+    "diameter": "DBH_1_99_, D130, DIAM_BREAS",
+    "crown_width": "Schirmdurchmesser, canopyspre, diametre_houppier, diameter_crown",
+    "crown_base": "crownBaseHeightM, Kronenansatzhöhe",
+    "planted": "Pflanzjahr, annee de plantation, plant_date, Year Planted",
+    "status": "Tree Status, condition",
+    "dead": "is_dead",
+    "name": "Name_lat, tradart_vet, SP_CODE, GATTUNG_ART",
+    "common": "Gattung Deutsch, dansk_navn",
+    "family": "familia",
+    "x": "POINT_X, X_L93",
+    "y": "yRel, Y_LAMBERT93",
+    "place": "geo_point_2d, the_geom, WKT",
+    "latitude": "LAT_WGS84",
+    "longitude": "経度",
+    "": "Street Name, tree_id, Page, start, village, Objectid, Standortnr, elevation, overhead_utilities, bezirk",
+}
+
+
+@pytest.mark.parametrize("name", _TITLES)
+def test_words_within_titles(name):
+    titles = _TITLES[name].split(", ")
+    assert {title: meaning(title)[0] for title in titles} == dict.fromkeys(titles, name)
+
+
+def test_titles_of_cities():
+    assert inventories.titles_read() >= 0.95, inventories.titles_not_read()
+
+
+@pytest.mark.parametrize("name", inventories.cases())
+def test_inventories_as_others_write_them(name):
+    assert inventories.problems(name) == []
 
 
 @pytest.mark.parametrize(
@@ -122,15 +145,16 @@ def test_dead_trees_and_degrees_that_are_called_x_and_y(tmp_path):
         ("", "line 1: 0 columns"),
         ("species,height,x,y\n", "it has no rows"),
         ("species,height\noak,3\n", "no columns of coordinates"),
-        ("species,height,x,y\noak,3,1,2\n\noak,high,1,2\n", "line 4, column 'height': 'high' is not a number"),
+        ("species,height,x,y\noak,3,1,2\n\noak,1x2,1,2\n", "line 4, column 'height': '1x2' is not a number"),
         ("species,height,x,y\noak,3,1,2\noak,1\n", "line 3: 2 values, and line 1 has 4"),
         ("species,height,x,y\noak,-3,1,2\n", "line 2, column 'height': '-3' is not from 0 to 150 m"),
-        ("species,height,x,y\noak,1.5e3,1,2\n", "not from 0 to 150"),
+        ("species,height,x,y\noak,1.5e3,1,2\noak,3,1,2\noak,4,1,2\n", "not from 0 to 150"),
         ("species,height,x,y\noak,3,,2\n", "line 2, column 'x': a tree without coordinates"),
         ("species,height,lon,lat\noak,3,9,200\n", "line 2, column 'lon': 9, 200 are no longitude"),
         ("species,height,crown base,x,y\noak,3,4,1,2\n", "column 'crown base': 4 m is not below the height of 3 m"),
         ('species,height,x,y\n"oak,3,1,2\n', "line 2"),
-        (b"\xff\xfea\0b\0", "no text in UTF-8"),
+        (b"a\0b\0", "this is no text"),
+        ("species,x,y\nvacant,1,2\nstump,1,2\n", "none of its rows is a tree"),
     ],
 )
 def test_a_broken_row_is_told_by_line_and_column(tmp_path, text, message):
@@ -139,13 +163,13 @@ def test_a_broken_row_is_told_by_line_and_column(tmp_path, text, message):
 
 
 def test_broken_rows_can_be_skipped(tmp_path):
-    text = "species,height,x,y\noak,3,1,2\noak,x,1,2\noak,999,1,2\noak,5,4,4\n"
+    text = "species,height,x,y\noak,3,1,2\noak,1x,1,2\noak,999,1,2\noak,5,4,4\n"
     found = _read(tmp_path, text, skip=True)
     assert found.sizes["height"].tolist() == [3.0, 5.0]
     assert found.skipped == 2
     assert "line 3" in found.first
     with pytest.raises(SceneError, match="line 2"):
-        _read(tmp_path, "species,height,x,y\noak,x,1,2\n", skip=True)
+        _read(tmp_path, "species,height,x,y\noak,1x,1,2\n", skip=True)
 
 
 @pytest.mark.parametrize(
@@ -162,7 +186,23 @@ def test_broken_rows_can_be_skipped(tmp_path):
         ("FI", "spruce", SPECIES),
         ("Fagus sylvatica f. purpurea", "beech", SPECIES),
         ("Acer campestre", "maple", GENUS),
-        ("Sumpfeiche", "oak", GENUS),
+        ("Zerreiche", "oak", GENUS),
+        ("Sumpfeiche", "black_oak", KIN),
+        ("Robinia pseudoacacia", "ash", KIN),
+        ("eastern redcedar", "juniper", GENUS),
+        ("box elder", "maple", GENUS),
+        ("oak, northern red (Quercus rubra)", "black_oak", KIN),
+        ("Acacia de tres espinas", "ash", KIN),
+        ("Pin parasol", "stone_pine", SPECIES),
+        ("pin oak", "black_oak", KIN),
+        ("Laurel oak", "oak", GENUS),
+        ("Plantanus acerifolia", "maple", KIN),
+        ("ACPL", "maple", SPECIES),
+        ("A. rubrum", "maple", GENUS),
+        ("Fagaceae", "oak", KIN),
+        ("Phoenix canariensis", "palm", KIN),
+        ("x Cupressocyparis leylandii", "cypress", KIN),
+        ("Red Maple October Glory", "maple", GENUS),
         ("Betula spp.", "birch", GENUS),
         ("Ulmus glabra", "hornbeam", KIN),
         ("Gemeine Rosskastanie", "maple", KIN),
@@ -174,12 +214,127 @@ def test_names(name, species, certainty):
     assert species_named(name) == (species, certainty)
 
 
+@pytest.mark.parametrize("name", ["pseudoacacia", "Primrose Tree", "Street", "Good", "unknown", "Unidentified tree"])
+def test_parts_of_words_and_other_words_name_nothing(name):
+    assert species_named(name) is None
+
+
+def test_a_scientific_name_counts_before_a_common_one():
+    assert best_of(["London Plane", "Juniperus virginiana"])[0].species == "juniper"
+    assert best_of(["Quercus", "Northern red oak"])[0].species == "oak"
+    assert best_of([]) == (None, "")
+
+
 def test_the_table_of_names_fits_the_catalogue():
-    known = {path.stem for path in _CATALOGUE.glob("*.json")}
-    groups = {name: group for name, group in table().items() if name not in ("fields", "dead")}
-    assert set().union(*groups.values()) <= known
-    keys = [key_of(name) for group in groups.values() for names in group.values() for name in names]
-    assert "" not in keys
-    assert [key for key, number in Counter(keys).items() if number > 1] == []
+    known, data = {path.stem for path in _CATALOGUE.glob("*.json")}, table()
+    kin = {kin for groups in data["families"].values() for kin, _ in names_in(groups)}
+    assert {*data["species"], *data["kin"], *data["kinds"], *kin} <= known
+    # Each entry stands below a source that is explained.
+    sources = {source for groups in (*data["families"].values(), *data["common"].values()) for source in groups}
+    assert sources <= set(data["sources"])
+    genera = [genus for groups in data["families"].values() for _, genus in names_in(groups)]
+    assert len(genera) == len(set(genera)) > 1000
+    common = {genus for groups in data["common"].values() for genus, _ in names_in(groups, ",")}
+    assert common - {"arecaceae"} <= set(genera)
     assert species_named("Foo bar") is None
     assert told({"a": 2, "b": 30}) == "b (30), a (2)"
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "unit"),
+    [
+        ("12 m", 12.0, 1.0),
+        ("5'6\"", 5.5, 0.3048),
+        ("35cm", 35.0, 0.01),
+        ("11-15 m", 13.0, 1.0),
+        ("<5", 2.5, 0.0),
+        ("über 20 m", 20.0, 1.0),
+        ("1.234,5", 1234.5, 0.0),
+        ("23/15", 23.0, 0.0),
+        ("#N/A", 0.0, 0.0),
+        ("nicht gemessen", 0.0, 0.0),
+        ("2018-03-04", np.nan, 0.0),
+    ],
+)
+def test_numbers_as_people_write_them(text, value, unit):
+    values, units, _ = cells.cells(np.array([text]))
+    assert (values[0], units[0]) == pytest.approx((value, unit), nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("Dead", "dead"),
+        ("dead tree", "dead"),
+        ("Dead branches", ""),
+        ("Vacant site small (vacant site small)", "vacant"),
+        ("Stump for removal", "stump"),
+        ("Baum gefällt", "removed"),
+        ("Souche", "stump"),
+        ("geplant", "planned"),
+        ("To be removed", ""),
+        ("Good", ""),
+    ],
+)
+def test_what_cells_say_of_trees(text, said):
+    assert said_of(text) == said
+
+
+def test_years_of_planting_become_ages(tmp_path):
+    now = datetime.date.today().year
+    for title, year in (("Pflanzjahr", "1990"), ("planting date", "12/03/1990"), ("age", "1990")):
+        found = _read(tmp_path, f"species,{title},x,y\noak,{year},0,0\noak,,5,5\n")
+        assert found.sizes["age"].tolist() == [now - 1990, 0.0]
+
+
+def test_a_mapping_changes_what_columns_are_taken_for(tmp_path):
+    text = "species,h1,h2,x,y\noak,30,5,0,0\noak,40,6,5,5\n"
+    assert not _read(tmp_path, text).sizes["height"].any()
+    columns = {"h1": "height ft", "h2": "crown_width", "species": ""}
+    found = _read(tmp_path, text, columns=columns)
+    assert found.sizes["height"] == pytest.approx([9.144, 12.192])
+    assert found.sizes["crown_width"].tolist() == [5.0, 6.0]
+    assert "no column of species" in found.notes
+    for columns in ({"h3": "height"}, {"h1": "size"}, {"h1": "height furlongs"}):
+        with pytest.raises(SceneError, match="correct Columns"):
+            _read(tmp_path, text, columns=columns)
+
+
+def test_a_preview_has_each_column_with_three_values(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("id,H (m),Art\n" + "".join(f"{n},{n % 4},Tilia cordata\n" for n in range(400)))
+    assert [tuple(column) for column in preview(path)] == [
+        ("id", "", ("0", "1", "2")),
+        ("H (m)", "height", ("0", "1", "2")),
+        ("Art", "name", ("Tilia cordata",)),
+    ]
+    assert {column.field for column in preview(path)} <= set(FIELDS)
+
+
+def test_classes_without_their_sizes_do_not_count(tmp_path):
+    found = _read(tmp_path, "species,height_class,x,y\noak,2,0,0\noak,3,5,5\n")
+    assert not found.sizes["height"].any()
+    assert "columns not used: height_class" in found.notes
+
+
+def test_names_of_cultivars_are_found_by_their_values(tmp_path):
+    found = _read(tmp_path, "foo,x,y\nTilia cordata,0,0\nAcer rubrum,5,5\n")
+    assert [names[0] for names in found.names] == ["Acer rubrum", "Tilia cordata"]
+
+
+@pytest.mark.parametrize(
+    ("header", "cells_", "points", "code"),
+    [
+        ("geo", '"48.1, 111.5"', [111.5, 48.1], 4326),
+        ("lon_lat", '"11.5, 48.1"', [11.5, 48.1], 4326),
+        ("geom", '"SRID=25832;POINT(500000 5300000)"', [500000.0, 5300000.0], 25832),
+        ("shape", '"MULTIPOLYGON (((0 0, 2 0, 2 2, 0 2, 0 0)))"', [1.0, 1.0], 4326),
+        ("where", '"{""type"":""Point"",""coordinates"":[11.5,48.1]}"', [11.5, 48.1], 4326),
+        ("latitude,longitude", "-111.5,48.1", [-111.5, 48.1], 4326),
+        ("longitude,latitude", "500000,5300000", [500000.0, 5300000.0], 0),
+    ],
+)
+def test_places_in_any_order(tmp_path, header, cells_, points, code):
+    found = _read(tmp_path, f"species,{header}\noak,{cells_}\n")
+    assert found.points[0].tolist() == points
+    assert found.system.code == code
