@@ -3,7 +3,7 @@
 """Import real places: terrain, trees that were measured or seen from above, and outlines of a map."""
 
 import json
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -69,8 +69,10 @@ class _Importing(ModalJob, ImportHelper):
             return ModalJob.execute(self, context)
         # Blender frees what the file browser has called: the steps are those of another call, with its undo step.
         again = getattr(bpy.ops.tetflora, type(self).bl_idname.partition(".")[2])
+        # A menu of species that was never opened has an empty value, which is none of its items.
+        settings = {name: value for name, value in self.as_keywords().items() if value != ""}
         try:
-            again('INVOKE_DEFAULT', **{**self.as_keywords(), "chosen": True})
+            again('INVOKE_DEFAULT', **{**settings, "chosen": True})
         except RuntimeError as error:  # what that call reported, which must not end as a traceback
             return self.failed(str(error).strip().removeprefix("Error: "))
         return {'CANCELLED'}
@@ -139,6 +141,9 @@ class _Trees(_Importing):
         """Report; the operator's result."""
         select_only(context, [result.object])
         parts = [f"{counted(result.number, 'tree')} imported"]
+        inventory = result.inventory
+        if inventory is not None and inventory.left_out:
+            parts.append(f"rows without a tree left out: {names_told(inventory.left_out)}")
         if result.completed:
             parts.append(f"heights of {result.completed:,} follow from trunk or crown")
         if result.beside:
@@ -146,11 +151,8 @@ class _Trees(_Importing):
         if result.kin:
             parts.append(f"{result.kin.total():,} stand as their nearest kin: {names_told(result.kin)}")
         parts += result.notes
-        inventory = result.inventory
         if inventory is not None and inventory.skipped:
             parts.append(f"{counted(inventory.skipped, 'broken row')} skipped, the first: {inventory.first}")
-        if inventory is not None and inventory.left_out:
-            parts.append(f"rows without a tree left out: {names_told(inventory.left_out)}")
         if result.unknown:
             left = " and left out" if result.left_out else ""
             parts.insert(1, f"{result.unknown.total():,} of unknown species{left}: {names_told(result.unknown, 25)}")
@@ -187,6 +189,12 @@ class TETFLORA_UL_inventory_columns(bpy.types.UIList):
         row.label(text=item.values, translate=False)
         row.prop(item, "field", text="")
         row.prop(item, "unit", text="")
+
+
+def chosen_columns(table: Iterable[TETFLORA_PG_inventory_column]) -> str:
+    """What was chosen for columns, as scripts write it."""
+    chosen = {row.name: row.field.lower() if row.field != 'NONE' else "" for row in table}
+    return json.dumps(chosen | {row.name: f"{chosen[row.name]} {row.unit}" for row in table if row.unit != 'AUTO'})
 
 
 class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
@@ -282,12 +290,7 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
     def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
         """Settings of another call, which takes columns as the table has them."""
         found = super().as_keywords(ignore=(*ignore, "table", "active"))
-        chosen = {
-            row.name: ("" if row.field == 'NONE' else row.field.lower())
-            + (f" {row.unit}" if row.unit != 'AUTO' else "")
-            for row in self.table
-        }
-        return found | ({"columns": json.dumps(chosen)} if chosen else {})
+        return found | ({"columns": chosen_columns(self.table)} if self.table else {})
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout

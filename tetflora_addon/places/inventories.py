@@ -44,6 +44,7 @@ METRIC, IMPERIAL = 'METRIC', 'IMPERIAL'
 _PREVIEWED, _SAMPLE, _SHOWN = 300, 60, 3  # rows that are looked at, values of them, and values that are shown
 _CLASSES = 12  # the most that a class of sizes is numbered
 _YEAR = re.compile(r"(?<!\d)(1[5-9]\d\d|20\d\d)(?!\d)")
+_STRAY = 20.0  # times as far from the middle as half of all are
 _NAMED = 6  # rows that a message names
 
 
@@ -226,7 +227,7 @@ class _Reading:
         self.good = np.ones(len(table_.numbers), bool)
         self.notes, self.first, self.left_out = list(table_.notes), table_.first, Counter()
         self.found: dict[str, list[tuple[str, Title]]] = {}
-        self.used: set[str] = set()
+        self.used: dict[str, str] = {}
         taken = taken_for(table_, chosen)
         for title, what in sorted(taken.items(), key=lambda pair: pair[1].doubt):
             if what.field:
@@ -249,6 +250,8 @@ class _Reading:
         kept = {name: values[self.good].astype(np.float32) for name, values in sizes.items()}
         if not any(values.any() for values in (kept["height"], kept["diameter"], kept["crown_width"], kept["age"])):
             self.notes.append("no column of heights, trunks or crowns: all trees are full-grown")
+        used = ", ".join(f"{title} ({FIELDS[name]})" for title, name in self.used.items())
+        self.notes += [f"columns used: {used}"] * bool(used)
         unused = [title for title in self.table.columns if title not in self.used]
         if unused:
             self.notes.append(f"columns not used: {', '.join(unused)}")
@@ -266,7 +269,7 @@ class _Reading:
         )
 
     def _texts(self, title: str) -> NDArray[np.str_]:
-        self.used.add(title)
+        self.used[title] = next(name for name, found in self.found.items() if title in dict(found))
         return self.table.columns[title]
 
     def _refuse(self, bad: NDArray[np.bool_], column: str, why: Callable[[int], str]) -> None:
@@ -435,7 +438,7 @@ class _Reading:
         place = place_about(system, middle, middle, f"{self.table.name}: ")
         local = between(points[good], system, place.system) - [place.east, place.north]
         away[good] = np.nan_to_num(np.abs(local).max(axis=1), nan=np.inf)
-        far = away >= MOST_AWAY
+        far = (away >= MOST_AWAY) & (away > _STRAY * np.median(away[good]))
         if 2 * far[good].sum() < len(good):
             self._refuse(
                 far, column, lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} is {_away(away[i])} most other trees"

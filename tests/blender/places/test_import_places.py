@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import shutil
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from benchmarks import places_files as files
+from benchmarks import places_inventories as inventories
 from devtools import session
 from operators import places
 from tests.blender.digests import difference, everything
@@ -203,6 +205,77 @@ def test_what_is_unknown_or_of_kin_is_told(tmp_path, capfd):
     told = capfd.readouterr().out
     assert "4 trees imported; 1 of unknown species: Foo bar (1)" in told
     assert "1 stand as their nearest kin: Ulmus glabra" in told
+
+
+def test_what_is_no_tree_is_told(tmp_path, capfd):
+    path = tmp_path / "a.csv"
+    path.write_text("species,x,y\nTilia cordata,0,0\nvacant,5,5\nStump,9,9\nAcer rubrum,12,0\n")
+    field = _call("import_inventory", path)
+    assert len(field.data.vertices) == 2
+    told = capfd.readouterr().out
+    assert "2 trees imported; rows without a tree left out: stump (1), vacant (1)" in told
+    assert "unknown" not in told
+
+
+def test_thin_trunks_are_trees_above_breast_height():
+    """It is where their diameter is measured."""
+    _call("import_inventory", inventories.FOLDER / "inv25_thin_trunks.csv")
+    heights = read(bpy.context.view_layer.objects.active.data, "tf_height")
+    assert heights.min() > 1.3
+    assert heights.max() < 6.0
+
+
+def test_far_rows_are_named_before_any_import():
+    path = inventories.FOLDER / "inv06_two_far_rows.csv"
+    with pytest.raises(RuntimeError, match=r"line 12.*line 13") as caught:
+        _call("import_inventory", path)
+    assert "imported before" not in str(caught.value)
+    assert len(_call("import_inventory", path, skip=True).data.vertices) == 10
+
+
+def test_large_areas_are_cropped(tmp_path, capfd):
+    path = tmp_path / "a.csv"
+    rows = [(9.0 + 0.5 * n, 48.0) for n in range(15)] + [(12.5001, 48.0001)]
+    path.write_text("species,lon,lat\n" + "".join(f"oak,{x},{y}\n" for x, y in rows))
+    with pytest.raises(RuntimeError, match=r"an area of 5\d\d by 0 km; choose a Crop"):
+        _call("import_inventory", path)
+    with pytest.raises(RuntimeError, match="nothing was imported yet"):
+        _call("import_inventory", path, crop='EXISTING')
+    assert len(_call("import_inventory", path, crop='MIDDLE', crop_size=1000.0).data.vertices) == 2
+    assert "14 beyond the Crop" in capfd.readouterr().out
+    # What the scene has is now a box of some metres about two trees.
+    assert len(_call("import_inventory", path, crop='EXISTING').data.vertices) == 2
+
+
+def test_a_mapping_from_scripts_and_from_the_dialog(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("species,top,x,y\nTilia cordata,30,0,0\nAcer rubrum,40,5,5\n")
+    field = _call("import_inventory", path, columns='{"top": "height ft"}')
+    assert read(field.data, "tf_height") == pytest.approx([9.144, 12.192])
+    for broken in ("{", "[]", '{"top": 1}', '{"none": "height"}'):
+        with pytest.raises(RuntimeError, match="Columns"):
+            _call("import_inventory", path, columns=broken)
+
+
+def test_the_dialog_shows_what_columns_were_taken_for(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("Art;top;x;y\nTilia cordata;30;0;0\nAcer rubrum;40;5;5\n")
+
+    class Rows(list):
+        def add(self):
+            self.append(SimpleNamespace(unit='AUTO'))
+            return self[-1]
+
+    dialog = SimpleNamespace(table=Rows())
+    places.TETFLORA_OT_import_inventory.show(dialog, path)
+    assert [(row.name, row.field, row.values) for row in dialog.table] == [
+        ("Art", 'NAME', "Tilia cordata, Acer rubrum"),
+        ("top", 'NONE', "30, 40"),
+        ("x", 'X', "0, 5"),
+        ("y", 'Y', "0, 5"),
+    ]
+    dialog.table[1].field, dialog.table[1].unit = 'HEIGHT', 'ft'
+    assert json.loads(places.chosen_columns(dialog.table)) == {"Art": "name", "top": "height ft", "x": "x", "y": "y"}
 
 
 def test_canopy_heights_become_trees(tmp_path):

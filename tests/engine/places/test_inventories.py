@@ -42,7 +42,10 @@ def test_a_german_table(tmp_path, encoding):
     assert found.sizes["age"].tolist() == [90.0, 0.0, 0.0, 70.0]
     assert found.points[2].tolist() == [500030.0, 5316012.25]
     assert found.system.code == 25832
-    assert found.notes == ["columns not used: id"]
+    used = (
+        "Höhe (m) (Height), Stammumfang [cm] (Trunk Girth), Kronendurchmesser (Crown Width), Alter (Age), X (X, East)"
+    )
+    assert found.notes == [f"columns used: Baumart (Species), {used}, Y (Y, North)", "columns not used: id"]
 
 
 def test_points_of_geojson(tmp_path):

@@ -152,6 +152,9 @@ def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[st
     known, counts = catalogue(), np.bincount(inventory.name, minlength=len(inventory.names))
     chosen: list[str] = []
     for names, count in zip(inventory.names, counts.tolist(), strict=True):
+        if not count:  # of rows that were left out
+            chosen.append("")
+            continue
         match, name = best_of(names, known)
         if match is None or match.certainty == KIND:
             made.unknown[names[0] if names else ""] += count
