@@ -28,8 +28,10 @@ from devtools import session
 from tetflora_addon.blender.job.contents import compile_for, read_scene
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.places.inventories import preview
 
 from . import places_files as files
+from . import places_inventories as inventories
 from .report import ROOT, Targets
 
 TREES, QUICK_TREES = 100_000, 10_000
@@ -51,6 +53,10 @@ _CLOSE = 0.05
 
 TARGETS: Targets = {
     "inventory_s": {"max": 30.0},
+    "preview_s": {"max": 1.0},
+    "cases_wrong": {"max": 0.0},
+    "titles_read": {"min": 0.95},
+    "names_unknown": {"max": 12.0},
     "within_5_percent": {"min": 0.95},
     "chm_rmse_m": {"max": 1.0},
     "mutated_files": {"min": 500.0, "max": 500.0},
@@ -205,6 +211,10 @@ def run(quick: bool) -> dict[str, Any]:
         folder = Path(name)
         path = folder / "trees.csv"
         path.write_text(inventory(QUICK_TREES if quick else TREES, np.random.default_rng(1)))
+        out |= inventories.figures()
+        start = time.monotonic()
+        preview(path)
+        out["preview_s"] = time.monotonic() - start
         session.clean_file()
         start = time.monotonic()
         bpy.ops.tetflora.import_inventory(filepath=str(path))

@@ -12,7 +12,7 @@ import numpy as np
 
 from tetflora_addon.errors import SceneError
 from tetflora_addon.places.inventories import Inventory, read_inventory
-from tetflora_addon.places.species_names import KIND, best_of
+from tetflora_addon.places.species_names import KIND, best_of, species_named
 from tetflora_addon.places.titles import read_title
 
 FOLDER = Path(__file__).parent.parent / "tests" / "data" / "places"
@@ -97,3 +97,22 @@ def titles_read() -> float:
 def titles_not_read() -> list[str]:
     """Titles that are read as something else, or not."""
     return [title for holds, title, field in titles() if field not in _FITS[holds]]
+
+
+def names_unknown() -> list[str]:
+    """Common names of trees of streets and parks, in five languages, that mean nothing."""
+    texts = json.loads((FOLDER / "names.json").read_text(encoding="utf-8")).values()
+    names = [name for text in texts for name in text.split("; ")]
+    return [name for name in names if (match := species_named(name)) is None or match.certainty == KIND]
+
+
+def figures() -> dict[str, float]:
+    """The figures of the benchmark."""
+    right = [not problems(name) for name in cases()]
+    return {
+        "cases": float(len(right)),
+        "cases_right": float(sum(right)),
+        "cases_wrong": float(len(right) - sum(right)),
+        "titles_read": titles_read(),
+        "names_unknown": float(len(names_unknown())),
+    }

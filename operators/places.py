@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Import real places: terrain, trees that were measured or seen from above, and outlines of a map."""
 
-import json
-from collections.abc import Generator, Iterable
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -11,17 +10,22 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
+from ..tetflora_addon.blender.places.columns import (
+    TetFloraInventoryColumn,
+    chosen_columns,
+    columns_in,
+    show_columns,
+)
 from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE
 from ..tetflora_addon.blender.places.outlines import Drawn, outline_steps, told
 from ..tetflora_addon.blender.places.rasters import PATTERN
 from ..tetflora_addon.blender.places.terrain import ImportedGround, terrain_steps
 from ..tetflora_addon.blender.places.trees import GENERIC, LEFT_OUT, Planted, canopy_steps, inventory_steps
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
-from ..tetflora_addon.errors import SceneError, TetFloraError, readable
+from ..tetflora_addon.errors import TetFloraError, readable
 from ..tetflora_addon.jobs import Progress
-from ..tetflora_addon.places.inventories import IMPERIAL, METRIC, preview
+from ..tetflora_addon.places.inventories import IMPERIAL, METRIC
 from ..tetflora_addon.places.species_names import told as names_told
-from ..tetflora_addon.places.titles import FIELDS
 from .add import mix_in, parse_weights
 from .base import ModalJob, counted, in_object_mode, select_only
 from .populations import selected_grounds
@@ -163,40 +167,6 @@ class _Trees(_Importing):
         return {'FINISHED'}
 
 
-class TETFLORA_PG_inventory_column(bpy.types.PropertyGroup):
-    """A column of an inventory, and what it is taken for."""
-
-    field: EnumProperty(
-        name="Meaning",
-        description="What the column holds",
-        items=[(name.upper() or 'NONE', label, "") for name, label in FIELDS.items()],
-    )
-    unit: EnumProperty(
-        name="Unit",
-        description="Unit of its numbers, where they and the title name none",
-        items=[('AUTO', "Automatic", ""), *((unit, unit, "") for unit in ("m", "cm", "mm", "ft", "in"))],
-    )
-    values: StringProperty(name="Values", description="Some of its values")
-
-
-class TETFLORA_UL_inventory_columns(bpy.types.UIList):
-    """Columns of an inventory: title, some values, and what they are taken for."""
-
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property) -> None:
-        row = layout.split(factor=0.25)
-        row.label(text=item.name, translate=False)
-        row = row.split(factor=0.45)
-        row.label(text=item.values, translate=False)
-        row.prop(item, "field", text="")
-        row.prop(item, "unit", text="")
-
-
-def chosen_columns(table: Iterable[TETFLORA_PG_inventory_column]) -> str:
-    """What was chosen for columns, as scripts write it."""
-    chosen = {row.name: row.field.lower() if row.field != 'NONE' else "" for row in table}
-    return json.dumps(chosen | {row.name: f"{chosen[row.name]} {row.unit}" for row in table if row.unit != 'AUTO'})
-
-
 class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
     """Make a field of the trees of an inventory, CSV or GeoJSON: species, place and sizes of each.
 
@@ -266,26 +236,18 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
         unit='LENGTH',
         options=_UNLINKED,
     )
-    table: CollectionProperty(type=TETFLORA_PG_inventory_column, options={'HIDDEN', 'SKIP_SAVE'})
+    table: CollectionProperty(type=TetFloraInventoryColumn, options={'HIDDEN', 'SKIP_SAVE'})
     active: IntProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.chosen or self.columns:
             return super().invoke(context, event)
         try:
-            self.show(self.path)
+            show_columns(self.table, self.path)
         except (OSError, TetFloraError) as error:
             return self.failed(str(error))
         self._browsing = True
         return context.window_manager.invoke_props_dialog(self, width=720, title="Columns of the Inventory")
-
-    def show(self, path: Path) -> None:
-        """Fill the table with the columns of a file."""
-        self.table.clear()
-        for column in preview(path):
-            row = self.table.add()
-            row.name, row.field = column.title, column.field.upper() or 'NONE'
-            row.values = ", ".join(column.values)
 
     def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
         """Settings of another call, which takes columns as the table has them."""
@@ -297,7 +259,7 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
         if self.table:
             rows = min(max(len(self.table), 4), 16)
             layout.template_list(
-                TETFLORA_UL_inventory_columns.__name__, "", self, "table", self, "active", rows=rows, maxrows=rows
+                "TETFLORA_UL_inventory_columns", "", self, "table", self, "active", rows=rows, maxrows=rows
             )
         layout.use_property_split = True
         for name in ("units", "unknown", "species", "skip", "code", "new_origin", "crop", "crop_size"):
@@ -305,12 +267,6 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
                 layout.prop(self, name)
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
-        try:
-            columns = json.loads(self.columns or "{}")
-        except ValueError as error:
-            raise SceneError(f"Columns is not valid JSON: {error}") from None
-        if not isinstance(columns, dict) or not all(isinstance(text, str) for text in columns.values()):
-            raise SceneError('Columns is no JSON object of texts, such as {"H": "height"}')
         chosen = self.species if self.unknown == 'SPECIES' and self.species != NO_SPECIES else self.unknown
         return inventory_steps(
             context.scene,
@@ -322,7 +278,7 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
             self.units,
             self.skip,
             self.new_origin,
-            columns=columns,
+            columns=columns_in(self.columns),
             crop=(self.crop, self.crop_size),
         )
 
@@ -403,8 +359,6 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
 
 
 CLASSES = (
-    TETFLORA_PG_inventory_column,
-    TETFLORA_UL_inventory_columns,
     TETFLORA_OT_import_terrain,
     TETFLORA_OT_import_canopy,
     TETFLORA_OT_import_inventory,

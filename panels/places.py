@@ -23,6 +23,18 @@ IMPORTS = (
 )
 
 
+class TETFLORA_UL_inventory_columns(bpy.types.UIList):
+    """Columns of an inventory that is about to be imported."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
+        row = layout.split(factor=0.25)
+        row.label(text=item.name, translate=False)
+        row = row.split(factor=0.45)
+        row.label(text=item.values, translate=False)
+        row.prop(item, "field", text="")
+        row.prop(item, "unit", text="")
+
+
 class TETFLORA_PT_places(SidebarPanel, bpy.types.Panel):
     """Real places."""
 
@@ -53,4 +65,4 @@ def draw_in_import_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> No
         Button(kind, icon, ending).draw(menu.layout)
 
 
-CLASSES = (TETFLORA_PT_places,)
+CLASSES = (TETFLORA_UL_inventory_columns, TETFLORA_PT_places)

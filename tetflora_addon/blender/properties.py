@@ -16,6 +16,7 @@ from bpy.props import (
 from . import settings
 from .biomes import library
 from .biomes import properties as biome_properties
+from .places import columns
 from .placing import properties
 from .placing.plant_objects import show_age
 from .results import output_properties
@@ -289,7 +290,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
 
 _MODULES = (
     *(properties, stand_properties, biome_properties, output_properties, state),
-    *(editor, edits, asset_species, scatterers, settings),
+    *(editor, edits, asset_species, scatterers, settings, columns),
 )
 CLASSES = (
     *(cls for module in _MODULES for cls in module.CLASSES),

@@ -20,7 +20,7 @@ from operators import places
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import depsgraph, select
 from tetflora_addon.blender.attributes import read
-from tetflora_addon.blender.places import outlines, trees
+from tetflora_addon.blender.places import columns, outlines, trees
 from tetflora_addon.blender.places.completion import curves_of
 from tetflora_addon.blender.places.origin import KEY, origin_of
 from tetflora_addon.blender.places.rasters import read_raster
@@ -237,7 +237,7 @@ def test_large_areas_are_cropped(tmp_path, capfd):
     path = tmp_path / "a.csv"
     rows = [(9.0 + 0.5 * n, 48.0) for n in range(15)] + [(12.5001, 48.0001)]
     path.write_text("species,lon,lat\n" + "".join(f"oak,{x},{y}\n" for x, y in rows))
-    with pytest.raises(RuntimeError, match=r"an area of 5\d\d by 0 km; choose a Crop"):
+    with pytest.raises(RuntimeError, match=r"an area of 522 by 6 km; choose a Crop"):
         _call("import_inventory", path)
     with pytest.raises(RuntimeError, match="nothing was imported yet"):
         _call("import_inventory", path, crop='EXISTING')
@@ -267,7 +267,7 @@ def test_the_dialog_shows_what_columns_were_taken_for(tmp_path):
             return self[-1]
 
     dialog = SimpleNamespace(table=Rows())
-    places.TETFLORA_OT_import_inventory.show(dialog, path)
+    columns.show_columns(dialog.table, path)
     assert [(row.name, row.field, row.values) for row in dialog.table] == [
         ("Art", 'NAME', "Tilia cordata, Acer rubrum"),
         ("top", 'NONE', "30, 40"),
@@ -275,7 +275,7 @@ def test_the_dialog_shows_what_columns_were_taken_for(tmp_path):
         ("y", 'Y', "0, 5"),
     ]
     dialog.table[1].field, dialog.table[1].unit = 'HEIGHT', 'ft'
-    assert json.loads(places.chosen_columns(dialog.table)) == {"Art": "name", "top": "height ft", "x": "x", "y": "y"}
+    assert json.loads(columns.chosen_columns(dialog.table)) == {"Art": "name", "top": "height ft", "x": "x", "y": "y"}
 
 
 def test_canopy_heights_become_trees(tmp_path):

@@ -115,6 +115,10 @@ def test_titles_of_cities():
     assert inventories.titles_read() >= 0.95, inventories.titles_not_read()
 
 
+def test_names_of_streets_and_parks():
+    assert len(inventories.names_unknown()) <= 12, inventories.names_unknown()
+
+
 @pytest.mark.parametrize("name", inventories.cases())
 def test_inventories_as_others_write_them(name):
     assert inventories.problems(name) == []

@@ -91,7 +91,7 @@ def cropped(
         corners = [obj.matrix_world @ Vector(c) for obj in grounds or scene.objects for c in obj.bound_box]
         if place is None or not corners:
             raise SceneError(f"{what}nothing was imported yet; choose a box around its middle as Crop")
-        low, high = np.min(corners, axis=0)[:2], np.max(corners, axis=0)[:2]
+        low, high = np.min(corners, axis=0)[:2] - 1.0, np.max(corners, axis=0)[:2] + 1.0
     elif how == WHOLE:
         width, depth = np.ptp(local, axis=0) / 1000.0
         if not max(width, depth) < 2.0 * MOST_AWAY / 1000.0:
