@@ -141,7 +141,7 @@ def place_in(text: str) -> tuple[float, float, int]:
             return *middle_of(points), int(known[1] or 0)
         if text.strip().startswith("{"):
             return *middle_of(_positions(json.loads(text).get("coordinates"))), 0
-    except (ValueError, TypeError, AttributeError, RecursionError):
+    except (ValueError, TypeError, AttributeError, IndexError, OverflowError, RecursionError):
         pass
     return math.nan, math.nan, 0
 

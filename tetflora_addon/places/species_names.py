@@ -148,20 +148,17 @@ def species_named(name: str) -> Match | None:
     if not is_name(" ".join(map(" ".join, parts))):
         return None
     turned = [parts[1] + parts[0]] if "," in text and len(parts) > 1 else []  # "oak, northern red"
-    ways = [whole, *turned, *parts]
-    for words in ways[: len(ways) - len(parts)] if turned else ways:
-        match = _exactly(words)
-        if match is not None:
-            return match
-    for words in ways:
-        match = _scientific(words)
-        if match is not None:
-            return match
-    for words in ways[1:] if turned else ways:
-        match = _exactly(words) or _common(words)
-        if match is not None:
-            return match
-    code = re.fullmatch(r"([a-z]{4,8})\d{0,2}", "".join(whole)) if len(parts) == 1 and len(parts[0]) <= 2 else None
+    beside = [words for words in parts if len(words) > 1 and words != whole]  # a scientific name in brackets
+    tries = (
+        (_scientific, beside),
+        (_exactly, [whole, *(turned or parts)]),
+        (_scientific, [whole, *turned, *parts]),
+        (_named, [*(turned or [whole]), *parts]),
+    )
+    match = next((match for look, ways in tries for words in ways if words and (match := look(words))), None)
+    if match is not None:
+        return match
+    code = re.fullmatch(r"([a-z]{3,8})\d{0,2}", "".join(whole)) if len(parts) == 1 and len(parts[0]) <= 2 else None
     if code is not None and code[1] in known.codes:
         return known.codes[code[1]]
     match = next((match for word in whole if (match := known.whole.get(word)) and match.certainty >= KIN), None)
@@ -186,6 +183,10 @@ def best_of(names: Sequence[str], among: Container[str] | None = None) -> tuple[
         if any(len(words) > 1 and _scientific(words) for words in ways):
             return match, name
     return min(found, key=lambda pair: pair[0].certainty, default=(None, names[0] if names else ""))
+
+
+def _named(words: list[str]) -> Match | None:
+    return _exactly(words) or _common(words)
 
 
 def _exactly(words: list[str]) -> Match | None:
@@ -213,7 +214,7 @@ def _common(words: list[str]) -> Match | None:
     keys = ["".join(words[i:]) for i in range(len(words))]
     last = next((word.match for key in keys if (word := known.words.get(key)) and word.last), None)
     if last is None and len(words) > 1 and words[-1] in _AFTER:
-        return _exactly(words[:-1]) or _common(words[:-1])
+        return _named(words[:-1])
     begin = words
     while begin and begin[0] in (_LINKS if len(begin) < len(words) else _BEFORE):
         begin = begin[1:]
