@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tetflora_addon.errors import SceneError
-from tetflora_addon.places.inventories import Inventory, read_inventory
+from tetflora_addon.places.inventories import Inventory, preview, read_inventory
 from tetflora_addon.places.species_names import KIND, best_of, species_named
 from tetflora_addon.places.titles import read_title
 
@@ -49,8 +49,13 @@ def problems(name: str) -> list[str]:
 
 
 def _read(name: str, skip: bool) -> Inventory | str:
+    """What is read, or the refusal; the same if the columns are those that the dialog proposes."""
+    path = FOLDER / name
     try:
-        return read_inventory(FOLDER / name, skip=skip)
+        asked = {column.title: column.field for column in preview(path)}
+        alone, found = (read_inventory(path, skip=skip, columns=columns) for columns in (None, asked))
+        same = all(np.array_equal(alone.sizes[key], found.sizes[key]) for key in alone.sizes)
+        return found if same and np.array_equal(alone.points, found.points) else "the dialog proposes other columns"
     except SceneError as error:
         return str(error)
 

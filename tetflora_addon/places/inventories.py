@@ -158,18 +158,22 @@ def _chosen(table_: Table, columns: Mapping[str, str]) -> dict[str, Title]:
             why = why or f"{shown(text)} is none of {', '.join(filter(None, FIELDS))}"
         if why:
             raise SceneError(f"{table_.name}: column {shown(title)}: {why}; correct Columns")
-        found[title] = Title(name, metres or read_title(title).unit, -1)
+        told = read_title(title)
+        found[title] = Title(name, metres or told.unit, told.doubt if told.field == name else -1)
     return found
 
 
 def taken_for(table_: Table, chosen: Mapping[str, Title]) -> dict[str, Title]:
     """What each column is taken for, by its title and its first values."""
     found, samples = dict(chosen), {}
+    decided = {title.field for title in chosen.values()}.difference(NAMES, ("status", "dead"))
     for title, texts in table_.columns.items():
         if title not in chosen:
             sample = samples[title] = np.unique(texts[: 4 * _PREVIEWED])[: 4 * _SAMPLE]
             sample = samples[title] = sample[sample != ""][:_SAMPLE]
             found[title] = _confirmed(read_title(title), sample)
+            if found[title].field in decided:
+                found[title] = found[title]._replace(field="")
     fields = {title.field for title in found.values()}
     free = [title for title in samples if not found[title].field and found[title].doubt < NEVER]
     if table_.points is None and not ({"longitude", "latitude"} <= fields or {"x", "y"} <= fields or "place" in fields):
@@ -209,13 +213,17 @@ def _confirmed(title: Title, sample: NDArray[np.str_]) -> Title:
         return title
     if name == "place":
         return title if _share("place", sample) >= 0.5 else none
-    kinds = cells(sample)[2]
+    values, units, kinds = cells(sample)
     numbers = np.isin(kinds, (NUMBER, RANGE))
     if name in NAMES:
         doubtful = title.doubt > 0 and name != "leaf" and _share(name, sample) < 0.3
         return none if numbers.all() or doubtful else title
-    if name in _MOST and not numbers.any() and (kinds == WORD).all():
-        return none
+    if name in _MOST:
+        known = values[kinds == NUMBER]
+        bare = len(known) > 0 and not (kinds == RANGE).any() and not units.any()
+        # Numbers of classes, of which nobody tells the sizes.
+        classes = title.classes and bare and (known <= _CLASSES).all() and (known == np.round(known)).all()
+        return none if classes or (kinds == WORD).all() else title
     return title
 
 
@@ -301,7 +309,6 @@ class _Reading:
     def _size(self, name: str) -> NDArray[np.float64]:
         """Sizes in metres, ages in years; 0 for unknown."""
         read = [(title, what, *cells(self.table.columns[title])) for title, what in self.found.get(name, ())]
-        read = [r for r in read if not self._are_classes(*r[1:])]
         if not read:
             return np.zeros(len(self.good))
         chosen = read[0]
@@ -332,19 +339,6 @@ class _Reading:
             lambda i: f"{shown(str(texts[i]))} is not from 0 to {most:,.0f} {'years' if name == 'age' else 'm'}",
         )
         return np.where(self.good, values, 0.0)
-
-    def _are_classes(
-        self, what: Title, values: NDArray[np.float64], units: NDArray[np.float64], kinds: NDArray[np.int64]
-    ) -> bool:
-        """Whether a column has numbers of classes, of which nobody tells the sizes."""
-        known = values[kinds == NUMBER]
-        return (
-            what.classes
-            and len(known) > 0
-            and not (kinds == RANGE).any()
-            and not units.any()
-            and bool((known <= _CLASSES).all() and (known == np.round(known)).all())
-        )
 
     def _guess(self, title: str, name: str, known: NDArray[np.float64]) -> float:
         """Metres of the unit of a column that names none."""

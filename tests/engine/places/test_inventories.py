@@ -302,6 +302,9 @@ def test_a_mapping_changes_what_columns_are_taken_for(tmp_path):
     assert found.sizes["height"] == pytest.approx([9.144, 12.192])
     assert found.sizes["crown_width"].tolist() == [5.0, 6.0]
     assert "no column of species" in found.notes
+    text = "species,height,height 2,x,y\noak,30,5,0,0\noak,40,6,5,5\n"
+    assert _read(tmp_path, text, columns={"height 2": "height"}).sizes["height"].tolist() == [5.0, 6.0]
+    text = "species,h1,h2,x,y\noak,30,5,0,0\n"
     for columns in ({"h3": "height"}, {"h1": "size"}, {"h1": "height furlongs"}):
         with pytest.raises(SceneError, match="correct Columns"):
             _read(tmp_path, text, columns=columns)

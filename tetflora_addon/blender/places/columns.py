@@ -15,7 +15,6 @@ from ...errors import SceneError
 from ...places.inventories import preview
 from ...places.titles import FIELDS
 
-
 _UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
 
 
