@@ -25,16 +25,16 @@ _METRES = {
     0.0: r"years?|yrs?|jahre?|ans?|a[nñ]os?|anni|jaar",
 }
 _UNIT = "|".join(_METRES.values())
-_LESS = r"<=?|≤|bis(?: zu)?|up to|less than|under|below|unter|moins de|jusqu'?[aà]|menos de|hasta|meno di|fino a|tot"
+_LESS = r"<=?|≤|bis(?: zu)?|up to|less than|under|below|unter|moins de|jusqu'?[aà]|menos de|menor (?:de|que|a)|hasta|meno di|fino a|tot"
 _MORE = (
     r">=?|≥|more than|greater than|over|above|at least|[uü]ber|[uü]ebersteigt|ab|mehr als|mindestens|plus de|au moins|"
-    r"m[aá]s de|oltre|pi[uù] di|meer dan|from|von"
+    r"m[aá]s de|mayor (?:de|que|a)|oltre|pi[uù] di|meer dan"
 )
 _PLUS = r"\+|(?:and|or|und|oder|et|ou|y|o|e|en) (?:more|above|over|mehr|gr[oö]sser|plus|m[aá]s|oltre|pi[uù]|meer)"
 _SHAPE = re.compile(
-    rf"(?:class|klasse|classe|clase)?\s*(?:ca\.?|circa|approx\.?|~|≈|about|etwa|env\.?|environ)?\s*"
-    rf"(?:(?P<less>{_LESS})|(?P<more>{_MORE}))?\s*(?P<low>-?(?:{_NUMBER}))\s*(?P<first>{_UNIT})?\.?\s*"
-    rf"(?:(?P<sep>-|–|—|/|;|\+|to|bis|[aà]|al|and|und|et|y|tot|hasta|<|…|\.\.\.?)\s*"
+    rf"(?:class|klasse|classe|clase)?\s*(?:[øØ⌀]|ca\.?|circa|approx\.?|~|≈|about|etwa|env\.?|environ|between|zwischen|von|from|entre|de|tra|da)?\s*"
+    rf"(?:(?P<less>{_LESS})|(?P<more>{_MORE}))?\s*(?P<low>-?(?:{_NUMBER}))(?P<over>\+)?\s*(?P<first>{_UNIT})?\.?\s*"
+    rf"(?:(?P<sep>-|–|—|/|;|\+|to|bis(?: unter)?|[aà]|al|and|und|et|y|e|tot|hasta|<|…|\.\.\.?)\s*"
     rf"(?:<=?\s*)?(?P<high>{_NUMBER})\s*(?P<second>{_UNIT})?\.?\s*)?(?P<plus>{_PLUS})?",
 )
 _FLOAT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
@@ -63,6 +63,10 @@ def cell_of(text: str, points: bool = False) -> Quantity:
         return Quantity(0.0, kind=NOTHING)
     if not any(c.isdecimal() for c in text):
         return Quantity(0.0, kind=WORD)
+    aside = re.fullmatch(r"([^()]*)\(([^()]*)\)([^()]*)", text)  # "small (0-15 ft)", "12 m (measured)"
+    if aside is not None:
+        inner, outer = cell_of(aside[2], points), cell_of(aside[1] + aside[3], points)
+        return inner if inner.kind == RANGE or outer.kind in (NOTHING, WORD) else outer
     found = _SHAPE.fullmatch(text)
     if found is None:
         return Quantity(math.nan, kind=WRONG)
@@ -71,7 +75,9 @@ def cell_of(text: str, points: bool = False) -> Quantity:
     if found["high"] is None:
         first = _unit(found["first"])
         value = low / 2.0 if found["less"] else low
-        return Quantity(value, first, RANGE if found["less"] or found["more"] or found["plus"] else NUMBER)
+        return Quantity(
+            value, first, RANGE if found["less"] or found["more"] or found["plus"] or found["over"] else NUMBER
+        )
     if found["first"] and not found["sep"]:
         return Quantity(math.nan, kind=WRONG)
     if found["sep"] in ("/", ";", "+"):  # several stems

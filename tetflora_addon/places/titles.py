@@ -156,7 +156,9 @@ def _field(meant: set[str]) -> tuple[str, int]:
     """The field that meanings of words make up, and the doubt."""
     if {"plant", "year"} <= meant:
         return "planted", 0
-    meant = meant - {"plant"}
+    if "cultivar" in meant and not meant & {"species", "genus", "latin"}:
+        return "", NEVER
+    meant = meant - {"plant", "cultivar"}
     if "veto" in meant or ("id" in meant and not meant & {"breast", "girth", "crown", "height", "diameter"}):
         return "", NEVER
     if meant & {"species", "genus", "name", "latin", "common"} and "lat" in meant:
