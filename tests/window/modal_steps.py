@@ -91,6 +91,19 @@ def steps(ui):
     ui.values["running_refused"] = running(ui)
     bpy.data.objects.remove(odd)
 
+    # The columns of an inventory are asked for first; what they were taken for goes with the call that imports.
+    table = ui.out_dir / "trees.csv"
+    table.write_text("Art;top;x;y\nTilia cordata;12;0;0\nAcer rubrum;9;5;5\n")
+    for key in ('ESC', 'RET'):
+        with ui.override():
+            bpy.ops.tetflora.import_inventory('INVOKE_DEFAULT', filepath=str(table), chosen=True)
+        yield 1.0
+        yield from ui.picture("columns")
+        ui.press(key)
+        yield 3.0
+        ui.values[f"fields_after_{key}"] = [obj.name for obj in bpy.data.objects if obj.tetflora.is_field]
+    ui.values["columns"] = json.loads(bpy.context.window_manager.operators[-1].columns)
+
     bare = datablocks()
     refine.refine_steps = broken
     begin(ui)

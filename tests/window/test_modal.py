@@ -50,3 +50,9 @@ def test_errors_in_the_middle_are_reported(seen: dict) -> None:
     assert seen["running_broken"]
     assert "leaf without faces" in seen["reports"]
     assert seen["left_by_error"] == []
+
+
+def test_columns_of_an_inventory_are_asked_for(seen: dict) -> None:
+    assert seen["fields_after_ESC"] == []
+    assert seen["fields_after_RET"] == ["trees"]
+    assert seen["columns"] == {"Art": "name", "top": "", "x": "x", "y": "y"}
