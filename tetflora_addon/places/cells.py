@@ -32,7 +32,7 @@ _MORE = (
 )
 _PLUS = r"\+|(?:and|or|und|oder|et|ou|y|o|e|en) (?:more|above|over|mehr|gr[oö]sser|plus|m[aá]s|oltre|pi[uù]|meer)"
 _SHAPE = re.compile(
-    rf"(?:class|klasse|classe|clase)?\s*(?:[øØ⌀]|ca\.?|circa|approx\.?|~|≈|about|etwa|env\.?|environ|between|zwischen|von|from|entre|de|tra|da)?\s*"
+    rf"(?:class|klasse|classe|clase|[a-z]\.)?\s*(?:[øØ⌀]|ca\.?|circa|approx\.?|~|≈|about|etwa|env\.?|environ|between|zwischen|von|from|entre|de|tra|da)?\s*"
     rf"(?:(?P<less>{_LESS})|(?P<more>{_MORE}))?\s*(?P<low>-?(?:{_NUMBER}))(?P<over>\+)?\s*(?P<first>{_UNIT})?\.?\s*"
     rf"(?:(?P<sep>-|–|—|/|;|\+|to|bis(?: unter)?|[aà]|al|and|und|et|y|e|tot|hasta|<|…|\.\.\.?)\s*"
     rf"(?:<=?\s*)?(?P<high>{_NUMBER})\s*(?P<second>{_UNIT})?\.?\s*)?(?P<plus>{_PLUS})?",

@@ -202,7 +202,7 @@ def _share(name: str, sample: NDArray[np.str_]) -> float:
         fits = [not math.isnan(place_in(text)[0]) for text in sample.tolist()]
     else:
         matches = [species_named(text) for text in sample.tolist() if is_name(text)]
-        fits = [match is not None and match.certainty < KIND for match in matches]
+        fits = [match is not None and (match.certainty < KIND or name == "leaf") for match in matches]
     return sum(fits) / max(len(fits), 1)
 
 
@@ -216,7 +216,7 @@ def _confirmed(title: Title, sample: NDArray[np.str_]) -> Title:
     values, units, kinds = cells(sample)
     numbers = np.isin(kinds, (NUMBER, RANGE))
     if name in NAMES:
-        doubtful = title.doubt > 0 and name != "leaf" and _share(name, sample) < 0.3
+        doubtful = (title.doubt > 0 or name == "leaf") and _share(name, sample) < 0.3
         return none if numbers.all() or doubtful else title
     if name in _MOST:
         known = values[kinds == NUMBER]

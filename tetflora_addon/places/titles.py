@@ -111,9 +111,8 @@ def _cut(text: str) -> list[str]:
         best.append(min(ways, key=lambda way: way[0]))
     found = best[-1][1]
     # Short words within others are chance: "age" in "page", "art" in "start".
-    if any(word.startswith("?") for word in found) and max(len(word) for word in found) < _SHORTEST:
-        return ["?" + text]
-    return found
+    chance = any(word.startswith("?") for word in found)
+    return [word if len(word) >= _SHORTEST or not chance else "?" + word.lstrip("?") for word in found]
 
 
 @cache
@@ -122,9 +121,7 @@ def read_title(title: str) -> Title:
     words, units, _ = _words()
     title = re.sub(r"(?i)\bd[ _]?1[.,]?30?\b", "dbh", title[:200])  # the diameter at 1.3 m
     once = re.sub(r"[^\W\d_]+", lambda run: re.sub(r"(?<=[a-z])(?=[A-Z])", " ", run[0]), title)
-    ways = [
-        [part for word in plain_words(text) for part in _cut_or_begun(word)] for text in dict.fromkeys((title, once))
-    ]
+    ways = [[part for word in plain_words(text) for part in _parts(word)] for text in dict.fromkeys((title, once))]
     parts = min(ways, key=lambda way: (sum(part.startswith("?") for part in way), len(way)))
     unit, meant, unknown = 0.0, [], 0
     for index, part in enumerate(parts):
@@ -140,23 +137,22 @@ def read_title(title: str) -> Title:
     field, doubt = _field(set(meant) - {"filler"})
     if unknown > _MOST_UNKNOWN and not _STRONG.intersection(meant):
         field = ""
+    if unknown and field == "crown_width" and "crown" not in meant:
+        field = ""
     return Title(field, unit if field else 0.0, doubt + (unknown > 0), "class" in meant)
 
 
-def _cut_or_begun(word: str) -> list[str]:
-    """A whole word, the beginning of three letters of one, or what it is put together from."""
-    words, units, begun = _words()
-    if word in words or word in units or word.isdigit():
-        return [word]
-    found = _cut(word)
-    return [begun[word]] if len(word) == 3 and word in begun and found[0].startswith("?") else found
+def _parts(word: str) -> list[str]:
+    """A whole word, or what it is put together from."""
+    words, units, _ = _words()
+    return [word] if word in words or word in units or word.isdigit() else _cut(word)
 
 
 def _field(meant: set[str]) -> tuple[str, int]:
     """The field that meanings of words make up, and the doubt."""
     if {"plant", "year"} <= meant:
         return "planted", 0
-    if "cultivar" in meant and not meant & {"species", "genus", "latin"}:
+    if "cultivar" in meant and not meant & {"species", "genus"}:
         return "", NEVER
     meant = meant - {"plant", "cultivar"}
     if "veto" in meant or ("id" in meant and not meant & {"breast", "girth", "crown", "height", "diameter"}):
@@ -165,10 +161,11 @@ def _field(meant: set[str]) -> tuple[str, int]:
         meant = (meant - {"lat"}) | {"latin"}
     place = meant & {"x", "y", "longitude", "latitude", "lat", "place"}
     if place and not meant - place - {"grid", "width"}:
-        if len(place) > 1 and place != {"lat", "latitude"}:
-            return "place", 1
-        name = place.pop()
-        return {"lat": "latitude"}.get(name, name), int(name == "place")
+        core = place - {"place"}
+        for name, also in (("longitude", {"x"}), ("latitude", {"lat", "y"})):
+            if core & {name, "lat"} and core <= {name, *also}:
+                return name, 0
+        return (core.pop(), 0) if len(core) == 1 else ("place", 1)
     if meant == {"grid"}:
         return "place", 2
     sizes = meant - {"trunk", "class", "name", "type", "id"}
@@ -182,7 +179,7 @@ def _field(meant: set[str]) -> tuple[str, int]:
     for name, field in (("girth", "girth"), ("breast", "diameter"), ("diameter", "diameter")):
         if name in sizes:
             return field, 0
-    if "base" in sizes:
+    if sizes & {"base"} or {"trunk", "height"} <= meant:  # the height of a trunk is that below the crown
         return ("crown_base", 0) if "height" in sizes else ("", 0)
     for name, field in (("height", "height"), ("width", "crown_width"), ("age", "age")):
         if name in sizes:
