@@ -369,11 +369,12 @@ class _Reading:
     def _dead(self) -> NDArray[np.float64]:
         """Years since death, 0 for those alive."""
         years = np.zeros(len(self.good))
-        for name in ("dead", "status"):
+        for name in ("dead", "status", "name", "common"):
             for title, _ in self.found.get(name, ()):
                 distinct, index = np.unique(self._texts(title), return_inverse=True)
                 words = ("dead", "yes") if name == "dead" else ("dead",)
-                values = np.where([said_of(text) in words for text in distinct.tolist()], DEAD_YEARS, 0.0)
+                says = [said_of(text) in words and not species_named(text) for text in distinct.tolist()]
+                values = np.where(says, DEAD_YEARS, 0.0)
                 if name == "dead" and re.search("year|jahr|ann|año", title.lower()):
                     values = np.nan_to_num(np.clip(cells(distinct)[0], 0.0, _MOST["age"]))
                 years = np.maximum(years, values[index])

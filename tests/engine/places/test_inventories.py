@@ -291,6 +291,23 @@ def test_what_cells_say_of_trees(text, said):
     assert said_of(text) == said
 
 
+def test_a_dead_tree_may_stand_in_place_of_a_species(tmp_path):
+    found = _read(tmp_path, "species,condition,x,y\nDead,,0,0\nTilia cordata,Good,5,5\nTilia cordata,Dead,9,5\n")
+    assert (found.sizes["dead"] > 0.0).tolist() == [True, False, True]
+
+
+def test_collections_of_geometry_and_features_without_a_place(tmp_path):
+    square = [[[9.0, 48.0], [9.2, 48.0], [9.2, 48.2], [9.0, 48.2], [9.0, 48.0]]]
+    point = {"type": "Point", "coordinates": ["9.5", "48.5"]}
+    both = {"type": "GeometryCollection", "geometries": [{"type": "LineString", "coordinates": []}, point]}
+    features = [files.feature("MultiPolygon", [square], species="oak"), files.feature("LineString", [[9, 48], [9, 49]])]
+    features.append({"type": "Feature", "properties": {"tags": {"species": "Tilia cordata"}}, "geometry": both})
+    found = _read(tmp_path, files.collection(*features), "a.geojson")
+    assert found.points == pytest.approx(np.array([[9.1, 48.1], [9.5, 48.5]]))
+    assert [found.names[i] for i in found.name] == [("oak",), ("Tilia cordata",)]
+    assert found.notes[0] == "1 feature without a place"
+
+
 def test_years_of_planting_become_ages(tmp_path):
     now = datetime.date.today().year
     for title, year in (("Pflanzjahr", "1990"), ("planting date", "12/03/1990"), ("age", "1990")):
