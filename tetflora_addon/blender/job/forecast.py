@@ -77,7 +77,9 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     used = (memory.resident() or 0) + picture_bytes(scene, camera)
     allowed = memory_left(scene, camera)
     everything = scene.tetflora.expand_everything
-    return estimate(stand, camera, settings_from(scene), used, allowed, enough(camera), everything)
+    return estimate(
+        stand, camera, settings_from(scene), used, allowed, enough(camera, scene.tetflora.facet), everything
+    )
 
 
 def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:

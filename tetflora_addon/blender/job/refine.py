@@ -21,14 +21,13 @@ from ...compiled.flora import Flora, compile_species
 from ...emission.asset_plan import plan_of
 from ...emission.asset_sight import AssetSight
 from ...emission.budget import afford
-from ...emission.facets import drawn_species
+from ...emission.drawing import drawing
 from ...emission.forms import EmissionForm, Refined
-from ...emission.plants import Transition, expanded_blocks, explicit_blocks
+from ...emission.plants import Transition, expanded_blocks
 from ...emission.polygons import polygon_blocks
-from ...emission.portions import Sight
 from ...jobs import Progress
 from ...processes import pool
-from ...proxies.facet_weights import measuring, unmeasured
+from ...proxies.facet_weights import facet_weights, measuring, unmeasured
 from ...refinement import loop
 from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
@@ -304,6 +303,7 @@ def _refined(
     settings: RefinementSettings,
     form: EmissionForm,
     disc: float,
+    baked: bool,
     statistics: Statistics,
     clock: Stopwatch,
 ) -> Generator[Progress, bool | None, Refined]:
@@ -311,24 +311,30 @@ def _refined(
     refinement = yield from _run_loop(flora, given, bound, camera, settings, statistics)
     yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
     assets = None if bound is None else (AssetSight(refinement, camera, form.facets), bound.keeping)
-    detail = afford(flora, refinement, camera, settings, form.faces, form.primitive_bytes, assets)
+    if form.facets and unmeasured(flora):
+        yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
+        for name, done in measuring(flora, range(len(flora.species))):
+            yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
+        yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
+    detail = afford(refinement, camera, settings, form.faces, form.primitive_bytes, assets)
     clock.lap("refine")
     _count(statistics, detail.refinement)
     statistics.strays = given.named(refinement.strays)
     planned = None
     if assets is not None:
         sight = assets[0] if detail.refinement is refinement else AssetSight(detail.refinement, camera, form.facets)
-        planned = sight, plan_of(sight, detail.leaf_limit if form.facets else None, bound.keeping)
+        planned = sight, plan_of(sight, detail.asset_limit if form.facets else None, bound.keeping)
     refinement = detail.refinement
     if not form.facets:
         return Refined(flora, refinement, camera, tolerance=detail.tolerance, assets=planned)
     transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
-    yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
-    sight = detail.sight or Sight(flora, refinement, camera)
-    if unmeasured(flora):
-        for name, done in measuring(flora, drawn_species(sight, transition)):
-            yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
-    return Refined(flora, refinement, camera, detail.pixels, transition, disc, detail.tolerance, sight, planned)
+    # Light is baked for facets, whatever is made of them then.
+    becomes = None if baked else form.form(camera, disc)
+    sizes, weights = detail.pixels, facet_weights(flora)
+    with_all = drawing(
+        flora, refinement, camera, transition, sizes.seen, weights, sizes.hidden, given.occluders, becomes
+    )
+    return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc)
 
 
 def _write_refined(
@@ -348,17 +354,16 @@ def _write_refined(
     # What the process holds already and what the image takes count too.
     settings = replace(settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
     disc = drawn_disc(scene.render.engine)
-    work = _refined(flora, given, bound, camera, settings, form.emission, disc, statistics, clock)
+    baked = given.sources is not None
+    work = _refined(flora, given, bound, camera, settings, form.emission, disc, baked, statistics, clock)
     refined = yield from steps_in_thread(work, Progress(0.05, "Refining, pass 1"))
     in_main_thread(results.open)
     baking = None
     if given.sources is not None:
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-    how = refined.transition, refined.tolerance, refined.sight
-    blocks = explicit_blocks(flora, refined.refinement, camera, *how)
-    yield from write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
+    yield from write_blocks(results, flora, refined.mesh_blocks(), statistics, _LOOP_FRACTION, baking)
     if given.explicit is not None:
-        blocks = polygon_blocks(refined.refinement, camera, refined.facet_pixels)
+        blocks = polygon_blocks(refined.refinement, camera, None if refined.pixels is None else refined.pixels.seen)
         yield from write_polygons(results, given.explicit, blocks, statistics, baking)
     hidden = []
     if refined.assets is not None:
