@@ -54,12 +54,15 @@ class Detail:
         Width in pixels up to which leaves are facets.
     tolerance : float
         Pixels by which the margins of near leaves may be off; infinite where only their models are drawn.
+    most : float
+        Polygons and facets of plants that there may be.
     """
 
     refinement: Refinement
     pixels: FacetPixels
     leaf_limit: float
     tolerance: float = TOLERANCE
+    most: float = np.inf
 
     @property
     def of_assets(self) -> FacetPixels:
@@ -118,6 +121,7 @@ def afford(
             pixels=FacetPixels(coarser * settings.facet, max(coarser, 1.0)),
             leaf_limit=coarser * settings.leaf_limit,
             tolerance=TOLERANCE * max(coarser, 1.0) ** 2,
+            most=left,
         )
         every = number / coarser**2
         if placed is not None:

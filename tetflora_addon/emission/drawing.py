@@ -45,7 +45,7 @@ from ..subplants.pieces import Pieces, whole_pieces
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
 from .coverage import Coverage
-from .frontier import Frontier, Pool
+from .frontier import Frontier, Waiting
 from .plants import Block, Transition
 from .shade import Shade
 
@@ -73,6 +73,8 @@ HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.6, 0.3
 _BESIDE, _THROWN = (0.1, 8.0, 15.0), (0.02, 1.0)
 #: Parts outside that are drawn at a time.
 _OUTSIDE_BATCH = 20_000
+#: Fraction of what a tile may have from which on all that is left counts as hidden.
+_FULL = 0.85
 #: Draws of this module.
 _MERGE, _THIN = 230, 231
 
@@ -111,6 +113,8 @@ class Drawing:
         Triangles of opaque polygons, metres.
     form : callable or None
         What becomes of facets where they are made; without, they stay what they are.
+    most : float
+        Polygons and facets that there may be, should what is expected be wrong.
     """
 
     flora: Flora
@@ -123,6 +127,7 @@ class Drawing:
     shade: Shade
     occluders: NDArray[np.float64]
     form: Form | None = None
+    most: float = np.inf
 
 
 def drawing(
@@ -135,6 +140,7 @@ def drawing(
     hidden: float = 1.0,
     occluders: NDArray[np.float64] | None = None,
     form: Form | None = None,
+    most: float = np.inf,
 ) -> Drawing:
     """What a refinement is drawn with, see `Drawing`."""
     points = result.plants.points
@@ -142,7 +148,7 @@ def drawing(
     shadows = ThrownShadows(camera, result.lights, float(lowest))
     shade = Shade(points.position, points.optical_area, result.lights)
     occluders = np.zeros((0, 3, 3)) if occluders is None else occluders
-    return Drawing(flora, camera, transition, facet, hidden, weights, shadows, shade, occluders, form)
+    return Drawing(flora, camera, transition, facet, hidden, weights, shadows, shade, occluders, form, most)
 
 
 def drawn_blocks(given: Drawing, parts: PlantParts, few: bool = False) -> Iterator[Block | Parts]:
@@ -151,9 +157,9 @@ def drawn_blocks(given: Drawing, parts: PlantParts, few: bool = False) -> Iterat
     few: so little that other processes are not worth it.
     """
     tiles, outside = _tiles(given, parts)
-    items = [(number, *tile) for number, tile in enumerate(tiles)]
+    items: list[tuple] = [(number, *tile) for number, tile in enumerate(tiles)]
     items += [
-        (len(tiles), None, outside.take(slice(start, start + _OUTSIDE_BATCH)), len(outside))
+        (len(tiles), None, outside.take(slice(start, start + _OUTSIDE_BATCH)), 1.0 / len(outside))
         for start in range(0, len(outside), _OUTSIDE_BATCH)
     ]
     whole = max(len(items), 1)
@@ -163,8 +169,8 @@ def drawn_blocks(given: Drawing, parts: PlantParts, few: bool = False) -> Iterat
             yield replace(one, fraction=(number + 1) / whole) if isinstance(one, Block) else one
 
 
-def _tiles(given: Drawing, parts: PlantParts) -> tuple[list[tuple[tuple[int, int], PlantParts, int]], PlantParts]:
-    """Columns, parts and number of these for each tile, and parts out of view.
+def _tiles(given: Drawing, parts: PlantParts) -> tuple[list[tuple[tuple[int, int], PlantParts, float]], PlantParts]:
+    """Columns, parts and share of all that may be drawn for each tile, and parts out of view.
 
     A part belongs to the tile that its middle is in; what is wider than half a tile is opened first.
     """
@@ -191,7 +197,8 @@ def _tiles(given: Drawing, parts: PlantParts) -> tuple[list[tuple[tuple[int, int
     for tile in range(number):
         own = every.take(np.flatnonzero(column == tile))
         if len(own):
-            tiles.append(((int(ends[tile]), int(ends[tile + 1])), _ordered(own), len(own)))
+            share = 0.5 * len(own) / len(every) + 0.5 / number
+            tiles.append(((int(ends[tile]), int(ends[tile + 1])), _ordered(own), share))
     return tiles, _ordered(PlantParts.concatenate(outside))
 
 
@@ -200,14 +207,14 @@ def _ordered(parts: PlantParts) -> PlantParts:
     return parts.take(np.lexsort([*parts.branches.position.T, parts.branches.key]))
 
 
-def _drawn_tile(given: Drawing, item: tuple[int, tuple[int, int] | None, PlantParts, int]) -> list[Block | Parts]:
+def _drawn_tile(given: Drawing, item: tuple[int, tuple[int, int] | None, PlantParts, float]) -> list[Block | Parts]:
     """All meshes and facets of one tile, or of parts that are out of view."""
-    number, columns, parts, every = item
+    number, columns, parts, share = item
     tile = _Tile(given, columns)
     if columns is None:
-        tile.draw_outside(parts, every)
+        tile.draw_outside(parts, share * len(parts))
     else:
-        tile.draw(parts, (columns[1] - columns[0]) * given.camera.height)
+        tile.draw(parts, (columns[1] - columns[0]) * given.camera.height, share * given.most)
     return tile.made(number)
 
 
@@ -222,6 +229,7 @@ class _Tile:
         self._facets: dict[tuple[int, bool], list[Drawn]] = {}
         # What was made between two depths: species and facets, or kinds and meshes, and their corners.
         self._waiting: list[tuple[Any, Any, NDArray[np.float32]]] = []
+        self.number = 0
 
     def made(self, number: int) -> list[Block | Parts]:
         """Meshes by kind, and facets by species."""
@@ -239,14 +247,17 @@ class _Tile:
             for one in species
         ]
 
-    def draw(self, parts: PlantParts, pixels: int) -> None:
-        """All parts of a tile of so many pixels."""
+    def draw(self, parts: PlantParts, pixels: int, most: float) -> None:
+        """All parts of a tile of so many pixels, with no more than so many polygons and facets."""
         given = self.given
         if len(given.occluders):
             _, *corners = self.coverage.of_corners(given.occluders)
             self.coverage.draw(*corners)
         frontier = Frontier(self.flora, self.coverage, given.transition, given.facet)
         for slab in frontier.slabs(parts):
+            if self.number > _FULL * most:
+                frontier.hidden.append(slab)
+                continue
             extent = given.camera.extent_around(slab.centre)
             side, branches = given.facet * extent, slab.parts.branches
             lines = slab.parts.alone | ~slab.parts.can_open(self.flora)
@@ -256,15 +267,17 @@ class _Tile:
             self._draw_subplants(branches.take(np.flatnonzero(~lines)), side[~lines])
             self._draw_branches(branches.take(np.flatnonzero(lines)), side[lines])
             self._cover()
-        self._draw_hidden(Pool.concatenate([Pool.empty(), *frontier.hidden]), HIDDEN_A_PIXEL * pixels)
+        self._draw_hidden(Waiting.concatenate([Waiting.empty(), *frontier.hidden]), self._few(HIDDEN_A_PIXEL * pixels))
         # What is outside of a tile's own image was part of something inside: it lies near the border.
-        self._draw_outside(Pool.concatenate([Pool.empty(), *frontier.outside]), OUTSIDE_A_PIXEL * pixels)
+        self._draw_outside(
+            Waiting.concatenate([Waiting.empty(), *frontier.outside]), self._few(OUTSIDE_A_PIXEL * pixels)
+        )
 
-    def draw_outside(self, parts: PlantParts, every: int) -> None:
-        """Parts out of view, some of so many."""
+    def draw_outside(self, parts: PlantParts, share: float) -> None:
+        """Parts out of view, a share of all of them."""
         camera = self.given.camera
         pool = Frontier(self.flora, self.coverage, self.given.transition, self.given.facet).pool(parts)
-        self._draw_outside(pool, OUTSIDE_A_PIXEL * camera.width * camera.height * len(parts) / every)
+        self._draw_outside(pool, self._few(OUTSIDE_A_PIXEL * camera.width * camera.height * share))
 
     # -- what is seen ---------------------------------------------------------------------------------------------
 
@@ -371,6 +384,7 @@ class _Tile:
             return
         _, *drawn = self.coverage.of_corners(corners)
         self._fill(*drawn)
+        self.number += buffers.polygons
         self._meshes.setdefault(what, []).append(buffers)
 
     def _fill(self, column: NDArray, row: NDArray, depth: NDArray) -> None:
@@ -406,7 +420,12 @@ class _Tile:
                 self._merge(_facets_of_faces(corners[lost], size, made, lost), species)
                 made = kept_faces(made, ~gone)
             if made.polygons:
+                self.number += made.polygons
                 self._meshes.setdefault(what, []).append(made)
+
+    def _few(self, number: float) -> float:
+        """So many facets that nobody sees, or fewer where they are to be larger."""
+        return number / self.given.hidden**2
 
     # -- what is not seen -----------------------------------------------------------------------------------------
 
@@ -428,7 +447,7 @@ class _Tile:
         """Facets (n,) behind full pixels."""
         return self.coverage.hidden(self.coverage.of_corners(triangle_corners(facets))[0])
 
-    def _draw_hidden(self, pool: Pool, most: float) -> None:
+    def _draw_hidden(self, pool: Waiting, most: float) -> None:
         """Hidden parts: facets that grow with their depth in the shade, as many as are allowed."""
         if not len(pool):
             return
@@ -444,7 +463,7 @@ class _Tile:
             facets = facets.take(np.flatnonzero(~hidden))
             facets = replace(facets, side=0.5 * facets.side)
 
-    def _draw_outside(self, pool: Pool, most: float) -> None:
+    def _draw_outside(self, pool: Waiting, most: float) -> None:
         """Parts out of view: facets as large as their distance and the shadows that they throw allow."""
         if not len(pool):
             return
@@ -461,7 +480,7 @@ class _Tile:
         self._draw_unseen(pool, side, most, add)
 
     def _draw_unseen(
-        self, pool: Pool, side: NDArray[np.float64], most: float, add: Callable[[Facets, int], None]
+        self, pool: Waiting, side: NDArray[np.float64], most: float, add: Callable[[Facets, int], None]
     ) -> None:
         """Facets of parts that nobody sees, of sides (n,) in metres, no more than so many."""
         flora, parts = self.flora, pool.parts
@@ -482,6 +501,7 @@ class _Tile:
 
     def _keep(self, facets: Facets, seen: bool, species: int) -> None:
         facets = facets.take(np.flatnonzero(facets.side > 0.0))
+        self.number += len(facets)
         if len(facets):
             form = self.given.form
             self._facets.setdefault((species, seen), []).append(facets if form is None else form(facets, seen))

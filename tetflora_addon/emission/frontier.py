@@ -34,7 +34,7 @@ _SLABS = 200
 
 
 @dataclass(frozen=True)
-class Pool(Arrays):
+class Waiting(Arrays):
     """Parts (n), and spheres around them.
 
     Attributes
@@ -67,16 +67,16 @@ class Frontier:
 
     Attributes
     ----------
-    hidden, outside : list of Pool
+    hidden, outside : list of Waiting
         What is not seen, as whole as it was left.
     """
 
     def __init__(self, flora: Flora, coverage: Coverage, transition: Transition, facet: float) -> None:
         self.flora, self.coverage, self.transition, self.facet = flora, coverage, transition, facet
-        self.hidden: list[Pool] = []
-        self.outside: list[Pool] = []
+        self.hidden: list[Waiting] = []
+        self.outside: list[Waiting] = []
 
-    def pool(self, parts: PlantParts) -> Pool:
+    def pool(self, parts: PlantParts) -> Waiting:
         """Parts (n,) with spheres around them, as far as samples of their leaves and wood reach."""
         branches, alone = parts.branches, parts.alone
         across, low, high = extents(self.flora, branches).T
@@ -85,9 +85,9 @@ class Frontier:
         across = np.where(alone, 0.5 * parts.extent / np.maximum(branches.length, 1e-12), across)
         centre = branches.position + middle[:, None] * branches.frame[:, :, 2]
         radius = branches.length * np.hypot(across, half) + branches.radius
-        return Pool(parts, centre, radius, self.coverage.project(centre)[2] - radius)
+        return Waiting(parts, centre, radius, self.coverage.project(centre)[2] - radius)
 
-    def slabs(self, parts: PlantParts) -> Iterator[Pool]:
+    def slabs(self, parts: PlantParts) -> Iterator[Waiting]:
         """Parts that are to be drawn, some at a time; what they cover is to be drawn before more are asked for."""
         pool, step = self.pool(parts), 0.0
         wanted = max(SLAB * self.coverage.depth.size, LEAST)
@@ -96,16 +96,16 @@ class Frontier:
             step = step or max((float(pool.near.max()) - first) / _SLABS, 1e-3)
             depth = max(first, 0.0) + step
             ready, later = self._decided(pool.take(np.flatnonzero(pool.near <= depth)), depth)
-            pool = Pool.concatenate([pool.take(np.flatnonzero(pool.near > depth)), *later])
+            pool = Waiting.concatenate([pool.take(np.flatnonzero(pool.near > depth)), *later])
             # The next slab is as much deeper as this one had fewer facets than it should.
             number = float(self.count(ready).sum()) if len(ready) else 0.0
             step *= float(np.clip(wanted / max(number, 1.0), 0.5, 2.0))
             if len(ready):
                 yield ready
 
-    def _decided(self, slab: Pool, depth: float) -> tuple[Pool, list[Pool]]:
+    def _decided(self, slab: Waiting, depth: float) -> tuple[Waiting, list[Waiting]]:
         """What is to be drawn of parts that begin before a depth, and what of theirs begins beyond."""
-        ready, later = [Pool.empty()], []
+        ready, later = [Waiting.empty()], []
         while len(slab):
             prints = self.coverage.of_spheres(slab.centre, slab.radius)
             outside = self.coverage.outside(prints)
@@ -119,14 +119,14 @@ class Frontier:
             new = self.pool(PlantParts.concatenate([made for made, _, _ in opened(self.flora, some)]))
             later.append(new.take(np.flatnonzero(new.near > depth)))
             slab = new.take(np.flatnonzero(new.near <= depth))
-        return Pool.concatenate(ready), later
+        return Waiting.concatenate(ready), later
 
-    def count(self, pool: Pool) -> NDArray[np.float64]:
+    def count(self, pool: Waiting) -> NDArray[np.float64]:
         """Facets (n,) that parts would have, all of them."""
         side = self.facet * self.coverage.camera.extent_around(pool.centre)
         return pool.parts.totals.optical_area / np.maximum(side**2, 1e-12)
 
-    def large(self, pool: Pool) -> NDArray[np.bool_]:
+    def large(self, pool: Waiting) -> NDArray[np.bool_]:
         """Parts (n,) that are to be opened: more of them shows than their samples tell."""
         pixels = 2.0 * pool.radius / self.coverage.camera.extent_around(pool.centre)
         shows = (pixels > DETAIL) & (self.count(pool) > FEW)

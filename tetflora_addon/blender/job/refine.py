@@ -332,7 +332,16 @@ def _refined(
     becomes = None if baked else form.form(camera, disc)
     sizes, weights = detail.pixels, facet_weights(flora)
     with_all = drawing(
-        flora, refinement, camera, transition, sizes.seen, weights, sizes.hidden, given.occluders, becomes
+        flora,
+        refinement,
+        camera,
+        transition,
+        sizes.seen,
+        weights,
+        sizes.hidden,
+        given.occluders,
+        becomes,
+        detail.most,
     )
     return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc)
 
