@@ -13,14 +13,18 @@ import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from textwrap import wrap
 from typing import Any, TypeVar
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import SceneError, readable
-from .main_thread import in_main_thread
+from ..processes import pool
+from .main_thread import in_main_thread, later, on_main_thread
 
+#: Letters of a line in a popup.
+_LINE = 100
 #: Errors of the last render: a text for each frame that was rendered without its plants.
 failed_frames: list[str] = []
 
@@ -63,8 +67,10 @@ class Listeners(list):
 
 
 def call_soon(function: Callable[[], float | None], seconds: float) -> None:
-    """Call a function of a module by a timer, once for all requests until then."""
-    if not bpy.app.timers.is_registered(function):
+    """Call a function of a module by a timer, once for all requests until then; from any thread, as of a render."""
+    if not on_main_thread():
+        later(partial(call_soon, function, seconds))
+    elif not bpy.app.timers.is_registered(function):
         bpy.app.timers.register(function, first_interval=seconds)
 
 
@@ -199,7 +205,13 @@ _STOPPING = Handlers(
     load_pre=lambda *_: stop_jobs("another file was opened"),
     render_init=lambda *_: in_main_thread(partial(stop_jobs, "a render began")),
 )
-register, unregister = _STOPPING.register, _STOPPING.unregister
+unregister = _STOPPING.unregister
+
+
+def register() -> None:
+    """Register the handlers, and let the artist know when other processes cannot be used."""
+    _STOPPING.register()
+    pool.tell = complain
 
 
 def redraw() -> None:
@@ -214,11 +226,12 @@ def complain(text: str) -> None:
     """Report an error where no operator can: in the terminal, and in the window if there is one."""
     text = readable(text)
     print(f"TetFlora: error: {text}", file=sys.stderr, flush=True)
-    _in_window(
-        lambda: bpy.context.window_manager.popup_menu(
-            lambda menu, _context: menu.layout.label(text=text), title="TetFlora", icon='ERROR'
-        )
-    )
+
+    def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+        for line in wrap(text, _LINE):
+            menu.layout.label(text=line)
+
+    _in_window(lambda: bpy.context.window_manager.popup_menu(draw, title="TetFlora", icon='ERROR'))
 
 
 def open_menu(identifier: str) -> None:
@@ -235,5 +248,4 @@ def _in_window(function: Callable[[], object]) -> None:
             with bpy.context.temp_override(window=windows[0]):
                 function()
 
-    if not bpy.app.background:
-        bpy.app.timers.register(call)
+    later(call)
