@@ -50,7 +50,7 @@ def engine(package: str) -> None:
 def peak() -> int:
     """Bytes that this process has held at most; 0 where the system does not tell."""
     if sys.platform == "linux":  # where the other call tells what the process that started this one had held
-        for line in Path("/proc/self/status").read_text().splitlines():
+        for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
     if resource is None:

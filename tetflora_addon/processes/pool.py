@@ -30,8 +30,10 @@ from .. import parallel
 from . import child as child_module
 from .messages import Closed, Packed, receive, send
 
-with suppress(ImportError):  # Windows has none
+try:
     import fcntl
+except ImportError:  # Windows
+    fcntl = None
 
 #: Bytes of a pipe; more takes more than users without privileges may have by default.
 _PIPE = 1 << 20
@@ -456,7 +458,7 @@ def _break(reason: str) -> None:
 
 def _widened(process: subprocess.Popen) -> None:
     """Let its pipes hold more, where the system can: a thread waits for the interpreter's lock after each filling."""
-    if sys.platform == "linux":
+    if hasattr(fcntl, "F_SETPIPE_SZ"):
         for stream in (process.stdin, process.stdout):
             with suppress(OSError):  # more than this user may have
                 fcntl.fcntl(stream.fileno(), fcntl.F_SETPIPE_SZ, _PIPE)
