@@ -22,7 +22,7 @@ from tetflora_addon import files
 _UNIX = ("resource", "fcntl", "pwd", "grp", "termios", "posix_ipc")
 _ONLY_UNIX = ("sched_getaffinity", "getuid", "geteuid", "sysconf", "O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "fork")
 
-#: Works as the extension does: reads what ships, writes and reads what is the user's own, asks for memory and processes.
+#: Works as the extension does: reads what ships, writes and reads what is the user's own, asks for processes.
 _USE = """
 import importlib, operator, os, pkgutil, sys, time
 from pathlib import Path

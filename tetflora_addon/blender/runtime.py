@@ -13,7 +13,9 @@ import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from textwrap import wrap
+from traceback import FrameSummary, extract_tb
 from typing import Any, TypeVar
 
 import bpy
@@ -162,6 +164,7 @@ class JobData:
             raise GoneError(f"{self.job} was stopped because {self._reason}; start it again") from error
 
 
+_last: tuple[str, list[str]] = ("", [])
 _running: list[tuple[JobData, Generator]] = []
 
 
@@ -214,6 +217,22 @@ def register() -> None:
     pool.tell = complain
 
 
+def remember(text: str, error: BaseException | None = None) -> None:
+    """Keep the last error of the session for a report, and where it was; the error itself would keep all its data."""
+    global _last
+    _last = text, [f"  {_place(frame)}" for frame in extract_tb(error.__traceback__)] if error is not None else []
+
+
+def _place(frame: FrameSummary) -> str:
+    """File, line and function of a call, without the folders of a user."""
+    return f"{'/'.join(Path(frame.filename).parts[-3:])}:{frame.lineno} in {frame.name}"
+
+
+def last_error() -> tuple[str, list[str]]:
+    """What was told last, and the calls that led there if it was none that TetFlora expects; empty at first."""
+    return _last
+
+
 def redraw() -> None:
     """Redraw all 3D views with their sidebars, in all windows."""
     for window in getattr(bpy.context.window_manager, "windows", ()):
@@ -225,6 +244,7 @@ def redraw() -> None:
 def complain(text: str) -> None:
     """Report an error where no operator can: in the terminal, and in the window if there is one."""
     text = readable(text)
+    remember(text)
     print(f"TetFlora: error: {text}", file=sys.stderr, flush=True)
 
     def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

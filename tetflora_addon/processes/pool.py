@@ -151,6 +151,15 @@ def peak() -> int:
     return sum(one.peak for one in list(_pool.children))
 
 
+def state() -> str:
+    """How many there are, or why there are none, in words."""
+    if not _python():
+        return "no Python to start"
+    if _pool.broken:
+        return "given up"
+    return "stopped" if _pool.stopped else f"{len(_pool.children)} of {number()}, {_pool.deaths} died"
+
+
 def stop() -> None:
     """End all processes; none is started until `resume`, and who waits for one gets an error."""
     with _pool.changed:

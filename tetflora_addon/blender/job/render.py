@@ -33,7 +33,7 @@ from ..results.hiding import (
     unpack_override_marks,
 )
 from ..results.output import KIND, adopt_materials, release_materials
-from ..runtime import Handlers, Listeners, complain, failed_frames
+from ..runtime import Handlers, Listeners, complain, failed_frames, remember
 from ..saved_files import clear_unreadable, migrate
 from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
 from ..scene.plants import NoPlantsError
@@ -108,7 +108,9 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     except Exception as error:
         # Blender would only print it and go on.
         traceback.print_exc()
-        _complain(scene, f"unexpected error, please report it as a bug: {error!r}")
+        text = f"unexpected error, please report it as a bug: {error!r}"
+        _complain(scene, text)
+        remember(text, error)
     finally:
         if not made:
             in_main_thread(partial(_take_back, scene))
