@@ -43,7 +43,7 @@ def test_what_would_not_fit_is_refused_before_it_is_begun(scene, monkeypatch) ->
     with pytest.raises(errors.SceneError, match="Expand Everything would make more than") as caught:
         refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     polygons, needed, left = map(float, re.findall(r"(\d+\.\d)", str(caught.value)))
-    assert polygons > 3.0 and needed > left and "raise Max Memory" in str(caught.value)
+    assert polygons > 3.0 and needed > left and "Raise Max Memory" in str(caught.value)
     assert not begun and datablocks() == before and has_results(scene)
     scene.camera.location.y = -300.0
     refine.refine(scene, bpy.context.evaluated_depsgraph_get())

@@ -176,6 +176,31 @@ def test_in_folders_of_any_name(name: str, tmp_path: Path, monkeypatch: pytest.M
     assert not told and sorted(tmp_path.rglob("*")) == before
 
 
+def test_they_end_with_the_one_that_started_them() -> None:
+    """However that ends: nobody could tell them to."""
+    script = (
+        "import os, signal, operator\n"
+        "from tetflora_addon import parallel\n"
+        "from tetflora_addon.processes import pool\n"
+        "parallel.threads = lambda: 2\n"
+        "if __name__ == '__main__':\n"
+        "    list(pool.in_processes(operator.add, 1, range(4)))\n"
+        "    print(*[own._process.pid for own in pool._pool.children], flush=True)\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
+    )
+    pids = done.stdout.split()
+    assert len(pids) == 2
+
+    def runs(pid: str) -> bool:
+        stat = Path("/proc", pid, "stat")
+        return stat.exists() and stat.read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()[0] != "Z"
+
+    assert soon(lambda: not any(runs(pid) for pid in pids))
+
+
 def test_without_a_console() -> None:
     script = (
         "import os, sys, operator; from tetflora_addon import parallel; from tetflora_addon.processes import pool\n"

@@ -208,13 +208,14 @@ def picture_bytes(scene: bpy.types.Scene, camera: Camera) -> int:
     return memory.picture_bytes(camera.width * camera.height, bool(cycles and cycles.use_denoising))
 
 
-def memory_left(scene: bpy.types.Scene, camera: Camera) -> float:
+def memory_left(scene: bpy.types.Scene, camera: Camera | None = None) -> float:
     """Bytes that the scene's limit of memory leaves for results now; infinite without a limit.
 
     What other processes of TetFlora will take is kept for them.
     """
     most = scene.tetflora.max_memory
-    return memory.allowance(most, picture_bytes(scene, camera) + pool.share(memory.limit(most)))
+    picture = 0 if camera is None else picture_bytes(scene, camera)
+    return memory.allowance(most, picture + pool.share(memory.limit(most)))
 
 
 def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:

@@ -23,27 +23,35 @@ def use_machine(scene: bpy.types.Scene) -> None:
     pool.use(memory.limit(scene.tetflora.max_memory))
 
 
-def check_expanded(flora: Flora, seeds: Seeds, camera: Camera, left: float) -> None:
-    """Refuse to expand plants that would not fit.
+def check_fits(what: str, polygons: float, left: float, remedy: str) -> None:
+    """Refuse what would make too many polygons.
 
     Parameters
     ----------
-    flora : Flora
-    seeds : Seeds
-    camera : Camera
-        Near it, plants are finer.
+    what : str
+        Begins the message.
+    polygons : float
+        At least.
     left : float
         Bytes, see `contents.memory_left`.
+    remedy : str
+        What to do, beside raising the limit.
 
     Raises
     ------
     SceneError
         Has the numbers, and says what to do.
     """
-    for faces in expanded_faces(flora, seeds, camera):
-        if (needed := faces * BYTES_PER_POLYGON) > left:
-            raise SceneError(
-                f"Expand Everything would make more than {faces / 1e6:,.1f} million polygons, which take "
-                f"{needed / memory.GIGABYTE:,.1f} GB with rendering; Max Memory leaves {left / memory.GIGABYTE:,.1f} "
-                "GB. Turn Expand Everything off, raise Max Memory, use fewer plants, or move the camera away from them"
-            )
+    if (needed := polygons * BYTES_PER_POLYGON) > left:
+        raise SceneError(
+            f"{what} would make more than {polygons / 1e6:,.1f} million polygons, which take "
+            f"{needed / memory.GIGABYTE:,.1f} GB with rendering; Max Memory leaves {left / memory.GIGABYTE:,.1f} GB. "
+            f"Raise Max Memory, {remedy}"
+        )
+
+
+def check_expanded(flora: Flora, seeds: Seeds, camera: Camera, left: float) -> None:
+    """Refuse to expand plants that would not fit, near a camera as finely as it sees them; as `check_fits`."""
+    for polygons in expanded_faces(flora, seeds, camera):
+        remedy = "turn Expand Everything off, use fewer plants, or move the camera away from them"
+        check_fits("Expand Everything", polygons, left, remedy)
