@@ -62,9 +62,9 @@ def run(quick: bool) -> dict[str, float]:
     """Render the animation, and go the rounds; see ``docs/results.md`` for what the figures mean."""
     from devtools import session
 
-    found = _rounds(QUICK_ROUNDS if quick else ROUNDS)
+    found = _frames(QUICK_FRAMES if quick else FRAMES)
     session.clean_file()
-    return {**found, **_frames(QUICK_FRAMES if quick else FRAMES)}
+    return {**found, **_rounds(QUICK_ROUNDS if quick else ROUNDS)}
 
 
 def _rounds(number: int) -> dict[str, float]:
