@@ -95,13 +95,13 @@ def _rounds(number: int) -> dict[str, float]:
         bpy.ops.ed.undo_push(message="Refine")
         bpy.ops.ed.undo()
         bpy.ops.ed.redo()
-        used = max(used, len(_children()))
+        used = max(used, len(children()))
         polygons.add(sum(len(mesh.polygons) for mesh in bpy.data.meshes))
         scene = bpy.context.scene
         scene.name = f"round {round % 3}"
         next(obj for obj in scene.objects if obj.tetflora.is_plant).name = f"renamed {round % 5}"
         addon_utils.disable(session.PACKAGE)
-        left["processes"] = max(left["processes"], len(_children()))
+        left["processes"] = max(left["processes"], len(children()))
         end = time.monotonic() + 5.0
         while threading.active_count() > threads and time.monotonic() < end:
             time.sleep(0.01)  # those of `parallel` end when they have seen that they may
@@ -128,7 +128,7 @@ def _rounds(number: int) -> dict[str, float]:
     }
 
 
-def _children() -> list[int]:
+def children() -> list[int]:
     """Processes that this one has started and that still run, or wait for it to learn of their end."""
     own, found = os.getpid(), []
     for path in Path("/proc").glob("[0-9]*/stat"):
