@@ -6,6 +6,7 @@ import sys
 import threading
 from pathlib import Path
 
+import addon_utils
 import bpy
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))
@@ -51,5 +52,5 @@ def steps(ui):
         bpy.app.handlers.render_complete.remove(end)
         ui.values["locked" if locked else "unlocked"] = [*seen, render.render_errors()]
     ui.values["timers_at_end"] = bpy.app.timers.is_registered(main_thread.make_changes)
-    bpy.ops.preferences.addon_disable(module=INSTALLED)
+    addon_utils.disable(INSTALLED)  # and not in the preferences, which other tests share
     ui.values["timer_after"] = bpy.app.timers.is_registered(main_thread.make_changes)
