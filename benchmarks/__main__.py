@@ -54,6 +54,7 @@ NAMES = (
     "biomes",
     "dolly",
     "endurance",
+    "limits",
     "farm",
     "attack",
 )

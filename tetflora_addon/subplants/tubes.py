@@ -60,6 +60,11 @@ def tube_buffers(
     return tubes.buffers()
 
 
+def tube_faces(flora: Flora, whole: WholeBranches, pixels: Pixels | None = None) -> int:
+    """Faces that `tube_buffers` makes, without making them."""
+    return sum(sort.numbers()[1] for sort in _sorts(flora, whole, pixels))
+
+
 @dataclass(frozen=True)
 class _Sort:
     """Branches of one number of sides.

@@ -35,7 +35,7 @@ def two(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(plants, "WORTH_PROCESSES", 0)
     monkeypatch.setattr(facets, "WORTH_PROCESSES", 0)
     yield
-    assert not pool._broken.is_set()
+    assert not pool._pool.broken
 
 
 @given(
@@ -102,7 +102,7 @@ class _Nested:
 
 def test_who_is_killed_is_replaced(two: None) -> None:
     list(in_processes(uniform, KEYS, range(4)))
-    for child in list(pool._children):
+    for child in list(pool._pool.children):
         child._process.kill()
     assert len(list(in_processes(uniform, KEYS, range(7)))) == 7
 

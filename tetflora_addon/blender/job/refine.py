@@ -15,7 +15,7 @@ from functools import partial
 import bpy
 import numpy as np
 
-from ... import memory, parallel
+from ... import memory
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
 from ...emission.asset_plan import plan_of
@@ -35,7 +35,6 @@ from ...refinement.settings import FIRST_LOOK, RefinementSettings
 from ...refinement.statistics import Statistics, Stopwatch
 from ..compat import drawn_disc
 from ..main_thread import in_main_thread
-from ..preferences import wanted_threads
 from ..results.collection import Results
 from ..results.forms import form_of
 from ..results.hiding import hide_originals, remove_results
@@ -49,6 +48,7 @@ from ..worker import at_once, call_in_thread, nobody_waits, steps_in_thread
 from .asset_writing import write_assets, write_plain
 from .assets import Bound, asset_warnings, bind_steps, is_plain
 from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
+from .limits import check_expanded, use_machine
 from .writing import bake_light, write_blocks, write_polygons
 
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
@@ -122,7 +122,7 @@ def _refine_steps(
     first_look: bool,
 ) -> Generator[Progress, bool | None, Statistics]:
     clock, scene = Stopwatch(), results.scene
-    parallel.use(wanted_threads(scene))
+    use_machine(scene)
     yield Progress(0.0, "Reading the scene")
     if camera is None or given is None:
         depsgraph.update()  # reading what was deleted since the last step would crash Blender
@@ -149,6 +149,8 @@ def _refine_steps(
     statistics.instances = sum(len(one) for one in given.places)
     asset_warnings.clear()
     bound, left = None, memory_left(scene, camera)
+    if not refined:
+        yield from call_in_thread(progress, check_expanded, flora, given.seeds, camera, left)
     plain = not refined or is_plain(scene, given.places, depsgraph, left)
     if not plain:
         bound = yield from bind_steps(scene, given.places, depsgraph, camera, left)
