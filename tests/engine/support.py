@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tetflora_addon.arrays import spread
-from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
+from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.drawing import drawing

@@ -23,7 +23,7 @@ MARGIN = 2
 #: Pairs of a triangle and a pixel of its box that are tested together: some 100 bytes each.
 PAIRS_BATCH = 1 << 20
 #: How much nearer than what it hides something is, over the depth of that: as far as several eyes count.
-_NEARER = 0.5
+_NEARER = 1.0
 #: Rectangles are read from a level of the pyramid in which they span at most so many cells on each side.
 _CELLS = 4
 

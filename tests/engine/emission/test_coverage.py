@@ -127,8 +127,8 @@ def test_other_eyes_see_behind() -> None:
     )
     centre, radius = np.array([[0.0, 20.0, 0.0]]), np.array([0.8])
     assert filled(camera(), narrow).hidden(Coverage(camera()).of_spheres(centre, radius)).all()
-    other = replace(camera(), position=np.array([1.0, 0.0, 0.0]))
-    for view in (camera(shutter=(other,)), camera(lens_radius=0.5, focus=10.0), camera(cell_radius=1.0)):
+    other = replace(camera(), position=np.array([3.0, 0.0, 0.0]))
+    for view in (camera(shutter=(other,)), camera(lens_radius=2.5, focus=10.0), camera(cell_radius=3.0)):
         made = filled(view, narrow)
         assert not made.hidden(made.of_spheres(centre, radius)).any()
 

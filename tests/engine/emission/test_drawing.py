@@ -67,7 +67,7 @@ def coverage_of(blocks: list, facets: Facets, seen: np.ndarray, camera: Camera) 
 
 def test_facets_that_are_seen_are_as_large_as_asked_for() -> None:
     """Up to the leaf that each stands for, which is smaller here; and none is larger than asked for by a half."""
-    flora, _, camera, _ = wood()
+    camera = wood()[2]
     _, facets, seen = drawn_wood()
     pixels = pixels_of(facets, camera)[seen]
     assert np.median(pixels) == pytest.approx(1.2, rel=0.35)
@@ -75,7 +75,7 @@ def test_facets_that_are_seen_are_as_large_as_asked_for() -> None:
 
 
 def test_no_facet_of_wood_in_the_image_is_larger_than_a_pixel_and_a_half() -> None:
-    flora, _, camera, _ = wood()
+    camera = wood()[2]
     _, facets, seen = drawn_wood()
     wooden = seen & (facets.transmission == 0)
     assert wooden.any()
@@ -125,9 +125,9 @@ def test_primitives_follow_the_image_however_deep_the_wood_is() -> None:
 
 
 def test_few_facets_stand_for_what_nobody_sees() -> None:
-    _, _, camera, result = wood()
+    camera = wood()[2]
     _, facets, seen = drawn_wood()
-    _, hidden = None, facets.take(np.flatnonzero(~seen))
+    hidden = facets.take(np.flatnonzero(~seen))
     merged = (1.0 / 6.0 + 0.1) * seen.sum() * 3.0
     assert len(hidden) < (HIDDEN_A_PIXEL + OUTSIDE_A_PIXEL) * camera.width * camera.height * 1.3 + merged
 
