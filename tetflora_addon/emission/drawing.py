@@ -45,7 +45,7 @@ from ..subplants.pieces import Pieces, whole_pieces
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
 from .coverage import Coverage
-from .frontier import Frontier, Waiting
+from .frontier import DETAIL, FEW, Frontier, Waiting
 from .plants import Block, Transition
 from .shade import Shade
 
@@ -68,6 +68,9 @@ MERGED = (24.0, 6.0)
 HIDDEN, SHADED, LARGEST = 5.0, 1.5, 40.0
 #: Facets of hidden parts, and of those outside, for each pixel of the image, at most.
 HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.6, 0.3
+#: Optical depth in the shade up to which shadows are refined where somebody asks for it, and how many times as many
+#: facets outside there may be then.
+LIT, SHADOWS = 1.5, 6.0
 #: Largest side of facets outside over their distance from the view; metres that count least, and from which on it grows
 #: faster. The same of those whose shadows fall into the view, over the metres that these fall, and the least of these.
 _BESIDE, _THROWN = (0.1, 8.0, 15.0), (0.02, 1.0)
@@ -115,6 +118,8 @@ class Drawing:
         What becomes of facets where they are made; without, they stay what they are.
     most : float
         Polygons and facets that there may be, should what is expected be wrong.
+    shadow : float
+        Pixels down to which shadows of what is not seen are refined; 0 leaves them coarse.
     """
 
     flora: Flora
@@ -128,6 +133,7 @@ class Drawing:
     occluders: NDArray[np.float64]
     form: Form | None = None
     most: float = np.inf
+    shadow: float = 0.0
 
 
 def drawing(
@@ -141,6 +147,7 @@ def drawing(
     occluders: NDArray[np.float64] | None = None,
     form: Form | None = None,
     most: float = np.inf,
+    shadow: float = 0.0,
 ) -> Drawing:
     """What a refinement is drawn with, see `Drawing`."""
     points = result.plants.points
@@ -148,7 +155,7 @@ def drawing(
     shadows = ThrownShadows(camera, result.lights, float(lowest))
     shade = Shade(points.position, points.optical_area, result.lights)
     occluders = np.zeros((0, 3, 3)) if occluders is None else occluders
-    return Drawing(flora, camera, transition, facet, hidden, weights, shadows, shade, occluders, form, most)
+    return Drawing(flora, camera, transition, facet, hidden, weights, shadows, shade, occluders, form, most, shadow)
 
 
 def drawn_blocks(given: Drawing, parts: PlantParts, few: bool = False) -> Iterator[Block | Parts]:
@@ -467,17 +474,38 @@ class _Tile:
         """Parts out of view: facets as large as their distance and the shadows that they throw allow."""
         if not len(pool):
             return
+
+        def add(facets: Facets, species: int) -> None:
+            self._keep(kept_out_of_view(facets, self.coverage.camera.clearance, 0.0), False, species)
+
+        if self.given.shadow > 0.0:
+            fine, pool = self._for_shadows(pool)
+            side = self.given.shadow * self.given.camera.extent_around(fine.centre)
+            self._draw_unseen(fine, side, SHADOWS * most, add)
         away = self.given.camera.clearance(pool.centre)
         fallen = self.given.shadows.distance(pool.centre, away, pool.radius)
         part, nearest, far = _BESIDE
         away = np.maximum(away, nearest)
         soft, least = _THROWN
         side = np.minimum(part * away * (1.0 + (away / far) ** 2), soft * np.maximum(fallen, least))
-
-        def add(facets: Facets, species: int) -> None:
-            self._keep(kept_out_of_view(facets, self.coverage.camera.clearance, 0.0), False, species)
-
         self._draw_unseen(pool, side, most, add)
+
+    def _for_shadows(self, pool: Waiting) -> tuple[Waiting, Waiting]:
+        """Parts that throw shadows which are to be fine, opened as far as these show, and all others."""
+        given, fine, left = self.given, [Waiting.empty()], [Waiting.empty()]
+        frontier = Frontier(self.flora, self.coverage, given.transition, given.shadow)
+        while len(pool):
+            away = given.camera.clearance(pool.centre)
+            lit = given.shade.depth(pool.centre) < LIT
+            lit &= np.isfinite(given.shadows.distance(pool.centre, away, pool.radius))
+            left.append(pool.take(np.flatnonzero(~lit)))
+            pool = pool.take(np.flatnonzero(lit))
+            pixels = 2.0 * pool.radius / given.camera.extent_around(pool.centre)
+            large = pool.parts.can_open(self.flora) & (pixels > DETAIL * given.shadow) & (frontier.count(pool) > FEW)
+            fine.append(pool.take(np.flatnonzero(~large)))
+            some = opened(self.flora, pool.parts.take(np.flatnonzero(large)))
+            pool = frontier.pool(PlantParts.concatenate([new for new, _, _ in some]))
+        return Waiting.concatenate(fine), Waiting.concatenate(left)
 
     def _draw_unseen(
         self, pool: Waiting, side: NDArray[np.float64], most: float, add: Callable[[Facets, int], None]

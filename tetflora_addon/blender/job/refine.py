@@ -344,6 +344,7 @@ def _refined(
         given.occluders,
         becomes,
         detail.most,
+        settings.shadow_cutoff,
     )
     return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc)
 
