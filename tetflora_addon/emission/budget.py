@@ -37,7 +37,7 @@ NEVER_TOO_MANY, FINEST = 1_200_000.0, 3.0
 #: What an expected number may be off by, and how often a detail is made coarser until it fits.
 RESERVE, _TRIES = 0.15, 24
 #: Facets of what is instanced are so many times finer than those of plants: its originals are at hand.
-ASSETS_FINER = 3.0
+ASSETS_FINER = 3.6
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,8 @@ class Detail:
         Pixels by which the margins of near leaves may be off; infinite where only their models are drawn.
     most : float
         Polygons and facets of plants that there may be.
+    asked : float
+        Side of facets that is asked for, pixels.
     """
 
     refinement: Refinement
@@ -63,16 +65,17 @@ class Detail:
     leaf_limit: float
     tolerance: float = TOLERANCE
     most: float = np.inf
+    asked: float = 1.0
 
     @property
     def of_assets(self) -> FacetPixels:
-        """Sides of facets of instances and of your own meshes."""
-        return replace(self.pixels, seen=self.pixels.seen / ASSETS_FINER)
+        """Sides of facets of instances and of your own meshes, which are no finer where there are few plants."""
+        return FacetPixels(self.asked * max(self.pixels.hidden, 1.0) / ASSETS_FINER, max(self.pixels.hidden, 1.0))
 
     @property
     def asset_limit(self) -> float:
         """`leaf_limit` of instances."""
-        return self.leaf_limit / ASSETS_FINER
+        return self.leaf_limit * max(1.0 / self.pixels.hidden, 1.0) / ASSETS_FINER
 
 
 def enough(camera: Camera, facet: float = 1.0) -> float:
@@ -105,7 +108,7 @@ def afford(
     """
     memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON if settings.max_memory else np.inf
     most = (1.0 - RESERVE) * min(memory, settings.max_polygons or np.inf)
-    detail = Detail(result, FacetPixels(settings.facet), settings.leaf_limit)
+    detail = Detail(result, FacetPixels(settings.facet), settings.leaf_limit, asked=settings.facet)
     if faces is not None:
         if not np.isfinite(most):
             return detail
@@ -118,7 +121,7 @@ def afford(
     for _ in range(_TRIES):
         fewer = replace(
             detail,
-            pixels=FacetPixels(coarser * settings.facet, max(coarser, 1.0)),
+            pixels=FacetPixels(coarser * settings.facet, coarser),
             leaf_limit=coarser * settings.leaf_limit,
             tolerance=TOLERANCE * max(coarser, 1.0) ** 2,
             most=left,

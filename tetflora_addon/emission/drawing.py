@@ -63,11 +63,13 @@ BROAD, SIDES = 4.0, 4
 TWIG = 0.6
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
 MERGED = (24.0, 6.0)
-#: Side in pixels of facets of hidden parts where the light reaches them, the optical depth in the shade over which it
-#: grows by e, and the largest.
-HIDDEN, SHADED, LARGEST = 5.0, 1.5, 40.0
+#: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
+#: the shade over which it grows by e; and the largest.
+HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
 #: Facets of hidden parts, and of those outside, for each pixel of the image, at most.
 HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.6, 0.3
+#: So many of each are never too many.
+NEVER_TOO_MANY = 50_000.0
 #: Optical depth in the shade up to which shadows are refined where somebody asks for it, and how many times as many
 #: facets outside there may be then.
 LIT, SHADOWS = 1.5, 6.0
@@ -78,6 +80,8 @@ _BESIDE, _THROWN = (0.1, 8.0, 15.0), (0.02, 1.0)
 _OUTSIDE_BATCH = 20_000
 #: Fraction of what a tile may have from which on all that is left counts as hidden.
 _FULL = 0.85
+#: Part of all that may be drawn which plants out of view have.
+_UNSEEN = 0.05
 #: Draws of this module.
 _MERGE, _THIN = 230, 231
 
@@ -108,7 +112,7 @@ class Drawing:
     facet : float
         Side of facets that are seen, pixels.
     hidden : float
-        Factor on the sides of those that are not.
+        Sides of facets over those that are asked for: the larger, the fewer stand for what is not seen.
     weights : FacetWeights
     shadows : ThrownShadows
     shade : Shade
@@ -221,7 +225,7 @@ def _drawn_tile(given: Drawing, item: tuple[int, tuple[int, int] | None, PlantPa
     if columns is None:
         tile.draw_outside(parts, share * len(parts))
     else:
-        tile.draw(parts, (columns[1] - columns[0]) * given.camera.height, share * given.most)
+        tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most)
     return tile.made(number)
 
 
@@ -254,8 +258,8 @@ class _Tile:
             for one in species
         ]
 
-    def draw(self, parts: PlantParts, pixels: int, most: float) -> None:
-        """All parts of a tile of so many pixels, with no more than so many polygons and facets."""
+    def draw(self, parts: PlantParts, share: float, most: float) -> None:
+        """All parts of a tile, a share of the image, with no more than so many polygons and facets."""
         given = self.given
         if len(given.occluders):
             _, *corners = self.coverage.of_corners(given.occluders)
@@ -274,17 +278,18 @@ class _Tile:
             self._draw_subplants(branches.take(np.flatnonzero(~lines)), side[~lines])
             self._draw_branches(branches.take(np.flatnonzero(lines)), side[lines])
             self._cover()
-        self._draw_hidden(Waiting.concatenate([Waiting.empty(), *frontier.hidden]), self._few(HIDDEN_A_PIXEL * pixels))
+        self._draw_hidden(
+            Waiting.concatenate([Waiting.empty(), *frontier.hidden]), self._few(HIDDEN_A_PIXEL, share, most)
+        )
         # What is outside of a tile's own image was part of something inside: it lies near the border.
         self._draw_outside(
-            Waiting.concatenate([Waiting.empty(), *frontier.outside]), self._few(OUTSIDE_A_PIXEL * pixels)
+            Waiting.concatenate([Waiting.empty(), *frontier.outside]), self._few(OUTSIDE_A_PIXEL, share, most)
         )
 
     def draw_outside(self, parts: PlantParts, share: float) -> None:
         """Parts out of view, a share of all of them."""
-        camera = self.given.camera
         pool = Frontier(self.flora, self.coverage, self.given.transition, self.given.facet).pool(parts)
-        self._draw_outside(pool, self._few(OUTSIDE_A_PIXEL * camera.width * camera.height * share))
+        self._draw_outside(pool, self._few(OUTSIDE_A_PIXEL, share, _UNSEEN * share * self.given.most))
 
     # -- what is seen ---------------------------------------------------------------------------------------------
 
@@ -430,25 +435,29 @@ class _Tile:
                 self.number += made.polygons
                 self._meshes.setdefault(what, []).append(made)
 
-    def _few(self, number: float) -> float:
-        """So many facets that nobody sees, or fewer where they are to be larger."""
-        return number / self.given.hidden**2
+    def _few(self, a_pixel: float, share: float, most: float) -> float:
+        """Facets that nobody sees, for each pixel of a share of the image, of the few that are left of so many.
+
+        Fewer where they are to be larger.
+        """
+        camera = self.given.camera
+        number = share * max(a_pixel * camera.width * camera.height, NEVER_TOO_MANY) / self.given.hidden**2
+        return min(number, max(0.5 * (most - self.number), 0.0))
 
     # -- what is not seen -----------------------------------------------------------------------------------------
 
     def _merge(self, facets: Facets, species: int) -> None:
         """Few large facets for many that are hidden; each lies behind full pixels as a whole, or is as it was."""
         number = uniform(_keys_of(facets.centre), _MERGE)
-        some = np.flatnonzero(number < 1.0 / MERGED[-1])
-        facets, number = facets.take(some), number[some]
         for times in MERGED:
             larger = replace(facets, side=facets.side * np.sqrt(times))
             hidden = self._hidden(larger)
-            kept = hidden & (number < 1.0 / times)
-            self._keep(larger.take(np.flatnonzero(kept)), False, species)
+            self._keep(larger.take(np.flatnonzero(hidden & (number < 1.0 / times))), False, species)
             rest = np.flatnonzero(~hidden)
             facets, number = facets.take(rest), number[rest]
-        self._keep(facets, False, species)
+        # Where there are few, all of these are kept; where there are many, as if they had been merged as well.
+        likely = 1.0 / (MERGED[-1] * self.given.hidden**2)
+        self._keep(facets.take(np.flatnonzero(number < likely)), False, species)
 
     def _hidden(self, facets: Facets) -> NDArray[np.bool_]:
         """Facets (n,) behind full pixels."""
@@ -460,15 +469,16 @@ class _Tile:
             return
         given = self.given
         pixels = np.minimum(HIDDEN * np.exp(given.shade.depth(pool.centre) / SHADED), LARGEST)
-        side = pixels * given.camera.extent_around(pool.centre)
+        side = pixels * given.facet * given.camera.extent_around(pool.centre)
         self._draw_unseen(pool, side, most, self._add_hidden)
 
     def _add_hidden(self, facets: Facets, species: int) -> None:
-        for _ in range(3):
+        """Facets of hidden parts, divided until they lie behind full pixels; what would show even so is left out."""
+        while len(facets):
             hidden = self._hidden(facets)
             self._keep(facets.take(np.flatnonzero(hidden)), False, species)
-            facets = facets.take(np.flatnonzero(~hidden))
-            facets = replace(facets, side=0.5 * facets.side)
+            large = facets.side > self.given.facet * self.given.camera.extent_around(facets.centre)
+            facets = quarters(facets.take(np.flatnonzero(~hidden & large)))
 
     def _draw_outside(self, pool: Waiting, most: float) -> None:
         """Parts out of view: facets as large as their distance and the shadows that they throw allow."""
@@ -481,7 +491,7 @@ class _Tile:
         if self.given.shadow > 0.0:
             fine, pool = self._for_shadows(pool)
             side = self.given.shadow * self.given.camera.extent_around(fine.centre)
-            self._draw_unseen(fine, side, SHADOWS * most, add)
+            self._draw_unseen(fine, side, SHADOWS * most, add, 1.0)
         away = self.given.camera.clearance(pool.centre)
         fallen = self.given.shadows.distance(pool.centre, away, pool.radius)
         part, nearest, far = _BESIDE
@@ -496,7 +506,7 @@ class _Tile:
         frontier = Frontier(self.flora, self.coverage, given.transition, given.shadow)
         while len(pool):
             away = given.camera.clearance(pool.centre)
-            lit = given.shade.depth(pool.centre) < LIT
+            lit = given.shade.depth(pool.centre, pool.radius) < LIT
             lit &= np.isfinite(given.shadows.distance(pool.centre, away, pool.radius))
             left.append(pool.take(np.flatnonzero(~lit)))
             pool = pool.take(np.flatnonzero(lit))
@@ -508,13 +518,18 @@ class _Tile:
         return Waiting.concatenate(fine), Waiting.concatenate(left)
 
     def _draw_unseen(
-        self, pool: Waiting, side: NDArray[np.float64], most: float, add: Callable[[Facets, int], None]
+        self,
+        pool: Waiting,
+        side: NDArray[np.float64],
+        most: float,
+        add: Callable[[Facets, int], None],
+        leaves: float = HIDDEN_LEAVES,
     ) -> None:
-        """Facets of parts that nobody sees, of sides (n,) in metres, no more than so many."""
+        """Facets of parts that nobody sees, of sides (n,) in metres or so many leaves; no more than so many."""
         flora, parts = self.flora, pool.parts
         single = parts.alone
         kept = np.where(single | ~parts.can_open(flora), 1.0, opaque_fractions(flora, parts.branches, parts.totals))
-        side = np.maximum(self.given.hidden * side, np.sqrt(HIDDEN_LEAVES * flora.one_leaf_area(parts.branches)))
+        side = np.maximum(self.given.hidden * side, np.sqrt(leaves * flora.one_leaf_area(parts.branches)))
         number = float((kept * parts.totals.optical_area / np.maximum(side, 1e-9) ** 2).sum())
         side = side * max(np.sqrt(number / max(most, 1.0)), 1.0)
         species = flora.species_of(parts.branches.row)
@@ -543,6 +558,14 @@ def _keys_of(centre: NDArray[np.float64]) -> NDArray[np.uint64]:
     return key
 
 
+def quarters(facets: Facets) -> Facets:
+    """Four facets (4 n,) in the place of each of facets (n,): what lines between the middles of its sides divide."""
+    corners = triangle_corners(facets).astype(np.float64)
+    half = replace(facets, side=0.5 * facets.side)
+    parts = [replace(half, centre=0.5 * (facets.centre + corners[:, k])) for k in range(3)]
+    return Facets.concatenate([*parts, replace(half, across=-facets.across, along=-facets.along)])
+
+
 def _facets_of_faces(
     corners: NDArray[np.float32], size: NDArray[np.integer], buffers: MeshBuffers, faces: NDArray[np.intp]
 ) -> Facets:
@@ -558,4 +581,8 @@ def _facets_of_faces(
     across = unit(np.cross(along, vector))
     colour = buffers.attributes["tf_colour"][1][faces].astype(np.float64)
     through = buffers.attributes["tf_transmission"][1][faces].astype(np.float64)
-    return Facets(centre, across, along, np.sqrt(area), colour, through, stretch=np.ones(len(area)))
+    velocity = None
+    if "velocity" in buffers.attributes:
+        moving = buffers.attributes["velocity"][1].astype(np.float64)
+        velocity = moving[buffers.corner_verts[buffers.face_offsets[faces]]]
+    return Facets(centre, across, along, np.sqrt(area), colour, through, velocity, stretch=np.ones(len(area)))

@@ -56,8 +56,10 @@ class Shade:
         at = np.clip(np.floor((local - self._low) / self._step), 0, self._size - 1).astype(np.int64)
         return (at[:, 0] * self._size[1] + at[:, 1]) * self._size[2] + at[:, 2]
 
-    def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Optical depth (n,) of all that is between points (n, 3) and the light."""
+    def depth(self, points: NDArray[np.float64], nearer: NDArray[np.float64] | float = 0.0) -> NDArray[np.float64]:
+        """Optical depth (n,) of all that is between the light and points (n, 3), moved so many metres towards it."""
         if self._table is None:
             return np.zeros(len(points))
-        return self._table[self._index(points @ self._frame)]
+        local = points @ self._frame
+        local[:, 2] += nearer
+        return self._table[self._index(local)]

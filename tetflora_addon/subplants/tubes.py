@@ -117,7 +117,7 @@ class _Sort:
                 yield buds[0], bud_sides(self.sides), whole.take(buds[1])
 
 
-def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None, most_sides: int | None) -> Iterator[_Sort]:
+def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None, most_sides: int | None = None) -> Iterator[_Sort]:
     """Branches by their sides."""
     if not len(whole):
         return

@@ -100,7 +100,8 @@ def test_settings_and_camera_show_at_once():
     scene = bpy.context.scene
     before = _forecast()
     scene.render.resolution_percentage *= 2
-    assert _forecast().primitives > 1.2 * before.primitives
+    # Leaves that are large enough to be drawn as they are do not become more.
+    assert _forecast().primitives > before.primitives
     scene.render.resolution_percentage //= 2
     scene.tetflora.quality = 'DRAFT'
     assert _forecast().primitives <= before.primitives
