@@ -490,15 +490,20 @@ class _Tile:
 
         if self.given.shadow > 0.0:
             fine, pool = self._for_shadows(pool)
-            side = self.given.shadow * self.given.camera.extent_around(fine.centre)
+            side = np.minimum(
+                self._sides_outside(fine), self.given.shadow * self.given.camera.extent_around(fine.centre)
+            )
             self._draw_unseen(fine, side, SHADOWS * most, add, 1.0)
+        self._draw_unseen(pool, self._sides_outside(pool), most, add)
+
+    def _sides_outside(self, pool: Waiting) -> NDArray[np.float64]:
+        """Sides (n,) of facets of parts out of view, metres."""
         away = self.given.camera.clearance(pool.centre)
         fallen = self.given.shadows.distance(pool.centre, away, pool.radius)
         part, nearest, far = _BESIDE
         away = np.maximum(away, nearest)
         soft, least = _THROWN
-        side = np.minimum(part * away * (1.0 + (away / far) ** 2), soft * np.maximum(fallen, least))
-        self._draw_unseen(pool, side, most, add)
+        return np.minimum(part * away * (1.0 + (away / far) ** 2), soft * np.maximum(fallen, least))
 
     def _for_shadows(self, pool: Waiting) -> tuple[Waiting, Waiting]:
         """Parts that throw shadows which are to be fine, opened as far as these show, and all others."""

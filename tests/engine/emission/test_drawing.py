@@ -242,7 +242,7 @@ def test_shade_is_the_depth_of_what_is_in_the_light() -> None:
     area = np.full(len(place), 3.0 * 40 * 40 / len(place))
     shade = Shade(place, area, (Light("SUN", np.zeros(3), np.array([0.0, 0.0, -1.0])),))
     middle = random.uniform(-15, 15, (200, 2))
-    for height, expected in ((-1.0, 1.5), (5.0, 0.75), (12.0, 0.0)):
+    for height, expected in ((-1.0, 1.5), (5.5, 0.675), (12.0, 0.0)):
         points = np.column_stack([middle, np.full(200, height)])
         assert shade.depth(points).mean() == pytest.approx(expected, abs=0.08)
     low = np.column_stack([middle, np.zeros(200)])
