@@ -55,6 +55,7 @@ NAMES = (
     "biomes",
     "dolly",
     "endurance",
+    "limits",
     "farm",
     "attack",
 )

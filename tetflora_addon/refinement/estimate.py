@@ -25,14 +25,14 @@ from .settings import RefinementSettings
 #: Seconds of any refinement, of each plant, and of each polygon or facet.
 SECONDS = 1.0
 SECONDS_PER_PLANT = 2.5e-5
-SECONDS_PER_PRIMITIVE = 3.3e-6
+SECONDS_PER_PRIMITIVE = 5.5e-6
 #: Facets of a covered pixel, one behind the other, if they are as large as one; numbers go with the inverse square of
 #: their size.
-FACETS_PER_PIXEL = 1.7
+FACETS_PER_PIXEL = 5.0
 #: Polygons of a plant whose leaves are all real over all that it has: far leaves are triangles, and some are hidden.
 REAL = 0.2
 #: Of what is seen, for plants that are out of view or hidden.
-UNSEEN = 0.5
+UNSEEN = 0.3
 #: Bytes of each plant, and of each polygon or facet in Blender and the renderer together.
 BYTES_PER_PLANT = 500.0
 BYTES_PER_PRIMITIVE = 610.0
