@@ -40,6 +40,7 @@ NAMES = (
     "assets",
     "closed_form",
     "edited_species",
+    "exact",
     "fidelity",
     "rami",
     "above",

@@ -9,7 +9,8 @@
 
 Plants have one of `SEEDS` seeds a species, by their places, so that the truth is so many expanded meshes a species as
 instances. Each picture is made in a process of its own, so that the largest memory is its own. Truths are kept in
-``out/exact/truth`` by a digest of all that they follow from. Nothing is denoised.
+``out/exact/truth`` by a digest of all that they follow from. Nothing is denoised. Needles are many: the truth of eight
+spruces takes some 12 GB, that of two (``--seeds 2``) 3.7 GB; facets of equal plants may differ in size (`equal_seeds`).
 
 Beside the figures, ``out/exact`` gets ``sheet.png`` (truth, refined, FLIP) and ``blobs.png`` (refined; blobs that are
 too bright in orange and too dark in blue) for each case.
@@ -17,8 +18,8 @@ too bright in orange and too dark in blue) for each case.
 - ``flip_over_noise``: mean FLIP over the pixels of plants, less that of the truth to itself with another noise seed.
 - ``color``: difference of the mean linear colors of plants, relative to the truth's.
 - ``blobs``: pixels of a million of plants' pixels, of which the mean luma of 3 × 3 is off by more than `OFF`.
-- ``facet_px``: mean side (root of the area) in pixels of the faces that the middles of pixels see: those of proxies,
-  leaves, and twigs that are triangles; `sums_of_sides`.
+- ``facet_px``: mean side (root of the area) in pixels of the faces that the middles of pixels see: of proxies, and of
+  twigs that are triangles. Leaves, blossoms and tubes have figures of their own (`sums_of_sides`).
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from numpy.typing import NDArray
 
 from devtools import session
 
+from . import forest
 from .report import ROOT, Targets
 
 FOLDER = ROOT / "out" / "exact"
@@ -53,8 +55,8 @@ FULL, WINDOW = (1920, 1080), (640, 360)
 OFF = 0.12
 #: Kinds of faces by number; 0 is no plant. ``triangle``: wood that is no tube.
 KINDS = ("", "proxy", "leaf", "blossom", "triangle", "bark")
-#: Those whose sides are sides of facets.
-_FACETS = ("proxy", "leaf", "blossom", "triangle")
+#: Those that stand for something else. Leaves are as large as they are, blossoms as well.
+_FACETS = ("proxy", "triangle")
 #: What a truth follows from, besides its numbers: folders and files of this repository.
 _SOURCES = (
     *(f"tetflora_addon/{room}" for room in ("catalogue", "species", "growth", "leaves", "subplants", "planting")),
@@ -63,6 +65,9 @@ _SOURCES = (
     "benchmarks/forest_scene.py",
     "benchmarks/forest_instances.py",
 )
+#: Woods that are timed at full HD, as in `forest`, and qualities from fine to coarse.
+TIMED = ("birch", "spruce", "bamboo", "mix")
+QUALITIES = ("FINAL", "PREVIEW", "DRAFT")
 _LONGEST = 3600  # seconds of one process
 
 TARGETS: Targets = {
@@ -106,6 +111,8 @@ class Spec:
         Different plants of each species; 0: all as Populate makes them, which have no truth.
     distance : float
         Minimum distance between the plants of ``eye``, metres.
+    few : int
+        Plants of a patch; 0: the whole wood.
     """
 
     case: str
@@ -116,6 +123,7 @@ class Spec:
     samples: int = SAMPLES
     seeds: int = SEEDS
     distance: float = 5.0
+    few: int = 0
 
     @property
     def name(self) -> str:
@@ -245,10 +253,11 @@ def _apart(
     compare: bool = False,
     render: bool = False,
     threads: int = 0,
+    quality: str = "FINAL",
 ) -> dict:
     """What a process of its own prints."""
     asked = asdict(spec) | {"what": what, "folder": str(folder), "kept": str(kept), "set": list(settings)}
-    asked |= {"compare": compare, "render": render}
+    asked |= {"compare": compare, "render": render, "quality": quality}
     command = [sys.executable, "-m", "benchmarks.exact", "--one", json.dumps(asked)]
     own = os.environ | ({"TETFLORA_THREADS": str(threads)} if threads else {})
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=_LONGEST, check=False, env=own)
@@ -256,6 +265,81 @@ def _apart(
     if done.returncode or not lines:
         raise RuntimeError(f"{what} of {spec.name} failed with {done.returncode}:\n{done.stderr[-3000:]}")
     return json.loads(lines[-1])
+
+
+def run(quick: bool) -> dict[str, float]:
+    """Measure everything; quick: the edge in summer and in winter, in a small image, with two seeds."""
+    if quick:
+        small = {"size": (480, 270), "samples": 8, "seeds": 2}
+        specs = [Spec("edge", SPECIES[0], season, **small) for season in ("summer", "bare")]
+        return _of_cases([measured(spec) for spec in specs])
+    woods = [Spec(case, species, season) for species in SPECIES for case in CASES for season in SEASONS]
+    # Windows in summer only: what seasons change does not depend on the size of the image.
+    woods += [replace(spec, size=FULL, window=WINDOW) for spec in woods if spec.season == "summer"]
+    records = []
+    for spec in woods:
+        records.append(measured(spec))
+        print(line(records[-1]), flush=True)
+    figures = _of_cases(records)
+    edge = woods[0]
+    figures["blobs_2gb"] = measured(edge, settings=[("max_memory", "2")])["blobs"]
+    different = measured(replace(edge, seeds=0), render=False)
+    few = next(found for found in records if found["name"] == edge.name)
+    figures["equal_seeds"] = few["facet_px"] / different["facet_px"]
+    figures |= _speed(edge) | _biomes()
+    checks = {f"check_{season}": check(SPECIES[0], season)["flip_over_noise"] for season in ("summer", "snow")}
+    return figures | checks
+
+
+def _of_cases(records: list[dict]) -> dict[str, float]:
+    """The largest figures of all woods, then those of each."""
+    figures = {f"{name}_max": max(found[name] for found in records) for name in _OF_CASES}
+    for found in records:
+        numbers = {name: value for name, value in found.items() if isinstance(value, int | float)}
+        figures |= {f"{found['name']}: {name}": value for name, value in numbers.items()}
+    return figures
+
+
+def _speed(edge: Spec) -> dict[str, float]:
+    """Seconds and memory of whole woods at full HD beside instances, and what workers and winter change."""
+    from . import forest_sums  # imports Blender
+
+    figures: dict[str, float] = {}
+    ours, theirs = {}, {}
+    for name in TIMED:
+        ours[name], theirs[name] = (
+            forest.measured(FOLDER / "forest", name, "--what", what, "--samples", str(forest.SAMPLES))
+            for what in ("refine", "instances")
+        )
+        ratios = forest_sums.ratios(ours[name], theirs[name])
+        figures |= {f"{key}_{name}": ratios[key] for key in ("total_ratio", "memory_ratio")}
+        figures |= {f"{key}_{name}": ours[name][key] for key in ("refine_emit_s", "peak_mb")}
+    for key in ("refine_emit_s", "peak_mb", "total_ratio", "memory_ratio"):
+        figures[f"{key}_max"] = max(figures[f"{key}_{name}"] for name in TIMED)
+    large = replace(edge, size=FULL)
+    alone, two = (measured(large, render=False, threads=threads)["refine_emit_s"] for threads in (1, 2))
+    bare = measured(replace(large, season="bare"), render=False, threads=2)["refine_emit_s"]
+    return figures | {"speedup_2": alone / two, "winter_ratio": bare / two}
+
+
+def _biomes() -> dict[str, float]:
+    """Sides of facets in each shipped biome, over what is set in *Final*, and whether qualities are in order."""
+    ratios, ordered, figures = [], True, {}
+    for path in sorted((ROOT / "tetflora_addon" / "biomes").glob("*.json")):
+        spec = Spec(path.stem, (), size=FULL, seeds=0)
+        found = [_apart(spec, "biome", FOLDER / f"biome-{path.stem}", FOLDER, quality=name) for name in QUALITIES]
+        sides = [one["facet_px"] for one in found]
+        figures |= {f"biome_{path.stem}_{n.lower()}_px": side for n, side in zip(QUALITIES, sides, strict=True)}
+        ratios.append(sides[0] / found[0]["facet_set"])
+        ordered &= sides == sorted(sides)
+    return {"biome_facet_ratio_max": max(ratios), "presets_ordered": float(ordered), **figures}
+
+
+def check(species: tuple[str, ...], season: str) -> dict:
+    """Figures of a few plants as instances beside the same expanded one by one: FLIP is that of noise."""
+    spec = Spec("low" if season == "summer" else "edge", species, season, (480, 270), (), 64, 2, few=5)
+    folder = FOLDER / f"check-{spec.name}"
+    return _apart(spec, "check", folder, folder)
 
 
 def line(found: dict) -> str:

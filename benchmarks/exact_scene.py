@@ -21,10 +21,13 @@ from numpy.typing import NDArray
 
 from devtools import session
 from devtools.formats import set_format
+from tetflora_addon.blender.biomes import adding, files, ground, library
 from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.job.contents import read_scene
 from tetflora_addon.blender.materials import snow
 from tetflora_addon.blender.results.output import KIND, result_collections
 from tetflora_addon.blender.scene.fields import fields_of
+from tetflora_addon.blender.worker import at_once
 from tetflora_addon.growth.hashing import child_key, key_of_seed
 
 from . import forest_instances, forest_scene
@@ -37,13 +40,19 @@ COVERED, COVERAGE_SAMPLES = 0.05, 8
 #: Attributes of faces: the root of the area in metres, and which of `KINDS`.
 _SIDE, _KIND = "exact_side", "exact_kind"
 _DAY = 20.0
+#: Exposure inside the wood, stops.
+_INSIDE = 3.0
+#: Height of the eye in biomes, metres.
+_EYE = 1.7
+#: Ground of a few plants, metres.
+_PATCH = 8.0
 _LOW_SUN = np.radians(12.0)
 
 
 def build(scene: bpy.types.Scene, spec: dict) -> int:
     """The wood of a case, its camera and light, on its day; how many plants there are."""
     kind, species = spec["case"], tuple(spec["species"])
-    case = forest_scene.Case(species)
+    case = forest_scene.Case(species, **({"side": _PATCH, "asked": spec["few"]} if spec["few"] else {}))
     if kind == "ridge":
         case = replace(case, away=600.0, eye=60.0)
     elif kind == "eye":
@@ -52,6 +61,9 @@ def build(scene: bpy.types.Scene, spec: dict) -> int:
     if kind == "ridge":
         scene.camera.data.lens = 110.0
         scene.camera.data.clip_end = 5000.0
+    if kind == "eye":
+        scene.camera.location[:2] = _clearing(scene)
+        scene.view_settings.exposure = _INSIDE
     if kind == "low":
         sun = next(o for o in scene.objects if o.type == 'LIGHT')
         sun.rotation_euler = _LOW_SUN - np.pi / 2.0, 0.0, 0.0
@@ -67,6 +79,17 @@ def build(scene: bpy.types.Scene, spec: dict) -> int:
         _set(scene.tetflora, name, value)
     bpy.context.view_layer.update()
     return planted
+
+
+def _clearing(scene: bpy.types.Scene) -> NDArray[np.float64]:
+    """The place (2,) near the middle of a wood that is farthest from all plants."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    plants = read_scene(scene, depsgraph, depsgraph.view_layer).seeds.position[:, :2]
+    along = np.arange(-20.0, 20.0, 0.5)
+    places = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+    near = plants[(np.abs(plants) < 40.0).all(axis=1)]
+    away = np.linalg.norm(places[:, None] - near, axis=2).min(axis=1)
+    return places[np.argmax(away)]
 
 
 def _set(group: Any, name: str, value: str) -> None:
@@ -110,8 +133,6 @@ def truth(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, float]:
     wood = scene.objects["Wood"]
     wood[KIND] = "truth"  # not one of those that are holes where plants are not
     snow.fit(bpy.data.materials)
-    scene.cycles.debug_use_compact_bvh = True
-    print("built", peak_mb(), flush=True)
     figures["instances_render_s"] = _rendered(scene, folder / "truth.png", spec["samples"], 0)
     figures["instances_peak_mb"] = peak_mb()
     _rendered(scene, folder / "again.png", spec["samples"], 1)
@@ -121,23 +142,66 @@ def truth(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, float]:
 
 def refined(scene: bpy.types.Scene, spec: dict, folder: Path, kept: Path) -> dict[str, float]:
     """What Refine makes, rendered, and how far it is from the truth in a folder."""
-    figures: dict[str, Any] = {"planted": build(scene, spec)}
-    forget_peak()
-    begun, processor = time.perf_counter(), cpu_s()
-    statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
-    figures["refine_emit_s"], figures["refine_emit_cpu_s"] = time.perf_counter() - begun, cpu_s() - processor
-    figures["peak_mb"] = peak_mb()
-    made = [o for c in result_collections(scene) for o in c.all_objects if o.data is not None]
-    figures |= counted(made, spec["size"])
-    figures["stages"] = {name: round(value, 2) for name, value in statistics.seconds.items()}
-    figures["facet_pixels_said"] = statistics.facet_pixels
+    figures: dict[str, Any] = {"planted": build(scene, spec)} | _refined(scene, spec)
     if spec["render"]:
         figures["render_s"] = _rendered(scene, folder / "refined.png", spec["samples"], 2)
         figures["peak_render_mb"] = max(peak_mb(), figures["peak_mb"])
-        covered = coverage(scene, folder / "coverage.png", COVERAGE_SAMPLES)
         if spec["compare"]:
-            figures |= compared(folder, kept, covered)
-    return figures | _sides(scene, [(o, str(o.get(KIND, ""))) for o in made], folder)
+            figures |= compared(folder, kept, coverage(scene, folder / "coverage.png", COVERAGE_SAMPLES))
+    return figures | _sides(scene, folder)
+
+
+def _refined(scene: bpy.types.Scene, spec: dict) -> dict[str, Any]:
+    """Refine as renders do; seconds, memory of all processes, and what was made."""
+    forget_peak()
+    begun, processor = time.perf_counter(), cpu_s()
+    statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
+    return {
+        "refine_emit_s": time.perf_counter() - begun,
+        "refine_emit_cpu_s": cpu_s() - processor,
+        "peak_mb": peak_mb(),
+        "stages": {name: round(value, 2) for name, value in statistics.seconds.items()},
+        "facet_pixels_said": statistics.facet_pixels,
+        **counted(_made(scene), spec["size"]),
+    }
+
+
+def _made(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    return [o for c in result_collections(scene) for o in c.all_objects if o.data is not None]
+
+
+def biome(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, Any]:
+    """A shipped biome on a hectare, seen at the height of the eye from the edge, in one of the qualities."""
+    chosen = files.read_biome(library.builtin_folder() / f"{spec['case']}{library.ENDING}")
+    land = ground.make_land(scene, chosen.ground)
+    bpy.context.view_layer.update()
+    at_once(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), chosen, [land]))
+    forest_scene.add_light(scene)
+    side = land.dimensions.y
+    forest_scene.add_camera(scene, forest_scene.Case((), eye=_EYE, side=side))
+    hit, place, *_ = land.ray_cast((0.0, -0.49 * side, 1e3), (0.0, 0.0, -1.0))
+    scene.camera.location = 0.0, -0.49 * side, _EYE + (place.z if hit else 0.0)
+    scene.camera.rotation_euler = np.pi / 2.0, 0.0, 0.0
+    scene.render.resolution_x, scene.render.resolution_y = spec["size"]
+    scene.render.resolution_percentage = 100
+    scene.tetflora.refine_at_render, scene.tetflora.quality = False, spec["quality"]
+    bpy.context.view_layer.update()
+    return {"facet_set": scene.tetflora.facet} | _refined(scene, spec) | _sides(scene, folder)
+
+
+def checked(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, float]:
+    """Whether instances are the plants: a few of them as instances, beside the same expanded one by one."""
+    figures: dict[str, float] = {"planted": build(scene, spec)}
+    scene.tetflora.expand_everything = True
+    refine.refine(scene, bpy.context.evaluated_depsgraph_get())
+    for name, seed in (("truth", 0), ("again", 1)):
+        _rendered(scene, folder / f"{name}.png", spec["samples"], seed)
+    _save_mask(folder / "covered.npy", covered := coverage(scene, folder / "coverage.png", COVERAGE_SAMPLES))
+    refine.clear(scene)
+    forest_instances.build(scene, spec["seeds"], own=True)
+    snow.fit(bpy.data.materials)
+    _rendered(scene, folder / "refined.png", spec["samples"], 2)
+    return figures | compared(folder, folder, covered)
 
 
 def _rendered(scene: bpy.types.Scene, path: Path, samples: int, seed: int) -> float:
@@ -205,23 +269,15 @@ def _save(path: Path, picture: NDArray[np.floating]) -> None:
     bpy.data.images.remove(image)
 
 
-def _sides(scene: bpy.types.Scene, objects: list[tuple[bpy.types.Object, str]], folder: Path) -> dict[str, float]:
-    """Sides in pixels of the faces that the centres of pixels see, by their kind; `exact.sums_of_sides`.
+def _sides(scene: bpy.types.Scene, folder: Path) -> dict[str, float]:
+    """Sides in pixels of the faces of results that the centres of pixels see; `exact.sums_of_sides`.
 
     Cycles draws each face in its own root of area, with one ray through the middle of each pixel. Independent of the
     engine: nothing but the meshes counts.
-
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-    objects : list
-        Objects with meshes and their kinds.
-    folder : Path
-        For the picture.
     """
-    for obj, kind in objects:
+    for obj in _made(scene):
         if obj.type == 'MESH' and len(obj.data.polygons):
-            _mark(obj.data, kind)
+            _mark(obj.data, str(obj.get(KIND, "")))
     seen = _seen(scene, folder / "sides.exr", _side_material())
     side, kind, depth = seen[:, :, 0], np.round(seen[:, :, 1]).astype(int), np.maximum(seen[:, :, 2], 1e-6)
     corners = np.array(scene.camera.data.view_frame(scene=scene))
@@ -302,4 +358,8 @@ def measure(spec: dict) -> dict[str, Any]:
     folder, kept = Path(spec["folder"]), Path(spec["kept"])
     folder.mkdir(parents=True, exist_ok=True)
     scene = bpy.context.scene
-    return truth(scene, spec, kept) if spec["what"] == "truth" else refined(scene, spec, folder, kept)
+    if spec["what"] == "truth":
+        return truth(scene, spec, kept)
+    if spec["what"] == "refined":
+        return refined(scene, spec, folder, kept)
+    return (biome if spec["what"] == "biome" else checked)(scene, spec, folder)
