@@ -125,7 +125,8 @@ def write_proxies(
     emission = form.emission
     baked = baking is not None and emission.baked_blocks is not None
     blocks = emission.baked_blocks(refined, baking.light, baking.first_facet) if baked else emission.blocks(refined)
-    statistics.facet_pixels = refined.facet_pixels or 0.0
+    statistics.facet_pixels = float(refined.facet_pixels or 0.0)
+    statistics.facet_asked = results.scene.tetflora.facet if refined.facet_pixels else 0.0
     with closing(in_thread((buffers for buffers in blocks), ahead=1)) as made:
         number, progress = 0, Progress(0.95, "Making proxies")
         yield progress
