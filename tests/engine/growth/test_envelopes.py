@@ -167,7 +167,7 @@ def test_all_area_is_drawn_at_any_size(name: str, pixels: int) -> None:
     camera = support.camera((30, 0, 18), (0, 0, 2), pixels=5 * pixels, view=20.0, kind="ORTHO")
     _, result = run(flora, seeds, camera)
     check(flora, seeds, result)
-    blocks, made, _ = support.drawn(flora, result, camera, 0.5, 1.5, weighted=False)
+    blocks, made, _ = support.drawn(flora, result, camera, 0.5, 1.5, weighted=False, hidden=0.4)
     area = (made.side**2).sum()
     for block in blocks:
         area += support.face_areas(block.buffers).sum() / (2 if block.kind == "bark" else 1)
