@@ -29,7 +29,7 @@ from ..growth.branches import Branches
 from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, mix, uniform
 from ..processes.pool import in_processes
-from ..proxies.drawn import Drawn, joined, triangle_corners
+from ..proxies.drawn import Drawn, Triangles, joined, triangle_corners
 from ..proxies.facet_sizes import HIDDEN_LEAVES, opaque_fractions
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.hotspots import light_ratios
@@ -80,10 +80,12 @@ _BESIDE, _THROWN = (0.1, 8.0, 15.0), (0.02, 1.0)
 _OUTSIDE_BATCH = 20_000
 #: Fraction of what a tile may have from which on all that is left counts as hidden.
 _FULL = 0.85
+#: Part of what a tile may have that is made between two depths, at most.
+_SLAB = 0.06
 #: Part of all that may be drawn which plants out of view have.
 _UNSEEN = 0.05
 #: Draws of this module.
-_MERGE, _THIN = 230, 231
+_MERGE, _THIN, _LEFT = 230, 231, 232
 
 #: What becomes of facets, which the camera sees or not. Another process may call it.
 Form = Callable[[Facets, bool], Any]
@@ -265,7 +267,7 @@ class _Tile:
             _, *corners = self.coverage.of_corners(given.occluders)
             self.coverage.draw(*corners)
         frontier = Frontier(self.flora, self.coverage, given.transition, given.facet)
-        for slab in frontier.slabs(parts):
+        for slab in frontier.slabs(parts, _SLAB * most):
             if self.number > _FULL * most:
                 frontier.hidden.append(slab)
                 continue
@@ -285,6 +287,24 @@ class _Tile:
         self._draw_outside(
             Waiting.concatenate([Waiting.empty(), *frontier.outside]), self._few(OUTSIDE_A_PIXEL, share, most)
         )
+        self._leave_out(self.number - most)
+
+    def _leave_out(self, number: float) -> None:
+        """Leave out so many of the facets that nobody sees, should there be more than allowed; all alike by a hash."""
+        unseen = {what: joined(some) for what, some in self._facets.items() if not what[1]}
+        there = sum(map(len, unseen.values()))
+        if number <= 0 or not there:
+            return
+        keys = np.concatenate([uniform(_keys_of(_places(some)), _LEFT) for some in unseen.values()])
+        left = max(there - int(np.ceil(number)), 0)
+        kept = np.zeros(there, bool)
+        kept[np.argsort(keys, kind="stable")[:left]] = True
+        start = 0
+        for what, some in unseen.items():
+            self._facets[what] = [some.take(np.flatnonzero(kept[start : start + len(some)]))]
+            start += len(some)
+        self._facets = {what: some for what, some in self._facets.items() if sum(map(len, some))}
+        self.number -= there - left
 
     def draw_outside(self, parts: PlantParts, share: float) -> None:
         """Parts out of view, a share of all of them."""
@@ -561,6 +581,11 @@ def _keys_of(centre: NDArray[np.float64]) -> NDArray[np.uint64]:
     for axis in range(3):
         key = mix(key ^ np.rint(centre[:, axis] * 1e4).astype(np.int64).view(np.uint64))
     return key
+
+
+def _places(drawn: Drawn) -> NDArray[np.float64]:
+    """A place (n, 3) of each facet, or of what is drawn for it."""
+    return drawn.corners[:, 0].astype(np.float64) if isinstance(drawn, Triangles) else drawn.centre.astype(np.float64)
 
 
 def quarters(facets: Facets) -> Facets:

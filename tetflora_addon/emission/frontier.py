@@ -87,10 +87,13 @@ class Frontier:
         radius = branches.length * np.hypot(across, half) + branches.radius
         return Waiting(parts, centre, radius, self.coverage.project(centre)[2] - radius)
 
-    def slabs(self, parts: PlantParts) -> Iterator[Waiting]:
-        """Parts that are to be drawn, some at a time; what they cover is to be drawn before more are asked for."""
+    def slabs(self, parts: PlantParts, most: float = np.inf) -> Iterator[Waiting]:
+        """Parts that are to be drawn, some at a time; what they cover is to be drawn before more are asked for.
+
+        Each time they have no more than about so many facets.
+        """
         pool, step = self.pool(parts), 0.0
-        wanted = max(SLAB * self.coverage.depth.size, LEAST)
+        wanted = min(max(SLAB * self.coverage.depth.size, LEAST), max(most, 1.0))
         while len(pool):
             first = float(pool.near.min())
             step = step or max((float(pool.near.max()) - first) / _SLABS, 1e-3)

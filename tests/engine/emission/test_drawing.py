@@ -203,13 +203,14 @@ def number_of(result: Refinement, settings: RefinementSettings) -> int:
     return sum(b.buffers.polygons for b in blocks) + len(facets)
 
 
-@pytest.mark.parametrize("share", [0.6, 0.3, 0.1])
+@pytest.mark.parametrize("share", [0.8, 0.6, 0.3, 0.1, 0.05])
 def test_a_budget_holds(share: float) -> None:
+    """To the last primitive, however tight it is; and most of it is used."""
     _, _, _, result = wood()
     free = number_of(result, RefinementSettings())
     most = int(share * free)
     made = number_of(result, RefinementSettings(max_polygons=most))
-    assert 0.3 * most < made <= 1.1 * most
+    assert 0.5 * most < made <= most
 
 
 def test_less_memory_is_coarser_everywhere() -> None:

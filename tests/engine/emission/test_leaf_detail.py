@@ -123,4 +123,4 @@ def test_limits_hold_up_close(share: float) -> None:
         )
 
     most = int(share * number(RefinementSettings()))
-    assert number(RefinementSettings(max_polygons=most)) <= 1.1 * most
+    assert number(RefinementSettings(max_polygons=most)) <= most
