@@ -19,6 +19,7 @@ from tetflora_addon.emission import drawing as subject
 from tetflora_addon.emission.budget import afford
 from tetflora_addon.emission.coverage import MARGIN, Coverage
 from tetflora_addon.emission.forms import as_triangles, facet_blocks
+from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.emission.shade import Shade
 from tetflora_addon.proxies.drawn import triangle_corners
 from tetflora_addon.proxies.microsurfaces import Facets
@@ -131,16 +132,32 @@ def test_few_facets_stand_for_what_nobody_sees() -> None:
     assert len(hidden) < 4.0 * camera.width * camera.height
 
 
-def test_area_is_kept() -> None:
-    """Of leaves and wood, drawn or merged, where nothing has weights; parts deep in the shade have fewer layers."""
-    flora, _, camera, result = scene()
-    whole = result.totals.optical_area.sum()
-    _, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False)
-    blocks, *_ = support.drawn(flora, result, camera, 0.5, weighted=False)
-    wood_ = sum(
-        (support.face_areas(b.buffers) * np.where(np.diff(b.buffers.face_offsets) == 3, 1.0, 0.5)).sum() for b in blocks
-    )
-    assert 0.9 * whole < (facets.side**2).sum() + wood_ < 1.1 * whole
+def optical(blocks: list, facets: Facets) -> np.ndarray:
+    """Area (2,) of leaves and of wood that can block light: closed tubes, of quads, show half of theirs."""
+    leafy = facets.transmission > 0
+    out = np.array([(facets.side[leafy] ** 2).sum(), (facets.side[~leafy] ** 2).sum()])
+    for block in blocks:
+        half = 0.5 if block.kind == "bark" else 1.0
+        sizes = np.where(np.diff(block.buffers.face_offsets) == 3, 1.0, half)
+        out[int(block.kind == "bark")] += (support.face_areas(block.buffers) * sizes).sum()
+    return out
+
+
+def test_area_is_that_of_the_plants() -> None:
+    """Of leaves and of wood, whatever they are drawn as and merged into, where nothing is thinned out."""
+    flora, seeds, camera, result = scene()
+    whole = optical(list(expanded_blocks(flora, seeds)), Facets.empty())
+    blocks, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False, hidden=0.33)
+    assert optical(blocks, facets) == pytest.approx(whole, rel=0.06)
+
+
+def test_thinning_of_what_nobody_sees_loses_little() -> None:
+    """Of primitives that cannot be merged behind full pixels a part is left out where there are many."""
+    flora, seeds, camera, result = scene()
+    whole = optical(list(expanded_blocks(flora, seeds)), Facets.empty())
+    blocks, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False)
+    assert (optical(blocks, facets) > 0.85 * whole).all()
+    assert (optical(blocks, facets) < 1.06 * whole).all()
 
 
 def digest(made: tuple) -> list:
