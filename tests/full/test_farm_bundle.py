@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A job that ``farm`` wrote, really run by Open Job Description's own runner: the pictures are those of one machine.
+"""A job that ``farm/write_job.py`` wrote, run by Open Job Description's own runner: pictures are those of one machine.
 
 The workers start a Blender that knows nothing of TetFlora; the job brings it along.
 """
@@ -21,6 +21,7 @@ import bpy
 import pytest
 
 from devtools import session
+from farm import write_job
 from tests.blender.scenes import add_camera, add_plant, tiny_render
 from tests.full.test_animation import pixels
 
@@ -28,6 +29,7 @@ Run = Callable[..., subprocess.CompletedProcess]
 
 OPENJD = (sys.executable, "-m", "openjd")
 FRAMES = (1, 2)
+WRITER = Path(write_job.__file__)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +65,7 @@ def expected(run: Run, scene_file: Path, tmp_path_factory: pytest.TempPathFactor
 def written(run: Run, scene_file: Path, folder: Path, *options: str | int) -> Path:
     """The job; checked by the runner, and nothing of the artist's is touched."""
     before = {path: path.read_bytes() for path in scene_file.parent.rglob("*") if path.is_file()}
-    done = run(scene_file, "--command", "tetflora", "farm", folder, "--json", *options)
+    done = run("-b", scene_file, "--python-exit-code", "1", "--python", WRITER, "--", folder, "--json", *options)
     assert done.returncode == 0, done.stdout + done.stderr
     assert json.loads(done.stdout.strip().splitlines()[-1])["frames"] == len(FRAMES)
     assert {path: path.read_bytes() for path in scene_file.parent.rglob("*") if path.is_file()} == before
