@@ -4,7 +4,7 @@
 
     blender --background FILE --python farm/write_job.py -- OUT_DIR [options]
 
-Exit codes and statistics are those of ``--command tetflora``.
+Exit codes and statistics are those of ``--command tetflora``, but Blender may print a line of its own after these.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     about = "refuse a job whose files are larger together (default: %(default)g)"
     parser.add_argument("--max-size", type=command.positive, default=LIMIT_GB, metavar="GB", help=about)
     parser.set_defaults(run=_write)
-    parser.add_argument("--json", action="store_true", help="print statistics as a JSON object in the last line")
+    parser.add_argument("--json", action="store_true", help="print statistics as a JSON object in one line")
     return parser
 
 

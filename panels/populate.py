@@ -21,7 +21,7 @@ from ..operators.populations import (
     TETFLORA_OT_set_population_ground,
     TETFLORA_OT_update_population,
 )
-from ..tetflora_addon.blender.placing.distances import distance_to_draw, empty_means, follows_species
+from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
 from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
 from ..tetflora_addon.blender.species.edits import catalogue
@@ -128,7 +128,7 @@ class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
         TETFLORA_UL_mix.draw_in(layout, settings)
         if not settings.mix:
             known = catalogue()
-            text = f"Default: {known[empty_means(settings)].name}" if known else "The catalog has no species"
+            text = f"Default: {next(iter(known.values())).name}" if known else "The catalog has no species"
             layout.label(text=text, icon='INFO')
         elif 0 <= settings.mix_index < len(settings.mix):
             entry = settings.mix[settings.mix_index]
