@@ -188,22 +188,6 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
     )
 
 
-def through_both_sides(
-    colour: NDArray[np.floating], transmission: NDArray[np.floating]
-) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    """Colours (n, 3) and transmissions (n,) of closed leaves as one sheet, from those of their sides.
-
-    Light that passes the first side meets the second from within, again and again: with r and t of a side, the whole
-    reflects r + t² r / (1 − r²), and t² / (1 − r²) goes through (Stokes 1862).
-    """
-    through = colour * transmission[:, None]
-    back = colour - through
-    again = 1.0 / np.maximum(1.0 - back**2, 1e-6)
-    passed = through**2 * again
-    whole = back + through**2 * back * again + passed
-    return whole, passed.sum(axis=1) / np.maximum(whole.sum(axis=1), 1e-12)
-
-
 @dataclass(frozen=True)
 class Measured:
     """What is known of the smallest clusters (c) of a run, and samples on them.

@@ -18,7 +18,7 @@ import bpy
 
 from ...errors import SceneError, TetFloraError
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress
+from ...jobs import Progress, mapped
 from ...species.fallen import KIND as FALLEN_LEAVES
 from ...species.litter import FALLEN
 from ..placing.cover import fallen_from
@@ -230,13 +230,8 @@ def _within(
     steps: Generator[Progress, object, _Result], begin: float, end: float, title: str
 ) -> Generator[Progress, object, _Result]:
     """Steps that are a part of others."""
-    while True:
-        try:
-            step = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        message = f"{title}: {step.message}"
-        yield replace(step, fraction=begin + (end - begin) * step.fraction, message=message)
+    part = end - begin
+    return mapped(steps, lambda s: replace(s, fraction=begin + part * s.fraction, message=f"{title}: {s.message}"))
 
 
 def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...jobs import Progress
+from ...jobs import Progress, mapped
 from ..attributes import read, write
 from ..runtime import JobData, guarded
 from .field_edits import own_mesh
@@ -75,14 +75,7 @@ def _drop_steps(
     groups += [_places(field) for field in fields]
     ends = np.cumsum([len(own) for own in groups])
     every = np.concatenate(groups)
-    search = ground.nearest_heights(every)
-    while True:
-        try:
-            fraction = next(search)
-        except StopIteration as stop:
-            heights = stop.value
-            break
-        yield Progress(fraction, _LOOKING)
+    heights = yield from mapped(ground.nearest_heights(every), lambda fraction: Progress(fraction, _LOOKING))
     of_plants, *of_fields = np.split(heights, ends[:-1])
     moved = _drop_plants(view_layer, plants, of_plants)
     moved += sum(_drop_field(field, own) for field, own in zip(fields, of_fields, strict=True))

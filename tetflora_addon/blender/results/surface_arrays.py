@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -67,25 +67,6 @@ class SurfaceArrays:
     normals: NDArray[np.float32] | None
     flat: NDArray[np.bool_]
     texture_space: NDArray[np.float64]
-
-
-def read_surface(given: bpy.types.Object | bpy.types.Mesh) -> SurfaceArrays:
-    """Read an evaluated object of any type that has a surface, or an evaluated mesh."""
-    if isinstance(given, bpy.types.Mesh):
-        return read_mesh(given, _materials(given.materials))
-    mesh = given.to_mesh()
-    try:
-        materials = _materials(mesh.materials)
-        for i, slot in enumerate(given.material_slots):
-            if slot.link == 'OBJECT' and i < len(materials):
-                materials[i] = slot.material.original if slot.material else None
-        return read_mesh(mesh, materials)
-    finally:
-        given.to_mesh_clear()
-
-
-def _materials(slots: Sequence[bpy.types.Material | None]) -> list[bpy.types.Material | None]:
-    return [m.original if m is not None else None for m in slots] or [None]
 
 
 def read_mesh(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> SurfaceArrays:
