@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import spread
+from ...arrays import linear_of, spread
 from ...buffers import MeshBuffers
 from ..attributes import KINDS, write
 from .meshes import mesh_steps
@@ -258,7 +258,7 @@ def _common(layers: list[AttributeArray | None]) -> tuple[str, str, list[Attribu
 def _converted(values: NDArray, old: str, new: str) -> NDArray:
     """Values of a type as those of a wider one: numbers are grey, vectors begin alike."""
     if old == 'BYTE_COLOR' and new == 'FLOAT_COLOR':
-        linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+        linear = linear_of(values)
         linear[:, 3] = values[:, 3]
         return linear
     width = KINDS[new].width
