@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from ..arrays import spread
 from ..growth.hashing import child_key, key_of_seed, uniform
-from .asset import AssetKites, SurfaceSamples
+from .asset import AssetKites, AssetSource, SurfaceSamples
 from .clusters import Hierarchy
 from .kites import kites_of
 from .patches import Patches
-from .source import AssetSource
 
 #: Triangles of which all is looked at at a time.
 AT_ONCE = 60_000

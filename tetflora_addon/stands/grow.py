@@ -18,12 +18,10 @@ from ..errors import TetFloraError
 from ..jobs import Progress
 from ..parallel import blocks, on_all_cores
 from ..setting import LENGTH, setting
-from .change import dying, fallen, grown
+from .change import MOST_PLANTS, SeedRain, dying, fallen, grown, planted
 from .guilds import Guild, Guilds
 from .light import LightGrid
-from .plants import DeadPlants, Plants
-from .records import Records, in_order
-from .renewal import MOST_PLANTS, SeedRain, planted
+from .plants import DeadPlants, Plants, Records, in_order
 from .site import StandSite
 
 #: Plants that are looked at together.

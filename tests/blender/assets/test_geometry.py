@@ -13,7 +13,7 @@ from tests.blender.assets.surfaces import SQUARE, Paint, cards, image, read, tar
 from tests.blender.scenes import add_mesh
 from tetflora_addon import errors
 from tetflora_addon.blender.assets.geometry import read_source_steps
-from tetflora_addon.blender.assets.target import Target, digest_of
+from tetflora_addon.blender.assets.parts import Target, digest_of
 from tetflora_addon.blender.scene.instances import references_of
 from tetflora_addon.jobs import at_once
 

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.engine.assets import trees
-from tetflora_addon.assets.asset import MESH_FACES, Asset
+from tetflora_addon.assets.asset import MESH_FACES, Asset, AssetSource
 from tetflora_addon.assets.compiled import compile_asset
-from tetflora_addon.assets.source import AssetSource
 from tetflora_addon.errors import TetFloraError
 
 KINDS = sorted(trees.SOURCES)

@@ -17,12 +17,11 @@ from tetflora_addon.errors import TetFloraError
 from tetflora_addon.jobs import at_once
 from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.species.ecology import Ecology
-from tetflora_addon.stands.change import grown
+from tetflora_addon.stands.change import grown, planted
 from tetflora_addon.stands.grow import StandSettings, begun, grow
 from tetflora_addon.stands.guilds import Guild, Guilds
 from tetflora_addon.stands.light import Crowns, LightGrid
-from tetflora_addon.stands.records import LYING, Records
-from tetflora_addon.stands.renewal import planted
+from tetflora_addon.stands.plants import LYING, Records
 from tetflora_addon.stands.site import StandSite, even_site
 
 SIDE = 40.0

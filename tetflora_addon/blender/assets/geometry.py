@@ -10,14 +10,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...assets.source import AssetSource, AssetSurface
+from ...assets.asset import AssetSource, AssetSurface
 from ...errors import SceneError
 from ...jobs import mapped
 from ..attributes import members, read
 from ..materials.face_looks import FaceReader
 from .baked_looks import BakeInput, bake_steps
-from .parts import AssetPart
-from .target import Target, digest_of_parts
+from .parts import AssetPart, Target, digest_of_parts
 
 #: Triangles whose corners become vertices at once.
 _TRIANGLES = 1 << 18

@@ -19,7 +19,7 @@ from ...arrays import srgb_of
 from ..attributes import members, read
 from ..materials.means import GREY, Looks
 from ..species.asset_species import PICTURE_SIDE
-from .target import Target
+from .parts import Target
 
 _POINTS = 60_000  # of a picture
 _TRIANGLES = 200_000  # of one mesh that are looked at

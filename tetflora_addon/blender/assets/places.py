@@ -23,7 +23,7 @@ from ..scene.objects import DEEPEST, ONE_BY_ONE, SURFACE_TYPES, has_nodes, rende
 from ..scene.plants import AssetPlants, read_asset_plants
 from ..scene.scatterers import is_scatter
 from ..species.asset_species import TetFloraAssetSpecies, asset_species
-from .target import Target
+from .parts import Target
 
 #: Instances up to which something that has nothing else is a group of assets; what has more is an asset of many parts.
 MOST_IN_GROUP = 256

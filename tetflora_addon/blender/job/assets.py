@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...assets import kept
-from ...assets.asset import Asset, AssetTable, Instances
+from ...assets.asset import Asset, AssetSource, AssetTable, Instances
 from ...assets.compiled import compile_steps
-from ...assets.source import AssetSource
 from ...camera.camera import Camera
 from ...emission.asset_costs import AssetCosts
 from ...emission.asset_plan import Keeping
@@ -26,8 +25,8 @@ from ...errors import SceneError, TetFloraError
 from ...jobs import Progress, at_once, mapped
 from ...refinement.asset_parts import PlacedAssets
 from ..assets.geometry import read_source_steps
+from ..assets.parts import Target, digest_of
 from ..assets.places import Places
-from ..assets.target import Target, digest_of
 from ..results.hiding import hidden_originals, originals_shown
 from ..worker import steps_in_thread
 

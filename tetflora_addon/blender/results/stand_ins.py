@@ -14,8 +14,7 @@ import bpy
 from ..materials.nodes import Graph, find_socket, get_or_create
 from .collection import Results
 from .hiding import artists_flags, forget_marks
-from .looks import look_like
-from .output import STAND_IN
+from .output import STAND_IN, look_like
 
 _VERSION = 1
 _NAME = "TetFlora Without Instances"

@@ -18,7 +18,7 @@ from ...jobs import Progress, mapped
 from ...species.species import Species
 from ...stands.grow import StandSettings, grow
 from ...stands.guilds import Guild
-from ...stands.records import Records
+from ...stands.plants import Records
 from ...stands.site import StandSite
 from ..attributes import write
 from ..placing.plant_objects import link_field

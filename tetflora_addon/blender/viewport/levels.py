@@ -20,8 +20,7 @@ from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...jobs import Progress, mapped
 from ...preview.levels import Level, Levels, gather
-from ...preview.light_plants import MOST_PLANTS, Shapes, bounds_of_plants, light_plants
-from ...preview.simple_crowns import joined, simple_crowns
+from ...preview.light_plants import MOST_PLANTS, Shapes, bounds_of_plants, joined, light_plants, simple_crowns
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
 from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
