@@ -90,7 +90,9 @@ def _ribbons(flora: Flora, whole: WholeBranches, times: NDArray[np.float64], par
     place = number / parts[ring]
     middle, frame = lines.at(ring, place)
     own = branches.take(ring)
-    half = 0.5 * np.pi * (times[ring] * radius_at(flora.rows, own, place))[:, None] * _turned(own, frame)
+    sides = flora.rows["sides"][own.row]
+    around = times[ring] * sides * np.sin(np.pi / sides) * radius_at(flora.rows, own, place)
+    half = 0.5 * around[:, None] * _turned(own, frame)
     corners = np.stack([middle - half, middle + half], axis=1).reshape(-1, 3)
     velocity = None
     if lines.later is not None:
@@ -102,11 +104,11 @@ def _ribbons(flora: Flora, whole: WholeBranches, times: NDArray[np.float64], par
     rungs, beside = len(ring), np.arange(len(first))
     edges = np.concatenate([np.arange(2 * rungs).reshape(-1, 2), quads[:, [0, 3]], quads[:, [1, 2]]])
     left, right = rungs + beside, rungs + len(first) + beside
-    around = np.stack([first, right, first + 1, left], axis=1)
+    border = np.stack([first, right, first + 1, left], axis=1)
     high = place * _height(branches)[ring]
     across = np.array([0.0, 1.0, 1.0, 0.0])[None] + np.zeros((len(first), 1))
     uv = np.stack([across, np.stack([high[first], high[first], high[first + 1], high[first + 1]], axis=1)], axis=2)
-    faces = _Faces(edges, quads.ravel(), around.ravel(), 4 * np.arange(len(first) + 1), uv.reshape(-1, 2))
+    faces = _Faces(edges, quads.ravel(), border.ravel(), 4 * np.arange(len(first) + 1), uv.reshape(-1, 2))
     return _buffers(flora, branches, ring[first], corners, velocity, faces)
 
 

@@ -73,7 +73,7 @@ def test_half_of_a_fruit_is_seen() -> None:
 
 def test_scales_of_a_cone_hide_each_other() -> None:
     """Kites of cones, a few pixels long, cover what the cones cover: three times as much with all faces counted."""
-    (cone,) = support.shipped("spruce").forms(1)
+    (cone,) = support.compiled(support.shipped("spruce")).forms[0][1]
     assert mean_silhouette(cone) < 0.2 * cone.area
     areas = np.linalg.norm(area_vectors(leaf_kites(cone)), axis=2).sum(axis=1)
     np.testing.assert_allclose(areas, 2.0 * mean_silhouette(cone))

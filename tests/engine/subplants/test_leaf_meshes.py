@@ -136,7 +136,9 @@ def test_area_of_leaves_is_that_of_the_model_times_size_squared() -> None:
             number, area = number + copies, area + support.face_areas(leaf.buffers).sum()
             single &= len(flora.forms[species][leaf.kind]) == 1
         assert number == len(size)
-        expected = (size**2 * flora.leaf.area[tips.branches.row[owner]]).sum()
+        kind = flora.rows["leaf_kind"][tips.branches.row[owner]]
+        every = [np.mean([m.area for m in models]) if models else 0.0 for models in flora.forms[species]]
+        expected = (size**2 * np.array(every)[kind]).sum()
         assert area == pytest.approx(expected, rel=1e-4 if single else 0.03)  # forms are drawn by chance
 
 
