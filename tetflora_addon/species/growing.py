@@ -17,43 +17,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..parameters import described, limited
+
 _SHARP = 4.0
+#: Limits of rates, 1/year, and powers of curves.
+_CURVE = (0.0001, 0.2), (10, 5)
 
 
 @dataclass(frozen=True)
 class Ages:
-    """How a species grows; years.
+    """How a species grows; years. Curves are [rate, power], see `grown`."""
 
-    Attributes
-    ----------
-    full : float
-        Age at which it is as described.
-    height, girth : tuple of float
-        Rate k, 1/year, and power p of the curves of the height and of the trunk's diameter, see `grown`.
-    lifespan, decline : float
-        Age at which it dies, and fraction of that from which on it declines.
-    base : float
-        The bare part of the trunk grows as this power of the height.
-    spread : float
-        Limbs grow as this power of the trunk's diameter.
-    flowers : float
-        Age from which on it bears short shoots with blossoms, cones or fruit.
-    scaled : bool
-        It only grows in size, without changing its form.
-    source : str
-        Where the curves are from.
-    """
-
-    full: float
-    height: tuple[float, float] = (0.04, 1.2)
-    girth: tuple[float, float] = (0.03, 1.2)
-    lifespan: float = 200.0
-    decline: float = 0.75
-    base: float = 2.0
-    spread: float = 0.72
-    flowers: float = 10.0
-    scaled: bool = False
-    source: str = ""
+    full: float = limited(..., 0.1, 5000, "age at which it is as described")
+    height: tuple[float, float] = limited((0.04, 1.2), *_CURVE, "curve of the height")
+    girth: tuple[float, float] = limited((0.03, 1.2), *_CURVE, "curve of the diameter of the trunk")
+    lifespan: float = limited(200.0, 0.2, 20000, "age at which it dies")
+    decline: float = limited(0.75, 0.05, 0.99, "fraction of the lifespan from which on it declines")
+    base: float = limited(2.0, 1, 10, "the bare part of the trunk grows as this power of the height")
+    spread: float = limited(0.72, 0.2, 2, "limbs grow as this power of the diameter of the trunk")
+    flowers: float = limited(10.0, 0, 5000, "age from which on it bears short shoots with blossoms, cones or fruit")
+    scaled: bool = described(False, "whether it only grows in size, without changing its form")
+    source: str = described("", "where the curves are from")
 
     def heights(self, years: float) -> float:
         """Height over that at the full age; it stands still when the plant declines."""
