@@ -16,7 +16,7 @@ from tetflora_addon import errors
 from tetflora_addon.blender import preferences
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.species import edits
-from tetflora_addon.blender.species.catalogue import delete_species_file, load_species_file
+from tetflora_addon.blender.species.catalogue import OWN_FILES, load_species_file
 from tetflora_addon.species import catalogue, schema, skeletons
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -236,7 +236,7 @@ def test_shipped_species_cannot_be_deleted(own_folder):
     _editor("bush")
     assert not bpy.ops.tetflora.delete_species.poll()
     with pytest.raises(errors.SpeciesError, match="built-in"):
-        delete_species_file("bush")
+        OWN_FILES.delete("bush")
 
 
 @pytest.mark.parametrize("text", ["{", '{"format": 1}', '{"format": 1, "name": "x", "orders": [], "leaf": {}}'])
