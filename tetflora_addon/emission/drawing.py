@@ -33,7 +33,7 @@ from ..proxies.drawn import Drawn, Triangles, joined, triangle_corners
 from ..proxies.facet_sizes import HIDDEN_LEAVES, opaque_fractions
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.hotspots import light_ratios
-from ..proxies.microsurfaces import Facets, kept_out_of_view, piece_facets, subplant_facets
+from ..proxies.microsurfaces import CIRCUMRADIUS, Facets, kept_out_of_view, piece_facets, subplant_facets
 from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.contents import PlantParts, as_pieces
 from ..refinement.decisions import real_fraction
@@ -54,7 +54,7 @@ TILE, AROUND = 240, 64
 #: Pixels from which on a branch that nothing else grows on has a line of its own; smaller ones are as straight.
 LINES = 6.0
 #: Batches, front to back, in which what was made between two depths is tested and covers the image.
-_BATCHES = 12
+_BATCHES = 4
 #: Width in pixels up to which wood is thin triangles; tubes take their place up to `decisions.BAND` times that.
 TUBES = 0.8
 #: Pixels that the axis of a branch may be off a straight line; ribbons follow those that bend more.
@@ -436,19 +436,26 @@ class _Tile:
     def _cover(self) -> None:
         """Test what was made, front to back, and let what is seen cover the image; few stand for the rest."""
         waiting, self._waiting = self._waiting, []
-        tested = [self.coverage.of_corners(corners) for _, _, corners in waiting]
-        hidden = [np.zeros(len(corners), bool) for _, _, corners in waiting]
-        near = np.concatenate([np.zeros(0, np.float32), *(prints.near for prints, *_ in tested)])
-        ends = np.quantile(near, np.linspace(0.0, 1.0, _BATCHES + 1)[1:]) if len(near) else []
-        before = -np.inf
-        for end in ends:
-            for (prints, *corners), gone in zip(tested, hidden, strict=True):
-                some = np.flatnonzero((prints.near > before) & (prints.near <= end))
-                gone[some] = self.coverage.hidden(prints.take(some))
-                seen = some[~gone[some]]
-                self._fill(*(of[seen] for of in corners))
-            before = end
-        for (what, made, corners), gone in zip(waiting, hidden, strict=True):
+        groups = sorted({corners.shape[1] for _, _, corners in waiting})
+        tested = [
+            self.coverage.of_corners(np.concatenate([of for _, _, of in waiting if of.shape[1] == group]))
+            for group in groups
+        ]
+        ends = np.cumsum([0, *(len(prints) for prints, *_ in tested)])
+        joined = [np.concatenate([np.zeros(0), *own]) for own in zip(*((p.near, c[:, 0], r[:, 0]) for p, c, r, _ in tested))]
+        hidden = np.zeros(ends[-1], bool)
+        for batch in self._batches(*joined) if waiting else ():
+            seen = []
+            for first, end, (prints, *corners) in zip(ends, ends[1:], tested, strict=False):
+                some = batch[(batch >= first) & (batch < end)] - first
+                gone = self.coverage.hidden(prints.take(some))
+                hidden[first + some[gone]] = True
+                seen.append([of[some[~gone]] for of in corners])
+            for corners in seen:
+                self._fill(*corners)
+        flags = dict(zip(groups, np.split(hidden, ends[1:-1]), strict=True)) if waiting else {}
+        for what, made, corners in waiting:
+            gone, flags[corners.shape[1]] = np.split(flags[corners.shape[1]], [len(corners)])
             species = what if isinstance(made, Facets) else what[2]
             lost = np.flatnonzero(gone)
             if isinstance(made, Facets):
@@ -462,6 +469,16 @@ class _Tile:
             if made.polygons:
                 self.number += made.polygons
                 self._meshes.setdefault(what, []).append(made)
+
+    def _batches(self, near: NDArray[np.float32], column: NDArray, row: NDArray) -> list[NDArray[np.intp]]:
+        """Things at least depths (n,), and places (n,), in batches: in each cell of the image the nearest come first."""
+        cell = self.coverage.cells(column, row)
+        order = np.lexsort((near, cell))
+        count = np.bincount(cell)
+        own = cell[order]
+        place = np.arange(len(near)) - (np.cumsum(count) - count)[own]
+        batch = _BATCHES * place // np.maximum(count[own], 1)
+        return [order[batch == number] for number in range(_BATCHES)]
 
     def _few(self, a_pixel: float, share: float, most: float) -> float:
         """Facets that nobody sees, for each pixel of a share of the image, of the few that are left of so many.
@@ -477,14 +494,16 @@ class _Tile:
     def _merge(self, facets: Facets, species: int) -> None:
         """Few large facets for many that are hidden; each lies behind full pixels as a whole, or is as it was."""
         number = uniform(_keys_of(facets.centre), _MERGE)
+        # Where there are few, all of the last are kept; where there are many, as if they had been merged as well.
+        likely = 1.0 / (MERGED[-1] * self.given.hidden**2)
+        some = np.flatnonzero(number < max(1.0 / MERGED[-1], likely))
+        facets, number = facets.take(some), number[some]
         for times in MERGED:
             larger = replace(facets, side=facets.side * np.sqrt(times))
             hidden = self._hidden(larger)
             self._keep(larger.take(np.flatnonzero(hidden & (number < 1.0 / times))), False, species)
             rest = np.flatnonzero(~hidden)
             facets, number = facets.take(rest), number[rest]
-        # Where there are few, all of these are kept; where there are many, as if they had been merged as well.
-        likely = 1.0 / (MERGED[-1] * self.given.hidden**2)
         self._keep(facets.take(np.flatnonzero(number < likely)), False, species)
 
     def _hidden(self, facets: Facets) -> NDArray[np.bool_]:
@@ -497,8 +516,19 @@ class _Tile:
             return
         given = self.given
         pixels = np.minimum(HIDDEN * np.exp(given.shade.depth(pool.centre) / SHADED), LARGEST)
-        side = pixels * given.facet * given.camera.extent_around(pool.centre)
+        finest = given.facet * given.camera.extent_around(pool.centre)
+        side = self._behind(pool, pixels * finest, finest)
         self._draw_unseen(pool, side, most, self._add_hidden)
+
+    def _behind(self, pool: Waiting, side: NDArray[np.float64], finest: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sides (n,) of facets anywhere in hidden parts that full pixels hide as well, halved down to the finest."""
+        side, left = side.copy(), np.arange(len(pool))
+        while len(left):
+            reach = pool.radius[left] + CIRCUMRADIUS * side[left]
+            shows = ~self.coverage.hidden(self.coverage.of_spheres(pool.centre[left], reach))
+            left = left[shows & (side[left] > finest[left])]
+            side[left] = np.maximum(0.5 * side[left], finest[left])
+        return side
 
     def _add_hidden(self, facets: Facets, species: int) -> None:
         """Facets of hidden parts, divided until they lie behind full pixels; what would show even so is left out."""
@@ -564,6 +594,7 @@ class _Tile:
         kept = np.where(single | ~parts.can_open(flora), 1.0, opaque_fractions(flora, parts.branches, parts.totals))
         side = np.maximum(self.given.hidden * side, np.sqrt(leaves * flora.one_leaf_area(parts.branches)))
         number = float((kept * parts.totals.optical_area / np.maximum(side, 1e-9) ** 2).sum())
+        print("UNSEEN", len(pool), number, most)
         side = side * max(np.sqrt(number / max(most, 1.0)), 1.0)
         species = flora.species_of(parts.branches.row)
         for s in np.unique(species).tolist():
