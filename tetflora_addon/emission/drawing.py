@@ -33,7 +33,7 @@ from ..proxies.drawn import Drawn, Triangles, joined, triangle_corners
 from ..proxies.facet_sizes import HIDDEN_LEAVES, opaque_fractions
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.hotspots import light_ratios
-from ..proxies.microsurfaces import CIRCUMRADIUS, Facets, kept_out_of_view, piece_facets, subplant_facets
+from ..proxies.microsurfaces import Facets, kept_out_of_view, piece_facets, subplant_facets
 from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.contents import PlantParts, as_pieces
 from ..refinement.decisions import real_fraction
@@ -68,6 +68,8 @@ MERGED = (24.0, 6.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
 #: the shade over which it grows by e; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
+#: Optical depth in the shade from which on hidden facets shrink instead of being divided.
+DARK = 1.0
 #: Facets of hidden parts, and of those outside, for each pixel of the image, at most.
 HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.6, 0.3
 #: So many of each are never too many.
@@ -516,27 +518,23 @@ class _Tile:
             return
         given = self.given
         pixels = np.minimum(HIDDEN * np.exp(given.shade.depth(pool.centre) / SHADED), LARGEST)
-        finest = given.facet * given.camera.extent_around(pool.centre)
-        side = self._behind(pool, pixels * finest, finest)
+        side = pixels * given.facet * given.camera.extent_around(pool.centre)
         self._draw_unseen(pool, side, most, self._add_hidden)
 
-    def _behind(self, pool: Waiting, side: NDArray[np.float64], finest: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sides (n,) of facets anywhere in hidden parts that full pixels hide as well, halved down to the finest."""
-        side, left = side.copy(), np.arange(len(pool))
-        while len(left):
-            reach = pool.radius[left] + CIRCUMRADIUS * side[left]
-            shows = ~self.coverage.hidden(self.coverage.of_spheres(pool.centre[left], reach))
-            left = left[shows & (side[left] > finest[left])]
-            side[left] = np.maximum(0.5 * side[left], finest[left])
-        return side
-
     def _add_hidden(self, facets: Facets, species: int) -> None:
-        """Facets of hidden parts, divided until they lie behind full pixels; what would show even so is left out."""
+        """Facets of hidden parts, smaller until they lie behind full pixels; what would show even so is left out.
+
+        Where light reaches them they are divided; in the shade each shrinks, as what lies before it keeps the light out.
+        """
+        dark = self.given.shade.depth(facets.centre) > DARK
         while len(facets):
             hidden = self._hidden(facets)
             self._keep(facets.take(np.flatnonzero(hidden)), False, species)
             large = facets.side > self.given.facet * self.given.camera.extent_around(facets.centre)
-            facets = quarters(facets.take(np.flatnonzero(~hidden & large)))
+            lit, rest = (np.flatnonzero(~hidden & large & own) for own in (~dark, dark))
+            smaller = facets.take(rest)
+            facets = Facets.concatenate([quarters(facets.take(lit)), replace(smaller, side=0.5 * smaller.side)])
+            dark = np.repeat([False, True], [4 * len(lit), len(rest)])
 
     def _draw_outside(self, pool: Waiting, most: float) -> None:
         """Parts out of view: facets as large as their distance and the shadows that they throw allow."""
@@ -594,7 +592,6 @@ class _Tile:
         kept = np.where(single | ~parts.can_open(flora), 1.0, opaque_fractions(flora, parts.branches, parts.totals))
         side = np.maximum(self.given.hidden * side, np.sqrt(leaves * flora.one_leaf_area(parts.branches)))
         number = float((kept * parts.totals.optical_area / np.maximum(side, 1e-9) ** 2).sum())
-        print("UNSEEN", len(pool), number, most)
         side = side * max(np.sqrt(number / max(most, 1.0)), 1.0)
         species = flora.species_of(parts.branches.row)
         for s in np.unique(species).tolist():
