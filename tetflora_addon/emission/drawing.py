@@ -64,7 +64,7 @@ BROAD, SIDES = 4.0, 4
 #: Fraction of a facet's area from which on each branch has a triangle; of smaller ones fewer have a wider one.
 TWIG = 0.6
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
-MERGED = (24.0, 6.0)
+MERGED = (48.0, 12.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
 #: the shade over which it grows by e; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
