@@ -27,9 +27,14 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("TETFLORA_THREADS", "1")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--quick``: only what has not taken long the last time."""
+    parser.addoption("--quick", action="store_true", help="leave out tests that took long in the last run")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Say at the end what tests cost."""
-    config.pluginmanager.register(Durations(config.rootpath / "out" / "durations"))
+    config.pluginmanager.register(Durations(config.rootpath / "out"))
 
 
 @pytest.fixture(scope="session")
