@@ -50,6 +50,10 @@ class Durations:
         config.hook.pytest_deselected(items=[item for item in items if item.nodeid in slow])
         items[:] = [item for item in items if item.nodeid not in slow]
 
+    def pytest_runtest_logstart(self) -> None:
+        """Begin to count: collecting is nobody's."""
+        self._last = _cpu()
+
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self) -> Generator[None, pytest.TestReport, pytest.TestReport]:
         """Mark a report with what it cost; reports travel from the processes of xdist with all they carry."""
