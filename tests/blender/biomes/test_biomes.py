@@ -7,6 +7,7 @@ from __future__ import annotations
 import copy
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -172,6 +173,27 @@ def test_what_is_saved_comes_back():
     assert "small" not in library.biomes()
     with pytest.raises(SceneError, match="built-in"):
         library.delete("meadow")
+
+
+def test_a_biome_whose_picture_another_program_has_open_stays(monkeypatch):
+    """As Windows has it, where what is open cannot be deleted: it is there as a whole, or gone."""
+    add(small(), add_mesh("ground", size=6.0))
+    path = saving.save_biome(scene(), "Small", "", picture=False, replace=False)
+    picture, unlink = path.with_suffix(".png"), Path.unlink
+    picture.write_bytes(b"")
+
+    def held(self, missing_ok=False):
+        if self == picture:
+            raise PermissionError(13, "The process cannot access the file because it is being used by another process")
+        unlink(self, missing_ok)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", held)
+        with pytest.raises(SceneError, match=r"Cannot delete small\.json: .* used by another process"):
+            library.delete("small")
+    assert path.exists() and library.biomes()["small"].is_own
+    library.delete("small")
+    assert not path.exists() and not picture.exists() and "small" not in library.biomes()
 
 
 def test_a_stand_is_a_layer():

@@ -13,7 +13,6 @@ import pytest
 from tests.engine import support
 from tests.engine.emission.test_emission import scene
 from tests.engine.refinement.test_loop import run
-from tetflora_addon import parallel
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission import drawing as subject
 from tetflora_addon.emission.budget import afford
@@ -24,7 +23,6 @@ from tetflora_addon.emission.shade import Shade
 from tetflora_addon.proxies.drawn import triangle_corners
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.refinement.lights import Light
-from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.refinement.settings import RefinementSettings
 
 WIDTH = 96
@@ -180,17 +178,6 @@ def test_the_order_of_plants_changes_nothing() -> None:
     assert made[0] == made[1] == made[2]
 
 
-def test_processes_and_batches_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tiles follow from the image alone: one process or two, one tile after the other."""
-    flora, _, camera, result = scene()
-    wide = replace(camera, width=2 * subject.TILE, height=160)
-    made = []
-    for threads in (1, 2):
-        monkeypatch.setattr(parallel, "_wanted", threads)
-        made.append(digest(support.drawn(flora, result, wide, 1.5, 0.6)))
-    assert made[0] == made[1]
-
-
 def test_equal_seeds_are_ordinary() -> None:
     """Plants that are copies of one have facets as large as plants that are all different."""
     flora, seeds, camera, _ = wood()
@@ -211,8 +198,11 @@ def test_what_was_off_screen_comes_back_identical() -> None:
     assert made[0] == made[2] != made[1]
 
 
-def number_of(result: Refinement, settings: RefinementSettings) -> int:
-    flora, _, camera, _ = wood()
+@cache
+def number_of(most: int | None = None) -> int:
+    """Primitives of the wood, as many as it has or as somebody allows."""
+    flora, _, camera, result = wood()
+    settings = RefinementSettings() if most is None else RefinementSettings(max_polygons=most)
     detail = afford(result, camera, settings)
     sizes = detail.pixels
     options = {"hidden": sizes.hidden, "most": detail.most}
@@ -223,11 +213,8 @@ def number_of(result: Refinement, settings: RefinementSettings) -> int:
 @pytest.mark.parametrize("share", [0.8, 0.6, 0.3, 0.1, 0.05])
 def test_a_budget_holds(share: float) -> None:
     """To the last primitive, however tight it is; and most of it is used."""
-    _, _, _, result = wood()
-    free = number_of(result, RefinementSettings())
-    most = int(share * free)
-    made = number_of(result, RefinementSettings(max_polygons=most))
-    assert 0.5 * most < made <= most
+    most = int(share * number_of())
+    assert 0.5 * most < number_of(most) <= most
 
 
 def test_less_memory_is_coarser_everywhere() -> None:
