@@ -174,13 +174,17 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
             continue
         child = rows[row["next"][sort]]
         fraction = np.linspace(0, 1, _SLABS + 1)
-        start, end = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0), 1.0
+        start, latest, end = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0), row["start"][sort].sum(), 1.0
         if sort == DEAD:
-            start, end = row["start"][sort]
+            start, latest, end = row["start"][sort][[0, 0, 1]]
         t = start + (end - start) * fraction
-        fraction = row["fraction"][sort, 0] + np.ptp(row["fraction"][sort]) * fraction
+        # Of branches whose bare part is longer, earlier children are at the same place.
+        later = np.clip((latest - start) / np.maximum(end - start, 1e-9), 0.0, 0.99)
+        earlier = np.maximum((fraction - later) / (1 - later), 0.0)
+        first_fraction, last_fraction = (
+            row["fraction"][sort, 0] + np.ptp(row["fraction"][sort]) * one for one in (earlier[:-1], fraction[1:])
+        )
         growing = row["growing"][sort, NOW] > 0
-        first_fraction, last_fraction = fraction[:-1], fraction[1:]
         if growing:  # any child may be anywhere
             first_fraction, last_fraction = np.tile(row["fraction"][sort][:, None], (1, _SLABS))
         r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
@@ -200,7 +204,7 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
         elif row["start"][sort, 1] > 0 or growing:
             longest *= _crown_most(row, np.zeros(1), np.ones(1))[0]  # where children sit is not known
         else:
-            longest *= _crown_most(row, fraction[:-1], fraction[1:])
+            longest *= _crown_most(row, first_fraction, last_fraction)
         angle = np.linspace(least, most, _ANGLES, axis=1)
         far, bottom, top = _tilted(bounds[row["next"][sort]], angle, longest)
         # Between a slab's ends nothing sticks out: radius and height grow along the axis, the lowest height is concave.
