@@ -103,12 +103,14 @@ def _tilted(bound: NDArray, angle: NDArray, scale: NDArray) -> tuple[NDArray, ND
     return scale * (far.max(1) + slack), scale * (bottom.min(1) - slack), scale * (top.max(1) + slack)
 
 
-def unit_bounds(rows: NDArray[np.void]) -> NDArray[np.float64]:
+def unit_bounds(rows: NDArray[np.void], raised: bool = False) -> NDArray[np.float64]:
     """Cylinders that hold every axis of every sub-plant whose branch has unit length.
 
     Parameters
     ----------
     rows : (r,) table of `rows.build_rows`
+    raised : bool
+        Also if plants have crown bases (see `growth.formed`), so that any limb may be anywhere above where they begin.
 
     Returns
     -------
@@ -118,7 +120,7 @@ def unit_bounds(rows: NDArray[np.void]) -> NDArray[np.float64]:
     """
     bounds = np.zeros((len(rows), 3))
     for index in range(len(rows) - 1, -1, -1):
-        bounds[index] = _unit_bound(rows, index, bounds)
+        bounds[index] = _unit_bound(rows, index, bounds, raised and rows["order"][index] == 0)
     return bounds
 
 
@@ -162,7 +164,7 @@ def leaf_reaches(
     return reach
 
 
-def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64], raised: bool) -> NDArray[np.float64]:
     row = rows[index]
     radius, low, high, turn = _axis_envelope(row)
     solid = float(reaches(row))
@@ -177,6 +179,7 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
         start, latest, end = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0), row["start"][sort].sum(), 1.0
         if sort == DEAD:
             start, latest, end = row["start"][sort][[0, 0, 1]]
+            end = 1.0 if raised and end > start else end
         t = start + (end - start) * fraction
         # Of branches whose bare part is longer, earlier children are at the same place.
         later = np.clip((latest - start) / np.maximum(end - start, 1e-9), 0.0, 0.99)
@@ -184,9 +187,10 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
         first_fraction, last_fraction = (
             row["fraction"][sort, 0] + np.ptp(row["fraction"][sort]) * one for one in (earlier[:-1], fraction[1:])
         )
-        growing = row["growing"][sort, NOW] > 0
-        if growing:  # any child may be anywhere
-            first_fraction, last_fraction = np.tile(row["fraction"][sort][:, None], (1, _SLABS))
+        anywhere = raised or row["growing"][sort, NOW] > 0
+        if anywhere:
+            among = (0.0, 1.0) if raised else row["fraction"][sort]
+            first_fraction, last_fraction = np.tile(np.reshape(among, (2, 1)), _SLABS)
         r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
         first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
         last = np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)
@@ -201,7 +205,7 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
             least[:] = 0.0  # a single stem goes straight on
         elif sort == DEAD:
             pass  # no crown's shape makes them shorter
-        elif row["start"][sort, 1] > 0 or growing:
+        elif row["start"][sort, 1] > 0 or anywhere:
             longest *= _crown_most(row, np.zeros(1), np.ones(1))[0]  # where children sit is not known
         else:
             longest *= _crown_most(row, first_fraction, last_fraction)

@@ -183,6 +183,11 @@ class Flora:
         return fit_clumping(self.rows, self.forms, area, self.polygons, self.leaf_width, totals.length)
 
     @cached_property
+    def raised_bound(self) -> NDArray[np.float64]:
+        """`bound` of plants with crown bases."""
+        return unit_bounds(self.rows, raised=True)
+
+    @cached_property
     def limb_reach(self) -> NDArray[np.float64]:
         """How far anything is from where its limb leaves the trunk (r,), for trunks of length 1."""
         return limb_reaches(self.rows, self.bound)

@@ -242,10 +242,12 @@ def bounds(flora: Flora, subplants: Branches) -> tuple[NDArray[np.float64], NDAr
     if len(some):
         own, rows = subplants.take(some), flora.rows
         crown = own.crown.astype(np.float64)
+        raised = crown[:, BASE] > 0
+        bound[some[raised]] = flora.raised_bound[own.row[raised]] * own.length[raised, None]
         stretch = along(rows, own.row, own.crown)
         longer = crown[:, WIDTH] * (1 + np.linalg.norm(crown[:, LIGHT], axis=1))
         longer = np.where(are_stools(rows, own.row), np.minimum(longer, MOST_LEANING), longer)
-        # Nothing on a limb moves farther than that is longer, and nothing else than the trunk is to its fork.
+        # Nothing on a limb moves farther than that is longer, and forks move as far as the trunk is to them.
         reach = flora.limb_reach[own.row] * np.maximum(longer - 1, 0.0)
         out[some] += (reach + 3 * np.abs(stretch - 1)) * own.length / stretch
         bound[some] /= stretch[:, None]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from tests.engine.support import RICH, compiled, expanded, leaves_of, meshes, plants, small_flora, whole_of
+from tests.engine.support import RICH, compiled, expanded, leaves_of, meshes, plants, small, small_flora, whole_of
 from tetflora_addon.arrays import spread
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.compiled.measured import fitted, measured
@@ -91,7 +91,27 @@ def test_plain_forms_have_the_same_totals_and_samples(kind: str) -> None:
 def test_all_vertices_are_within_the_bounds(seed: int, part: tuple[float, ...], kind: str) -> None:
     flora = small_flora() if kind == "small" else flora_of(kind, 0.001)
     form = LEAST + np.array(part) * (MOST - LEAST)
-    whole = trunks(flora.rows, replace(plants(seed), crown=form[None]))
+    within_bounds(flora, trunks(flora.rows, replace(plants(seed), crown=form[None])))
+
+
+@pytest.mark.parametrize("base", [0.3, 0.5, 0.95])
+@pytest.mark.parametrize("forks", [0, 2])
+@pytest.mark.parametrize("tip", [10, 90])
+def test_long_limbs_that_sit_high_are_within_the_bounds(base: float, forks: int, tip: float) -> None:
+    """The crown begins farther up and keeps its shape: limbs that are described near the ground are near the top."""
+    flora = compiled(
+        small(
+            order0={
+                "length": [10, 0], "curvature": [0, 0], "angle": [0, 0], "branches": [40, 0], "branch_start": 0.05,
+                "crown": "conical", "forks": [forks, 0], "fork_at": 0.4, "fork_angle": [30, 0],
+            },
+            order1={"length": [0.8, 0], "curvature": [0, 0], "angle": [10, 0], "angle_tip": tip, "branches": [0, 0]},
+        )
+    )  # fmt: skip
+    within_bounds(flora, trunks(flora.rows, formed(1, base=base)))
+
+
+def within_bounds(flora: Flora, whole: Branches) -> None:
     tubes, leaves = meshes(flora, expanded(flora, whole))
     centre, radius, half = bounding_cylinders(flora, whole)
     axis = whole.frame[0, :, 2]
