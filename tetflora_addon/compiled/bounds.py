@@ -19,6 +19,7 @@ from ..growth.grown_rows import NOW
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..growth.wind import widest_sway
 from ..species.species import crown_ratio
+from .limbs import LIMB
 from .samples import Points
 
 _SLABS = 48
@@ -226,14 +227,19 @@ def _crown_most(row: NDArray[np.void], low: NDArray[np.float64], high: NDArray[n
 
 
 def sampled_bounds(parts: Sequence[Points], rows: int) -> NDArray[np.float64]:
-    """Radius across the branch, and lowest and highest place along it (r, 3), that hold the samples of each row."""
-    out = np.zeros((rows, 3))
+    """Cylinders (r, 6) that hold the samples of each row.
+
+    Radius across the branch, and lowest and highest place along it. Then how far across the limbs leave that they are
+    on, and how far along it, down and up, they are from there.
+    """
+    out = np.zeros((rows, 6))
     for points in parts:
-        across, along = np.hypot(points.position[:, 0], points.position[:, 1]), points.position[:, 2]
+        root = np.where((points.limbs.kind >= LIMB)[:, None], points.limbs.root, points.position)
+        along, way = points.position[:, 2], points.position[:, 2] - root[:, 2]
+        across, leaves = (np.hypot(place[:, 0], place[:, 1]) for place in (points.position, root))
+        found = np.stack([across, -along, along, leaves, -way, way], axis=1)
         for row, (first, number) in enumerate(zip(points.first, points.number, strict=True)):
             some = slice(int(first.min()), int((first + number).max()))  # the runs of a row follow one another
-            if some.stop > some.start:
-                out[row, 0] = max(out[row, 0], across[some].max())
-                out[row, 1] = min(out[row, 1], along[some].min())
-                out[row, 2] = max(out[row, 2], along[some].max())
+            out[row] = np.maximum(out[row], found[some].max(axis=0, initial=0.0))
+    out[:, [1, 4]] *= -1
     return out

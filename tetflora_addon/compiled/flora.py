@@ -158,7 +158,7 @@ class Flora:
 
     @cached_property
     def sampled_bound(self) -> NDArray[np.float64]:
-        """Radius, and lowest and highest place along the branch (r, 3), of all samples; unit is the branch's length."""
+        """`bounds.sampled_bounds` of all samples (r, 6); unit is the branch's length."""
         if self.in_leaf is not self:
             return self.in_leaf.sampled_bound
         parts = (self.samples.leaves, self.samples.wood)

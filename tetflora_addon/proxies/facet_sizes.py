@@ -252,6 +252,6 @@ def opaque_fractions(flora: Flora, own: Branches, totals: Totals) -> NDArray[np.
 
     A spruce has twenty layers of needles across its crown. Where it is hidden, the first of them cast its shadow.
     """
-    bound = extents(flora, own)
+    bound = extents(flora, own, farthest=False)
     silhouette = _FILLED * 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * own.length**2
     return np.minimum(_LAYERS * silhouette / np.maximum(totals.optical_area, 1e-300), 1.0)

@@ -153,6 +153,23 @@ def test_samples_are_where_leaves_grow(kind: str, form: dict[str, float]) -> Non
     )
 
 
+@pytest.mark.parametrize(
+    "form", [*FORMS, {"width": 3.0, "east": 0.5, "north": 0.5}, {"width": 0.3}, {"base": 0.8}], ids=str
+)
+@pytest.mark.parametrize("kind", [*KINDS, "willow", "hazel"])
+def test_samples_are_within_the_extents(kind: str, form: dict[str, float]) -> None:
+    """What is looked for where samples are finds all of them, on the side to which a crown leans too."""
+    flora = flora_of(kind)
+    own = trunks(flora.rows, formed(2, **form))
+    radius, low, high = extents(flora, own).T * 1.001
+    for points in (flora.samples.leaves, flora.samples.wood):
+        first, number = points.runs(own)
+        owner, index = spread(number)
+        place, _ = placed_samples(flora, points, own, owner, first[owner] + index)
+        assert (np.hypot(place[:, 0], place[:, 1]) <= radius[owner]).all()
+        assert (place[:, 2] <= high[owner]).all() and (place[:, 2] >= low[owner] - 1e-6).all()
+
+
 def test_turned_samples_reach_to_the_light_as_others_do() -> None:
     flora = flora_of("beech")
     own = trunks(flora.rows, formed(30, east=0.6))
