@@ -177,16 +177,6 @@ def test_dense_stands_thin_themselves() -> None:
     assert 4.5 < leaves < 8.0
 
 
-def test_plants_that_are_given_grow_on() -> None:
-    rows = records().at(60.0)
-    alive = rows.take(np.flatnonzero(rows.dead == 0))
-    bare = StandSettings(years=5, interval=0, density=0.0, recruits=0.0)
-    later = at_once(grow(half_planted(), MIXED, bare, alive))
-    later = later.take(np.flatnonzero(later.dead == 0))
-    assert 0.6 * len(alive) < len(later) <= len(alive)
-    assert later.height.mean() > 0.98 * alive.height.mean()
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
