@@ -103,9 +103,10 @@ class SeedRain:
         for guild in range(len(self.outside)):
             own = plants.guild == guild
             sums = np.bincount(place[own], crown[own], self.rows * self.columns).reshape(self.rows, self.columns)
-            reach = self.guilds.dispersal[guild] / np.sqrt(area)
+            # About a normal distribution, whose mean distance is √(π / 2) standard deviations.
+            width = np.sqrt(1.0 + 12.0 / np.pi * self.guilds.dispersal[guild] ** 2 / area)
             for axis in (0, 1, 0, 1):
-                sums = _smoothed(sums, max(round(0.6 * reach), 0), axis)
+                sums = _smoothed(sums, round((width - 1.0) / 2.0), axis)
             out[guild] = sums * (0.01 * self.guilds.seeds[guild] / area) + self.outside[guild]
         return out.reshape(len(self.outside), -1)
 
