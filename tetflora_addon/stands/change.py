@@ -155,8 +155,7 @@ def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells:
     lies = np.floor((_LIES[0] + (_LIES[1] - _LIES[0]) * uniform(plants.key, StandDraw.LIE)) * lasts) + 1.0
     turn = uniform(plants.key, StandDraw.LEAN)
     # Directions on a square, which needs no sine: rounded to a circle by its own length.
-    across, along = 4.0 * turn - 2.0, 0.0 * turn
-    along = 1.0 - np.abs((across % 2.0) - 1.0) * 2.0
+    along = 1.0 - np.abs(((4.0 * turn - 2.0) % 2.0) - 1.0) * 2.0
     across = np.where(turn < 0.5, 1.0, -1.0) * (1.0 - np.abs(along))
     east, north = across - 3.0 * slope[0][cells], along - 3.0 * slope[1][cells]
     length = np.maximum(np.sqrt(east**2 + north**2), 1e-6)

@@ -75,7 +75,7 @@ class SeedRain:
     def __init__(
         self, site: StandSite, guilds: Guilds, suits: NDArray[np.float64], most: float, outside: float
     ) -> None:
-        """Prepare.
+        """Of a site, for guilds that grow so well on its cells.
 
         Parameters
         ----------
