@@ -195,6 +195,21 @@ def test_closed_leaves_are_bodies_and_trunks_are_wood() -> None:
     assert not asset.leaves_of(int(np.flatnonzero((whole.parent == 0) & (whole.body_area == 0))[0]))
 
 
+def test_closed_leaves_are_as_dark_as_both_of_their_sides_together() -> None:
+    """A facet in their place is one sheet: light that passes has met two walls, and walls swallow some each time."""
+    whole = trees.compiled("closed").clusters
+    leaves = whole.take((whole.parent == 0) & (whole.body_area > 0))
+    wall = np.array(trees.GREEN)
+    back, through = 0.6 * wall, 0.4 * wall
+    inner = 1.0 / (1.0 - back**2)
+    passed = through**2 * inner
+    sheet = back + through**2 * back * inner + passed
+    assert leaves.colour[0] == pytest.approx(sheet, rel=2e-3)
+    assert leaves.transmission[0] == pytest.approx(passed.sum() / sheet.sum(), rel=2e-3)
+    trunk = whole.take((whole.parent == 0) & (whole.body_area == 0))
+    assert trunk.colour[0] == pytest.approx(trees.BROWN, rel=2e-3)
+
+
 @given(st.floats(0, 1), st.floats(0, 1))
 def test_light_through_both_sides_is_the_sum_of_all_ways(albedo: float, through: float) -> None:
     """Nothing is gained, and the series is summed by hand."""
