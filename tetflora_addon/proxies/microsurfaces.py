@@ -148,14 +148,11 @@ def _joined(parts: list[Facets]) -> Facets:
     return Facets.concatenate([p if p.stretch is not None else replace(p, stretch=np.ones(len(p))) for p in parts])
 
 
-def kept_out_of_view(
-    facets: Facets, clearance: Callable[[NDArray], NDArray], smallest: float, within: bool = False
-) -> Facets:
+def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], within: bool = False) -> Facets:
     """Facets that are out of view, moved away from it where they would reach into it, so that they keep their area.
 
-    Where there is no room beside it, they are shrunk, but to no less than a fraction of their side. ``clearance`` gives
-    the distance (n,) of points (n, 3) from the view in metres. With ``within``, facets whose middle is in the view stay
-    as they are.
+    Where there is no room beside it, they are shrunk, or left out. ``clearance`` gives the distance (n,) of
+    points (n, 3) from the view in metres. With ``within``, facets whose middle is in the view stay as they are.
     """
     reach, centre = CIRCUMRADIUS * facets.side, facets.centre
     away = clearance(centre)
@@ -168,8 +165,8 @@ def kept_out_of_view(
         steep = np.maximum(np.einsum("ni,ni->n", slope, slope), _LEAST_SLOPE)
         centre = centre.copy()
         centre[some] += (short[some] / steep)[:, None] * slope
-    fraction = np.where(stay, 1.0, np.clip(clearance(centre) / np.maximum(reach, 1e-12), smallest, 1.0))
-    return replace(facets, centre=centre, side=facets.side * fraction)
+    fraction = np.where(stay, 1.0, np.clip(clearance(centre) / np.maximum(reach, 1e-12), 0.0, 1.0))
+    return replace(facets, centre=centre, side=facets.side * fraction).take(np.flatnonzero(fraction > 0.0))
 
 
 def facet_numbers(

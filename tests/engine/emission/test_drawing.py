@@ -98,11 +98,13 @@ def test_what_is_hidden_never_shows() -> None:
     assert (facets.side[~seen][~cover.hidden(prints)] ** 2).sum() < 0.02 * (facets.side[~seen] ** 2).sum()
 
 
-def test_no_facet_of_what_is_outside_is_in_the_image() -> None:
-    """A plant of which a little is in the corner of the image: what is large lies beyond it as a whole."""
+@pytest.mark.parametrize("lens", [0.0, 0.1, 0.4])
+def test_no_facet_of_what_is_outside_is_in_the_image(lens: float) -> None:
+    """A plant of which a little is in the corner of the image: what is large lies beyond it and its blur as a whole."""
     flora = support.flora()
     seeds = support.plants([3], support.SPECIES.index("birch"), [(11.2, 0, 0)])
     camera = support.camera((0, -30, 8), (0, 0, 8), pixels=WIDTH, view=0.7)
+    camera = replace(camera, lens_radius=lens, focus=10.0)
     _, facets, seen = support.drawn(flora, run(flora, seeds, camera)[1], camera, 1.2, 0.6)
     cover = Coverage(camera)
     inside = ~cover.outside(cover.of_corners(triangle_corners(facets))[0])
