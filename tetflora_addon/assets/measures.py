@@ -168,6 +168,8 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
         through = shown.transmission[of_face].astype(np.float32)
         unknown = np.where(solid[at], np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
         transmission[at] = np.where(np.isnan(through), unknown, through)
+        both = at[solid[at] & ~woody[at]]  # a facet or a kite is one sheet in place of the two sides of a closed leaf
+        colour[both], transmission[both] = through_both_sides(colour[both], transmission[both])
         width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
     new_face = (np.diff(face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0)
     return Run(

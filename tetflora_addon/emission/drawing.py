@@ -542,7 +542,7 @@ class _Tile:
             return
 
         def add(facets: Facets, species: int) -> None:
-            self._keep(kept_out_of_view(facets, self.coverage.camera.clearance, 0.0), False, species)
+            self._keep(kept_out_of_view(facets, self.coverage.camera.clearance), False, species)
 
         if self.given.shadow > 0.0:
             fine, pool = self._for_shadows(pool)

@@ -23,7 +23,7 @@ from ..arrays import spread, unit
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..growth.hashing import child_key, key_of_seed, mix, stepped, uniform
-from ..proxies.facet_sizes import HIDDEN_FACES, polygon_facet_sizes
+from ..proxies.facet_sizes import polygon_facet_sizes
 from ..proxies.microsurfaces import Facets, kept_out_of_view
 from ..refinement.contents import Held
 from ..refinement.decisions import Decision
@@ -230,7 +230,7 @@ def polygon_facets(
         for run in chunks(expected[chosen], at_once):
             some = chosen[run]
             made = chosen_facets(held.items.take(some), sizes.optical[some], side[some])
-            yield kept_out_of_view(made, camera.clearance, HIDDEN_FACES**-0.5) if beside else made, seen
+            yield kept_out_of_view(made, camera.clearance) if beside else made, seen
 
 
 def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:

@@ -279,7 +279,7 @@ def test_light_plants_stand_where_plants_do(species: str) -> None:
     assert len(shapes.indices) / count <= 24
     assert shapes.indices.min() == 0
     assert shapes.indices.max() == len(shapes.positions) - 1
-    radius, low, high = flora.sampled_bound[stems.row].T * stems.length
+    radius, low, high = flora.sampled_bound[stems.row, :3].T * stems.length
     assert (np.hypot(points[..., 0], points[..., 1]) <= radius[:, None] + 0.02 * stems.length[:, None]).all()
     assert (points[..., 2] <= high[:, None] + 1e-3).all()
     assert (points[..., 2] >= low[:, None] - 0.02 * stems.length[:, None]).all()  # trunks lean
