@@ -169,6 +169,27 @@ def test_the_panels_settings_serve_where_nothing_is_given():
     assert [o.tetflora.species for o in bpy.data.objects if o.tetflora.is_plant] == ["conifer"] * 7
 
 
+def test_the_panels_density_and_habitats_count():
+    settings = bpy.context.scene.tetflora.populate
+    settings.count, settings.by_density, settings.density, settings.min_distance = 7, True, 500.0, 0.0
+    entry = settings.mix.add()
+    entry.species, entry.habitat = "conifer", 'LIGHT'
+    select(add_mesh("ground", size=10.0))  # 20 m to a side: .04 ha
+    bpy.ops.tetflora.populate()
+    population = bpy.context.scene.tetflora.populations[0]
+    assert (population.by_density, population.density) == (True, 500.0)
+    assert 10 <= population.made <= 20
+    assert population.mix[0].habitat == 'LIGHT'
+
+
+def test_a_script_that_gives_a_number_gets_it_whatever_the_panel_says():
+    settings = bpy.context.scene.tetflora.populate
+    settings.by_density, settings.density = True, 500.0
+    select(add_mesh("ground", size=10.0))
+    bpy.ops.tetflora.populate(count=3, min_distance=0.0, species="conifer")
+    assert bpy.context.scene.tetflora.populations[0].made == 3
+
+
 def test_populate_twice_leaves_the_first_plants_their_room():
     select(add_mesh("ground", size=20.0))
     add_plant("by hand", location=(0.0, 0.0, 0.0))
