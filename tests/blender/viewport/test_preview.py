@@ -238,3 +238,27 @@ def test_every_setting_has_a_name_of_its_own():
     properties = state.TetFloraPreview.bl_rna.properties
     names = [p.name for p in properties if p.identifier not in {"rna_type", "name"}]
     assert len(names) == len(set(names)) == 8
+
+
+def test_simple_shapes_make_way_for_refined_plants_where_these_are_seen(monkeypatch):
+    scene, _, _ = scene_of_plants(1)
+    scene.tetflora.preview.plants = 'LIGHT'
+    read_shapes(scene, depsgraph())
+    drawn = []
+    monkeypatch.setattr(overlay, "_draw_plants", drawn.append)
+
+    def is_drawn():
+        drawn.clear()
+        bpy.context.view_layer.update()
+        overlay._in_space(bpy.context, state.find(scene))
+        return bool(drawn)
+
+    assert is_drawn()
+    bpy.ops.tetflora.refine()
+    assert not is_drawn()
+    scene.tetflora.output.show_viewport = False
+    assert is_drawn()
+    scene.tetflora.output.show_viewport = True
+    assert not is_drawn()
+    bpy.context.view_layer.layer_collection.children["TetFlora"].hide_viewport = True  # the eye in the Outliner
+    assert is_drawn()

@@ -19,7 +19,7 @@ from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...jobs import Progress
 from ...preview.levels import Level, Levels, gather
-from ...preview.light_plants import MOST_PLANTS, Shapes, bounds_of_plants, light_plants
+from ...preview.light_plants import Shapes, bounds_of_plants, light_plants, thinned
 from ...preview.simple_crowns import joined, simple_crowns
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
@@ -149,8 +149,9 @@ def _grown(
     kinds = seeds.identifiers
     if len(kinds) <= _MANY_KINDS:
         return [make(in_year(scene, compile_for(kinds, scene, depsgraph)), seeds)]
-    some, out = seeds.take(slice(None, None, max(-(-len(seeds) // MOST_PLANTS), 1))), []
-    for number, species in enumerate(load_for(kinds, scene, depsgraph)):
+    loaded, out = load_for(kinds, scene, depsgraph), []
+    some = thinned(seeds, np.array([species.orders[0].length.mean for species in loaded]))
+    for number, species in enumerate(loaded):
         own = some.take(np.flatnonzero(some.species == number))
         if len(own):
             one = replace(own, identifiers=(kinds[number],), species=np.zeros(len(own), np.int32))
