@@ -152,7 +152,7 @@ def _draw(made: gpu.types.GPUBatch | None, origin: NDArray[np.float64]) -> None:
 def refined_seen(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> bool:
     """Whether viewports show refined plants, in place of which simple ones stand."""
     done = [c for c in result_collections(scene, 'VIEW') if UNFINISHED not in c]
-    return any(c.is_visible and c.collection in done for c in layer.layer_collection.children)
+    return any(obj.visible_get(view_layer=layer) for collection in done for obj in collection.objects)
 
 
 def _draw_plants(preview: Preview) -> None:
