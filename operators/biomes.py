@@ -41,7 +41,8 @@ class _Planting(ModalJob):
         if result.kept:
             text += f'; "{result.kept[0]}" keeps its own material'
         if result.bare:
-            self.report({'WARNING'}, f"{text}; without plants: {result.bare[0]}")
+            more = f"; and {counted(len(result.bare) - 1, 'other layer')}" if len(result.bare) > 1 else ""
+            self.report({'WARNING'}, f"{text}; without plants: {result.bare[0]}{more}")
             return {'FINISHED'}
         return self.done(f"{text}{self.next_step(context)}")
 

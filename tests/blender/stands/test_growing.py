@@ -74,6 +74,23 @@ def test_masks_keep_the_stand_away():
     assert (west < 0.0).mean() > 0.65
 
 
+@pytest.mark.parametrize(
+    ("size", "settings", "says"),
+    [
+        (0.4, {"relief": 0.0}, "too small for a stand: no square of 1 m"),
+        (0.5, {"recruits": 0.0, "outside": 0.0, "density": 1.0}, "too small for a stand of 1 plants per hectare"),
+        (20.0, {"slope_max": 0.1}, "steeper than Max Slope"),
+        (20.0, {"vertex_group": "none"}, "Vertex Group, Areas, Paths"),
+    ],
+)
+def test_what_leaves_no_ground_is_what_is_told(size, settings, says):
+    ground = add_mesh("ground", size=size)
+    ground.vertex_groups.new(name="none")
+    ground.rotation_euler.x = 0.0 if size < 1.0 or "vertex_group" in settings else 0.5
+    with pytest.raises(RuntimeError, match=says):
+        stand_on(ground, **settings)
+
+
 def test_a_year_is_kept_as_a_plain_field():
     field = stand_on(add_mesh("ground", size=12.0))
     seeds, _, sizes = plants_of(field, 6.5)

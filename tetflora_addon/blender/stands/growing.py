@@ -194,6 +194,11 @@ def _again_steps(
     except TetFloraError as error:
         raise SceneError(f'"{field.name}": {error}') from None
     if not len(records):
+        if 0.0 < site.area * settings.density < 1e5:  # square meters by plants per hectare: fewer than ten
+            raise SceneError(
+                f"{site.area:.3g} m² of ground are too small for a stand of {settings.density:,.0f} plants per "
+                "hectare; use a larger mesh, or raise Planted"
+            )
         raise SceneError(
             "Nothing is left of the stand: no plant is as tall as Min Height; grow it longer, plant more, or change "
             "the species, Warmth or Moisture"
