@@ -41,7 +41,7 @@ class Given:
     """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
 
     ``owners`` are the objects of the plants in their order, each with the number of its own; ``places`` are those of
-    assets.
+    assets; ``unknown`` tells of plants that were left out because nobody has their species.
     """
 
     seeds: Seeds
@@ -51,6 +51,7 @@ class Given:
     sources: Sources | None = None
     owners: tuple[tuple[str, int], ...] = ()
     places: tuple[Places, ...] = ()
+    unknown: str = ""
 
     @property
     def species(self) -> tuple[str, ...]:
@@ -120,17 +121,18 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
         explicit = read_explicit(depsgraph, view_layer)
         places = tuple(read_places(scene, depsgraph, view_layer))
         try:
-            seeds, owners = read_plants_of(scene, depsgraph, view_layer)
+            seeds, owners, unknown = read_plants_of(scene, depsgraph, view_layer)
         except NoPlantsError:
             if explicit is None and not places:
                 raise
             none = np.zeros(0)
             frames = none.reshape(0, 3), none.reshape(0, 3, 3)
             seeds, owners = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none), ()
+            unknown = ""
         lights = (*read_lights(depsgraph, view_layer), *sky_suns(scene))
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners, places)
+        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners, places, unknown)
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:

@@ -199,7 +199,7 @@ def _make(scene: bpy.types.Scene) -> None:
             before = result_collections(scene, 'RENDER')
             statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
             if statistics.left_out:
-                _warn(statistics.left_out, " ".join(sorted(statistics.strays)))
+                _warn(statistics.left_out, statistics.unknown or " ".join(sorted(statistics.strays)))
             for text in asset_warnings:
                 _warn(text, text)
             new = [c for c in result_collections(scene, 'RENDER') if c not in before]
