@@ -95,7 +95,8 @@ class TETFLORA_OT_animate_growth(Reporting, bpy.types.Operator):
 
 
 class TETFLORA_OT_keep_year(Reporting, bpy.types.Operator):
-    """Keep the active stand as it is in its present year, as an ordinary field of plants, and forget all other years.
+    """Keep the active stand as it is in its present year, as an ordinary field of plants, and forget all other years
+    and their keys.
 
     The brush and other tools can then change it. Grow Again brings the years back.
     """
@@ -103,6 +104,10 @@ class TETFLORA_OT_keep_year(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.keep_year"
     bl_label = "Keep Year"
     needs = _ACTIVE
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        text = "All other years of the stand and their keys are removed. Grow Again brings the years back"
+        return context.window_manager.invoke_confirm(self, event, message=text, confirm_text=self.bl_label)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         number = keep_year(context.active_object)

@@ -76,7 +76,7 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         names = ("quality", "cutoff", "shadow_cutoff", "proxy_form", "baked_light", "max_polygons")
         draw_properties(column, settings, *names)
         _draw_memory(column, context.scene)
-        active = context.active_object
+        active = context.view_layer.objects.active  # and not the context's, which is None while results hide it
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
             layout.prop(active.tetflora, "is_explicit")
         if active is not None and (may_scatter(active) or is_scatter(active)):
