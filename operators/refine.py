@@ -52,11 +52,14 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Statistics]:
         scene, nothing = context.scene, not has_results(context.scene)
+        made_for = auto.results_made_for(scene)
         with auto.paused():
             depsgraph = context.evaluated_depsgraph_get()
             job = refine.refine_steps(scene, depsgraph, view_layer=context.view_layer, first_look=nothing)
             try:
-                return (yield from job)
+                statistics = yield from job
+                auto.note_results(scene, made_for)
+                return statistics
             except BaseException:
                 job.close()
                 if nothing and is_there(scene):

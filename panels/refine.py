@@ -65,6 +65,9 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
             draw_message(context, layout, error)
         if context.scene.camera is None:
             draw_message(context, layout, "The scene has no camera; add one, and make it active with Ctrl Numpad 0")
+        elif changed := [] if settings.auto_refine else auto.changed_since(context.scene):
+            text = f"Results are out of date: {', '.join(changed)} changed since. Click Refine"
+            draw_message(context, layout, text, 'FILE_REFRESH')
         elif text := hint(context.scene) or made_of(settings.statistics):
             draw_message(context, layout, text, 'INFO')
         expected = forecast_text(context.scene, context.view_layer)

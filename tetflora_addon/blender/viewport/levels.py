@@ -29,7 +29,7 @@ from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
 from ..scene.field_sizes import stand_years
 from ..scene.objects import taking_part
-from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
+from ..scene.plants import NoPlantsError, read_asset_plants, read_plants_of
 from ..scene.scatterers import is_drop
 from ..scene.sizes import measure_of
 from ..settings import season_of, years_of
@@ -133,7 +133,7 @@ def _shapes_of(
         size = crown.radius, crown.base, crown.height
         crowns.append(simple_crowns(plants.matrices, size, crown.colour, boxes=make is bounds_of_plants))
     try:
-        seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
+        seeds, _, of(scene).message = read_plants_of(scene, depsgraph, depsgraph.view_layer)
     except NoPlantsError:
         if not crowns:
             raise
