@@ -108,6 +108,12 @@ def selected_plants(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in plants_of(context.selected_objects) if obj.library is None]
 
 
+def show_shapes(scene: bpy.types.Scene) -> None:
+    """Show plants as simple shapes where nothing is shown of them: points of fields are no picture of plants."""
+    if scene.tetflora.preview.plants == 'NONE':
+        scene.tetflora.preview.plants = 'LIGHT'
+
+
 def select_only(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
     """Select these objects and no others, as far as the view layer has them; the first becomes active."""
     for obj in context.selected_objects:

@@ -16,7 +16,7 @@ from ..tetflora_addon.blender.stands.growing import (
     new_stand_steps,
 )
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only
+from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
 from .populations import ground_selected, selected_grounds
 
 _ACTIVE = (
@@ -34,9 +34,7 @@ class _Growing(ModalJob):
 
     def finish(self, context: bpy.types.Context, result: GrownStand) -> set[str]:
         select_only(context, [result.field])
-        preview = context.scene.tetflora.preview
-        if preview.plants == 'NONE':  # its points are no picture of it
-            preview.plants = 'LIGHT'
+        show_shapes(context.scene)
         context.scene.update_tag()
         return self.done(f"{counted(result.plants, 'plant')} after {counted(result.years, 'year')}")
 
