@@ -20,7 +20,7 @@ import bpy
 
 from ...camera.camera import Camera
 from ...errors import TetFloraError
-from ...jobs import Progress
+from ...jobs import Pace, Progress
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
 from ..main_thread import in_main_thread
@@ -52,6 +52,7 @@ class _State:
     steps: Generator[Progress, bool | None, object] | None = None
     digest: str = ""  # of the job
     made_for: dict[str, str] = field(default_factory=dict)
+    pace: Pace = field(default_factory=lambda: Pace(SLICE))
     due: float = 0.0
     message: str = ""
     working: bool = False  # in here right now: what changes is our own doing
@@ -174,16 +175,16 @@ def _begin(scene: bpy.types.Scene) -> bool:
         redraw()
         return False
     _state.digest, _state.again, _state.waiting = digest, False, False
-    _state.made_for = results_made_for(scene)
+    _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE)
     _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer, camera=camera, first_look=True)
     return True
 
 
 def _slice(scene: bpy.types.Scene) -> bool:
-    end = time.monotonic() + SLICE
+    _state.pace.begin()
     try:
         progress = next(_state.steps)
-        while time.monotonic() < end and not progress.waiting:
+        while _state.pace.goes_on(progress):
             progress = next(_state.steps)
     except StopIteration as stop:
         _state.steps, _state.message = None, stop.value.unknown
