@@ -13,6 +13,7 @@ from ... import memory
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
 from ...emission.light import Sources
+from ...errors import SceneError
 from ...growth.growth import trunks
 from ...growth.seeds import Seeds
 from ...processes import pool
@@ -179,6 +180,8 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
         As `read_scene` and `compile_for`.
     """
     given = read_scene(scene, depsgraph, depsgraph.view_layer)
+    if given.unknown:  # who counts in advance wants to know it
+        raise SceneError(given.unknown)
     flora = in_year(scene, compile_for(given.species, scene, depsgraph))
     instances = sum(len(one) for one in given.places)
     return Statistics(plants=len(given.seeds), polygons_full=given.polygons_full(flora), instances=instances)
