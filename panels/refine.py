@@ -65,6 +65,9 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
             draw_message(context, layout, error)
         if context.scene.camera is None:
             draw_message(context, layout, "The scene has no camera; add one, and make it active with Ctrl Numpad 0")
+        elif changed := [] if settings.auto_refine else auto.changed_since(context.scene):
+            text = f"Results are out of date: {', '.join(changed)} changed since. Click Refine"
+            draw_message(context, layout, text, 'FILE_REFRESH')
         elif text := hint(context.scene) or made_of(settings.statistics):
             draw_message(context, layout, text, 'INFO')
         expected = forecast_text(context.scene, context.view_layer)
@@ -76,7 +79,7 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         names = ("quality", "cutoff", "shadow_cutoff", "proxy_form", "baked_light", "max_polygons")
         draw_properties(column, settings, *names)
         _draw_memory(column, context.scene)
-        active = context.active_object
+        active = context.view_layer.objects.active  # and not the context's, which is None while results hide it
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
             layout.prop(active.tetflora, "is_explicit")
         if active is not None and (may_scatter(active) or is_scatter(active)):

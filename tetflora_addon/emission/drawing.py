@@ -44,7 +44,7 @@ from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import Pieces, whole_pieces
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
-from .coverage import Coverage
+from .coverage import Coverage, Footprints
 from .frontier import DETAIL, FEW, Frontier, Waiting
 from .plants import Block, Transition
 from .shade import Shade
@@ -444,9 +444,8 @@ class _Tile:
             for group in groups
         ]
         ends = np.cumsum([0, *(len(prints) for prints, *_ in tested)])
-        joined = [np.concatenate([np.zeros(0), *own]) for own in zip(*((p.near, c[:, 0], r[:, 0]) for p, c, r, _ in tested))]
         hidden = np.zeros(ends[-1], bool)
-        for batch in self._batches(*joined) if waiting else ():
+        for batch in self._batches(tested):
             seen = []
             for first, end, (prints, *corners) in zip(ends, ends[1:], tested, strict=False):
                 some = batch[(batch >= first) & (batch < end)] - first
@@ -472,9 +471,12 @@ class _Tile:
                 self.number += made.polygons
                 self._meshes.setdefault(what, []).append(made)
 
-    def _batches(self, near: NDArray[np.float32], column: NDArray, row: NDArray) -> list[NDArray[np.intp]]:
-        """Things at least depths (n,), and places (n,), in batches: in each cell of the image the nearest come first."""
-        cell = self.coverage.cells(column, row)
+    def _batches(self, tested: list[tuple[Footprints, NDArray, NDArray, NDArray]]) -> list[NDArray[np.intp]]:
+        """Numbers of what was tested in batches: in each cell of the image the nearest come first."""
+        if not tested:
+            return []
+        near = np.concatenate([prints.near for prints, *_ in tested])
+        cell = self.coverage.cells(*(np.concatenate([of[k][:, 0] for of in tested]) for k in (1, 2)))
         order = np.lexsort((near, cell))
         count = np.bincount(cell)
         own = cell[order]
@@ -524,7 +526,7 @@ class _Tile:
     def _add_hidden(self, facets: Facets, species: int) -> None:
         """Facets of hidden parts, smaller until they lie behind full pixels; what would show even so is left out.
 
-        Where light reaches them they are divided; in the shade each shrinks, as what lies before it keeps the light out.
+        Where light reaches them they are divided; in the shade each shrinks: what lies before it keeps the light out.
         """
         dark = self.given.shade.depth(facets.centre) > DARK
         while len(facets):

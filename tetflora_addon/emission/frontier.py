@@ -5,7 +5,8 @@
 Parts wait in a pool. In each cell of the image the nearest ones are tested against the coverage of all that was drawn
 before: what is hidden or outside stays whole, what is seen and large is opened, what is seen and small is to be drawn,
 and covers the image in its turn. Then the next ones follow. Each part is opened once, and everything that is made
-follows from it. The loop's tetrahedra say what to open before anything is drawn (`refinement`); what is hidden is decided here.
+follows from it. The loop's tetrahedra say what to open before anything is drawn (`refinement`); what is hidden is
+decided here.
 """
 
 from __future__ import annotations

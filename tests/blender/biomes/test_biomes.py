@@ -256,6 +256,13 @@ def test_a_stand_that_cannot_grow_keeps_no_other_layer_from_its_plants():
     assert "Birches" in said and "no ground" in said
 
 
+def test_a_layer_without_a_place_is_told():
+    rare = {**SMALL["layers"][0], "name": "Rare", "density": 1e-6}
+    added = add(small(layers=[rare, SMALL["layers"][0]]), add_mesh("ground", size=10.0))
+    assert [name for name, _ in added.layers] == ["Bushes"]
+    assert [text[:19] for text in added.bare] == ["Rare: a density of "]
+
+
 def test_neighbours_blend():
     """A biome with limits takes its part; one without leaves it, as much as the mask says; nothing else changes."""
     land = add_mesh("ground", size=10.0)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tests.engine.assets import trees
 from tetflora_addon.assets.asset import MESH_FACES, Asset, AssetSource
 from tetflora_addon.assets.compiled import compile_asset
+from tetflora_addon.assets.measures import through_both_sides
 from tetflora_addon.errors import TetFloraError
 
 KINDS = sorted(trees.SOURCES)

@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.stands.change import SeedRain, planted
 from tetflora_addon.stands.guilds import Guild, Guilds
 from tetflora_addon.stands.plants import Plants
-from tetflora_addon.stands.renewal import SeedRain, planted
 from tetflora_addon.stands.site import even_site
 
 SIDE = 600.0

@@ -13,6 +13,7 @@ from ... import memory
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
 from ...emission.light import Sources
+from ...errors import SceneError
 from ...growth.growth import trunks
 from ...growth.seeds import Seeds
 from ...processes import pool
@@ -41,7 +42,7 @@ class Given:
     """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
 
     ``owners`` are the objects of the plants in their order, each with the number of its own; ``places`` are those of
-    assets.
+    assets; ``unknown`` tells of plants that were left out because nobody has their species.
     """
 
     seeds: Seeds
@@ -51,6 +52,7 @@ class Given:
     sources: Sources | None = None
     owners: tuple[tuple[str, int], ...] = ()
     places: tuple[Places, ...] = ()
+    unknown: str = ""
 
     @property
     def species(self) -> tuple[str, ...]:
@@ -120,17 +122,18 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
         explicit = read_explicit(depsgraph, view_layer)
         places = tuple(read_places(scene, depsgraph, view_layer))
         try:
-            seeds, owners = read_plants_of(scene, depsgraph, view_layer)
+            seeds, owners, unknown = read_plants_of(scene, depsgraph, view_layer)
         except NoPlantsError:
             if explicit is None and not places:
                 raise
             none = np.zeros(0)
             frames = none.reshape(0, 3), none.reshape(0, 3, 3)
             seeds, owners = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none), ()
+            unknown = ""
         lights = (*read_lights(depsgraph, view_layer), *sky_suns(scene))
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners, places)
+        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners, places, unknown)
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
@@ -177,6 +180,8 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
         As `read_scene` and `compile_for`.
     """
     given = read_scene(scene, depsgraph, depsgraph.view_layer)
+    if given.unknown:  # who counts in advance wants to know it
+        raise SceneError(given.unknown)
     flora = in_year(scene, compile_for(given.species, scene, depsgraph))
     instances = sum(len(one) for one in given.places)
     return Statistics(plants=len(given.seeds), polygons_full=given.polygons_full(flora), instances=instances)

@@ -143,7 +143,7 @@ def _refine_steps(
     full = yield from call_in_thread(progress, given.polygons_full, flora)
     if full > _MANY:
         pool.start()
-    statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
+    statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds, unknown=given.unknown)
     refined = not scene.tetflora.expand_everything
     statistics.instances = sum(len(one) for one in given.places)
     asset_warnings.clear()

@@ -104,12 +104,12 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     except NoPlantsError:
         pass  # the artist has disabled or hidden all of them
     except TetFloraError as error:
-        _complain(scene, str(error))
+        _complain(scene, f"without plants: {error}")
     except Exception as error:
         # Blender would only print it and go on.
         traceback.print_exc()
         text = f"unexpected error, please report it as a bug: {error!r}"
-        _complain(scene, text)
+        _complain(scene, f"without plants: {text}")
         remember(text, error)
     finally:
         if not made:
@@ -198,7 +198,9 @@ def _make(scene: bpy.types.Scene) -> None:
             options = {"view_layer": layer, "for_render": True, "camera": camera, "given": given, "mark": key[:8]}
             before = result_collections(scene, 'RENDER')
             statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
-            if statistics.left_out:
+            if statistics.unknown:
+                _complain(scene, f"without some plants: {statistics.unknown}")
+            elif statistics.left_out:
                 _warn(statistics.left_out, " ".join(sorted(statistics.strays)))
             for text in asset_warnings:
                 _warn(text, text)
@@ -283,7 +285,7 @@ def _warn(text: str, about: str) -> bool:
 
 
 def _complain(scene: bpy.types.Scene, message: str) -> None:
-    text = f"frame {scene.frame_current} was rendered without plants: {message}"
+    text = f"frame {scene.frame_current} was rendered {message}"
     failed_frames.append(text)
     complain(text)
 

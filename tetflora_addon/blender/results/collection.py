@@ -75,7 +75,8 @@ class Results:
 
     def open(self) -> None:
         """Make the collection."""
-        name = NAMES[self.purpose] + self.mark
+        earlier = result_collections(self.scene, 'VIEW') if self.purpose == 'VIEW' else []
+        name = earlier[0].name if earlier else NAMES[self.purpose] + self.mark  # the artist may have renamed it
         snow.fit_soils()
         self.collection = bpy.data.collections.new(name)
         self._names.append((self.collection, name))

@@ -16,7 +16,16 @@ import bpy
 
 from ..materials.nodes import is_own, untag
 from .hiding_linked import hide_linked, leave_hidden, linked_hidden, scenes_hiding, show_linked
-from .output import KIND, PARENT, PURPOSE, mark_runtime, remove_collection, result_collections, sources_of
+from .output import (
+    KIND,
+    PARENT,
+    PURPOSE,
+    mark_runtime,
+    release_copies,
+    remove_collection,
+    result_collections,
+    sources_of,
+)
 
 #: Custom properties of hidden objects, as JSON: hide_render and hide_viewport before ("flags"), and the names of the
 #: scenes with the results ("scenes"). Results of a render come last and go first.
@@ -149,6 +158,7 @@ def keep_results(scene: bpy.types.Scene) -> int:
                 for datablock in (obj, obj.data):
                     if datablock is not None:
                         untag(datablock)
+        release_copies(collection)
         del collection[PURPOSE]
         untag(collection)
         collection.name = "TetFlora kept"

@@ -16,7 +16,7 @@ from typing import Any
 
 import bpy
 
-from ..materials.nodes import is_ours, is_own, tag
+from ..materials.nodes import MADE, is_ours, is_own, tag, untag
 from ..runtime import is_there
 
 #: Custom property of result objects, as JSON: which rays do not see what they stand for, and its light group.
@@ -219,9 +219,26 @@ def release_materials() -> None:
 
 
 def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
-    """Result collections of a scene and this file, of one purpose or of all."""
-    made = [c for c in scene.collection.children if is_own(c) and PURPOSE in c]
-    return [c for c in made if purpose is None or c[PURPOSE] == purpose]
+    """Result collections of a scene and this file, of one purpose or of all, wherever the artist has moved them.
+
+    One that was renamed still is: only where another one bears the name under which it was made, it is a copy of that.
+    """
+    return [
+        c
+        for c in scene.collection.children_recursive
+        if PURPOSE in c
+        and (purpose is None or c[PURPOSE] == purpose)
+        and c.library is None
+        and c.override_library is None
+        and (is_ours(c) or (c.get(MADE, c.name), None) not in bpy.data.collections)
+    ]
+
+
+def release_copies(collection: bpy.types.Collection) -> None:
+    """Hand copies of a result collection over to the artist, before it is gone and they count as the renamed one."""
+    for other in bpy.data.collections:
+        if other != collection and other.library is None and other.get(MADE) == collection.get(MADE):
+            untag(other)
 
 
 def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Collection) -> int:
@@ -244,6 +261,7 @@ def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Colle
     groups = _groups(every)
     materials = {m for o in every if o.data is not None and is_own(o.data) for m in o.data.materials}
     removed = [*own, *(d for d in data if d.users <= 1), collection]
+    release_copies(collection)
     bpy.data.batch_remove(removed)
     unused = {m for m in materials if m is not None and is_own(m)}
     return len(removed) + remove_sources(sources) + _remove_unused(unused, groups)

@@ -50,22 +50,28 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
     NoPlantsError
         No plant is left; the message says how to get some.
     SceneError
-        A species that the catalogue does not have, a scale of 0, or a transform that is not a number; the message names
-        the objects.
+        No plant is of a species that the catalogue has, or one has a scale of 0, or a transform that is not a number;
+        the message names the objects.
     """
     return read_plants_of(scene, depsgraph, view_layer)[0]
 
 
 def read_plants_of(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> tuple[Seeds, tuple[tuple[str, int], ...]]:
-    """The same, and the names of the objects that they belong to, in their order, each with the number of its own."""
-    assets = {*asset_species(scene), *gone_species(scene)}
+) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
+    """The same, and the names of the objects that they belong to, in their order, each with the number of its own.
+
+    The text names plants among them of which nobody has the species: they are left out, unless there are no others.
+    """
+    known, assets = catalogue(), {*asset_species(scene), *gone_species(scene)}
+    odd: list[tuple[str, str]] = []  # names of objects, each with a species
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
     own = [o for o, _ in grouped]
     single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
+    odd += [(o.name, o.tetflora.species) for o in single if o.tetflora.species not in known]
+    single = [o for o in single if o.tetflora.species in known]
     read: list[Part] = [(single[0].name if single else "", single_plants(single, depsgraph), stored_ages(single), None)]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
@@ -79,6 +85,13 @@ def read_plants_of(
         if c.owner.tetflora.is_field
     ]
     read = [part for found in read if len((part := _grown(found, assets))[1])]
+    for name, seeds, *_ in read:
+        kinds = [seeds.identifiers[i] for i in np.flatnonzero(np.bincount(seeds.species)).tolist()]
+        odd += [(name, own) for own in dict.fromkeys(map(species_of, kinds)) if own not in known]
+    unknown = {species for _, species in odd}
+    read = [part for found in read if len((part := _grown(found, unknown))[1])]
+    if odd and not read:
+        raise SceneError(_unknown(odd))
     if not read:
         found = own or copies
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
@@ -87,7 +100,7 @@ def read_plants_of(
     owners = [(name, len(seeds)) for name, seeds, *_ in read]
     if single:
         owners[:1] = [(obj.name, 1) for obj in single]
-    return _merged(classed(scene, read)), tuple(owners)
+    return _merged(classed(scene, read)), tuple(owners), f"Left out {_unknown(odd)}" if odd else ""
 
 
 def _is_plant(copies: Copies) -> bool:
@@ -251,7 +264,6 @@ def _merged(read: list[tuple[str, Seeds]]) -> Seeds:
     for _, seeds in read:
         occurring = np.bincount(seeds.species, minlength=len(seeds.identifiers)) > 0
         tables.append({i: seeds.identifiers[i] for i in np.flatnonzero(occurring).tolist()})
-    _check_species([(name, kind) for (name, _), table in zip(read, tables, strict=True) for kind in table.values()])
     identifiers = tuple(sorted({kind for table in tables for kind in table.values()}))
     number = {kind: i for i, kind in enumerate(identifiers)}
     parts, formed = [], any(seeds.crown is not None for _, seeds in read)
@@ -269,18 +281,24 @@ def _check_species(plants: list[tuple[str, str]]) -> None:
     known = catalogue()
     bad = [(name, species) for name, kind in plants if (species := species_of(kind)) not in known]
     if bad:
-        species = bad[0][1]
-        names = _listed([name for name, other in bad if other == species])
-        if find_asset(None, species) is not None:
-            raise SceneError(
-                f'{names}: "{name_of(species)}", which was used as their species, was deleted; undo that, or choose '
-                "another species in the TetFlora tab of the sidebar"
-            )
-        raise SceneError(
-            f'{names}: unknown species "{species}"; choose '
-            "another in the TetFlora tab of the sidebar, or add "
-            f"{species or 'its file'}{'.json' if species else ''} with Load Species"
+        raise SceneError(_unknown(bad))
+
+
+def _unknown(odd: list[tuple[str, str]]) -> str:
+    """What is said of objects with the species that nobody has, of the first of these."""
+    species = odd[0][1]
+    names = _listed([name for name, other in odd if other == species])
+    if find_asset(None, species) is not None:
+        return (
+            f'{names}: "{name_of(species)}", which was used as their species, was deleted; undo that, or choose '
+            "another species in the TetFlora tab of the sidebar"
         )
+    more = len({other for _, other in odd}) - 1
+    return (
+        f'{names}: unknown species "{species}"{f" and {more} more" if more else ""}; choose '
+        "another in the TetFlora tab of the sidebar, or add "
+        f"{species or 'its file'}{'.json' if species else ''} with Load Species"
+    )
 
 
 def _listed(names: list[str]) -> str:

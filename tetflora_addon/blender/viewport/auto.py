@@ -13,13 +13,14 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from hashlib import blake2b
 
 import bpy
 
 from ...camera.camera import Camera
 from ...errors import TetFloraError
-from ...jobs import Progress
+from ...jobs import Pace, Progress
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
 from ..main_thread import in_main_thread
@@ -28,7 +29,7 @@ from ..placing.plant_objects import prepare_scene
 from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
-from ..results.output import PURPOSE, remove_collection
+from ..results.output import PURPOSE, remove_collection, result_collections
 from ..runtime import GoneError, Handlers, call_off, call_soon, redraw
 from ..scene.field_sizes import stand_years
 from ..scene.view import view_camera
@@ -37,6 +38,7 @@ from .state import camera_now
 
 #: Seconds without a change before it begins, and seconds of work between two redraws.
 QUIET, SLICE = 0.6, 0.02
+_MADE_FOR = "tetflora_made_for"  # on result collections, see `results_made_for`
 _BUSY = 0.5  # seconds until it looks again whether Blender has time
 _LOOK = 0.2  # seconds between two looks at the viewport
 _CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Curve)
@@ -49,6 +51,8 @@ class _State:
     scene: str = ""
     steps: Generator[Progress, bool | None, object] | None = None
     digest: str = ""  # of the job
+    made_for: dict[str, str] = field(default_factory=dict)
+    pace: Pace = field(default_factory=lambda: Pace(SLICE))
     due: float = 0.0
     message: str = ""
     working: bool = False  # in here right now: what changes is our own doing
@@ -171,19 +175,21 @@ def _begin(scene: bpy.types.Scene) -> bool:
         redraw()
         return False
     _state.digest, _state.again, _state.waiting = digest, False, False
+    _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE)
     _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer, camera=camera, first_look=True)
     return True
 
 
 def _slice(scene: bpy.types.Scene) -> bool:
-    end = time.monotonic() + SLICE
+    _state.pace.begin()
     try:
         progress = next(_state.steps)
-        while time.monotonic() < end and not progress.waiting:
+        while _state.pace.goes_on(progress):
             progress = next(_state.steps)
-    except StopIteration:
-        _state.steps, _state.message = None, ""
+    except StopIteration as stop:
+        _state.steps, _state.message = None, stop.value.unknown
         _done[scene.name] = _state.digest
+        note_results(scene, _state.made_for)
         prepare_scene(scene)
         redraw()
         _state.due = time.monotonic() + QUIET
@@ -205,6 +211,30 @@ def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     windows = bpy.context.window_manager.windows
     shown = next((window.view_layer for window in windows if window.scene == scene), None)
     return shown or scene.view_layers[0]
+
+
+def results_made_for(scene: bpy.types.Scene) -> dict[str, str]:
+    """What decides on results and is cheap to ask, as texts that differ, by what to call it."""
+    *settings, wind, season, years, disc = choices(scene)
+    parts = {
+        "the camera": camera_now(scene),
+        "the day or year": (season, years, stand_years(scene)),
+        "the wind": wind,
+        "settings": (settings, disc),
+    }
+    return {name: blake2b(repr(part).encode(), digest_size=8).hexdigest() for name, part in parts.items()}
+
+
+def note_results(scene: bpy.types.Scene, made_for: dict[str, str]) -> None:
+    """Mark new results of a scene with what they were made for."""
+    for collection in result_collections(scene, 'VIEW'):
+        collection[_MADE_FOR] = made_for
+
+
+def changed_since(scene: bpy.types.Scene) -> list[str]:
+    """What has changed since the results of a scene were made; nothing where these do not say for what."""
+    before = next((c[_MADE_FOR].to_dict() for c in result_collections(scene, 'VIEW') if _MADE_FOR in c), {})
+    return [name for name, text in results_made_for(scene).items() if before.get(name, text) != text] if before else []
 
 
 _seen: dict[str, str] = {}  # settings of scenes as they were at the last change
