@@ -328,32 +328,3 @@ def through_both_sides(
     passed = through**2 * again
     whole = back + through**2 * back * again + passed
     return whole, passed.sum(axis=1) / np.maximum(whole.sum(axis=1), 1e-12)
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What is known of the smallest clusters (c) of a run, and samples on them.
-
-    Attributes
-    ----------
-    low, high : (c, 3) float64
-    sums : (c, 17) float64
-        Areas of sheets and solids, optical area; faces; patches that are not wood; area of solids that are not;
-        optical area times width, colour (3), transmission, and n nᵀ (6).
-    samples : SurfaceSamples of s
-    counts : (c, 2) int64
-        Samples on leaves and on wood of each.
-    leaves : AssetKites of l
-        Those of the clusters, one after the other; patches that are not wood.
-    part, face : (f,) int32
-        Faces of the clusters, one after the other.
-    """
-
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    sums: NDArray[np.float64]
-    samples: SurfaceSamples
-    counts: NDArray[np.int64]
-    leaves: AssetKites
-    part: NDArray[np.int32]
-    face: NDArray[np.int32]
