@@ -93,10 +93,14 @@ Form = Callable[[Facets, bool], Any]
 
 @dataclass(frozen=True)
 class Parts:
-    """Facets of one species, of assets, or of other meshes where that is None; and whether the camera sees them."""
+    """Facets of one species, of assets, or of other meshes where that is None; and whether the camera sees them.
+
+    ``look`` is that of the surfaces of other meshes.
+    """
 
     species: int | None
     facets: tuple[tuple[Drawn, bool], ...]
+    look: str = ""
 
     def __iter__(self) -> Iterator[tuple[Drawn, bool]]:
         return iter(self.facets)

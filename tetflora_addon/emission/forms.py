@@ -108,14 +108,14 @@ class Refined:
         form = self.drawing.form
         more = []
         if self.assets is not None:
-            more = [(ASSETS, made) for made in planned_facets(*self.assets, self.pixels, form)]
+            more = [((ASSETS, ""), made) for made in planned_facets(*self.assets, self.pixels, form)]
         polygons = hidden_polygon_facets(self.refinement, self.camera, self.pixels.seen, FACETS_AT_ONCE)
-        for facets, seen in polygons:
-            more.append((None, (facets if form is None else form(facets, seen), seen)))
-        for species in (ASSETS, None):
-            made = [(some, seen) for of, (some, seen) in more if of == species and len(some)]
+        for look, facets, seen in polygons:
+            more.append(((None, look), (facets if form is None else form(facets, seen), seen)))
+        for species, look in dict.fromkeys(of for of, _ in more):
+            made = [(some, seen) for of, (some, seen) in more if of == (species, look) and len(some)]
             if made:
-                yield Parts(species, tuple(made))
+                yield Parts(species, tuple(made), look)
 
 
 @dataclass(frozen=True)
@@ -195,9 +195,9 @@ def facet_blocks(refined: Refined) -> Iterator[Buffers]:
         triangles = [some for some, _ in parts if isinstance(some, Triangles)]
         spheres = [some for some, _ in parts if isinstance(some, Spheres)]
         if triangles:
-            yield replace(triangle_mesh(joined(triangles)), species=parts.species)
+            yield replace(triangle_mesh(joined(triangles)), species=parts.species, look=parts.look)
         if spheres:
-            yield replace(sphere_points(joined(spheres)), species=parts.species)
+            yield replace(sphere_points(joined(spheres)), species=parts.species, look=parts.look)
 
 
 def shell_blocks(refined: Refined, light: BakedLight | None = None, _first_sheet: int = 0) -> Iterator[MeshBuffers]:
@@ -218,7 +218,7 @@ def _numbered(refined: Refined, first_sheet: int) -> Iterator[tuple[Parts, Facet
 def _baked_facets(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[MeshBuffers]:
     for parts, facets, sheets in _numbered(refined, first_sheet):
         made, values = facet_mesh(facets), baked_attributes('FACE', *light.of_facets(facets, sheets))
-        yield replace(made, attributes={**made.attributes, **values}, species=parts.species)
+        yield replace(made, attributes={**made.attributes, **values}, species=parts.species, look=parts.look)
 
 
 def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[PointBuffers]:
@@ -227,7 +227,7 @@ def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Ite
         drawn = [spheres_of(some, camera if seen else None, refined.disc) for some, seen in parts]
         made, values = sphere_points(joined(drawn)), light.of_spheres(facets, sheets)
         baked = {name: array for name, (_, array) in baked_attributes('POINT', values).items()}
-        yield replace(made, attributes={**made.attributes, **baked}, species=parts.species)
+        yield replace(made, attributes={**made.attributes, **baked}, species=parts.species, look=parts.look)
 
 
 MICROSURFACES = EmissionForm(facet_blocks, _triangles_everywhere, _baked_facets)

@@ -44,6 +44,7 @@ from ..results.proxies import Baking, write_proxies
 from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
+from ..scene.skeletons import look_of
 from ..worker import at_once, call_in_thread, nobody_waits, steps_in_thread
 from .asset_writing import write_assets, write_plain
 from .assets import Bound, asset_warnings, bind_steps, is_plain
@@ -134,7 +135,8 @@ def _refine_steps(
     if scene.tetflora.expand_everything:  # for no camera: exports, and others' renderers
         camera = camera.counted_from(origin_near(given.seeds.position))
     given = given.counted_from(camera.origin)
-    results.origin = camera.origin
+    results.origin, results.layer = camera.origin, layer
+    results.looks = [look_of(kind) for kind in given.species]
     clock.lap("read")
     progress = Progress(0.02, "Compiling species")
     yield progress
@@ -202,7 +204,8 @@ def _first_look(
 ) -> Generator[Progress, bool | None, None]:
     """A coarse result in place of earlier ones, without baked light."""
     first = Results(results.scene, results.purpose, "", data)
-    first.origin, given = results.origin, replace(given, sources=None)
+    first.origin, first.layer, first.looks = results.origin, results.layer, results.looks
+    given = replace(given, sources=None)
     settings, camera = refinement_settings(results.scene).first_look(), camera.smaller(FIRST_LOOK)
     try:
         work = _write_refined(first, flora, given, bound, depsgraph, camera, Statistics(), Stopwatch(), settings)

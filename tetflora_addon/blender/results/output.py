@@ -15,7 +15,7 @@ import bpy
 
 from ..materials.nodes import is_ours, is_own, tag
 from ..runtime import is_there
-from .looks import likeness
+from ..scene.looks import wear
 
 #: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy', or the parent of a species.
 KIND = "tetflora_kind"
@@ -62,15 +62,16 @@ def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> No
     """Apply a scene's output settings to a result object; ``identifier`` is empty where species are mixed."""
     if made.get(KIND) == STAND_IN:
         return
-    output, entry, like = scene.tetflora.output, entry_of(scene, identifier), likeness(made)
+    output, entry, look = scene.tetflora.output, entry_of(scene, identifier), wear(made)
     for name in SWITCHES:
-        shown = getattr(output, name) and (like is None or name not in like["off"])
+        shown = getattr(output, name) and name not in look.get("off", ())
         if getattr(made, f"visible_{name}") != shown:  # after each, Blender lists all objects anew
             setattr(made, f"visible_{name}", shown)
-    if like is None:
-        made.pass_index = output.pass_index if entry is None else entry.pass_index
-    own = (entry.light_group if entry is not None else "") if like is None else like["light_group"]
-    made.lightgroup = own or output.light_group
+    own = output if entry is None else entry
+    if "pass_index" not in look:
+        made.pass_index = own.pass_index
+    if "lightgroup" not in look:
+        made.lightgroup = own.light_group or output.light_group
     made[SPECIES] = identifier
     first = made.material_slots[0].material if made.material_slots else None
     made[MATERIAL] = first.name if first is not None else ""

@@ -24,10 +24,11 @@ from .ages import Part, classed
 from .fallen import gone_species
 from .fields import read_aged_field, read_field_matrices
 from .instances import name_keys
+from .looks import LayerLooks
 from .objects import Copies, copies_of, may_instance, renderable_objects
 from .own_ages import stored_ages
 from .scatterers import is_drop
-from .skeletons import kind_of, kind_of_choice, species_of
+from .skeletons import kind_of, kind_of_choice, species_of, with_look
 
 _NAMED = 3  # objects that a message names before it only counts
 
@@ -66,28 +67,42 @@ def read_plants_of(
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
     own = [o for o, _ in grouped]
     single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
-    read: list[Part] = [(single[0].name if single else "", single_plants(single, depsgraph), stored_ages(single), None)]
+    looks, alike = LayerLooks(view_layer), {}
+    for obj in single:
+        alike.setdefault(looks.of(obj), []).append(obj)
+    given: list[tuple[str, Part]] = [
+        (look, (some[0].name, single_plants(some, depsgraph), stored_ages(some), None)) for look, some in alike.items()
+    ]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
-    read += [(c.owner.name, *_copied_plants(c)) for c in enabled if _is_plant(c) and _species(c.owner) not in assets]
+    for c in enabled:
+        if _is_plant(c) and _species(c.owner) not in assets:
+            given.append((looks.of(c.owner, c.instancer), (c.owner.name, *_copied_plants(c))))
     for obj in own:
         if obj.tetflora.is_field and obj.tetflora.enabled:
-            read.append((obj.name, *read_aged_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])))
-    read += [
-        (c.owner.name, *read_aged_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry))
-        for c in enabled
-        if c.owner.tetflora.is_field
-    ]
-    read = [part for found in read if len((part := _grown(found, assets))[1])]
+            part = read_aged_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])
+            given.append((looks.of(obj), (obj.name, *part)))
+    for c in enabled:
+        if c.owner.tetflora.is_field:
+            part = read_aged_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry)
+            given.append((looks.of(c.owner, c.instancer), (c.owner.name, *part)))
+    read = [(look, part) for look, whole in given if len((part := _grown(whole, assets))[1])]
     if not read:
         found = own or copies
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
         hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
         raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
-    owners = [(name, len(seeds)) for name, seeds, *_ in read]
-    if single:
-        owners[:1] = [(obj.name, 1) for obj in single]
-    return _merged(classed(scene, read)), tuple(owners)
+    owners = [(part[0], len(part[1])) for _, part in read]
+    owners[: len(alike)] = [(obj.name, 1) for some in alike.values() for obj in some]
+    aged = classed(scene, [part for _, part in read])
+    return _merged([(name, _seen_as(seeds, look)) for (look, _), (name, seeds) in zip(read, aged, strict=True)]), (
+        *owners,
+    )
+
+
+def _seen_as(seeds: Seeds, look: str) -> Seeds:
+    """Plants with a look."""
+    return replace(seeds, identifiers=tuple(with_look(kind, look) for kind in seeds.identifiers))
 
 
 def _is_plant(copies: Copies) -> bool:
