@@ -21,7 +21,7 @@ _VERSION = 1
 _NAME = "TetFlora Without Instances"
 _SIMULATED = {'CLOTH', 'SOFT_BODY', 'FLUID', 'DYNAMIC_PAINT'}
 _INSTANCED = {'OBJECT', 'COLLECTION'}
-_TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder", "is_asset")
+_TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder")
 
 
 def add_stand_in(
