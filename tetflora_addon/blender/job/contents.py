@@ -15,6 +15,7 @@ from ...compiled.flora import Flora, compile_species
 from ...emission.light import Sources
 from ...growth.growth import trunks
 from ...growth.seeds import Seeds
+from ...growth.wind import Wind
 from ...processes import pool
 from ...refinement.lights import Light
 from ...refinement.polygons import Polygons
@@ -162,9 +163,9 @@ def in_year(scene: bpy.types.Scene, flora: Flora) -> Flora:
     return flora if season is None else flora.in_year(season)
 
 
-def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera) -> Flora:
-    """A flora on the scene's day, in its wind at its frame, in the coordinates of a camera."""
-    flora, wind = in_year(scene, flora), wind_of(scene)
+def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera, moving: bool = False) -> Flora:
+    """A flora on the scene's day, in its wind at its frame, in the coordinates of a camera; its plants may move."""
+    flora, wind = in_year(scene, flora), wind_of(scene) or (Wind(0.0, moving=True) if moving else None)
     return flora if wind is None else flora.in_wind(replace(wind, origin=tuple(camera.origin.tolist())))
 
 

@@ -141,7 +141,7 @@ def _refine_steps(
     progress = Progress(0.02, "Compiling species")
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
-    flora = in_wind(scene, flora, camera)
+    flora = in_wind(scene, flora, camera, given.seeds.motion is not None)
     clock.lap("compile")
     full = yield from call_in_thread(progress, given.polygons_full, flora)
     if full > _MANY:

@@ -8,6 +8,7 @@ Plants whose species is an asset do not grow and are read apart, with all of the
 
 from collections.abc import Container
 from dataclasses import dataclass, replace
+from functools import partial
 
 import bpy
 import numpy as np
@@ -17,6 +18,7 @@ from ...errors import SceneError
 from ...growth.crown_forms import crown_forms
 from ...growth.hashing import child_key, key_of_seed
 from ...growth.seeds import Seeds
+from ...growth.wind import rotation_vectors
 from ..attributes import frames_of, world_matrix
 from ..species.asset_species import asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalogue
@@ -25,7 +27,8 @@ from .fallen import gone_species
 from .fields import read_aged_field, read_field_matrices
 from .instances import name_keys
 from .looks import LayerLooks
-from .objects import Copies, copies_of, may_instance, renderable_objects
+from .motion import exposure, moment, moves
+from .objects import Copies, copies_of, may_instance, may_take_part, renderable_objects
 from .own_ages import stored_ages
 from .scatterers import is_drop
 from .skeletons import kind_of, kind_of_choice, species_of, with_look
@@ -60,7 +63,29 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
 def read_plants_of(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
 ) -> tuple[Seeds, tuple[tuple[str, int], ...]]:
-    """The same, and the names of the objects that they belong to, in their order, each with the number of its own."""
+    """The same, and the names of the objects that they belong to, in their order, each with the number of its own.
+
+    With motion blur they are where they are in the middle of the exposure, and have their motion.
+    """
+    read = partial(_read_plants, scene, depsgraph, view_layer)
+    if not (scene.render.use_motion_blur and any(map(moves, filter(may_take_part, bpy.data.objects)))):
+        return read()
+    first, last = exposure(scene)
+    seconds = (last - first) * scene.render.fps_base / scene.render.fps
+    with moment(first):
+        before, _ = read()
+    with moment(last):
+        after, _ = read()
+    with moment((first + last) / 2.0):
+        seeds, owners = read()
+    turned = after.frame @ before.frame.transpose(0, 2, 1)
+    motion = np.concatenate([after.position - before.position, rotation_vectors(turned)], axis=1) / max(seconds, 1e-9)
+    return replace(seeds, motion=motion) if motion.any() else seeds, owners
+
+
+def _read_plants(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+) -> tuple[Seeds, tuple[tuple[str, int], ...]]:
     assets = {*asset_species(scene), *gone_species(scene)}
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
