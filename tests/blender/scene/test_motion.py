@@ -122,9 +122,11 @@ def test_every_part_of_a_plant_that_turns_has_the_velocity_of_its_place(scene):
     for obj in made:
         place, velocity = (read(obj.data, name).astype(np.float64) for name in ("position", "velocity"))
         expected = TURN * RATE * np.stack([-place[:, 1], place[:, 0], 0.0 * place[:, 0]], axis=1)
-        # Thin triangles and facets move as a whole.
-        assert np.abs(velocity - expected).max() < (3.0 if obj["tetflora_kind"] == "proxy" else 1.0)
-        assert np.abs(velocity - expected).mean() < (0.4 if obj["tetflora_kind"] == "proxy" else 0.1)
+        off = np.abs(velocity - expected)
+        if obj["tetflora_kind"] == "proxy" and obj.type == 'MESH':  # triangles move as a whole, with their middle
+            off = np.abs((velocity - expected).reshape(-1, 3, 3).mean(axis=1))
+        assert off.max() < 1.0  # thin triangles of twigs have two speeds for three corners
+        assert off.mean() < 0.25
         assert np.abs(velocity).max() > 4.0
 
 
