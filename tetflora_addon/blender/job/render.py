@@ -25,6 +25,7 @@ from ..main_thread import in_main_thread, window_draws
 from ..results.collection import has_results, leave_out_of_file, result_collections
 from ..results.forms import raise_settings, restore_settings
 from ..results.hiding import (
+    hidden_originals,
     lift_marks,
     originals_shown,
     pack_override_marks,
@@ -90,7 +91,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     made = False
     try:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
-        if wanted and has_contents(scene):
+        if wanted and (has_contents(scene) or hidden_originals(scene)):  # those may be in no collection meanwhile
             make = partial(_make, scene)
             with looked_at_once():
                 if window_draws():

@@ -48,6 +48,16 @@ def moves(obj: bpy.types.Object | None) -> bool:
     return False
 
 
+def curves_of(obj: bpy.types.Object) -> Iterator[bpy.types.FCurve]:
+    """Curves of an object's action."""
+    animation = obj.animation_data
+    if animation is not None and animation.action is not None and animation.action_slot is not None:
+        for layer in animation.action.layers:
+            for strip in layer.strips:
+                bag = strip.channelbag(animation.action_slot)
+                yield from () if bag is None else bag.fcurves
+
+
 @contextmanager
 def moment(frame: float) -> Iterator[None]:
     """Let `attributes.world_matrix` tell where objects are at another frame, while the context lasts."""
@@ -74,18 +84,12 @@ def _displaced(frame: float, obj: bpy.types.Object, depsgraph: bpy.types.Depsgra
 
 def _animated_basis(obj: bpy.types.Object, frame: float) -> Matrix | None:
     """An object's own transform at a time, from the curves of its action; None if it has none."""
-    animation = obj.animation_data
-    if animation is None or animation.action is None or animation.action_slot is None:
-        return None
     values = {path: list(getattr(obj, path)) for path in _CHANNELS}
     curves = 0
-    for layer in animation.action.layers:
-        for strip in layer.strips:
-            bag = strip.channelbag(animation.action_slot)
-            for curve in [] if bag is None else bag.fcurves:
-                if not curve.mute and curve.array_index < _CHANNELS.get(curve.data_path, 0):
-                    values[curve.data_path][curve.array_index] = curve.evaluate(frame)
-                    curves += 1
+    for curve in curves_of(obj):
+        if not curve.mute and curve.array_index < _CHANNELS.get(curve.data_path, 0):
+            values[curve.data_path][curve.array_index] = curve.evaluate(frame)
+            curves += 1
     if not curves:
         return None
     return Matrix.LocRotScale(values["location"], _rotation(obj, values), values["scale"])
