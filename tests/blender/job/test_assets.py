@@ -330,3 +330,18 @@ def test_undo_brings_the_scatterer_back_and_redo_the_results():
     ground = bpy.context.scene.objects["ground"]
     assert not ground.hide_render and not ground.hide_viewport
     assert len(shown()) == COUNT
+
+
+def test_what_a_layer_collection_says_of_a_scatterer_holds_for_its_instances_each_time():
+    scene, ground, tree = forest()
+    tree.hide_viewport = True  # as sources of scatters often are
+    home = bpy.data.collections.new("scattered")
+    scene.collection.children.link(home)
+    scene.collection.objects.unlink(ground)
+    home.objects.link(ground)
+    bpy.context.view_layer.layer_collection.children["scattered"].holdout = True
+    for _ in range(2):
+        run(scene)
+        made = [o for o in scene.objects if o.get("tetflora_kind") in ("asset", "asset clusters", "stand-in")]
+        assert made and all(o.is_holdout and not o.hide_viewport for o in made)
+        assert shown()

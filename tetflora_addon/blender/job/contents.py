@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 
 import bpy
 import numpy as np
@@ -31,6 +32,7 @@ from ..results.leaf_objects import resolved_species
 from ..scene.ages import grown_species
 from ..scene.explicit import Explicit, read_explicit
 from ..scene.lights import read_lights, read_sources, sky_suns
+from ..scene.looks import LayerLooks
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants_of
 from ..scene.skeletons import plain_kind
@@ -42,7 +44,7 @@ class Given:
     """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
 
     ``owners`` are the objects of the plants in their order, each with the number of its own; ``places`` are those of
-    assets.
+    assets, ``looks`` those of the objects that show these.
     """
 
     seeds: Seeds
@@ -52,6 +54,7 @@ class Given:
     sources: Sources | None = None
     owners: tuple[tuple[str, int], ...] = ()
     places: tuple[Places, ...] = ()
+    looks: Mapping[bpy.types.Object, str] = field(default_factory=dict)
 
     @property
     def species(self) -> tuple[str, ...]:
@@ -131,7 +134,9 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
         lights = (*read_lights(depsgraph, view_layer), *sky_suns(scene))
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners, places)
+        looks = LayerLooks(view_layer)
+        worn = {owner: looks.of(owner) for owner in dict.fromkeys(one.owner for one in places)}
+        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners, places, worn)
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:

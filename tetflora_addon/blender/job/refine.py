@@ -134,7 +134,7 @@ def _refine_steps(
     if scene.tetflora.expand_everything:  # for no camera: exports, and others' renderers
         camera = camera.counted_from(origin_near(given.seeds.position))
     given = given.counted_from(camera.origin)
-    results.origin, results.layer = camera.origin, layer
+    results.origin, results.owners = camera.origin, given.looks
     results.looks = [look_of(kind) for kind in given.species]
     clock.lap("read")
     progress = Progress(0.02, "Compiling species")
@@ -203,7 +203,7 @@ def _first_look(
 ) -> Generator[Progress, bool | None, None]:
     """A coarse result in place of earlier ones, without baked light."""
     first = Results(results.scene, results.purpose, "", data)
-    first.origin, first.layer, first.looks = results.origin, results.layer, results.looks
+    first.origin, first.owners, first.looks = results.origin, results.owners, results.looks
     given = replace(given, sources=None)
     settings, camera = refinement_settings(results.scene).first_look(), camera.smaller(FIRST_LOOK)
     try:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Hashable, Sequence
+from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from typing import TypeVar
 
 import bpy
@@ -59,8 +59,8 @@ class Results:
     ----------
     origin : (3,) float
         Where in the world positions in buffers are counted from, metres: objects are placed there.
-    layer : bpy.types.ViewLayer or None
-        Whose collections say how results look; None for the objects alone.
+    owners : mapping of bpy.types.Object to str
+        Looks of objects that show instances, where more than they themselves say counts.
     looks : sequence of str
         Of plants of each kind, see `scene.looks`; empty where there are none.
     """
@@ -70,7 +70,7 @@ class Results:
         self.data = data
         self.purpose = purpose
         self.origin: Sequence[float] = (0.0, 0.0, 0.0)
-        self.layer: bpy.types.ViewLayer | None = None
+        self.owners: Mapping[bpy.types.Object | None, str] = {}
         self.looks: Sequence[str] = ()
         self.mark = f" {mark}" if mark else ""
         self.collection: bpy.types.Collection | None = None

@@ -63,7 +63,7 @@ def add_stand_in(
             if getattr(made.tetflora, switch, False):
                 setattr(made.tetflora, switch, False)
         _drop_instances(made)
-    look_like(made, original, results.layer)
+    look_like(made, original, results.owners.get(original))
     return results.add_object(name, made, STAND_IN, placed=True)
 
 

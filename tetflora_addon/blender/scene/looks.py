@@ -28,10 +28,10 @@ _OTHERS = ("color", "display_type", "show_bounds")
 class LayerLooks:
     """LayerLooks of objects in a view layer, whose collections may say more than the objects."""
 
-    def __init__(self, layer: bpy.types.ViewLayer | None) -> None:
+    def __init__(self, layer: bpy.types.ViewLayer) -> None:
         self._layer = layer
         self._shown: set[int] | None = None  # where collections are hidden in viewports, what others hold
-        waiting, shown, hidden = [] if layer is None else [layer.layer_collection], set(), False
+        waiting, shown, hidden = [layer.layer_collection], set(), False
         while waiting:
             one = waiting.pop()
             if one.collection.hide_viewport:
@@ -54,11 +54,10 @@ class LayerLooks:
 
     def _read(self, obj: bpy.types.Object) -> dict[str, Any]:
         found = _of_object(obj)
-        if self._layer is not None:
-            if obj.indirect_only_get(view_layer=self._layer):
-                found["off"] = sorted({*found.get("off", ()), "camera"})
-            if obj.holdout_get(view_layer=self._layer):
-                found["is_holdout"] = True
+        if obj.indirect_only_get(view_layer=self._layer):
+            found["off"] = sorted({*found.get("off", ()), "camera"})
+        if obj.holdout_get(view_layer=self._layer):
+            found["is_holdout"] = True
         if self._shown is not None and obj.session_uid not in self._shown:
             found["hide_viewport"] = True
         return found
@@ -74,8 +73,10 @@ def _of_object(obj: bpy.types.Object) -> dict[str, Any]:
     return found
 
 
-def look_like(made: bpy.types.Object, like: bpy.types.Object | None, layer: bpy.types.ViewLayer | None) -> None:
+def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str | None = None) -> None:
     """Give a result the look, color and settings of Cycles of an object; nothing for None.
+
+    Without a look it is what the object says itself, but for viewports: what is instanced may be hidden there.
 
     Output settings may hide it from more rays, but show it to none that the object is hidden from.
     """
@@ -87,7 +88,11 @@ def look_like(made: bpy.types.Object, like: bpy.types.Object | None, layer: bpy.
         _copy(
             [p.identifier for p in own.bl_rna.properties if not p.is_readonly and p.identifier != "name"], others, own
         )
-    made[LIKE] = json.dumps({"pass_index": like.pass_index} | json.loads(LayerLooks(layer).of(like) or "{}"))
+    said = json.loads(look or "{}")
+    if look is None:
+        said = _of_object(like)
+        said.pop("hide_viewport", None)
+    made[LIKE] = json.dumps({"pass_index": like.pass_index} | said)
     wear(made)
 
 
