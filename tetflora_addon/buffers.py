@@ -36,7 +36,7 @@ class MeshBuffers:
     species : int or None
         The species all of it is of, if that is known; −1 for assets.
     look : str
-        Of the surfaces that it stands for, where it is of no species.
+        Of the surfaces or assets that it stands for, where it is of no species.
     """
 
     positions: NDArray[np.float32]

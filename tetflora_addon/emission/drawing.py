@@ -97,7 +97,7 @@ Form = Callable[[Facets, bool], Any]
 class Parts:
     """Facets of one species, of assets, or of other meshes where that is None; and whether the camera sees them.
 
-    ``look`` is that of the surfaces of other meshes.
+    ``look`` is that of assets and of the surfaces of other meshes.
     """
 
     species: int | None

@@ -66,6 +66,8 @@ class Refined:
         What instances of assets are drawn as; None where there are none.
     disc : float
         Area that the renderer draws of a sphere of radius 1.
+    asset_looks : (i,) str
+        Of instances of assets; what stands for different ones is kept apart.
     """
 
     flora: Flora
@@ -76,6 +78,7 @@ class Refined:
     tolerance: float = TOLERANCE
     assets: tuple[AssetSight, AssetPlan] | None = None
     disc: float = np.pi
+    asset_looks: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, str))
     _waiting: list[Parts] = field(default_factory=list, compare=False)
 
     @property
@@ -108,7 +111,11 @@ class Refined:
         form = self.drawing.form
         more = []
         if self.assets is not None:
-            more = [((ASSETS, ""), made) for made in planned_facets(*self.assets, self.pixels, form)]
+            sight, plan = self.assets
+            looks = self.asset_looks[plan.facets.parts.instance]
+            for look in np.unique(looks).tolist():
+                some = replace(plan, facets=plan.facets.take(looks == look))
+                more += [((ASSETS, look), made) for made in planned_facets(sight, some, self.pixels, form)]
         polygons = hidden_polygon_facets(self.refinement, self.camera, self.pixels.seen, FACETS_AT_ONCE)
         for look, facets, seen in polygons:
             more.append(((None, look), (facets if form is None else form(facets, seen), seen)))

@@ -348,7 +348,8 @@ def _refined(
         detail.most,
         settings.shadow_cutoff,
     )
-    return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc)
+    looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner] if bound else np.zeros(0, str)
+    return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc, looks)
 
 
 def _write_refined(
