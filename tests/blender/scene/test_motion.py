@@ -125,8 +125,7 @@ def test_every_part_of_a_plant_that_turns_has_the_velocity_of_its_place(scene):
         off = np.abs(velocity - expected)
         if obj["tetflora_kind"] == "proxy" and obj.type == 'MESH':  # triangles move as a whole, with their middle
             off = np.abs((velocity - expected).reshape(-1, 3, 3).mean(axis=1))
-        assert off.max() < 1.0  # thin triangles of twigs have two speeds for three corners
-        assert off.mean() < 0.25
+        assert off.mean() < 0.15  # a wide triangle that stands for many twigs has the speeds of its axis
         assert np.abs(velocity).max() > 4.0
 
 
