@@ -134,8 +134,8 @@ class Flora:
         return _on_day(self.in_leaf, replace(season, snow=0.0))
 
     def in_wind(self, wind: Wind) -> Flora:
-        """The flora in a wind; bounds hold at all times."""
-        if wind.speed == 0:
+        """The flora in a wind; bounds hold at all times. Without speed plants may still move as a whole."""
+        if wind.speed == 0 and not wind.moving:
             return self.at_rest
         windy = _windy(self.at_rest, replace(wind, time=0.0))
         rows = windy.rows.copy()

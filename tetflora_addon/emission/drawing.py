@@ -97,10 +97,14 @@ Form = Callable[[Facets, bool], Any]
 
 @dataclass(frozen=True)
 class Parts:
-    """Facets of one species, of assets, or of other meshes where that is None; and whether the camera sees them."""
+    """Facets of one species, of assets, or of other meshes where that is None; and whether the camera sees them.
+
+    ``look`` is that of assets and of the surfaces of other meshes.
+    """
 
     species: int | None
     facets: tuple[tuple[Drawn, bool], ...]
+    look: str = ""
 
     def __iter__(self) -> Iterator[tuple[Drawn, bool]]:
         return iter(self.facets)
@@ -639,8 +643,11 @@ def _facets_of_faces(
 ) -> Facets:
     """Facets in the place of faces (n,) with corners (n, k, 3), the last of which repeats beyond their size (n,)."""
     corners = corners.astype(np.float64)
-    centre = corners.sum(axis=1) - (corners.shape[1] - size)[:, None] * corners[:, -1]
-    centre /= size[:, None]
+
+    def middle(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (values.sum(axis=1) - (values.shape[1] - size)[:, None] * values[:, -1]) / size[:, None]
+
+    centre = middle(corners)
     along = unit(corners[:, 1] - corners[:, 0])
     vector = np.zeros_like(centre)
     for k in range(1, corners.shape[1] - 1):
@@ -652,5 +659,6 @@ def _facets_of_faces(
     velocity = None
     if "velocity" in buffers.attributes:
         moving = buffers.attributes["velocity"][1].astype(np.float64)
-        velocity = moving[buffers.corner_verts[buffers.face_offsets[faces]]]
+        every = np.minimum(np.arange(corners.shape[1]), size[:, None] - 1) + buffers.face_offsets[faces, None]
+        velocity = middle(moving[buffers.corner_verts[every]])
     return Facets(centre, across, along, np.sqrt(area), colour, through, velocity, stretch=np.ones(len(area)))

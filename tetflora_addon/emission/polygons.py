@@ -203,12 +203,17 @@ def _at_corners(
 
 def hidden_polygon_facets(
     result: Refinement, camera: Camera, facet_pixels: float, at_once: float
-) -> Iterator[tuple[Facets, bool]]:
-    """`polygon_facets` of all polygons in proxies, hidden or not."""
+) -> Iterator[tuple[str, Facets, bool]]:
+    """`polygon_facets` of all polygons in proxies, hidden or not, each with the look of their surfaces before."""
     held = result.holdings.polygons
     proxies = held.take(result.chosen(Decision.PROXY, Decision.HIDDEN)[held.cell])
-    if len(proxies):
-        yield from polygon_facets(proxies, result, camera, facet_pixels, at_once)
+    if not len(proxies):
+        return
+    meshes = proxies.items.meshes
+    looks = np.array([surface.look for surface in meshes.surfaces])[meshes.surface[proxies.items.instance]]
+    for look in np.unique(looks).tolist():
+        for made in polygon_facets(proxies.take(looks == look), result, camera, facet_pixels, at_once):
+            yield look, *made
 
 
 def polygon_facets(

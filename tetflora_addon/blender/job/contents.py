@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 
 import bpy
 import numpy as np
@@ -16,6 +17,7 @@ from ...emission.light import Sources
 from ...errors import SceneError
 from ...growth.growth import trunks
 from ...growth.seeds import Seeds
+from ...growth.wind import Wind
 from ...processes import pool
 from ...refinement.lights import Light
 from ...refinement.polygons import Polygons
@@ -31,6 +33,7 @@ from ..results.leaf_objects import resolved_species
 from ..scene.ages import grown_species
 from ..scene.explicit import Explicit, read_explicit
 from ..scene.lights import read_lights, read_sources, sky_suns
+from ..scene.looks import LayerLooks
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants_of
 from ..scene.skeletons import plain_kind
@@ -42,7 +45,8 @@ class Given:
     """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
 
     ``owners`` are the objects of the plants in their order, each with the number of its own; ``places`` are those of
-    assets; ``unknown`` tells of plants that were left out because nobody has their species.
+    assets, ``looks`` those of the objects that show these; ``unknown`` tells of plants that were left out because nobody
+    has their species.
     """
 
     seeds: Seeds
@@ -52,6 +56,7 @@ class Given:
     sources: Sources | None = None
     owners: tuple[tuple[str, int], ...] = ()
     places: tuple[Places, ...] = ()
+    looks: Mapping[bpy.types.Object, str] = field(default_factory=dict)
     unknown: str = ""
 
     @property
@@ -133,7 +138,10 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
         lights = (*read_lights(depsgraph, view_layer), *sky_suns(scene))
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners, places, unknown)
+        looks = LayerLooks(view_layer)
+        worn = {owner: looks.of(owner) for owner in dict.fromkeys(one.owner for one in places)}
+        occluders = read_occluders(depsgraph, view_layer)
+        return Given(seeds, explicit, occluders, lights, sources, owners, places, worn, unknown)
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
@@ -165,9 +173,9 @@ def in_year(scene: bpy.types.Scene, flora: Flora) -> Flora:
     return flora if season is None else flora.in_year(season)
 
 
-def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera) -> Flora:
-    """A flora on the scene's day, in its wind at its frame, in the coordinates of a camera."""
-    flora, wind = in_year(scene, flora), wind_of(scene)
+def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera, moving: bool = False) -> Flora:
+    """A flora on the scene's day, in its wind at its frame, in the coordinates of a camera; its plants may move."""
+    flora, wind = in_year(scene, flora), wind_of(scene) or (Wind(0.0, moving=True) if moving else None)
     return flora if wind is None else flora.in_wind(replace(wind, origin=tuple(camera.origin.tolist())))
 
 

@@ -128,7 +128,7 @@ def polygons_text(number: float) -> str:
 
 
 def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
-    layer, now = (scene.name, view_layer.name), time.perf_counter()
+    layer, now = (scene.session_uid, view_layer.name), time.perf_counter()
     waits = now - _counted.at < _PATIENCE * _counted.took
     if _counted.stand is None or _counted.layer != layer or (_counted.stale and not waits):
         _counted.stand, _counted.layer, _counted.stale = _count(scene, view_layer), layer, False

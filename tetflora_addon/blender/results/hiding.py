@@ -15,7 +15,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..materials.nodes import is_own, untag
-from .hiding_linked import hide_linked, leave_hidden, linked_hidden, scenes_hiding, show_linked
+from .hiding_linked import hide_linked, is_switched, leave_hidden, linked_hidden, scenes_hiding, show_linked
 from .output import (
     KIND,
     PARENT,
@@ -42,9 +42,10 @@ def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy
     SceneError
         One is linked in such a way that it cannot be hidden: see `hiding_linked.check_linked`. None is hidden then.
     """
-    hide_linked(scene, purpose, [original for original in originals if original.library is not None])
+    apart = [original for original in originals if original.library is not None or is_switched(original)]
+    hide_linked(scene, purpose, apart)
     for original in originals:
-        if original.library is not None:
+        if original in apart:
             continue
         # Where it is hidden for another scene already, its current visibility is not the artist's.
         flags, scenes = _marker(original, purpose) or ([original.hide_render, original.hide_viewport], [])

@@ -30,7 +30,7 @@ from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
-from ..runtime import GoneError, Handlers, call_off, call_soon, redraw
+from ..runtime import GoneError, Handlers, call_off, call_soon, redraw, with_uid
 from ..scene.field_sizes import stand_years
 from ..scene.view import view_camera
 from ..settings import season_of, wind_of, years_of
@@ -46,9 +46,9 @@ _CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh
 
 @dataclass
 class _State:
-    """The job of the session; names instead of datablocks, which do not outlive a load."""
+    """The job of the session; the scene by its `session_uid`, because datablocks do not outlive a load."""
 
-    scene: str = ""
+    scene: int = 0
     steps: Generator[Progress, bool | None, object] | None = None
     digest: str = ""  # of the job
     made_for: dict[str, str] = field(default_factory=dict)
@@ -63,7 +63,7 @@ class _State:
 
 
 _state = _State()
-_done: dict[str, str] = {}  # digest of the results that a scene has, by its name
+_done: dict[int, str] = {}  # digest of the results that a scene has, by its `session_uid`
 
 
 def message() -> str:
@@ -99,7 +99,7 @@ def watch() -> float | None:
 def schedule(scene: bpy.types.Scene) -> None:
     """Refine a scene when it has been quiet for a moment; stops what was begun before."""
     stop()
-    _state.scene, _state.due = scene.name, time.monotonic() + QUIET
+    _state.scene, _state.due = scene.session_uid, time.monotonic() + QUIET
     if not bpy.app.background:
         call_soon(tick, QUIET)
 
@@ -130,12 +130,12 @@ def refined(scene: bpy.types.Scene) -> None:
     if scene.tetflora.auto_refine:
         layer = _view_layer(scene)
         layer.update()
-        _done[scene.name] = scene_digest(scene, layer.depsgraph, layer)  # for the scene's camera
+        _done[scene.session_uid] = scene_digest(scene, layer.depsgraph, layer)  # for the scene's camera
 
 
 def tick() -> float | None:
     """Do a slice of what there is to do; seconds until the next, or None if nothing is left."""
-    scene = bpy.data.scenes.get((_state.scene, None))
+    scene = with_uid(bpy.data.scenes, _state.scene)
     if scene is None or not scene.tetflora.auto_refine:
         stop()
         return None
@@ -170,7 +170,7 @@ def _begin(scene: bpy.types.Scene) -> bool:
     layer.update()
     camera = _view(scene)
     digest = scene_digest(scene, layer.depsgraph, layer, camera)
-    if _done.get(scene.name) == digest and has_results(scene):
+    if _done.get(scene.session_uid) == digest and has_results(scene):
         _state.message = ""
         redraw()
         return False
@@ -188,7 +188,7 @@ def _slice(scene: bpy.types.Scene) -> bool:
             progress = next(_state.steps)
     except StopIteration as stop:
         _state.steps, _state.message = None, stop.value.unknown
-        _done[scene.name] = _state.digest
+        _done[scene.session_uid] = _state.digest
         note_results(scene, _state.made_for)
         prepare_scene(scene)
         redraw()
@@ -237,7 +237,7 @@ def changed_since(scene: bpy.types.Scene) -> list[str]:
     return [name for name, text in results_made_for(scene).items() if before.get(name, text) != text] if before else []
 
 
-_seen: dict[str, str] = {}  # settings of scenes as they were at the last change
+_seen: dict[int, str] = {}  # settings of scenes as they were at the last change
 
 
 def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -245,10 +245,10 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _state.working or not scene.tetflora.auto_refine:
         return
     settings = f"{choices(scene)}{camera_now(scene)}{leaf_objects(scene)}"
-    other = _seen.get(scene.name) != settings
-    _seen[scene.name] = settings
+    other = _seen.get(scene.session_uid) != settings
+    _seen[scene.session_uid] = settings
     concerns = [update for update in depsgraph.updates if _concerns(update)]
-    at_it = _state.steps is not None and scene.name == _state.scene
+    at_it = _state.steps is not None and scene.session_uid == _state.scene
     if at_it and not other and all(_only_flags(update) for update in concerns):
         # Results that are linked have the flags of all other objects updated, and that when we are no longer at work:
         # the job would stop itself for ever. Whoever hid an object meanwhile is heard when it is done.
@@ -279,7 +279,7 @@ def _only_flags(update: bpy.types.DepsgraphUpdate) -> bool:
 
 def on_interruption(*_arguments: object) -> None:
     """Undo, load or render: datablocks that the job holds may go."""
-    scene = bpy.data.scenes.get((_state.scene, None)) if _state.steps is not None else None
+    scene = with_uid(bpy.data.scenes, _state.scene) if _state.steps is not None else None
     stop()
     if scene is not None:
         schedule(scene)
