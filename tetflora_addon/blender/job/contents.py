@@ -45,8 +45,8 @@ class Given:
     """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
 
     ``owners`` are the objects of the plants in their order, each with the number of its own; ``places`` are those of
-    assets, ``looks`` those of the objects that show these; ``unknown`` tells of plants that were left out because nobody
-    has their species.
+    assets, ``looks`` those of the objects that show these; ``unknown`` tells of plants that were left out because
+    nobody has their species.
     """
 
     seeds: Seeds
