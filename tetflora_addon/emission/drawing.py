@@ -571,6 +571,7 @@ class _Tile:
         """Parts that throw shadows which are to be fine, opened as far as these show, and all others."""
         given, fine, left = self.given, [Waiting.empty()], [Waiting.empty()]
         frontier = Frontier(self.flora, self.coverage, given.transition, given.shadow)
+        pool = frontier.pool(pool.parts)
         while len(pool):
             away = given.camera.clearance(pool.centre)
             lit = given.shade.depth(pool.centre, pool.radius) < LIT
@@ -578,7 +579,7 @@ class _Tile:
             left.append(pool.take(np.flatnonzero(~lit)))
             pool = pool.take(np.flatnonzero(lit))
             pixels = 2.0 * pool.radius / given.camera.extent_around(pool.centre)
-            large = pool.parts.can_open(self.flora) & (pixels > DETAIL * given.shadow) & (frontier.count(pool) > FEW)
+            large = pool.parts.can_open(self.flora) & (pixels > DETAIL * given.shadow) & (pool.count > FEW)
             fine.append(pool.take(np.flatnonzero(~large)))
             some = opened(self.flora, pool.parts.take(np.flatnonzero(large)))
             pool = frontier.pool(PlantParts.concatenate([new for new, _, _ in some]))

@@ -44,12 +44,18 @@ class Waiting(Arrays):
         Metres.
     near : (n,) float64
         Least depth of the sphere, metres.
+    cell : (n,) int64
+        Cell of the image that its middle is in.
+    count : (n,) float64
+        Facets that they would have, all of them.
     """
 
     parts: PlantParts = field(metadata=nested(PlantParts))
     centre: NDArray[np.float64] = field(metadata=column(3))
     radius: NDArray[np.float64]
     near: NDArray[np.float64]
+    cell: NDArray[np.int64]
+    count: NDArray[np.float64]
 
 
 class Frontier:
@@ -84,7 +90,10 @@ class Frontier:
         across = np.where(alone, 0.5 * parts.extent / np.maximum(branches.length, 1e-12), across)
         centre = branches.position + middle[:, None] * branches.frame[:, :, 2]
         radius = branches.length * np.hypot(across, half) + branches.radius
-        return Waiting(parts, centre, radius, self.coverage.project(centre)[2] - radius)
+        column, row, depth = self.coverage.project(centre)
+        side = self.facet * self.coverage.camera.extent_around(centre)
+        count = parts.totals.optical_area / np.maximum(side**2, 1e-12)
+        return Waiting(parts, centre, radius, depth - radius, self.coverage.cells(column, row), count)
 
     def slabs(self, parts: PlantParts, most: float = np.inf) -> Iterator[Waiting]:
         """Parts that are to be drawn, some at a time; what they cover is to be drawn before more are asked for.
@@ -98,18 +107,18 @@ class Frontier:
             pool = Waiting.concatenate([pool.take(np.flatnonzero(pool.near > depth)), *later])
             # Where much was hidden, or little is left, the next ones are so many more.
             wanted = min(max(SLAB * CELL**2 * cells, LEAST), max(most, 1.0))
-            number = float(self.count(ready).sum()) if len(ready) else 0.0
+            number = float(ready.count.sum())
             dense *= float(np.clip(wanted / max(number, 1.0), 0.5, 2.0))
             if len(ready):
                 yield ready
 
     def _depths(self, pool: Waiting, number: float) -> tuple[NDArray[np.float64], int]:
         """Depths (n,) for parts, before which these have so many facets in each cell, about; and how many cells."""
-        cell = self.coverage.cells(*self.coverage.project(pool.centre)[:2])
-        order = np.lexsort((pool.near, cell))
-        cells, near = cell[order], pool.near[order]
+        deepest = float(np.ptp(pool.near)) + 1.0
+        order = np.argsort(pool.cell * deepest + (pool.near - pool.near.min()), kind="stable")
+        cells, near = pool.cell[order], pool.near[order]
         first = np.flatnonzero(np.diff(cells, prepend=-1))
-        count = self.count(pool)[order]
+        count = pool.count[order]
         before = np.cumsum(count) - count
         group = np.repeat(np.arange(len(first)), np.diff(first, append=len(cells)))
         left = number - (before - before[first][group])
@@ -142,13 +151,8 @@ class Frontier:
             slab, depth = new.take(soon), depth[soon]
         return Waiting.concatenate(ready), later
 
-    def count(self, pool: Waiting) -> NDArray[np.float64]:
-        """Facets (n,) that parts would have, all of them."""
-        side = self.facet * self.coverage.camera.extent_around(pool.centre)
-        return pool.parts.totals.optical_area / np.maximum(side**2, 1e-12)
-
     def large(self, pool: Waiting) -> NDArray[np.bool_]:
         """Parts (n,) that are to be opened: more of them shows than their samples tell."""
         pixels = 2.0 * pool.radius / self.coverage.camera.extent_around(pool.centre)
-        shows = (pixels > DETAIL) & (self.count(pool) > FEW)
+        shows = (pixels > DETAIL) & (pool.count > FEW)
         return pool.parts.can_open(self.flora) & (shows | (self.transition.of_branches(pool.parts.branches) > 0.0))
