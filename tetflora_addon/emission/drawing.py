@@ -64,7 +64,7 @@ BROAD, SIDES = 4.0, 4
 #: Fraction of a facet's area from which on each branch has a triangle; of smaller ones fewer have a wider one.
 TWIG = 0.6
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
-MERGED = (48.0, 12.0)
+MERGED = (64.0, 16.0, 4.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
 #: the shade over which it grows by e; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
@@ -512,7 +512,8 @@ class _Tile:
             self._keep(larger.take(np.flatnonzero(hidden & (number < 1.0 / times))), False, species)
             rest = np.flatnonzero(~hidden)
             facets, number = facets.take(rest), number[rest]
-        self._keep(facets.take(np.flatnonzero(number < likely)), False, species)
+        # A facet has another outline than the face for which it stands.
+        self._keep(facets.take(np.flatnonzero((number < likely) & self._hidden(facets))), False, species)
 
     def _hidden(self, facets: Facets) -> NDArray[np.bool_]:
         """Facets (n,) behind full pixels."""
