@@ -54,6 +54,7 @@ def forest(engine='CYCLES', detail='REFINE', away=25.0, **options):
     ground.location.x = -COUNT / 2
     add_camera(location=(0.0, -away, 3.0))
     scene = bpy.context.scene
+    scene.camera.data.clip_end = 10_000.0
     scene.render.engine = engine
     scene.render.resolution_x, scene.render.resolution_y = 200, 100
     scene.tetflora.asset_detail = detail
@@ -348,7 +349,7 @@ def test_what_a_layer_collection_says_of_a_scatterer_holds_for_its_instances_eac
 
 
 def test_facets_of_scatterers_that_look_otherwise_are_apart():
-    scene, ground, tree = forest(away=1300.0)
+    scene, ground, tree = forest(away=2500.0)
     other = scattered(tree, COUNT)
     other.location = ground.location
     other.location.y += 20.0
