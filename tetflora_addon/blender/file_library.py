@@ -135,8 +135,8 @@ class OwnFiles:
             )
         path = self.place(identifier)
         try:
-            path.unlink()
             self._drop_pictures(path)
+            path.unlink()
         except OSError as error:
             raise self.error(f"Cannot delete {path.name}: {error.strerror}") from None
         self.changed()

@@ -71,6 +71,8 @@ class Year:
     autumn: float = limited(7.0, 0, 40, "the same in autumn", "days")
     leaf: LeafYear | None = None
     blossom: LeafYear | None = None
+    #: Plants are gone while there are none, and in a summer without days.
+    fallen: bool = described(False, "whether it is nothing but leaves that have fallen")
     source: str = described("", "where the dates are from")
 
     def of_kind(self, kind: int) -> LeafYear | None:
