@@ -106,7 +106,8 @@ def numbers(
     """Number (n,) of children of a sort over that without crown bases (n,), by their own ``start`` (n,)."""
     if sort == DEAD:
         end = rows["start"][row, DEAD, 1]
-        return np.where(end > start, (dead_end(rows, row, base) - start) / np.maximum(end - start, 1e-9), 1.0)
+        left = np.maximum(dead_end(rows, row, base) - start, 0.0)  # none where the crown begins below all of them
+        return np.where(end > start, left / np.maximum(end - start, 1e-9), 1.0)
     if sort != LATERAL:
         return np.ones(len(row))
     whole = (1 - np.maximum(start, bare_part(rows, row, base))) / np.maximum(1 - start, 1e-9)
