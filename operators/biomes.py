@@ -18,14 +18,15 @@ from ..tetflora_addon.blender.biomes.adding import (
 from ..tetflora_addon.blender.biomes.biome import active_biome
 from ..tetflora_addon.blender.biomes.files import read_biome
 from ..tetflora_addon.blender.biomes.ground import make_land
-from ..tetflora_addon.blender.biomes.library import ENDING, NO_BIOME, biome_property, biomes, delete
+from ..tetflora_addon.blender.biomes.library import NO_BIOME, OWN_FILES, biome_property, biomes
 from ..tetflora_addon.blender.biomes.saving import import_biome, save_biome, saved_populations
+from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only
+from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
 from .populations import selected_grounds
 
 _biome_exists = need(lambda context: active_biome(context.scene), "Add a biome first")
@@ -36,12 +37,14 @@ class _Planting(ModalJob):
 
     def finish(self, context: bpy.types.Context, result: Added) -> set[str]:
         points.schedule()
+        show_shapes(context.scene)
         number = sum(number for _, number in result.layers)
         text = f'"{result.name}": {counted(number, "plant")} in {counted(len(result.layers), "layer")}'
         if result.kept:
             text += f'; "{result.kept[0]}" keeps its own material'
         if result.bare:
-            self.report({'WARNING'}, f"{text}; without plants: {result.bare[0]}")
+            more = f"; and {counted(len(result.bare) - 1, 'other layer')}" if len(result.bare) > 1 else ""
+            self.report({'WARNING'}, f"{text}; without plants: {result.bare[0]}{more}")
             return {'FINISHED'}
         return self.done(f"{text}{self.next_step(context)}")
 
@@ -213,7 +216,7 @@ class TETFLORA_OT_delete_biome(Reporting, bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        return self.done(f"{delete(context.scene.tetflora.new_biome).name} deleted")
+        return self.done(f"{OWN_FILES.delete(context.scene.tetflora.new_biome).name} deleted")
 
 
 CLASSES = (

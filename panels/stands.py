@@ -12,7 +12,15 @@ from ..operators.stands import (
 )
 from ..tetflora_addon.blender.scene.field_sizes import has_history
 from ..tetflora_addon.blender.stands.growing import is_stand, shown_stand
-from .base import Button, SidebarPanel, TETFLORA_UL_stand_species, draw_properties, split_layout
+from .base import (
+    Button,
+    SidebarPanel,
+    TETFLORA_UL_stand_species,
+    draw_paths,
+    draw_properties,
+    draw_vertex_group,
+    split_layout,
+)
 
 
 class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
@@ -28,7 +36,9 @@ class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
             if has_history(active):
                 column = layout.column()
                 column.scale_y = 1.4
-                column.prop(active.tetflora, "stand_year", text="Year", slider=True)
+                last = active.tetflora.stand.last_year
+                text = f"Year of {last:g}" if last else "Year"
+                column.prop(active.tetflora, "stand_year", text=text, slider=True)
                 layout.prop(active.tetflora, "stand_smooth")
                 row = layout.row(align=True)
                 Button(TETFLORA_OT_animate_growth, 'KEYFRAME').draw(row)
@@ -62,14 +72,8 @@ class TETFLORA_PT_stand_site(_PartOfStand, bpy.types.Panel):
         draw_properties(layout.column(align=True), stand, "warmth", "winter")
         draw_properties(layout.column(align=True), stand, "moisture", "relief", "fertility")
         layout.prop(stand, "slope_max")
-        ground = next((entry.object for entry in stand.grounds if entry.object is not None), None)
-        if ground is not None:
-            layout.prop_search(stand, "vertex_group", ground, "vertex_groups")
-        else:
-            layout.prop(stand, "vertex_group")
-        draw_properties(layout, stand, "areas", "paths")
-        if stand.paths is not None:
-            layout.prop(stand, "path_distance")
+        draw_vertex_group(layout, stand)
+        draw_paths(layout, stand)
 
 
 class TETFLORA_PT_stand_detail(_PartOfStand, bpy.types.Panel):

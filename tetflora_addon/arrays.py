@@ -23,8 +23,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from .parallel import blocks
 
-#: Steps of `spiral` that spread directions evenly: the golden section twice, and the golden angle over π.
-GOLDEN_TURN, GOLDEN_ANGLE = 1.0 + np.sqrt(5.0), 3.0 - np.sqrt(5.0)
+#: Steps in radians that spread directions evenly about an axis: full turns by the golden section, and the golden angle.
+GOLDEN_TURN, GOLDEN_ANGLE = np.pi * (1.0 + np.sqrt(5.0)), np.pi * (3.0 - np.sqrt(5.0))
 #: Room to spare where columns of `Growing` are made larger: one part in so many of what is there.
 _SPARE = 3
 #: Indices that are looked at at a time: numpy makes 64 bit of each, which stays in the cache. Threads gain nothing.
@@ -48,6 +48,28 @@ class _Components:
     def array(self) -> NDArray:
         """The array."""
         return np.moveaxis(self.components, -1, 0)
+
+
+def srgb_of(linear: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Linear values from 0 to 1 as images store them (IEC 61966-2-1)."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def linear_of(stored: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The opposite of `srgb_of`."""
+    return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+
+
+def bilinear(values: NDArray[np.floating], place: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Values (n,) of a grid (h, w) at places (n, 2) in columns and rows, linear between; beyond, of its border."""
+    rows, columns = values.shape
+    place = np.clip(place, 0.0, (columns - 1, rows - 1))
+    low = place.astype(np.int64)
+    (x, y), (right, above) = low.T, np.minimum(low + 1, (columns - 1, rows - 1)).T
+    part, rise = (place - low).T
+    bottom = values[y, x] * (1.0 - part) + values[y, right] * part
+    top = values[above, x] * (1.0 - part) + values[above, right] * part
+    return bottom * (1.0 - rise) + top * rise
 
 
 class Arrays:
@@ -219,8 +241,8 @@ def perpendicular(axis: NDArray) -> NDArray:
 
 
 def spiral(z: NDArray, index: NDArray, step: float) -> NDArray:
-    """Unit vectors (n, 3) of a Fibonacci lattice: heights z (n,), turned by ``index`` (n,) × π × ``step``."""
-    turn, level = np.pi * step * index, np.sqrt(1.0 - z * z)
+    """Unit vectors (n, 3) of a Fibonacci lattice: heights z (n,), turned by ``index`` (n,) × ``step`` radians."""
+    turn, level = step * index, np.sqrt(1.0 - z * z)
     return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)
 
 

@@ -35,6 +35,8 @@ class MeshBuffers:
         Whether faces are shaded smooth.
     species : int or None
         The species all of it is of, if that is known; −1 for assets.
+    look : str
+        Of the surfaces or assets that it stands for, where it is of no species.
     """
 
     positions: NDArray[np.float32]
@@ -45,6 +47,7 @@ class MeshBuffers:
     attributes: Mapping[str, tuple[str, NDArray]] = field(default_factory=dict)
     smooth: bool = False
     species: int | None = None
+    look: str = ""
 
     @property
     def polygons(self) -> int:
@@ -70,7 +73,7 @@ class PointBuffers:
         Metres.
     attributes : mapping of str to ndarray
         Name to values of the points: ``(n,)`` or ``(n, 3)`` float32.
-    species : int or None
+    species, look : int or None, str
         As of meshes.
     """
 
@@ -78,6 +81,7 @@ class PointBuffers:
     radius: NDArray[np.float32]
     attributes: Mapping[str, NDArray] = field(default_factory=dict)
     species: int | None = None
+    look: str = ""
 
     @property
     def polygons(self) -> int:
@@ -111,6 +115,27 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
         face_offsets=np.concatenate([*starts, corners[-1:]]),
         attributes={name: (own[0], np.concatenate([_values(p, name, *own) for p in parts])) for name, own in first},
         smooth=parts[0].smooth,
+    )
+
+
+def kept_faces(mesh: MeshBuffers, kept: NDArray[np.bool_]) -> MeshBuffers:
+    """Some faces of a mesh, a mask (f,), with the vertices and edges that they need."""
+    size = np.diff(mesh.face_offsets)
+    corner = np.flatnonzero(np.repeat(kept, size))
+    verts, edges = np.zeros(len(mesh.positions), bool), np.zeros(len(mesh.edge_verts), bool)
+    verts[mesh.corner_verts[corner]] = True
+    edges[mesh.corner_edges[corner]] = True
+    vert, edge = (np.cumsum(some, dtype=np.int32) - np.int32(1) for some in (verts, edges))
+    some = {"POINT": np.flatnonzero(verts), "FACE": np.flatnonzero(kept), "CORNER": corner}
+    return MeshBuffers(
+        positions=mesh.positions[some["POINT"]],
+        edge_verts=vert[mesh.edge_verts[edges]],
+        corner_verts=vert[mesh.corner_verts[corner]],
+        corner_edges=edge[mesh.corner_edges[corner]],
+        face_offsets=np.concatenate([[0], np.cumsum(size[kept])]).astype(np.int32),
+        attributes={name: (domain, values[some[domain]]) for name, (domain, values) in mesh.attributes.items()},
+        smooth=mesh.smooth,
+        species=mesh.species,
     )
 
 

@@ -7,7 +7,7 @@ from .biomes import library
 from .cli import command
 from .job import forecast, render
 from .placing import assets
-from .species import catalogue
+from .species import catalogue, travel
 from .viewport import auto, levels, overlay, points
 from .viewport import species as species_preview  # or the room of that name could not be read as an attribute
 
@@ -18,11 +18,12 @@ _PARTS = (
     runtime,
     preferences,
     catalogue,
-    library,
+    library.pictures,
     properties,
     render,
     forecast,
     saved_files,
+    travel,
     auto,
     levels,
     overlay,

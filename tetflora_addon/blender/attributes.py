@@ -9,13 +9,15 @@ empty, it still returns what there was when the mode was entered.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
 import bpy
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
+
+from ..arrays import linear_of
 
 Geometry = bpy.types.Mesh | bpy.types.PointCloud | bpy.types.Curves
 
@@ -128,7 +130,18 @@ def _empty(kind: Kind, size: int) -> NDArray:
     return np.zeros(size if kind.width == 1 else (size, kind.width), kind.dtype)
 
 
+#: While somebody asks for another moment: matrices (4, 4) that take objects from where they are now to where they are
+#: then, see `scene.motion`.
+elsewhere: Callable[[bpy.types.Object, bpy.types.Depsgraph], NDArray[np.float64]] | None = None
+
+
 def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+    """As `matrix_now`, or at another moment while somebody asks for that."""
+    matrix = matrix_now(obj, depsgraph)
+    return matrix if elsewhere is None else elsewhere(obj, depsgraph) @ matrix
+
+
+def matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
     """An object's evaluated matrix in world space, (4, 4); float32 in some versions of Blender.
 
     Objects that are disabled in viewports but render are not evaluated, and their stored matrix may be old. Then it
@@ -140,7 +153,7 @@ def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArr
     own = np.array(obj.matrix_basis)
     if obj.parent is None:
         return own
-    return world_matrix(obj.parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
+    return matrix_now(obj.parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
 
 
 def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
@@ -194,7 +207,7 @@ def linear_rgb(image: bpy.types.Image, pixels: NDArray[np.floating]) -> NDArray[
     """Linear RGB (..., 3) of some pixels (..., channels) of an image."""
     colour = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     if image.colorspace_settings.name == "sRGB" and not image.is_float:
-        colour = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+        colour = linear_of(colour)
     return colour
 
 

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 
 from ..growth.hashing import Draw, uniform
 from ..proxies.asset_facets import asset_facet_sizes, facets_of_assets
-from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes
+from ..proxies.facet_sizes import FacetPixels, FacetSizes
 from ..proxies.microsurfaces import Facets, kept_out_of_view
 from ..refinement.asset_parts import AssetParts
 from ..refinement.decisions import real_fraction
+from ..subplants.pieces import chunks
 from .asset_sight import AssetPortions, AssetSight
 from .leaf_detail import FADING
-from .plants import KITES
-from .portions import MIXED, in_chunks
+from .plants import KITES, MIXED
 
 #: How many times as far plain instances are kept where the renderer shows a mesh in many places for the cost of one.
 FARTHER = 20.0
@@ -156,7 +156,7 @@ def planned_facets(
 ) -> Iterator[tuple[Any, bool]]:
     """Facets of a plan, or what a form makes of them, and whether they are seen, some at a time."""
     expected = sizes_of(sight, plan.facets).counts(pixels) + 1.0
-    for run in in_chunks(expected, AT_ONCE) if len(expected) else ():
+    for run in chunks(expected, AT_ONCE):
         for facets, seen in _facets_of(sight, plan.facets.take(run), pixels):
             if len(facets):
                 yield facets if form is None else form(facets, seen), seen
@@ -183,6 +183,6 @@ def _facets_of(sight: AssetSight, portions: AssetPortions, pixels: FacetPixels) 
                 left_out = np.where(seen[some], 0.0, 1.0 - own.enough(pixels))
                 made = facets_of_assets(sight.placed, portions.parts.take(some), own, pixels, left_out)
                 if not seen[some[0]]:
-                    made = kept_out_of_view(made, sight.camera.clearance, HIDDEN_LEAVES**-0.5, not beside)
+                    made = kept_out_of_view(made, sight.camera.clearance, not beside)
                 yield made, bool(seen[some[0]] or not beside)
         portions, _ = sight.opened(portions.take(opening))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..growth.hashing import child_key, key_of_seed
+from ..jobs import mapped
 from .canopy import Canopy, Sheet, fallen_on, light_on
 from .plane import clumps
 
@@ -78,9 +79,10 @@ class Floor:
         """
         size, keeps = habitat.value
         key = child_key(key_of_seed(seed), _PATCHES + list(Habitat).index(habitat))
+        values = self.map_of(habitat, species)
 
         def suitable(points: NDArray[np.float64]) -> NDArray[np.float64]:
-            found = self.sheet.at(self.map_of(habitat, species), points)
+            found = self.sheet.at(values, points)
             return found * clumps(points, size, keeps, key) if keeps else found
 
         return suitable
@@ -115,12 +117,7 @@ def mapping(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, 
     """Light and what falls on the ground under plants; yields the fraction of the work that is done."""
     steps, parts = (light_on(sheet, canopy), fallen_on(sheet, canopy, kinds)), []
     for number, step in enumerate(steps):
-        while True:
-            try:
-                yield (number + next(step)) / len(steps)
-            except StopIteration as stop:
-                parts.append(stop.value)
-                break
+        parts.append((yield from mapped(step, lambda done, before=number: (before + done) / len(steps))))
     return Floor(sheet, *parts)
 
 

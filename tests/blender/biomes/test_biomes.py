@@ -7,6 +7,7 @@ from __future__ import annotations
 import copy
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -17,6 +18,7 @@ from hypothesis import strategies as st
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
 from tetflora_addon.blender.biomes import adding, files, ground, library, saving, stands
 from tetflora_addon.blender.biomes import biome as parts
+from tetflora_addon.blender.file_library import as_text
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.preferences import preferences
 from tetflora_addon.blender.species.edits import catalogue
@@ -115,7 +117,7 @@ def test_shipped_biomes_are_sound(path):
             else:
                 assert name in known or name in pages
     assert set(pages).isdisjoint(known), "species of a biome have names of their own"
-    assert files.as_text(json.loads(path.read_text(encoding="utf-8"))) == path.read_text(encoding="utf-8")
+    assert as_text(json.loads(path.read_text(encoding="utf-8"))) == path.read_text(encoding="utf-8")
     picture = library.picture_file(path)
     assert picture is not None and picture.stat().st_size <= 20_000
     assert biome.description and library.biomes()[path.stem].name == biome.name
@@ -168,10 +170,31 @@ def test_what_is_saved_comes_back():
     assert parts.pages_of(scene(), read) == parts.pages_of(scene(), given)
     with pytest.raises(SceneError, match="already has"):
         saving.save_biome(scene(), "Small", "", picture=False, replace=False)
-    library.delete("small")
+    library.OWN_FILES.delete("small")
     assert "small" not in library.biomes()
     with pytest.raises(SceneError, match="built-in"):
-        library.delete("meadow")
+        library.OWN_FILES.delete("meadow")
+
+
+def test_a_biome_whose_picture_another_program_has_open_stays(monkeypatch):
+    """As Windows has it, where what is open cannot be deleted: it is there as a whole, or gone."""
+    add(small(), add_mesh("ground", size=6.0))
+    path = saving.save_biome(scene(), "Small", "", picture=False, replace=False)
+    picture, unlink = path.with_suffix(".png"), Path.unlink
+    picture.write_bytes(b"")
+
+    def held(self, missing_ok=False):
+        if self == picture:
+            raise PermissionError(13, "The process cannot access the file because it is being used by another process")
+        unlink(self, missing_ok)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", held)
+        with pytest.raises(SceneError, match=r"Cannot delete small\.json: .* used by another process"):
+            library.OWN_FILES.delete("small")
+    assert path.exists() and library.biomes()["small"].is_own
+    library.OWN_FILES.delete("small")
+    assert not path.exists() and not picture.exists() and "small" not in library.biomes()
 
 
 def test_a_stand_is_a_layer():
@@ -232,6 +255,13 @@ def test_a_stand_that_cannot_grow_keeps_no_other_layer_from_its_plants():
     assert [name for name, _ in updated.layers] == ["Bushes"] and field.data == mesh
     (said,) = updated.bare
     assert "Birches" in said and "no ground" in said
+
+
+def test_a_layer_without_a_place_is_told():
+    rare = {**SMALL["layers"][0], "name": "Rare", "density": 1e-6}
+    added = add(small(layers=[rare, SMALL["layers"][0]]), add_mesh("ground", size=10.0))
+    assert [name for name, _ in added.layers] == ["Bushes"]
+    assert [text[:19] for text in added.bare] == ["Rare: a density of "]
 
 
 def test_neighbours_blend():
@@ -368,8 +398,8 @@ def test_nothing_is_left_of_what_fails(monkeypatch):
 def test_the_button_makes_land_where_there_is_none(monkeypatch):
     """On the selected ground otherwise; the startup's cube is none."""
     monkeypatch.setattr(ground, "SIDE", 8.0)
-    path = library.own_place("small")
-    path.write_text(files.as_text(SMALL), encoding="utf-8")
+    path = library.OWN_FILES.place("small")
+    path.write_text(as_text(SMALL), encoding="utf-8")
     library.look_again()
     assert bpy.ops.tetflora.add_biome(biome="small") == {'FINISHED'}
     land = bpy.context.object

@@ -109,6 +109,25 @@ def test_animations_are_refined_for_the_camera_and_plants_of_each_frame(stage, s
     assert datablocks() == before
 
 
+@pytest.mark.parametrize("draws", [False, True])
+def test_a_frame_is_made_in_the_main_thread_while_nothing_locks_the_window(
+    stage, stub, tmp_path, draws, monkeypatch, capfd
+):
+    """Which waits for it, and so cannot draw; and the artist is told which setting does without."""
+    handed = []
+
+    def in_main_thread(function=lambda: None):
+        handed.append(getattr(function, "func", function))
+        return function()
+
+    monkeypatch.setattr(render, "window_draws", lambda: draws)
+    monkeypatch.setattr(render, "in_main_thread", in_main_thread)
+    assert _still(stage, tmp_path / "a.png") == 0.0
+    assert (render._make in handed) == draws
+    said = capfd.readouterr().err
+    assert said.count(f'Lock Interface of the scene "{stage.name}" is off') == draws
+
+
 @pytest.mark.parametrize("persistent", [False, True])
 def test_stills_leave_nothing_behind_render_after_render(stage, stub, tmp_path, persistent):
     stage.render.use_persistent_data = persistent
@@ -255,7 +274,7 @@ def test_a_scene_that_is_deleted_in_the_middle_of_a_render_stops_neither_saving_
     render.on_save_pre("")
     render.on_save_post("")
     render.on_render_end(other)
-    render._rendering.outer = ""
+    render._rendering.outer = 0
     render.on_load_post("")
 
 
@@ -381,3 +400,15 @@ def test_baked_light_is_made_for_each_render_and_outlives_the_file(stage, tmp_pa
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
     assert bpy.context.scene.tetflora.baked_light == 'ALL'
+
+
+def test_a_scene_that_is_renamed_in_the_middle_of_a_render_is_left_as_it_was(stage, stub):
+    stage.render.engine = 'CYCLES'
+    stage.tetflora.proxy_form = 'SHELLS'
+    stage.cycles.transparent_max_bounces = 10
+    render.on_render_pre(stage)
+    assert stage.cycles.transparent_max_bounces > 10
+    stage.name = "renamed"
+    render.on_render_end(stage)
+    assert stage.cycles.transparent_max_bounces == 10
+    assert not render._rendering.outer and not collection.result_collections(stage, 'RENDER')

@@ -69,6 +69,8 @@ def test_the_ground_of_a_population_is_covered_by_what_grows_and_falls_there():
     assert _group().populations_index == 0  # the trees stay what the panel shows
     assert [entry.object for entry in cover.grounds] == [ground]
     assert cover.made == fields.stored_size(_field()) > 2000
+    assert _field().display_type == 'BOUNDS'  # black points would hide the ground
+    assert bpy.context.scene.tetflora.preview.plants == 'LIGHT'
     assert len(_places("birch_litter")) > 100
     for name in species:
         species_for(bpy.context.scene, name)
@@ -313,7 +315,6 @@ def test_habitats_are_written_to_files_and_read_again(tmp_path):
     assert [(e.species, e.habitat, e.shed_by) for e in read.mix] == [
         (e.species, e.habitat, e.shed_by) for e in _group().populations[1].mix
     ]
-    assert "habitat" not in population_files.as_data([_group().populations[0]])["populations"][0]["species"][0]
 
 
 def test_large_ground_has_no_more_plants_than_blender_bears():

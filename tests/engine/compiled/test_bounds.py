@@ -152,6 +152,26 @@ def test_bounds_hold_for_any_species(first: dict, second: dict, leans: list[dict
         assert outside(flora, some) < _FLOAT32
 
 
+@pytest.mark.parametrize("variation", [0.0, 0.3])
+@pytest.mark.parametrize(("angle", "tip"), [(10, 90), (90, 10), (150, 20)])
+def test_limbs_whose_first_is_not_known_where_it_is_are_inside_the_bound(
+    variation: float, angle: float, tip: float
+) -> None:
+    """The bare part of a trunk varies: at the same height one bears its first limb, another one of its last."""
+    flora = support.compiled(
+        support.small(
+            order0={
+                "branches": [20, 0],
+                "branch_start": [0.35, variation],
+                "crown": "cylindrical",
+                "curvature": [0, 0],
+            },
+            order1={"length": [0.8, 0], "angle": [angle, 0], "angle_tip": tip, "branches": [0, 0], "leaves": [0, 0]},
+        )
+    )
+    assert outside(flora, support.trunks(flora.rows, support.plants(np.arange(4)))) < _FLOAT32
+
+
 @pytest.mark.parametrize("whorl", [2, 3])
 def test_whorls_are_inside_the_bound(whorl: int) -> None:
     """Branches and leaves that share their places."""
@@ -216,7 +236,7 @@ def test_samples_are_inside_the_bound(species: int) -> None:
             first, number = points.runs(some)
             for i in np.flatnonzero(number):
                 local = points.position[first[i] : first[i] + number[i]].astype(float)
-                radius, low, high = tight[i] + np.array([1, -1, 1]) * 1e-6 * (1.0 + np.abs(tight[i]))
+                radius, low, high = tight[i, :3] + np.array([1, -1, 1]) * 1e-6 * (1.0 + np.abs(tight[i, :3]))
                 assert np.hypot(local[:, 0], local[:, 1]).max() <= radius
                 assert local[:, 2].min() >= low
                 assert local[:, 2].max() <= high

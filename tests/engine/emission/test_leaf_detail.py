@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,21 +13,31 @@ from tests.engine import support
 from tests.engine.refinement.test_loop import run
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
-from tetflora_addon.camera.camera import Camera
+from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.budget import afford
-from tetflora_addon.emission.expected import Expected
 from tetflora_addon.emission.leaf_detail import LeafDetail
-from tetflora_addon.emission.plants import Transition, expanded_blocks, explicit_blocks
+from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import WholeBranches
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.members import expected_polygons
+from tetflora_addon.species.quality import with_quality
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
+from tetflora_addon.subplants.pieces import Pieces
+
+
+@cache
+def tree(name: str) -> tuple[Flora, Pieces]:
+    """A shipped tree, and its branches; of fewer and larger leaves than it is shipped with, where it has many."""
+    species = load_species(name)
+    flora = compile_species([with_quality(species, min(support.MOST_POLYGONS / expected_polygons(species), 1.0))])
+    return flora, support.grown(flora, support.plants(3))[1]
 
 
 def near(distance: float, name: str = "oak", pixels: int = 400) -> tuple:
     """A tree and a camera so far from its middle."""
-    flora = support.compiled(support.shipped(name))
-    _, pieces = support.grown(flora, support.plants(3))
+    flora, pieces = tree(name)
     target = pieces.end[len(pieces) // 2]
     camera = support.camera(tuple(target + [0.0, -distance, 0.0]), tuple(target), pixels=pixels, view=0.6)
     return flora, camera, support.plants(3), pieces
@@ -112,45 +122,22 @@ def test_lengths_are_those_in_the_image() -> None:
     assert (seen[~some] * errors <= 1.0).all()
 
 
-def refined(camera: Camera, flora, seeds, settings: RefinementSettings) -> tuple:
-    """Detail that is affordable, and leaves that come of it."""
-    _, result = run(flora, seeds, camera)
-    detail = afford(flora, result, camera, settings)
-    transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
-    return detail, list(explicit_blocks(flora, detail.refinement, camera, transition))
-
-
-def test_finer_leaves_give_way_first() -> None:
-    """Under a budget margins become coarser before facets and limits grow; without one they have the tolerance."""
-    flora, camera, seeds, _ = near(1.5)
-    settings = RefinementSettings()
-    free, blocks = refined(camera, flora, seeds, settings)
-    whole = polygons([b.buffers for b in blocks])
-    assert free.tolerance == LeafDetail(flora, camera).tolerance
-    tight, blocks = refined(camera, flora, seeds, replace(settings, max_polygons=int(0.7 * whole)))
-    assert tight.tolerance > free.tolerance
-    assert polygons([b.buffers for b in blocks]) < 0.8 * whole
-
-
-def test_budgets_expect_what_is_made() -> None:
-    """What near leaves are expected to have beyond their models is about what they have."""
-    flora, camera, seeds, _ = near(6.0)
-    settings = RefinementSettings()
-    _, result = run(flora, seeds, camera)
-    transition = Transition(flora, camera, settings.leaf_limit)
-    coarse = Transition(flora, camera, settings.leaf_limit, np.inf)
-    made = [polygons(leaves(explicit_blocks(flora, result, camera, one))) for one in (transition, coarse)]
-    count = Expected(flora, result, camera)
-    assert made[0] > 1.2 * made[1]
-    assert count.finer(settings.leaf_limit) == pytest.approx(made[0] - made[1], rel=0.5)
-
-
-@pytest.mark.parametrize("share", [0.8, 0.4, 0.1])
-def test_limits_hold_up_close(share: float) -> None:
+def test_limits_hold_up_close() -> None:
     """However fine leaves could be, no more is made than somebody allows."""
     flora, camera, seeds, _ = near(1.0)
-    settings = RefinementSettings()
-    _, blocks = refined(camera, flora, seeds, settings)
-    most = int(share * polygons([b.buffers for b in blocks]))
-    _, blocks = refined(camera, flora, seeds, replace(settings, max_polygons=most))
-    assert polygons([b.buffers for b in blocks]) <= most
+    result = run(flora, seeds, camera)[1]
+
+    def number(settings: RefinementSettings) -> int:
+        detail = afford(result, camera, settings)
+        given = support.refined(
+            flora, result, camera, detail.pixels.seen, detail.leaf_limit, weighted=False, most=detail.most
+        )
+        blocks = list(given.mesh_blocks())
+        return sum(b.buffers.polygons for b in blocks) + sum(
+            len(some) for part in given.facet_parts() for some, _ in part
+        )
+
+    free = number(RefinementSettings())
+    for share in (0.8, 0.4):
+        most = int(share * free)
+        assert number(RefinementSettings(max_polygons=most)) <= most

@@ -3,10 +3,15 @@
 """What an asset consists of: each distinct mesh once, with all of its places in the asset, as arrays.
 
 Objects, collections, nodes, particles and what is instanced by instances are followed down to meshes.
+
+What is instanced: an object, a collection, or geometry that nodes instance without an object of its own.
+
+Its digest tells whether what it shows has changed since it was compiled.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -16,10 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ..attributes import world_matrix
+from ..attributes import members, read, values_of, world_matrix
 from ..materials.nodes import is_ours
-from ..scene.instances import references_of
-from ..scene.objects import ONE_BY_ONE, SURFACE_TYPES, has_nodes, rendered_objects
+from ..scene.instances import instanced
+from ..scene.objects import SURFACE_TYPES, collected, geometry_of, has_nodes, is_listed, listed_instances, materials_of
+from .material_digests import attributes_of, material_digest
 
 Slots = list[bpy.types.Material | None]
 
@@ -52,7 +58,10 @@ class AssetPart:
         """The mesh as it is evaluated, and its materials, while the context lasts; None if it has no faces."""
         if isinstance(self.shown, bpy.types.GeometrySet):
             mesh = self.shown.mesh
-            yield None if mesh is None or not len(mesh.polygons) else (mesh, _originals(mesh.materials))
+            if mesh is None or not len(mesh.polygons):
+                yield None
+            else:
+                yield mesh, [m.original if m is not None else None for m in mesh.materials] or [None]
             return
         obj = _evaluated(self.shown, depsgraph)
         try:
@@ -60,11 +69,7 @@ class AssetPart:
             if mesh is None or not len(mesh.polygons):
                 yield None
                 return
-            slots = _originals(mesh.materials)
-            for i, slot in enumerate(obj.material_slots):
-                if slot.link == 'OBJECT' and i < len(slots):
-                    slots[i] = slot.material.original if slot.material else None
-            yield mesh, slots
+            yield mesh, materials_of(obj, mesh)
         finally:
             obj.to_mesh_clear()
 
@@ -80,10 +85,6 @@ def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh | None:
         return obj.to_mesh()
     except RuntimeError:  # hair, of which nodes may have made a mesh all the same
         return None
-
-
-def _originals(materials: bpy.types.IDMaterials) -> Slots:
-    return [m.original if m is not None else None for m in materials] or [None]
 
 
 def parts_of(
@@ -129,16 +130,12 @@ class _Walk:
         path = (*path, obj)
         if not obj.is_instancer or obj.show_instancer_for_render or obj.instance_type == 'COLLECTION':
             self._own(obj, matrices)
-        if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
+        if is_listed(obj):
             self._one_by_one(obj, matrices)
             return
         if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             self.collection(obj.instance_collection, matrices, path)
-        if has_nodes(obj) and (evaluated := obj.evaluated_get(self.depsgraph)).is_evaluated:
-            try:
-                geometry = evaluated.evaluated_geometry()
-            except TypeError:  # an object without geometry
-                return
+        if has_nodes(obj) and (geometry := geometry_of(obj, self.depsgraph)) is not None:
             self._instances(geometry, matrices, path)
             if obj.type == 'CURVES' and geometry.mesh is not None:
                 self._add(obj, AssetPart(obj.name, geometry), matrices)
@@ -151,10 +148,8 @@ class _Walk:
                 "out of the collection, or let it instance another one"
             )
         path = (*path, collection)
-        back = np.eye(4)
-        back[:3, 3] = -np.array(collection.instance_offset)
-        for obj in sorted(rendered_objects(collection), key=lambda o: o.name_full):
-            self.object(obj, matrices @ (back @ world_matrix(obj, self.depsgraph)), path)
+        for obj, places in collected(collection, matrices, self.depsgraph):
+            self.object(obj, places, path)
 
     def geometry(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Path) -> None:
         """Take geometry without an object, with what it instances."""
@@ -165,22 +160,19 @@ class _Walk:
 
     def _instances(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Path) -> None:
         keys = np.zeros(len(matrices), np.uint64)
-        for target, rows in references_of(geometry):
-            places, _ = rows.within(matrices, keys)
+        for target, places, _ in instanced(geometry, matrices, keys):
             if isinstance(target, bpy.types.GeometrySet):
                 self.geometry(target, places, path)
             elif isinstance(target, bpy.types.Collection):
-                self.collection(target.original, places, path)
+                self.collection(target, places, path)
             else:
-                self.object(target.original, places, path)
+                self.object(target, places, path)
 
     def _one_by_one(self, obj: bpy.types.Object, matrices: NDArray[np.float64]) -> None:
         """Instances on vertices and faces, and of particles, which only Blender's own list has."""
         back = np.linalg.pinv(world_matrix(obj, self.depsgraph).astype(np.float64))
         found: dict[bpy.types.Object, list[NDArray[np.float64]]] = {}
-        for instance in self.depsgraph.object_instances:
-            if not instance.is_instance or not instance.show_self or instance.parent.original != obj:
-                continue
+        for _, instance in listed_instances(self.depsgraph, (obj,)):
             if instance.object.original != obj:
                 place = back @ np.array(instance.matrix_world, dtype=np.float64)
                 found.setdefault(instance.object.original, []).append(place)
@@ -210,3 +202,91 @@ class _Walk:
 
     def _add(self, key: object, part: AssetPart, matrices: NDArray[np.float64]) -> None:
         self.parts.setdefault(key, part).places.append(matrices)
+
+
+#: Changes what a digest is of; raise it when what is read of an asset changes.
+_VERSION = 2
+_COLOURS = {'FLOAT_COLOR', 'BYTE_COLOR'}
+_TYPES = {'FLOAT', 'INT', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLOURS}
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is instanced; equal where it is the same datablock, or the same geometry.
+
+    Attributes
+    ----------
+    datablock : bpy.types.Object or bpy.types.Collection or None
+        An original. An object's space is its own, without its place in the scene; that of a collection is where
+        instances of it show it: its objects as they stand, from its offset.
+    geometry : bpy.types.GeometrySet or None
+        Without a datablock: what nodes instance.
+    owner : bpy.types.Object or None
+        Whose nodes.
+    name : str
+        For messages.
+    """
+
+    datablock: bpy.types.Object | bpy.types.Collection | None
+    geometry: bpy.types.GeometrySet | None
+    owner: bpy.types.Object | None
+    name: str
+
+    @property
+    def shown(self) -> bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet:
+        """The datablock or the geometry."""
+        return self.geometry if self.datablock is None else self.datablock
+
+    def parts(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[AssetPart], list[str]]:
+        """What it consists of, see `parts.parts_of`."""
+        return parts_of(self.shown, self.name, depsgraph)
+
+
+def digest_of(target: Target, depsgraph: bpy.types.Depsgraph, *, bake: bool = False) -> str:
+    """Hexadecimal digest of all that a target shows: meshes, their attributes, materials and images, and places.
+
+    Names of objects do not count, and of images in files only which file it is, how long and how old.
+
+    Parameters
+    ----------
+    target : Target
+    depsgraph : bpy.types.Depsgraph
+    bake : bool
+        Whether materials are baked when it is read.
+
+    Raises
+    ------
+    SceneError
+        As `parts.parts_of`.
+    """
+    parts, _ = target.parts(depsgraph)
+    return digest_of_parts(parts, depsgraph, bake)
+
+
+def digest_of_parts(parts: list[AssetPart], depsgraph: bpy.types.Depsgraph, bake: bool) -> str:
+    """As `digest_of`."""
+    content = hashlib.sha256(f"{_VERSION} {bake}".encode())
+    for part in parts:
+        with part.opened(depsgraph) as opened:
+            if opened is not None:
+                content.update(np.ascontiguousarray(part.matrices))
+                _add_mesh(content, *opened)
+    return content.hexdigest()
+
+
+def _add_mesh(content: hashlib._Hash, mesh: bpy.types.Mesh, slots: Slots) -> None:
+    for material in slots:
+        content.update(material_digest(material).encode())
+    content.update(f"{len(mesh.vertices)} {len(mesh.polygons)} {len(mesh.loops)}".encode())
+    content.update(read(mesh, "position"))
+    content.update(read(mesh, ".corner_vert"))
+    if len(mesh.loops) != 3 * len(mesh.polygons):  # else all are triangles, one after the other
+        content.update(members(mesh.polygons, "loop_start", dtype=np.int32))
+    wanted = {"material_index", *(name for material in slots for name in attributes_of(material))}
+    for attribute in mesh.attributes:
+        kind = attribute.data_type
+        if kind in _TYPES and (attribute.name in wanted or kind == 'FLOAT2'):
+            content.update(f"{attribute.name} {attribute.domain} {kind}".encode())
+            content.update(values_of(attribute, "color" if kind in _COLOURS else ""))
+    first = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
+    content.update(first.encode())

@@ -20,7 +20,7 @@ from ...camera.view_cells import Around, ViewCells, cell_camera
 from ...growth.crown_forms import farthest
 from ...species.species import Species
 from ..assets.measures import reach_of
-from ..assets.target import digest_of
+from ..assets.parts import digest_of
 from ..compat import drawn_disc
 from ..materials.snow import has_snow
 from ..results.hiding import hidden_originals, hide_originals, name_of, object_named, show_originals
@@ -109,7 +109,10 @@ def scene_digest(
         given.lights,
         given.sources,
         explicit,
-        [(targets[one.target], _names(one.owners), one.matrices, one.keys) for one in given.places],
+        [
+            (targets[one.target], _names(one.owners), one.matrices, one.keys, given.looks[one.owner])
+            for one in given.places
+        ],
         choices(scene),
         [_digest_of_species(one) for one in species],
         [brought_materials(scene, identifier) for identifier in given.species],

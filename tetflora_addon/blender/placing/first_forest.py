@@ -26,6 +26,7 @@ from ..species.edits import catalogue
 from ..worker import at_once
 from .cover import cover_steps
 from .plant_objects import add_plants
+from .terrain import grid_mesh
 
 Stops = tuple[tuple[float, tuple[float, float, float]], ...]
 
@@ -237,12 +238,8 @@ def _scene_for(context: bpy.types.Context) -> tuple[bpy.types.Scene, str]:
 def _ground() -> bpy.types.Object:
     xs, ys = np.arange(_WEST, _EAST + 0.1, _STEP), np.arange(_SOUTH, _NORTH + 0.1, _STEP)
     x, y = np.meshgrid(xs, ys)
-    points = np.stack([x, y, height(x, y)], axis=2).reshape(-1, 3)
-    first = (np.arange(len(ys) - 1)[:, None] * len(xs) + np.arange(len(xs) - 1)).reshape(-1)
-    faces = np.stack([first, first + 1, first + len(xs) + 1, first + len(xs)], axis=1)
-    mesh = bpy.data.meshes.new("Forest ground")
-    mesh.from_pydata(points.tolist(), [], faces.tolist(), shade_flat=False)
-    aside = np.abs(points[:, 0] - path(points[:, 1])).astype(np.float32)
+    mesh = grid_mesh("Forest ground", np.stack([x, y, height(x, y)], axis=2))
+    aside = np.abs(x - path(y)).astype(np.float32).ravel()
     write(mesh, "aside", aside)
     write(mesh, OFF_PATH, np.clip((aside - 1.2) / 2.0, 0.0, 1.0))
     ground = bpy.data.objects.new("Forest ground", mesh)
@@ -321,12 +318,17 @@ def _settings(scene: bpy.types.Scene) -> None:
         if layer.species in known_species:
             entry = mix.add()
             entry.species, entry.weight = layer.species, 0.1 * layer.number
-    render = scene.render
-    known = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
-    if 'CYCLES' in known or hasattr(scene, "cycles"):
-        render.engine = 'CYCLES'
-        scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
-        scene.cycles.use_adaptive_sampling, scene.cycles.adaptive_threshold = True, 0.1
-        scene.cycles.max_bounces = 4
-    render.resolution_x, render.resolution_y, render.resolution_percentage = 1280, 720, 50
-    scene.view_settings.exposure = 0.9
+    # Only what is as in new scenes: all else is the artist's choice.
+    new = bpy.data.scenes.new("")
+    wanted = {"render": {"resolution_x": 1280, "resolution_y": 720, "resolution_percentage": 50}}
+    wanted["view_settings"] = {"exposure": 0.9}
+    if hasattr(scene, "cycles"):
+        wanted["render"]["engine"] = 'CYCLES'
+        wanted["cycles"] = {"samples": SAMPLES, "use_denoising": True, "use_adaptive_sampling": True}
+        wanted["cycles"] |= {"adaptive_threshold": 0.1, "max_bounces": 4}
+    for group, values in wanted.items():
+        own, fresh = getattr(scene, group), getattr(new, group)
+        for name, value in values.items():
+            if getattr(own, name) == getattr(fresh, name):
+                setattr(own, name, value)
+    bpy.data.scenes.remove(new)

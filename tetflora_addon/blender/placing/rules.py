@@ -32,9 +32,10 @@ from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
 from ..settings import check_limits
+from ..species.catalogue import default_species
 from ..species.edits import catalogue, unknown_text
 from .canopy import not_of_covers, read_suits
-from .distances import HECTARE, distance_of, empty_means, weights_of
+from .distances import HECTARE, distance_of, weights_of
 from .plant_objects import EMPTIES_UNASKED, plants_of
 from .terrain import MASKS, read_ground
 from .zones import read_zones, zone_values
@@ -44,9 +45,8 @@ IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
     *("mix_index", "distance_from", "covers", "biome"),
 }
-_COMPANION = ("companion", "companion_strength", "companion_distance")
 _DIGITS = 4  # of erased places: tenths of a millimetre
-_ENTRY = ("species", "weight", *_COMPANION)
+_ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance")
 _HABITAT = ("habitat", "shed_by")
 
 
@@ -104,16 +104,12 @@ def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGro
             setattr(target, prop.identifier, getattr(source, prop.identifier))
     target.mix.clear()
     for entry in source.mix:
-        new = target.mix.add()
-        new.species, new.weight = entry.species, entry.weight
-        copy_companion(entry, new)
-        for name in _HABITAT:
-            setattr(new, name, getattr(entry, name))
+        copy_entry(entry, target.mix.add())
 
 
-def copy_companion(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
-    """Give an entry the companion of another."""
-    for name in _COMPANION:
+def copy_entry(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+    """Let an entry of a mixture be as another."""
+    for name in (*_ENTRY, *_HABITAT):
         setattr(target, name, getattr(source, name))
 
 
@@ -134,7 +130,7 @@ def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, .
 
     Companions that are not in the mixture follow it with a weight of 0.
     """
-    mix = [(e.species or empty_means(population), e) for e in population.mix]
+    mix = [(e.species or default_species(), e) for e in population.mix]
     weights = weights_of(population)
     for _, entry in mix:
         if entry.companion:

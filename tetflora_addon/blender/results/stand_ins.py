@@ -12,16 +12,17 @@ from __future__ import annotations
 import bpy
 
 from ..materials.nodes import Graph, find_socket, get_or_create
+from ..scene.looks import look_like
+from ..scene.objects import geometry_of
 from .collection import Results
 from .hiding import artists_flags, forget_marks
-from .looks import look_like
 from .output import STAND_IN
 
 _VERSION = 1
 _NAME = "TetFlora Without Instances"
 _SIMULATED = {'CLOTH', 'SOFT_BODY', 'FLUID', 'DYNAMIC_PAINT'}
 _INSTANCED = {'OBJECT', 'COLLECTION'}
-_TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder", "is_asset")
+_TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder")
 
 
 def add_stand_in(
@@ -63,7 +64,7 @@ def add_stand_in(
             if getattr(made.tetflora, switch, False):
                 setattr(made.tetflora, switch, False)
         _drop_instances(made)
-    look_like(made, original)
+    look_like(made, original, results.owners.get(original))
     return results.add_object(name, made, STAND_IN, placed=True)
 
 
@@ -72,11 +73,7 @@ def shows_itself(original: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> 
     instances = original.instance_type in {'VERTS', 'FACES', 'COLLECTION'} or len(original.particle_systems)
     if instances and not original.show_instancer_for_render:
         return any(_is_hair(system) for system in original.particle_systems)
-    evaluated = original.evaluated_get(depsgraph)
-    try:
-        geometry = evaluated.evaluated_geometry() if evaluated.is_evaluated else None
-    except TypeError:  # an empty, or anything else without geometry
-        return False
+    geometry = geometry_of(original, depsgraph)
     if geometry is None:
         return len(getattr(original.data, "polygons", ())) > 0
     mesh, curves, points = (getattr(geometry, kind) for kind in ("mesh", "curves", "pointcloud"))

@@ -92,11 +92,6 @@ class History:
         return a, b, (now - self.year[a]) / np.maximum(self.year[b] - self.year[a], 1e-9)
 
 
-def has_sizes(points: Points) -> bool:
-    """Whether points have any recorded size, or are records of a history; cheap."""
-    return any(name in points.attributes for name in SIZE_ATTRIBUTES)
-
-
 def has_history(obj: bpy.types.Object) -> bool:
     """Whether the points that a field stores are records of a history; cheap."""
     return isinstance(obj.data, Points) and YEAR in obj.data.attributes
@@ -104,13 +99,23 @@ def has_history(obj: bpy.types.Object) -> bool:
 
 def year_curves(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
     """Curves of keys of a stand's year."""
+    return [curve for bag in _channels(obj) for curve in bag.fcurves if curve.data_path == YEAR_PATH]
+
+
+def clear_years(obj: bpy.types.Object) -> None:
+    """Remove all keys of a stand's year."""
+    for bag in _channels(obj):
+        for curve in [curve for curve in bag.fcurves if curve.data_path == YEAR_PATH]:
+            bag.fcurves.remove(curve)
+
+
+def _channels(obj: bpy.types.Object) -> list[bpy.types.ActionChannelbag]:
     animation = obj.animation_data
     if animation is None or animation.action is None or animation.action_slot is None:
         return []
     slot = animation.action_slot.handle
     strips = [strip for layer in animation.action.layers for strip in layer.strips]
-    bags = [bag for strip in strips for bag in strip.channelbags if bag.slot_handle == slot]
-    return [curve for bag in bags for curve in bag.fcurves if curve.data_path == YEAR_PATH]
+    return [bag for strip in strips for bag in strip.channelbags if bag.slot_handle == slot]
 
 
 def year_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:

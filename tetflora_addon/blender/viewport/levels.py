@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator
 from dataclasses import replace
+from itertools import count
 
 import bpy
 import numpy as np
@@ -17,10 +18,9 @@ import numpy as np
 from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
-from ...jobs import Progress
+from ...jobs import Progress, mapped
 from ...preview.levels import Level, Levels, gather
-from ...preview.light_plants import MOST_PLANTS, Shapes, bounds_of_plants, light_plants
-from ...preview.simple_crowns import joined, simple_crowns
+from ...preview.light_plants import Shapes, bounds_of_plants, joined, light_plants, simple_crowns, thinned
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
 from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
@@ -29,7 +29,7 @@ from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
 from ..scene.field_sizes import stand_years
 from ..scene.objects import taking_part
-from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
+from ..scene.plants import NoPlantsError, read_asset_plants, read_plants_of
 from ..scene.scatterers import is_drop
 from ..scene.sizes import measure_of
 from ..settings import season_of, years_of
@@ -91,14 +91,9 @@ def _level_steps(
 
 def _shown(levels: Generator[Level, None, Levels]) -> Generator[Progress, object, Levels]:
     """Levels as progress."""
-    fraction = 0.05
-    while True:
-        try:
-            level = next(levels)
-        except StopIteration as stop:
-            return stop.value
-        fraction += 0.15 * (1.0 - fraction)  # nobody knows how many passes will follow
-        yield Progress(fraction, f"Level {level.number}: {len(level):,} tetrahedra")
+    # Nobody knows how many passes will follow.
+    fractions = (1.0 - 0.95 * 0.85**number for number in count(1))
+    return mapped(levels, lambda one: Progress(next(fractions), f"Level {one.number}: {len(one):,} tetrahedra"))
 
 
 def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shapes | None:
@@ -133,7 +128,7 @@ def _shapes_of(
         size = crown.radius, crown.base, crown.height
         crowns.append(simple_crowns(plants.matrices, size, crown.colour, boxes=make is bounds_of_plants))
     try:
-        seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
+        seeds, _, of(scene).message = read_plants_of(scene, depsgraph, depsgraph.view_layer)
     except NoPlantsError:
         if not crowns:
             raise
@@ -149,8 +144,9 @@ def _grown(
     kinds = seeds.identifiers
     if len(kinds) <= _MANY_KINDS:
         return [make(in_year(scene, compile_for(kinds, scene, depsgraph)), seeds)]
-    some, out = seeds.take(slice(None, None, max(-(-len(seeds) // MOST_PLANTS), 1))), []
-    for number, species in enumerate(load_for(kinds, scene, depsgraph)):
+    loaded, out = load_for(kinds, scene, depsgraph), []
+    some = thinned(seeds, np.array([species.orders[0].length.mean for species in loaded]))
+    for number, species in enumerate(loaded):
         own = some.take(np.flatnonzero(some.species == number))
         if len(own):
             one = replace(own, identifiers=(kinds[number],), species=np.zeros(len(own), np.int32))
