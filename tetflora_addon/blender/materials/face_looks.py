@@ -505,6 +505,8 @@ class Looks:
         attributes : mapping of str to (n, k) float32
             Of the mesh that wears it, for those that take their colour from one.
         """
+        if material is None:
+            return Look()
         types = {name: 'FLOAT2' if values.shape[1] == 2 else 'FLOAT_VECTOR' for name, values in attributes.items()}
         means = {name: values.mean(axis=0, dtype=np.float64) for name, values in attributes.items()}
         plan = _plan_of(material, MeshLayers("", types, means), self._known)
