@@ -31,6 +31,7 @@ from .feet import (
 )
 from .wood_detail import Curve, Fineness, Pixels, curve, parts, unit_of
 
+_SHORTEST = 1e-9  # metres of a branch that has just begun to grow
 _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
 
 
