@@ -159,6 +159,22 @@ def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
     return owner, np.arange(len(owner)) - first[owner]
 
 
+def connected(n: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) smallest index in the part of each of n things, of which a (e,) and b (e,) are connected."""
+    label = np.arange(n)
+    while (label[a] != label[b]).any():
+        np.minimum.at(label, np.maximum(label[a], label[b]), np.minimum(label[a], label[b]))
+        label = top(label)
+    return label
+
+
+def top(up: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Where each thing (n,) comes to by following ``up`` until it stays; the steps double each time."""
+    while (up[up] != up).any():
+        up = up[up]
+    return up
+
+
 def rows_within(chosen: NDArray[np.bool_], index: NDArray[np.int32]) -> NDArray[np.intp]:
     """Rows (k,), ascending, of which an index (n,) is among those of a mask."""
     found = [np.flatnonzero(np.take(chosen, index[block])) + block.start for block in blocks(len(index), _AT_ONCE)]

@@ -66,9 +66,8 @@ def _areoles(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Places (n, 3) on a body at least a distance apart, and its unit normals (n, 3) there."""
     first = body.corner_verts[body.face_offsets[:-1]]
-    middle = np.add.reduceat(body.positions[body.corner_verts], body.face_offsets[:-1]) / np.diff(
-        body.face_offsets
-    ).reshape(-1, 1)
+    corners = np.add.reduceat(body.positions[body.corner_verts], body.face_offsets[:-1])
+    middle = corners / np.diff(body.face_offsets)[:, None]
     area = np.linalg.norm(body.face_vectors, axis=1)
     own = np.flatnonzero((part >= 0) & (area > 0) & (body.positions[first, 1] > _BARE))
     # From face to face far away from it, so that places are dense soon; each takes those around it away.

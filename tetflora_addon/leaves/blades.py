@@ -33,11 +33,10 @@ def _dense(blade: Blade, side: int) -> tuple[NDArray[np.float64], NDArray[np.flo
 
 def outline(blade: Blade, tolerance: float = FINEST) -> NDArray[np.float64]:
     """Closed outline (n, 2) of a flat blade within a tolerance, from the base along its right half and back."""
-    halves = []
-    for side in (1, -1):
-        _, points = _dense(blade, side)
-        halves.append(points[simplified(points[:, None], tolerance)])
-    return np.concatenate([halves[0], halves[1][-2:0:-1]])
+    right, left = (
+        points[simplified(points[:, None], tolerance)] for _, points in (_dense(blade, 1), _dense(blade, -1))
+    )
+    return np.concatenate([right, left[-2:0:-1]])
 
 
 def check_outline(blade: Blade) -> None:
@@ -48,8 +47,7 @@ def check_outline(blade: Blade) -> None:
     SpeciesError
         Names what may be changed.
     """
-    points = outline(blade, 0.002)
-    if crossings(points):
+    if crossings(outline(blade, 0.002)):
         raise SpeciesError(
             "the outline crosses itself; use a smaller tooth_size or lobe_depth, fewer teeth, or a rounded base"
         )

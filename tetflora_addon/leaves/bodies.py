@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import connected
 from .models import LeafModel
 
 #: Angle of all faces around a vertex below which it is a point, and stays: a full turn on flat ground, 4/3 π on an
@@ -30,7 +31,7 @@ def closed_parts(model: LeafModel) -> NDArray[np.int64]:
     order = np.argsort(of_corner, kind="stable")
     paired = np.bincount(of_corner) == 2
     pairs = face[order][paired[of_corner[order]]].reshape(-1, 2)
-    part = _connected(pairs, model.polygons)
+    part = connected(model.polygons, *pairs.T)
     return np.where(np.isin(part, part[face[~paired[of_corner]]]), -1, part)
 
 
@@ -132,18 +133,6 @@ def _with_faces(
         face_offsets=np.cumsum(np.concatenate([[0], np.full(len(corners), 3), size])).astype(np.int32),
         uv=np.concatenate([uv.reshape(-1, 2), model.uv[kept]]).astype(np.float32),
     )
-
-
-def _connected(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Least number of all that each of so many things is connected with by pairs (p, 2)."""
-    part = np.arange(count)
-    while True:
-        least = part.copy()
-        np.minimum.at(least, pairs, part[pairs[:, ::-1]])
-        least = least[least]
-        if (least == part).all():
-            return part
-        part = least
 
 
 def _turns(points: NDArray[np.float64], corners: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,16 +52,10 @@ def compound_surface(compound: Compound, tolerance: float, amount: float = 1.0, 
         at = np.zeros((VARIANTS, 3))
         at[:, 1], at[:, 2] = place[i], 0.0 if petals else -compound.curl * place[i] ** 2
         # Each variant's leaflets are those of others: one after the other.
-        moved = LeafSurface(np.roll(blade.positions, i, axis=0), *_faces(blade))
-        parts.append(moved.moved(frame, at))
+        parts.append(replace(blade, positions=np.roll(blade.positions, i, axis=0)).moved(frame, at))
     if compound.stem and tolerance < 0.02:
         parts.append(_rachis(compound, float(place.max()), tolerance))
-    made = joined(parts)
-    return LeafSurface(made.positions, made.corner_verts, made.face_offsets, made.uv, made.solid, tolerance)
-
-
-def _faces(blade: LeafSurface) -> tuple:
-    return blade.corner_verts, blade.face_offsets, blade.uv, blade.solid, blade.error
+    return replace(joined(parts), error=tolerance)
 
 
 def _leaflets(compound: Compound) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -77,13 +71,10 @@ def _leaflets(compound: Compound) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     size = compound.length * (compound.ends + (1.0 - compound.ends) * share)
     place = compound.first + (compound.last - compound.first) * rank
     turn = np.radians(compound.angle) * np.where(rank > 0.7, 1.0 - 0.5 * (rank - 0.7), 1.0)
-    places, turns, sizes = (
-        np.repeat(place, 2) + np.tile([0.0, 0.012], len(rank)),
-        np.stack([turn, -turn], axis=1).ravel(),
-        np.repeat(size, 2),
-    )
-    if not compound.pairs:
-        places, turns, sizes = places[:0], turns[:0], sizes[:0]
+    places, turns, sizes = np.zeros((3, 0))
+    if compound.pairs:
+        places, sizes = np.repeat(place, 2) + np.tile([0.0, 0.012], len(rank)), np.repeat(size, 2)
+        turns = np.stack([turn, -turn], axis=1).ravel()
     if compound.terminal or not len(places):
         end = max(1.0 - compound.length * compound.ends, compound.last if compound.pairs else 0.0)
         places, turns = np.append(places, end), np.append(turns, 0.0)

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .models import LeafModel, leaf_model
+from .models import LeafModel, fans, leaf_model
 
 #: The topology of all of them.
 KITE = leaf_model([[0.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [-0.5, 0.5, 0.0]], [[0, 1, 2, 3]])
@@ -66,10 +66,10 @@ def leaf_kites(model: LeafModel) -> LeafKites:
     normals = vectors / np.maximum(areas, 1e-300)[:, None]
     materials = np.zeros(len(areas), np.int32) if model.material_index is None else model.material_index
     fan = _fan(model, normals)
+    normal, fold, off = _sheet(*fan)
     found = []
     for material in np.unique(materials):
         own = np.flatnonzero((materials == material) & (areas > 0))
-        normal, fold, off = _sheet(*fan)
         if off < _FOLDED_ONCE and len(own) == len(areas):
             # A face that is not flat counts as it is drawn.
             found.append((_kite(model, float(fan[1].sum()), normal, fan, fold), areas.sum(), material))
@@ -108,10 +108,8 @@ def _mean_direction(normals: NDArray[np.float64], areas: NDArray[np.float64]) ->
 
 def _fan(model: LeafModel, normals: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Corners (t, 3, 3) and areas (t,) of triangles that fan out over the faces."""
-    first = model.corner_verts[model.face_offsets[:-1]]
-    face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))
-    corners = np.stack([first[face], model.corner_verts, model.corner_verts[model.next_corner]], axis=1)
-    points = model.positions[corners]
+    face, corners = fans(model)
+    points = np.ascontiguousarray(corners.swapaxes(0, 1))
     # Negative where a face is concave; triangles at the ends of a fan have none.
     vectors = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
     area = np.copysign(np.linalg.norm(vectors, axis=1), np.einsum("ti,ti->t", vectors, normals[face]))

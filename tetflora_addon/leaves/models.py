@@ -20,6 +20,7 @@ from .compounds import Compound
 from .needles import Needles
 from .outlines import Blade
 from .shapes import LEAF_SHAPES
+from .surfaces import next_corners
 
 MAX_LEAF_POLYGONS = 2000
 MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices
@@ -101,9 +102,7 @@ class LeafModel:
     @cached_property
     def next_corner(self) -> NDArray[np.int32]:
         """(c,) int32: the corner that follows each corner in its face."""
-        following = np.arange(1, len(self.corner_verts) + 1, dtype=np.int32)
-        following[self.face_offsets[1:] - 1] = self.face_offsets[:-1]
-        return following
+        return next_corners(self.face_offsets)
 
     @cached_property
     def edges(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -158,6 +157,13 @@ class LeafModel:
         return float(np.ptp(self.positions[:, [0, 2]], axis=0).max())
 
 
+def fans(model: LeafModel) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Faces (c,) of triangles that fan out over them, one for each corner, and the corners (3, c, 3) of these."""
+    first = model.corner_verts[model.face_offsets[:-1]]
+    face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))
+    return face, model.positions[np.stack([first[face], model.corner_verts, model.corner_verts[model.next_corner]])]
+
+
 def mean_silhouette(model: LeafModel) -> float:
     """Mean over directions of the area that a leaf of size 1 covers, seen from each, to a few percent.
 
@@ -165,9 +171,7 @@ def mean_silhouette(model: LeafModel) -> float:
     courbes et à la quadrature des surfaces", 1841). Directions follow a spiral over half of a sphere, as both sides
     show the same; faces are drawn as fans of triangles.
     """
-    first = model.corner_verts[model.face_offsets[:-1]]
-    face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))
-    corners = model.positions[np.stack([first[face], model.corner_verts, model.corner_verts[model.next_corner]])]
+    corners = fans(model)[1]
     number = np.arange(_DIRECTIONS)
     total = 0.0
     for towards in spiral((number + 0.5) / _DIRECTIONS, number, GOLDEN_ANGLE):
@@ -252,24 +256,17 @@ def _folded(half_width: float, fold: float, droop: float) -> LeafModel:
     return leaf_model([base, tip, low, high, *mirrored], [[0, 2, 3, 1], [0, 1, 5, 4]])
 
 
-def _spray(blades: int, half_width: float) -> LeafModel:
-    """Narrow quads fanned out in a plane and tilted out of it: a bundle of needles."""
-    positions, faces = [], []
-    for i in range(blades):
-        turn = np.radians(-55 + 110 * (i + 0.5) / blades)
-        lift = 0.25 * (1 if i % 2 else -1)
-        along = np.array([np.sin(turn), np.cos(turn), lift])
+def _spray() -> LeafModel:
+    """Four narrow quads fanned out in a plane and tilted out of it: a bundle of needles."""
+    positions = []
+    for i in range(4):
+        turn = np.radians(-55 + 110 * (i + 0.5) / 4)
+        along = np.array([np.sin(turn), np.cos(turn), 0.25 * (1 if i % 2 else -1)])
         along /= np.linalg.norm(along)
-        across = half_width * np.array([np.cos(turn), -np.sin(turn), 0.0])
-        faces.append([4 * i + k for k in range(4)])
+        across = 0.035 * np.array([np.cos(turn), -np.sin(turn), 0.0])
         positions += [0 * along - across, 0 * along + across, along + across, along - across]
-    return leaf_model(np.array(positions), faces, np.tile([[0, 0], [1, 0], [1, 1], [0, 1]], (blades, 1)))
-
-
-def _kite(half_width: float, fold: float, droop: float) -> LeafModel:
-    """One quad, bent along the midrib: the least that still looks like a leaf."""
-    corners = [(0.0, 0.0, 0.0), (half_width, 0.4, fold), (0.0, 1.0, -droop), (-half_width, 0.4, fold)]
-    return leaf_model(corners, [[0, 1, 2, 3]])
+    faces = np.arange(16).reshape(4, 4).tolist()
+    return leaf_model(np.array(positions), faces, np.tile([[0, 0], [1, 0], [1, 1], [0, 1]], (4, 1)))
 
 
 def _outlined(half: list[tuple[float, float]], fold: float, droop: float) -> LeafModel:
@@ -285,9 +282,9 @@ def _outlined(half: list[tuple[float, float]], fold: float, droop: float) -> Lea
     return leaf_model([*ends, *right, *left], faces)
 
 
-def _flower(petals: int, half_width: float, cup: float) -> LeafModel:
+def _flower() -> LeafModel:
     """Quads around a point half a unit along: an open flower that looks up, its petals raised at their tips."""
-    centre = np.array([0.0, 0.5, 0.0])
+    petals, half_width, cup, centre = 5, 0.24, 0.12, np.array([0.0, 0.5, 0.0])
     turn = 2 * np.pi * (np.arange(petals) + 0.5) / petals - np.pi / 2
     along = np.stack([np.cos(turn), np.sin(turn), np.zeros(petals)], axis=1)
     across = np.stack([-along[:, 1], along[:, 0], along[:, 2]], axis=1)
@@ -303,15 +300,16 @@ _MAPLE = [(0.2, -0.05), (0.4, 0.12), (0.29, 0.22), (0.56, 0.56), (0.24, 0.5), (0
 _DELTOID = [(0.3, 0.1), (0.37, 0.3), (0.19, 0.66)]
 
 _COARSE: dict[str, LeafModel] = {
-    "kite": _kite(0.32, 0.05, 0.05),
+    # One quad, bent along the midrib: the least that still looks like a leaf.
+    "kite": leaf_model([(0.0, 0.0, 0.0), (0.32, 0.4, 0.05), (0.0, 1.0, -0.05), (-0.32, 0.4, 0.05)], [[0, 1, 2, 3]]),
     "ovate": _folded(0.30, 0.08, 0.10),
     "round": _folded(0.42, 0.05, 0.06),
     "lanceolate": _folded(0.13, 0.03, 0.12),
-    "needles": _spray(4, 0.035),
+    "needles": _spray(),
     "lobed": _outlined(_LOBED, 0.16, 0.08),
     "maple": _outlined(_MAPLE, 0.14, 0.1),
     "deltoid": _outlined(_DELTOID, 0.14, 0.08),
-    "blossom": _flower(5, 0.24, 0.12),
+    "blossom": _flower(),
 }
 LEAF_MODELS: dict[str, LeafModel] = {n: replace(model, shape=LEAF_SHAPES.get(n)) for n, model in _COARSE.items()}
 """The built-in polygon lists by name, with what they stand for."""

@@ -7,7 +7,7 @@ Fewer and broader ones from afar, then all of them, flat, and prisms with a bend
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,8 +73,7 @@ def needle_surface(needles: Needles, tolerance: float, factor: float = 1.0) -> L
         parts.append(_shoot(needles, i, tolerance, factor).moved(frame, np.zeros(3)))
     error = needles.gap * (_SPARSE_GAP if tolerance > SPARSE else 1.0)
     error = error if tolerance > _FLAT else min(tolerance, error)
-    made = joined(parts)
-    return LeafSurface(made.positions, made.corner_verts, made.face_offsets, made.uv, made.solid, error)
+    return replace(joined(parts), error=error)
 
 
 def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> LeafSurface:

@@ -17,10 +17,17 @@ _FITS, _FITTED = 12, 1e-7
 _GOLDEN = 0.6180339887498949
 
 
-def drawn(number: int, count: int = VARIANTS) -> NDArray[np.float64]:
-    """Even numbers (count,) from -1 to 1, one for each variant; others for each number that they are drawn by."""
+def drawn(number: int) -> NDArray[np.float64]:
+    """Even numbers (k,) from -1 to 1, one for each variant; others for each number that they are drawn by."""
     step = (_GOLDEN * (number + 1) ** 2 + 0.31 * number) % 1.0
-    return 2.0 * ((np.arange(count) * (_GOLDEN + 0.4 * step) + step) % 1.0) - 1.0
+    return 2.0 * ((np.arange(VARIANTS) * (_GOLDEN + 0.4 * step) + step) % 1.0) - 1.0
+
+
+def next_corners(offsets: NDArray[np.int32]) -> NDArray[np.int32]:
+    """The corner (c,) that follows each corner in its face, by where faces start (f + 1,)."""
+    following = np.arange(1, offsets[-1] + 1, dtype=np.int32)
+    following[offsets[1:] - 1] = offsets[:-1]
+    return following
 
 
 @dataclass(frozen=True)
@@ -71,8 +78,7 @@ class LeafSurface:
 
     def _area_vectors(self) -> NDArray[np.float64]:
         """Twice the area vectors (k, f, 3) of all faces."""
-        following = np.arange(1, len(self.corner_verts) + 1)
-        following[self.face_offsets[1:] - 1] = self.face_offsets[:-1]
+        following = next_corners(self.face_offsets)
         points = self.positions[:, self.corner_verts]
         origin = np.repeat(points[:, self.face_offsets[:-1]], np.diff(self.face_offsets), axis=1)
         return np.add.reduceat(np.cross(points - origin, points[:, following] - origin), self.face_offsets[:-1], axis=1)
@@ -136,17 +142,12 @@ def joined(parts: Sequence[LeafSurface]) -> LeafSurface:
     )
 
 
-def tube(
-    points: NDArray[np.float64], radius: NDArray[np.float64], sides: int, across: NDArray[np.float64] | None = None
-) -> LeafSurface:
-    """A tube along points (k, n, 3) with radii (n,), ended by a point where the last of them is 0.
-
-    Its texture runs once around in u, and along in v; ``across`` (3,) is a direction that it does not lead along.
-    """
+def tube(points: NDArray[np.float64], radius: NDArray[np.float64], sides: int) -> LeafSurface:
+    """A tube along points (k, n, 3), which do not lead upwards, with radii (n,); its texture runs around and along."""
     variants, rings, _ = points.shape
     along = np.gradient(points, axis=1)
     along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-12)
-    side = np.cross(along, np.array([0.0, 0.0, 1.0]) if across is None else across)
+    side = np.cross(along, [0.0, 0.0, 1.0])
     side /= np.maximum(np.linalg.norm(side, axis=2, keepdims=True), 1e-12)
     up = np.cross(side, along)
     turn = 2 * np.pi * np.arange(sides) / sides
@@ -155,9 +156,6 @@ def tube(
     i, j = np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij")
     after = (j + 1) % sides
     quads = np.stack([i * sides + j, i * sides + after, (i + 1) * sides + after, (i + 1) * sides + j], axis=-1)
-    quads = quads.reshape(-1, 4)
-    if radius[-1] == 0.0:
-        quads = np.where(quads >= (rings - 1) * sides, (rings - 1) * sides, quads)
     u = np.tile(0.5 + 0.5 * np.cos(turn), rings)
     v = np.repeat(np.linspace(0.0, 1.0, rings), sides)
-    return surface(places, quads, np.stack([u, v], axis=1), solid=True)
+    return surface(places, quads.reshape(-1, 4), np.stack([u, v], axis=1), solid=True)

@@ -15,6 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import connected
+
 _JOINED_WITHIN = 0.01  # of the size: a start that is drawn by eye, not snapped
 
 
@@ -227,22 +229,6 @@ def joined_edges(chains: Chains) -> tuple[NDArray[np.float64], NDArray[np.int64]
     split = [np.stack([before, new], axis=1), np.stack([new[final], edges[bearer[final], 1]], axis=1)]
     lines = [np.delete(line, bearer), line[bearer], line[bearer[final]]]
     return points, np.concatenate([np.delete(edges, bearer, axis=0), *split]), np.concatenate(lines)
-
-
-def connected(n: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n,) smallest index in the part of each of n things, of which a (e,) and b (e,) are connected."""
-    label = np.arange(n)
-    while (label[a] != label[b]).any():
-        np.minimum.at(label, np.maximum(label[a], label[b]), np.minimum(label[a], label[b]))
-        label = top(label)
-    return label
-
-
-def top(up: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Where each thing (n,) comes to by following ``up`` until it stays; the steps double each time."""
-    while (up[up] != up).any():
-        up = up[up]
-    return up
 
 
 def breadth_first(pairs: NDArray[np.int64], roots: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -15,8 +15,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import connected, top
 from ..errors import SpeciesError
-from .curves import breadth_first, coinciding, connected, levels, longest_way, summed_from_root, top
+from .curves import breadth_first, coinciding, levels, longest_way, summed_from_root
 
 #: Orders of branches that a plant has at most.
 MAX_ORDERS = 6
