@@ -19,7 +19,7 @@ import numpy as np
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import facet_weights
-from tetflora_addon.proxies.weight_variants import variants
+from tetflora_addon.proxies.facet_weights import variants
 from tetflora_addon.species.catalogue import list_species, load_species
 
 #: Blocked rays from which weights of variants follow; those of species as described follow from all.

@@ -40,6 +40,20 @@ class Range(NamedTuple):
         """Largest possible value."""
         return self.mean + self.variation
 
+    def scaled(self, factor: float) -> Range:
+        """The same times a factor."""
+        return Range(factor * self.mean, factor * self.variation)
+
+    def allowed(self, factor: float, key: Key) -> float:
+        """The factor, or the nearest to it that keeps a range with a mean above 0 within the limits of a key."""
+        if self.high > 0:
+            factor = min(factor, key.high / self.high)
+        if self.low < 0:
+            factor = min(factor, key.low / self.low)
+        elif self.low > 0:
+            factor = max(factor, key.low / self.low)
+        return factor
+
 
 class Colour(NamedTuple):
     """A linear colour that differs from leaf to leaf: mean ± variation, all channels together."""

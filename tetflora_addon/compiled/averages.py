@@ -19,11 +19,11 @@ from ..growth.foliage import YOUTH
 from ..growth.grown_rows import NOW, fullness_of, lengths, spread_children
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..leaves.models import LeafModel
+from ..species.growing import EVEN
 from ..species.members import dead_vigour, expected_forks
 from ..species.species import Range
 
 NODES = np.array([0.0, 0.5, 1.0])
-_FRACTIONS = (np.arange(256) + 0.5) / 256
 _GAUSS, _WEIGHTS = (part / 2 for part in np.polynomial.legendre.leggauss(8))
 _GAUSS = _GAUSS + 0.5
 
@@ -271,7 +271,7 @@ def children_sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
         return _fork_sums(rows, i)
     start, (low, high) = row["start"][sort, 0], row["fraction"][sort]
     end = row["start"][sort, 1] if sort == DEAD else 1.0
-    t, fraction = start + (end - start) * _FRACTIONS, low + (high - low) * _FRACTIONS
+    t, fraction = start + (end - start) * EVEN, low + (high - low) * EVEN
     weight, fading = 1.0, 1.0
     if row["growing"][sort, NOW] > 0:
         t, fraction, weight, fading = spread_children(row, sort)

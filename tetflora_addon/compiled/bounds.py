@@ -19,8 +19,7 @@ from ..growth.grown_rows import NOW
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..growth.wind import widest_sway
 from ..species.species import crown_ratio
-from .limbs import LIMB
-from .samples import Points
+from .samples import LIMB, Points
 
 _SLABS = 48
 _ANGLES = 33

@@ -16,7 +16,8 @@ nothing in truth shall on the mean pass through the tetrahedra. What is fitted i
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -29,7 +30,6 @@ from ..growth.growth import trunks
 from ..growth.hashing import key_of_seed, mix, uniform
 from ..growth.seeds import Seeds
 from ..leaves.models import LeafModel
-from ..species.fingerprints import fingerprint
 from ..storage import remembered
 from .rays import WIDEST, Things, basis, cell_numbers, covered, opened, path_lengths, things_of
 
@@ -265,3 +265,45 @@ def _solved(
         if largest < 1e-4:
             break
     return found
+
+
+#: Fields that depend on what other species there are, one that others give, and one that changes no area.
+_PLACES = {"species", "next", "drawn_rows", "sunlit", "dead"}
+#: Fields that came later, with the values that change nothing: species without them keep their fingerprint.
+_LATER: dict[str, Callable[[NDArray[np.void]], NDArray[np.float64] | float]] = {
+    "leaf_light_tip": lambda rows: rows["leaf_light"][:, 0],
+    "leaf_size_young": lambda _: 1.0,
+    "leaf_colour_young": lambda rows: rows["leaf_colour"][:, 0],
+    "envelope": lambda _: 0.0,
+    "envelope_radius": lambda _: 0.0,
+    "inclination": lambda _: 0.0,
+    **{name: lambda _: 0.0 for name in ("growing", "settled", "conical", "ramps", "least")},
+}
+#: Sorts of children in the first tables that were kept; others count where a species has them.
+_FIRST_SORTS = 3
+
+
+def fingerprint(rows: NDArray[np.void], forms: Sequence[Sequence[LeafModel]], method: int) -> str:
+    """Hash of a species' parameters and the forms of its leaves: 16 hexadecimal digits.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+        Of this species alone.
+    forms : by kind
+        Models of leaves.
+    method : int
+        Counts the ways in which results were found so far.
+    """
+    content = hashlib.sha256(f"{method}".encode())
+    unused = {name for name, neutral in _LATER.items() if (rows[name] == neutral(rows)).all()}
+    for name in sorted(set(rows.dtype.names) - _PLACES - unused):
+        # Rounded, because versions of numpy may differ in the last digit.
+        value = np.round(rows[name].astype(np.float64), 6) + 0.0
+        if name in ("count", "start", "fraction") and not (rows["next"][:, _FIRST_SORTS:] >= 0).any():
+            value = value[:, :_FIRST_SORTS]
+        content.update(name.encode() + np.ascontiguousarray(value).tobytes())
+    for form in (model for models in forms for model in models):
+        content.update(np.ascontiguousarray(form.positions).tobytes())
+        content.update(np.ascontiguousarray(form.corner_verts).tobytes())
+    return content.hexdigest()[:16]

@@ -21,12 +21,12 @@ from ..growth.crown_forms import BASE, MOST, WIDTH
 from ..growth.formed import LIGHT, are_stools, bare_part, dead_end, fractions, raised, sparser
 from ..growth.grown_rows import NOW, fullness_of, lengths, living, spread_children
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
+from ..species.growing import EVEN
 from ..species.members import dead_vigour
 from ..species.species import LEAF_KINDS
 from .averages import Averages, children_sums
 
 _BASES = np.linspace(0.0, MOST[BASE], 39)
-_EVEN = (np.arange(256) + 0.5) / 256
 _GAUSS = np.polynomial.legendre.leggauss(5)[0]
 _MEANS = np.polynomial.legendre.leggauss(5)[1] / 2
 _KINDS = len(LEAF_KINDS)
@@ -170,13 +170,13 @@ def _limbs(rows: NDArray[np.void], i: int, sort: int, base: float) -> tuple[floa
     elif sort == DEAD:
         (start, end), last = row["start"][sort], float(dead_end(rows, at, base)[0])
         number *= (last - start) / (end - start) if end > start else 1.0
-        t, fraction = start + (last - start) * _EVEN, among[0] + (among[1] - among[0]) * _EVEN
+        t, fraction = start + (last - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
     else:
         mean, variation = row["start"][sort]
         starts = mean + variation * _GAUSS
         number *= float(_MEANS @ ((1 - np.maximum(starts, bare)) / np.maximum(1 - starts, 1e-9)))
         start = max(mean, bare)
-        t, fraction = start + (1 - start) * _EVEN, among[0] + (among[1] - among[0]) * _EVEN
+        t, fraction = start + (1 - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
     if sort == LATERAL:
         number *= float(sparser(rows, at, base)[0])
     here = np.full(t.shape, i)

@@ -1,23 +1,42 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heights and crown widths of single plants as one would measure them, and crown forms of plants that were measured."""
+"""Heights and crown widths of single plants as one would measure them, and crown forms of plants that were measured.
+
+Of the limbs of a plant the few that are likely to end outermost or on top are grown. How far what grows on these
+reaches beyond them is known from a few whole limbs of their kind.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..growth.crown_forms import LEAST, MOST, PLAIN, WIDTH
-from ..growth.formed import MOST_LEANING, along, are_stools
-from ..growth.growth import trunks
+from ..arrays import spread
+from ..growth.axes import Axes, axes
+from ..growth.branches import Branches
+from ..growth.crown_forms import BASE, LEAST, MOST, PLAIN, WIDTH
+from ..growth.foliage import leaf_keys, leaf_places, place_leaves, settled
+from ..growth.formed import MOST_LEANING, along, are_stools, bare_part, fractions, reaches
+from ..growth.grown_rows import FADES, lengths
+from ..growth.growth import (
+    branch_counts,
+    children,
+    chosen_children,
+    drawn_children,
+    leaf_counts,
+    living_nodes,
+    trunks,
+)
+from ..growth.hashing import Draw, uniform
+from ..growth.rows import FORK, LATERAL
 from ..growth.seeds import Seeds
 from ..parallel import each_on_all_cores
+from ..species.growing import faded
 from .flora import Flora
-from .outermost import Beyond, Outermost, beyond_limbs, outermost
 
 _AT_ONCE = 2_000
 _BISECTIONS = 11
@@ -129,3 +148,293 @@ def _solved(
         narrow = width < wanted * height
         low, high = np.where(narrow, middle, low), np.where(narrow, high, middle)
     return np.sqrt(low * high)
+
+
+#: East, west, north, south and up.
+WAYS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
+UP = 4
+#: Limbs that are grown for each of these.
+_LIKELY = (6, 6, 6, 6, 8)
+#: Plants, and limbs of these, that tell how far twigs and leaves reach; factors on the lengths of the limbs.
+_KNOWN_PLANTS, _LONG, _HIGH, _FACTORS = 8, 27, 15, (0.6, 1.0, 1.7)
+#: Of limbs that reach almost as far, that one wins whose twigs do: so many standard deviations more than on the mean.
+_LUCK = 0.6
+#: Part of the way that stems of shrubs reach to the sides which is not their own lean.
+_ASIDE = 0.4
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """How far twigs and leaves of a species reach beyond its limbs.
+
+    Attributes
+    ----------
+    side, up : pair of float
+        Metres at plant scale 1, and fraction of the limb's length.
+    top : float
+        How far leaves of trunks and stems reach beyond these, metres at plant scale 1.
+    whole : pair of float
+        Height and crown width of plants without limbs, in lengths of their trunks; 0 where there are limbs.
+    """
+
+    side: tuple[float, float] = (0.0, 0.0)
+    up: tuple[float, float] = (0.0, 0.0)
+    top: float = 0.0
+    whole: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Outermost:
+    """What reaches farthest on plants (n).
+
+    Attributes
+    ----------
+    plant : (m,) int32
+        Whose limb it is; in order.
+    root, limb : (5, m) float64
+        How far limbs begin in each of `WAYS`, and how much farther they lead; metres.
+    stem : (m,) bool
+        Whether they begin on stems beyond a fork, which lean more or less.
+    width : (n,) float64
+        Factor on the lengths of limbs that plants have already.
+    """
+
+    plant: NDArray[np.int32]
+    root: NDArray[np.float64]
+    limb: NDArray[np.float64]
+    stem: NDArray[np.bool_]
+    width: NDArray[np.float64]
+
+    def sizes(self, factor: NDArray[np.float64] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Heights and crown widths (n,), (n,) if limbs were so many times (n,) as long, about; metres."""
+        if factor is None:
+            reach = self.root + self.limb
+        else:
+            lean = np.minimum(factor * self.width, 1.0) / np.minimum(self.width, 1.0)
+            reach = factor[self.plant] * self.limb
+            reach[:UP] += np.where(self.stem, lean[self.plant], 1.0) * self.root[:UP]
+            reach[UP] += self.root[UP]
+        far = np.maximum.reduceat(reach, np.flatnonzero(np.diff(self.plant, prepend=-1)), axis=1)
+        return far[UP], far[:UP].sum(axis=0) / 2
+
+
+def outermost(rows: NDArray[np.void], plants: Branches, beyond: Beyond) -> Outermost:
+    """What reaches farthest on plants (n) of one species, trunks of which are given."""
+    stems = _stems(rows, plants)
+    chosen = _likely(rows, stems, len(plants))
+    owner, root, limb, stem = [], [], [], []
+    for (grown, lines), (counts, which, index) in zip(stems, chosen, strict=True):
+        origin = plants.position[grown.plant]
+        owner.append(grown.plant)
+        own = _farthest(lines, origin)
+        own[:, UP] += beyond.top * grown.scale
+        root.append(own)
+        limb.append(np.zeros((len(grown), len(WAYS))))
+        stem.append(rows["continues"][grown.row])
+        limbs = chosen_children(rows, grown, lines, which, index, counts)
+        if not len(limbs):
+            continue
+        origin, axis = plants.position[limbs.plant], axes(rows, limbs)
+        begin = _in_ways(limbs.position - origin)
+        leads = _farthest(axis, origin) - begin
+        end = axis.knot(np.arange(len(limbs)), axis.segments) - limbs.position
+        level = end[:, :2] / np.maximum(np.hypot(end[:, 0], end[:, 1]), 1e-9)[:, None]
+        side, up = (a * limbs.scale + b * limbs.length for a, b in (beyond.side, beyond.up))
+        leads[:, :UP] += np.maximum(level @ WAYS[:UP, :2].T, 0.0) * side[:, None]
+        leads[:, UP] += up
+        # Wider crowns of shrubs are stems that lean more, which bear as much to the sides as before.
+        lean, part = are_stools(rows, grown.row[which]), np.array([_ASIDE] * UP + [1.0])
+        begin[lean], leads[lean] = begin[lean] + part * leads[lean], (1 - part) * leads[lean]
+        stem.append(rows["continues"][grown.row[which]])
+        owner.append(limbs.plant)
+        root.append(begin)
+        limb.append(leads)
+    width = np.ones(len(plants)) if plants.crown is None else plants.crown[:, WIDTH].astype(np.float64)
+    plant, root, limb, stem = (np.concatenate(some) for some in (owner, root, limb, stem))
+    order = np.argsort(plant, kind="stable")
+    root, limb = (np.ascontiguousarray(some[order].T) for some in (root, limb))
+    return Outermost(plant[order], root, limb, stem[order], width)
+
+
+def _stems(rows: NDArray[np.void], plants: Branches) -> list[tuple[Branches, Axes]]:
+    """Trunks and the stems beyond their forks, a generation at a time, numbered by plant, with their axes."""
+    out, grown = [], replace(plants, plant=np.arange(len(plants), dtype=np.int32))
+    while len(grown):
+        lines = axes(rows, grown)
+        out.append((grown, lines))
+        counts = branch_counts(rows, grown, FORK)
+        owner, index = spread(counts)
+        grown = chosen_children(rows, grown, lines, owner, index, counts, FORK)
+    return out
+
+
+def _farthest(lines: Axes, origin: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far axes (n,) reach in each of `WAYS` (n, 5) from places (n, 3)."""
+    return np.maximum(_in_ways(lines.knots.max(axis=1) - origin), _in_ways(lines.knots.min(axis=1) - origin))
+
+
+def _in_ways(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places (n, 3) along each of `WAYS` (n, 5)."""
+    x, y, z = place.T
+    return np.stack([x, -x, y, -y, z]).T
+
+
+def _likely(
+    rows: NDArray[np.void], stems: list[tuple[Branches, Axes]], n: int
+) -> list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]]:
+    """Limbs of stems that are likely to reach farthest: by generation counts, stems (m,) and limbs (m,) of these."""
+    found = [_mean_tips(rows, *one) for one in stems]
+    tree = np.concatenate([grown.plant[owner] for (grown, _), (_, owner, _, _) in zip(stems, found, strict=True)])
+    tips = np.concatenate([tip for *_, tip in found])
+    order = np.argsort(tree, kind="stable")
+    number = np.bincount(tree, minlength=n)
+    place = np.arange(len(tree)) - (np.cumsum(number) - number)[tree[order]]
+    most = int(number.max(initial=0))
+    chosen = np.zeros((n, most), bool)
+    if most > max(_LIKELY):
+        for way, likely in enumerate(_LIKELY):
+            padded = np.full((n, most), -np.inf, np.float32)
+            padded[tree[order], place] = tips[order, way]
+            best = np.argpartition(padded, most - likely, axis=1)[:, most - likely :]
+            np.put_along_axis(chosen, best, True, axis=1)
+    else:
+        chosen[:] = True
+    some = np.zeros(len(tree), bool)
+    some[order] = chosen[tree[order], place]
+    out, start = [], 0
+    for counts, owner, index, _ in found:
+        mine = np.flatnonzero(some[start : start + len(owner)])
+        out.append((counts, owner[mine], index[mine]))
+        start += len(owner)
+    return out
+
+
+def _mean_tips(
+    rows: NDArray[np.void], stems: Branches, lines: Axes
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
+    """Counts of limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `WAYS`.
+
+    As `growth.chosen_children` has it, but for what differs at random from limb to limb.
+    """
+    counts = branch_counts(rows, stems)
+    owner, index = spread(counts)
+    row, child = stems.row, np.maximum(rows["next"][stems.row, LATERAL], 0)
+    whorl = np.maximum(rows["whorl"][child], 1)[owner]
+    crown = stems.crown
+    base = np.zeros(len(stems)) if crown is None else crown[:, BASE]
+    start = np.maximum(rows["start"][row, LATERAL, 0], bare_part(rows, row, base))
+    part = (index // whorl + 0.5) / np.maximum(counts[owner] // whorl, 1)
+    t, number, fading = start[owner] + (1 - start[owner]) * part, index, 1.0
+    grown = living_nodes(rows, stems, LATERAL)
+    if grown is not None:
+        number, _, extra = grown.chosen(owner, index, whorl)
+        there, among, described = grown.places(owner, number // whorl, np.full(len(owner), 0.5), extra)
+        on = grown.on[owner]
+        least = whorl / np.maximum(counts, 1)[owner]  # the lowest may be anywhere in their node
+        t, part = np.where(on, there, t), np.where(on, np.maximum(among, least), part)
+        first, last = rows["fraction"][row, LATERAL].T
+        described = first[owner] + (last - first)[owner] * described
+        fading = faded(described, rows["growing"][row, LATERAL, FADES][owner], extra)
+    low, high = fractions(rows, row, base).T
+    fraction = low[owner] + (high - low)[owner] * part
+    angle = rows["angle"][child, 0][owner]
+    angle = angle + (rows["angle_tip"][child][owner] - angle) * fraction
+    turn = 2 * np.pi * uniform(stems.key, Draw.AZIMUTH)
+    azimuth = turn[owner] + 2 * np.pi * (number % whorl) / whorl + number // whorl * rows["azimuth"][child, 0][owner]
+    length = (stems.length * rows["nominal"][row] * rows["length"][child, 0])[owner]
+    length = length * lengths(rows, row[owner], fraction) * fading
+    if crown is not None:
+        length /= along(rows, row, crown)[owner]
+        few = replace(Branches.empty(), row=row[owner], crown=crown[owner])
+        lean, reach = reaches(rows, few, azimuth, LATERAL)
+        length, angle = length * reach, angle * lean
+    sine, cosine = length * np.sin(angle), length * np.cos(angle)
+    rise = lines.knot(np.arange(len(stems)), lines.segments) - stems.position
+    c, s = sine * np.cos(azimuth), sine * np.sin(azimuth)
+    tips = np.empty((len(owner), 3))
+    for k in range(3):
+        across, aside, upright = stems.frame[:, k].T
+        tips[:, k] = stems.position[owner, k] + t * rise[owner, k]
+        tips[:, k] += c * across[owner] + s * aside[owner] + cosine * upright[owner]
+    tips = _in_ways(tips).astype(np.float32)
+    return counts, owner, index, tips
+
+
+def beyond_limbs(rows: NDArray[np.void], first: int, species: int) -> Beyond:
+    """How far twigs and leaves of a species reach, whose trunk is row ``first``."""
+    n = _KNOWN_PLANTS
+    upright = np.tile(np.eye(3), (n, 1, 1))
+    seeds = Seeds(("",), np.full(n, species, np.int32), np.arange(n), np.zeros((n, 3)), upright, np.ones(n))
+    plants = trunks(rows, seeds)
+    limbs, over = [], 0.0
+    for grown, lines in [] if rows["phantom"][first] else _stems(rows, plants):
+        owner, tip = _leaf_tips(rows, grown, lines)
+        own = lines.knots[:, :, 2].max(axis=1)
+        highest = own.copy()
+        np.maximum.at(highest, owner, tip[:, 2])
+        over = max(over, float((highest - own).mean()))
+        if (rows["next"][grown.row, LATERAL] >= 0).any():
+            counts = branch_counts(rows, grown)
+            owner, index = spread(counts)
+            limbs.append(chosen_children(rows, grown, lines, owner, index, counts))
+    limbs = Branches.concatenate(limbs)
+    if not len(limbs):
+        far = _all_extremes(rows, plants, np.broadcast_to(WAYS, (n, *WAYS.shape))) / plants.length[:, None]
+        return Beyond(whole=(float(far[:, UP].mean()), float(far[:, :UP].sum(axis=1).mean() / 2)))
+    order = np.argsort(limbs.length, kind="stable")
+    longest = np.flatnonzero(limbs.length[order] > 0.5 * limbs.length.max())
+    side = order[longest[np.linspace(0, len(longest) - 1, _LONG).astype(np.int64)]]
+    top = np.argsort(limbs.position[:, 2] + limbs.length * limbs.frame[:, 2, 2], kind="stable")
+    high = top[np.linspace(len(top) - 1 - min(4 * n, len(top) - 1), len(top) - 1, _HIGH).astype(np.int64)]
+    return Beyond(_fitted(rows, limbs.take(side), False), _fitted(rows, limbs.take(high), True), over)
+
+
+def _fitted(rows: NDArray[np.void], limbs: Branches, up: bool) -> tuple[float, float]:
+    """How far what grows on limbs reaches beyond them, in the way that they lead or up: metres, and of their length."""
+    factor = np.resize(_FACTORS, len(limbs))
+    limbs = replace(limbs, length=limbs.length * factor, vigour=limbs.vigour * factor)
+    lines, every = axes(rows, limbs), np.arange(len(limbs))
+    end = lines.knot(every, lines.segments) - limbs.position
+    way = end * [1.0, 1.0, 0.0] if not up else np.broadcast_to(WAYS[UP], end.shape)
+    way = way / np.maximum(np.linalg.norm(way, axis=1), 1e-9)[:, None]
+    own = np.einsum("nsi,ni->ns", lines.knots - limbs.position[:, None], way).max(axis=1)
+    over = _all_extremes(rows, limbs, way[:, None])[:, 0] - own
+    terms = np.stack([np.ones(len(limbs)), limbs.length], axis=1)
+    (metres, part), *_ = np.linalg.lstsq(terms, over, rcond=None)
+    luck = _LUCK * (over - terms @ [metres, part]).std() / limbs.length.mean()
+    return float(metres), float(part + luck)
+
+
+def _leaf_tips(
+    rows: NDArray[np.void], branches: Branches, lines: Axes
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Branch (m,) and end (m, 3) of the leaves of branches."""
+    counts = leaf_counts(rows, branches)
+    owner, index = spread(counts)
+    key = leaf_keys(branches, owner, index)
+    t = leaf_places(rows, branches, owner, index, counts, key)
+    leaves = place_leaves(rows, branches, lines, owner, index, key, t)
+    frame = settled(rows, branches.row[owner], leaves.frame, leaves.light, leaves.sky)
+    return owner, leaves.position + leaves.size[:, None] * frame[:, :, 1]
+
+
+def _all_extremes(rows: NDArray[np.void], base: Branches, ways: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far wood and leaves of sub-plants (n,) reach from their bases in directions (n, k, 3) of each."""
+    out = np.zeros(ways.shape[:2])
+
+    def meet(owner: NDArray[np.integer], place: NDArray[np.float64]) -> None:
+        away = np.einsum("mi,mki->mk", place - base.position[owner], ways[owner])
+        np.maximum.at(out, owner, away)
+
+    grown = replace(base, plant=np.arange(len(base), dtype=np.int32))
+    while len(grown):
+        bodies = grown
+        if rows["phantom"][grown.row].any():
+            bodies, _ = drawn_children(rows, grown)
+        lines = axes(rows, bodies)
+        for s in range(lines.knots.shape[1]):
+            meet(bodies.plant, lines.knots[:, s])
+        owner, tip = _leaf_tips(rows, bodies, lines)
+        meet(bodies.plant[owner], tip)
+        grown, _ = children(rows, bodies, lines)
+    return out

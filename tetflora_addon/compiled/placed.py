@@ -19,8 +19,7 @@ from ..growth.formed import LIGHT, MOST_LEANING, along, are_stools, bare_part, f
 from ..growth.grown_rows import lengths
 from ..growth.rows import FORK, LATERAL
 from .flora import Flora
-from .limbs import LIMB, STEM, STEM_LIMB, Limbs, Shares
-from .samples import Points
+from .samples import LIMB, STEM, STEM_LIMB, Limbs, Points, Shares
 
 
 def formed_subplants(rows: NDArray[np.void], subplants: Branches) -> NDArray[np.intp]:

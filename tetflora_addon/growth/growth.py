@@ -32,9 +32,8 @@ from .formed import (
     reaches,
     sparser,
 )
-from .grown_rows import FADES, NOW, fullness_of, lengths
+from .grown_rows import FADES, NOW, Grown, child_number, fullness_of, grown_nodes, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
-from .nodes import Grown, child_number, grown_nodes
 from .rows import DEAD, FORK, LATERAL, SPUR, flare_rings, ranged, varied
 from .seasons import plant_years
 from .seeds import Seeds

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..species.extras import dead_part
+from ..species.growing import EVEN
 from ..species.members import expected_forks, least_length, part_segments
 from ..species.skeletons import drawn_branches
 from ..species.species import (
@@ -180,7 +180,7 @@ def _bear_dead(row: np.void, dead: Dead, order: Order, o: int, first: int) -> No
     if number.high > 0:
         row["next"][DEAD] = first
         row["count"][DEAD] = number
-        row["start"][DEAD] = dead_part(dead, order.branch_start.mean)
+        row["start"][DEAD] = dead.part(order.branch_start.mean)
 
 
 def _drawn_rows(
@@ -248,7 +248,7 @@ def _grow(row: np.void, order: Order, p: int, dead: Dead | None) -> None:
     sorts = [(LATERAL, own.laterals, order.branches, order.branch_start)]
     sorts += [(SPUR, own.spurs, order.spurs, order.spur_start)]
     if dead is not None and row["next"][DEAD] >= 0:
-        low, high = dead_part(dead, order.branch_start.mean)
+        low, high = dead.part(order.branch_start.mean)
         nodes = own.dead._replace(until=high)
         sorts += [(DEAD, nodes, dead.on_limbs if row["order"] else dead.number, Range(low))]
     for sort, nodes, number, start in sorts:
@@ -334,7 +334,7 @@ def flare_rings(number: int) -> NDArray[np.float64]:
 def _pipe_radius(row: np.void, thickest: float) -> float:
     """Radius of a lateral of vigour 1 such that all together have what the taper takes away, in r^p."""
     low, high = row["fraction"][LATERAL]
-    at, weight, fading = low + (high - low) * (np.arange(256) + 0.5) / 256, 1.0, 1.0
+    at, weight, fading = low + (high - low) * EVEN, 1.0, 1.0
     if row["growing"][LATERAL, NOW] > 0:
         _, at, weight, fading = spread_children(row, LATERAL)
     vigour = lengths(row[None], np.zeros(at.shape, np.int64), at) * fading

@@ -378,3 +378,17 @@ def in_season(
     out += stages.turned[:, None] * (autumn - out)
     out += stages.dead[:, None] * (dry - out)
     return out
+
+
+def is_gone(species: Species, season: Season | None) -> bool:
+    """Whether no plant of a species is there in a season, because its leaves have not fallen yet or are rotten.
+
+    Without seasons it is summer, when there are none.
+    """
+    if species.year is None or species.year.leaf is None or not species.year.fallen:
+        return False
+    if season is None:
+        return True
+    year = species.year.at_latitude(abs(season.latitude))
+    days = plant_days(season.northern_day, season.spread * max(year.spring, year.autumn))
+    return not expected_of(year.leaf, days, PRESENT).any()

@@ -16,9 +16,8 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from .areoles import spined
 from .blades import blade_surface
-from .bodies import closed_parts, rounded
+from .bodies import closed_parts, rounded, spined
 from .compounds import Compound, compound_surface
 from .models import LeafModel
 from .needles import SPARSE, Needles, needle_surface

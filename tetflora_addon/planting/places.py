@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Arrays
 from ..errors import SceneError
@@ -326,3 +326,19 @@ def _tilted(normal: NDArray[np.float64], tilt: float) -> NDArray[np.float64] | N
 
 def _positive(keys: NDArray[np.uint64]) -> NDArray[np.int32]:
     return (uniform(keys, SiteDraw.SEED) * 2**31).astype(np.int32)
+
+
+_DRAWS = range(1 << 20, (1 << 20) + 12)  # beyond those of branches and leaves
+
+
+def plant_ages(seed: ArrayLike, age: float, spread: float) -> NDArray[np.float32]:
+    """Ages (n,) of plants with seeds (n,), years, in single precision as Blender stores them.
+
+    They are log-normal, as sizes in uneven-aged stands are: the median is ``age``, and a standard deviation is a factor
+    of 1 + ``spread``. The sum of twelve even numbers stands for a normal one, so that none is beyond six deviations.
+    """
+    if spread == 0.0:
+        return np.full(np.shape(seed), age, np.float32)
+    key = key_of_seed(seed)
+    normal = np.clip(sum(uniform(key, draw) for draw in _DRAWS) - 6.0, -2.5, 2.5)
+    return (age * np.exp(np.log1p(spread) * normal)).astype(np.float32)

@@ -17,9 +17,8 @@ from ..assets.asset import COUNTS
 from ..growth.hashing import signed, uniform
 from ..refinement.asset_parts import AssetParts, PlacedAssets
 from ..refinement.contents import Totals
-from .facet_colours import trapped
 from .facet_sizes import FacetPixels, FacetSizes
-from .microsurfaces import Facets, facet_numbers
+from .microsurfaces import Facets, facet_numbers, trapped
 from .thrown_shadows import ThrownShadows
 
 #: Child indices of facets of leaves and of wood start here; draws of their numbers, turns and places.

@@ -16,13 +16,15 @@ Sub-plants are tested together with all that grow around them, of any parent, be
 across the gaps between neighbours. Next siblings alone asked for up to a twentieth more area, and made aspens too
 dense. Facets of pieces are compared in the same way with what branches themselves bear.
 
-What a day of the year or another age makes of a species lies between variants that are measured, `weight_variants`.
+Nobody measures anew for a day or an age. Plants with fewer leaves have greater weights, as less hides behind them: the
+same species is measured with all of its leaves, some, and none (`SHARES`), and in a few stages of its life. The inverse
+of a weight is nearly linear in the share of leaves that is left; between two ages it is so in their logarithm.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -30,18 +32,22 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.flora import Flora
+from ..arrays import GOLDEN_TURN, spiral, spread
+from ..compiled.clumping import fingerprint
+from ..compiled.flora import Flora, compile_species
+from ..compiled.rays import Things, basis, covered, things_of
 from ..growth.branches import Branches
 from ..growth.envelopes import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
 from ..growth.seeds import Seeds
 from ..jobs import at_once
-from ..species.fingerprints import fingerprint
+from ..refinement.contents import piece_totals, subplant_totals
+from ..species.ages import ages_of, with_age
+from ..species.species import Species
 from ..storage import remembered
-from ..subplants.pieces import open_subplants
-from .sights import FAMILIES, LARGEST, Families, View, least_weights, look
-from .weight_variants import SHARES, needed, states_of, weights_of
+from ..subplants.pieces import Pieces, open_subplants
+from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_facets
 
 #: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
 #: are made differently.
@@ -358,3 +364,313 @@ def _stride(blocked: float, rays: float, pairs: float) -> int:
 def _weight(least: NDArray[np.float64], met: int) -> float:
     """Weight with which ``met`` rays are blocked, from the least weight (n,) with which each ray is."""
     return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else LARGEST
+
+
+#: Families that are seen side by side, at most.
+FAMILIES = 6
+#: Rays across a family, and directions of rays.
+_RAYS, _DIRECTIONS = 36, 6
+#: Maximum weight.
+LARGEST = 1.6
+
+
+@dataclass(frozen=True)
+class View:
+    """Parallel rays through the points of a lattice on the plane of two axes."""
+
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    spacing: float
+
+    def flat(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vectors (n, 3) on the plane (n, 2), in units of the lattice."""
+        return vectors @ np.stack([self.u, self.v], axis=1) / self.spacing
+
+    def coarser(self, stride: int) -> View:
+        """The same with each so many-th line of the lattice only."""
+        return replace(self, spacing=self.spacing * stride)
+
+    def covered(self, facets: Facets) -> float:
+        """How many rays facets of the maximum weight block, from all directions, one behind the other."""
+        return 0.5 * _DIRECTIONS * LARGEST * float((facets.side**2).sum()) / self.spacing**2
+
+
+@dataclass(frozen=True)
+class Families:
+    """Families of sub-plants, or what their branches themselves bear.
+
+    Attributes
+    ----------
+    flora : Flora
+    some : Branches of n
+    beyond : (3,) float64
+        Offset at which a copy meets none of them, metres.
+    area, leaf : (n,) float64
+        Optical area of each, and area of one of its leaves, m².
+    pieces : Pieces or None
+        Of the branches, where only these count.
+    """
+
+    flora: Flora
+    some: Branches
+    beyond: NDArray[np.float64]
+    area: NDArray[np.float64]
+    leaf: NDArray[np.float64]
+    pieces: Pieces | None
+
+    @classmethod
+    def of_subplants(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> Families:
+        """Whole sub-plants."""
+        return cls(flora, some, beyond, subplant_totals(flora, some).optical_area, flora.one_leaf_area(some), None)
+
+    @classmethod
+    def of_branches(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> Families:
+        """Branches with their own leaves only."""
+        pieces, owner = open_subplants(flora, some)[2:]
+        area = np.bincount(owner, piece_totals(flora, pieces).optical_area, len(some))
+        return cls(flora, some, beyond, area, flora.one_leaf_area(some), pieces)
+
+    @property
+    def content(self) -> tuple[bytes, bool]:
+        """What follows from all that is grown: equal for whole sub-plants and branches on which nothing grows."""
+        rows = self.flora.rows[np.unique(self.some.row)]
+        bare = not ((rows["next"] >= 0).any() or rows["phantom"].any())
+        return self.some.key.tobytes() + self.some.position.tobytes(), bare or self.pieces is not None
+
+    def grown(self) -> Things:
+        """The real leaves and wood."""
+        forms = self.flora.forms[int(self.flora.species_of(self.some.row[:1])[0])]
+        rows, orders = len(self.flora.rows), None if self.pieces is None else 1
+        return things_of(self.flora.rows, forms, self.some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
+
+    def facets(self, side: float, copies: int) -> Facets:
+        """Facets of a side in metres for several copies of all side by side, each copy with other facets."""
+        if self.pieces is None:
+            several = Branches.concatenate([self._copy(self.some, n) for n in range(copies)])
+            return subplant_facets(self.flora, several, np.full(len(several), side))
+        several = []
+        for n in range(copies):
+            start, end = (place + n * self.beyond for place in (self.pieces.start, self.pieces.end))
+            several.append(replace(self.pieces, branches=self._copy(self.pieces.branches, n), start=start, end=end))
+        pieces = Pieces.concatenate(several)
+        return piece_facets(self.flora, pieces, np.full(len(pieces), side))
+
+    def _copy(self, branches: Branches, number: int) -> Branches:
+        key = mix(branches.key + np.uint64(number + 1))
+        return replace(branches, key=key, position=branches.position + number * self.beyond)
+
+
+def look(things: Things, beyond: NDArray[np.float64]) -> Iterator[tuple[View, NDArray[np.int64]]]:
+    """Views of families, and the numbers (m,) of the rays of each that meet anything.
+
+    Directions are spread over the half sphere; the lattice is as fine for all of them.
+    """
+    along = np.floor(beyond @ things.middle / (beyond @ beyond) * FAMILIES + 0.5)
+    extent = 2.0 * float(things.radius.max())  # one straight branch has no extent but its own
+    for family in np.unique(along):
+        extent = max(extent, float(np.ptp(things.middle[:, along == family], axis=1).max()))
+    index = np.arange(_DIRECTIONS) + 0.5
+    for direction in spiral(index / _DIRECTIONS, index, GOLDEN_TURN):
+        view = View(*basis(direction), extent / _RAYS)
+        yield view, _met(view, things)
+
+
+def _met(view: View, things: Things) -> NDArray[np.int64]:
+    place = view.flat(things.middle.T)
+    near = (np.abs(place - np.rint(place)) <= (things.radius / view.spacing)[:, None]).all(axis=1)
+    begin, rays = 0, []
+    for part in things.parts:
+        end = begin + len(part)
+        corners, first, number = part.outlines(np.flatnonzero(near[begin:end]), view.u, view.v)
+        rays.append(_ray_numbers(*covered(corners / view.spacing, first, number)[1].T))
+        begin = end
+    return np.unique(np.concatenate(rays))
+
+
+def least_weights(view: View, facets: Facets) -> NDArray[np.float64]:
+    """For each ray that any of the facets can block, the least weight with which one does."""
+    reach, largest = CIRCUMRADIUS * facets.side[:, None], np.sqrt(LARGEST)
+    centre, a, b = (view.flat(v).T for v in (facets.centre, facets.across * reach, facets.along * reach))
+    # A triangle's sides are where these three numbers are 1: each is linear in x and y, and grows by x and y by (3, n).
+    with np.errstate(divide="ignore", invalid="ignore"):
+        aside, up = np.stack([[b[1], -b[0]], [-a[1], a[0]]]) / (a[0] * b[1] - a[1] * b[0])
+    grow = 2.0 * SIN_60 * aside
+    by_x, by_y = (np.stack([-2.0 * u, u + v, u - v]) for u, v in zip(up, grow, strict=True))
+    wide = SIN_60 * np.abs(a[0])
+    low = np.ceil(centre[0] + largest * np.minimum(b[0], -b[0] / 2 - wide)).astype(np.int64)
+    high = np.floor(centre[0] + largest * np.maximum(b[0], -b[0] / 2 + wide)).astype(np.int64)
+    facet, step = spread(np.maximum(high - low + 1, 0))
+    # On each line of the lattice, rays from where the last of the sides is entered to where the first is left.
+    column = low[facet] + step
+    x = column - centre[0][facet]
+    at, slope = by_x[:, facet] * x, by_y[:, facet]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = (largest - at) / slope
+    enter = np.where(slope < 0, ends, -np.inf).max(axis=0) + centre[1][facet]
+    leave = np.where(slope > 0, ends, np.inf).min(axis=0) + centre[1][facet]
+    first = np.ceil(np.where(enter <= leave, enter, 0.0)).astype(np.int64)
+    last = np.floor(np.where(enter <= leave, leave, -1.0)).astype(np.int64)
+    line, step = spread(np.maximum(last - first + 1, 0))
+    row = first[line] + step
+    y = row - centre[1][facet[line]]
+    # How many times as large the triangle has to be to reach the ray.
+    scale = (at[:, line] + slope[:, line] * y).max(axis=0)
+    inside = np.flatnonzero(scale <= largest)  # a side along the line has neither been entered nor left
+    ray, scale = _ray_numbers(column[line[inside]], row[inside]), scale[inside]
+    order = np.argsort(ray, kind="stable")
+    begin = np.flatnonzero(np.diff(ray[order], prepend=np.iinfo(np.int64).min))
+    return np.minimum.reduceat(scale[order], begin) ** 2 if len(begin) else np.zeros(0)
+
+
+def _ray_numbers(column: NDArray[np.int64], row: NDArray[np.int64]) -> NDArray[np.int64]:
+    return (column << 32) + row
+
+
+SHARES = (1.0, 0.4, 0.1, 0.0)
+"""Parts of their leaves that plants have, of which weights are measured."""
+#: Ages of which weights are measured: fractions of the full one, of the lifespan, and years after death.
+_YOUNG, _OLD, _DEAD = (0.04, 0.1, 0.25, 0.5), (0.9, 0.995), (1.0, 8.0, 30.0)
+#: No plant has weights beyond, however few leaves it has.
+_LOWEST_WEIGHT, _HIGHEST_WEIGHT = 0.02, 1.8
+
+#: Weights (2, r, k) of a species (index) of a flora.
+Known = Callable[[Flora, int], NDArray[np.float64]]
+
+
+def states_of(flora: Flora, number: int) -> tuple[int, ...]:
+    """Indices of `SHARES` between which plants of a species are on the day of a flora; those in summer have all."""
+    if flora.day is None:
+        return (0,)
+    low, high = flora.day.share_range(flora.rows, number)
+    shares = np.array(SHARES)
+    first = int(np.flatnonzero(shares >= min(high, 1.0) - 1e-9)[-1])
+    last = int(np.flatnonzero(shares <= low + 1e-9)[0])
+    return tuple(range(first, last + 1))
+
+
+def variants(species: Species) -> Iterator[tuple[str, Flora]]:
+    """All variants of a species of which weights are needed on any day and at any age, each with a name."""
+    plain = compile_species([species])
+    shares = SHARES if species.year is not None else SHARES[:1]
+    for share in shares:
+        yield f"{species.identifier} {share:g}", _with_leaves(plain.species[0], share)
+    for years in ages_measured(species):
+        if years != 0.0:
+            yield f"{species.identifier} {years:g} years", _at_age(species, years)
+
+
+def ages_measured(species: Species) -> list[float]:
+    """Ages of which weights are measured, rising; 0.0 stands for the full one."""
+    ages = ages_of(species)
+    if ages.scaled or species.form is not None:
+        return [0.0]
+    found = [(part * ages.full, part * ages.full) for part in _YOUNG] + [(ages.full, 0.0)]
+    if np.isfinite(ages.lifespan):
+        found += [(y, y) for y in (part * ages.lifespan for part in _OLD) if y > ages.full]
+        found += [(y, y) for y in (ages.lifespan + after for after in _DEAD)]
+    return [years for _, years in sorted(found)]
+
+
+def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
+    """What has to be known for the weights of a species of a flora on its day, in summer or not."""
+    plain, states = flora.in_leaf, states_of(flora, number)
+    own = plain.species[number]
+    if own.aged is None:
+        return [(plain, number) if s == 0 else (_with_leaves(own, SHARES[s]), 0) for s in states]
+    described, years = own.aged
+    around, _ = _around(described, years)
+    out = [(_at_age(described, one), 0) for one in around]
+    if states != (0,):
+        full = _at_age(described, 0.0)
+        out += [(_with_leaves(full.species[0], SHARES[s]), 0) for s in {0, *states}]
+    return out
+
+
+def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> NDArray[np.float64]:
+    """Weights (2, s, r, k) of a species of a flora in summer, in some states; 1 in the others.
+
+    Parameters
+    ----------
+    flora : Flora
+        In summer.
+    number : int
+        Index of the species.
+    states : tuple of int
+        Indices of `SHARES`.
+    known : callable
+        What was measured of those that are `needed`.
+    """
+    own, last = flora.species[number], max(states)
+    if own.aged is None:
+        found = [known(flora, number) if s == 0 else known(_with_leaves(own, SHARES[s]), 0) for s in states]
+        out = np.ones((2, last + 1, *found[0].shape[1:]))
+        for state, one in zip(states, found, strict=True):
+            out[:, state] = one
+        return out
+    described, years = own.aged
+    rows = flora.rows[flora.rows["species"] == number]
+
+    def inverse(some: Flora) -> NDArray[np.float64]:
+        return 1.0 / np.clip(known(some, 0)[:, _alike(rows, some.rows)], _LOWEST_WEIGHT, _HIGHEST_WEIGHT)
+
+    around, place = _around(described, years)
+    ends = [inverse(_at_age(described, one)) for one in around]
+    grown = ends[0] + place * (ends[-1] - ends[0])
+    out = np.ones((2, last + 1, *grown.shape[1:]))
+    full = _at_age(described, 0.0)
+    for state in states:
+        if state == 0:
+            out[:, 0] = 1.0 / grown
+            continue
+        # Leaves that are gone change as much of what hides behind others as when the plant is full-grown.
+        all_leaves, some = inverse(full), inverse(_with_leaves(full.species[0], SHARES[state]))
+        hidden = np.maximum(all_leaves - 1.0, 0.05)
+        left = np.clip((some - all_leaves) / hidden, -1.0, 0.5)
+        out[:, state] = 1.0 / np.clip(
+            grown + left * np.maximum(grown - 1.0, 0.05), 1.0 / _HIGHEST_WEIGHT, 1.0 / _LOWEST_WEIGHT
+        )
+    return out
+
+
+def _around(described: Species, years: float) -> tuple[list[float], float]:
+    """One or two of the `ages_measured` around an age, and its place between them, 0 to 1."""
+    ages = ages_measured(described)
+    real = np.array([ages_of(described).full if one == 0.0 else one for one in ages])
+    if len(ages) == 1:
+        return ages, 0.0
+    high = int(np.clip(np.searchsorted(real, years), 1, len(real) - 1))
+    low, dies = real[high - 1], ages_of(described).lifespan
+    if low < dies <= real[high]:  # it dies at once
+        return [ages[high if years >= dies else high - 1]], 0.0
+    place = np.log(max(years, 1e-3) / low) / np.log(real[high] / low)
+    return [ages[high - 1], ages[high]], float(np.clip(place, 0.0, 1.0))
+
+
+def _alike(rows: NDArray[np.void], other: NDArray[np.void]) -> NDArray[np.int64]:
+    """For each row (r,) of a species, that of a variant which is its order and the nearest part of it."""
+    out = np.zeros(len(rows), np.int64)
+    for order in np.unique(rows["order"]):
+        own, there = np.flatnonzero(rows["order"] == order), np.flatnonzero(other["order"] == order)
+        if not len(there):  # none of these branches yet, or no more
+            there = np.flatnonzero(other["order"] <= order)[-1:]
+        middle = other["part"][there].mean(axis=1)
+        away = np.abs(rows["part"][own].mean(axis=1)[:, None] - middle)
+        out[own] = there[np.argmin(away, axis=1)]
+    return out
+
+
+@lru_cache(maxsize=64)
+def _at_age(described: Species, years: float) -> Flora:
+    return compile_species([with_age(described, years)])
+
+
+@lru_cache(maxsize=64)
+def _with_leaves(species: Species, share: float) -> Flora:
+    """A compiled species with a part of its leaves."""
+    # What is compiled has its quality and habit already.
+    species = replace(species, quality=1.0, habit=0.0)
+    if share != 1.0:
+        spur = species.spur and replace(species.spur, leaves=species.spur.leaves.scaled(share))
+        orders = tuple(replace(order, leaves=order.leaves.scaled(share)) for order in species.orders)
+        species = replace(species, orders=orders, spur=spur)
+    return compile_species([species])

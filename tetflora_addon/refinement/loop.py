@@ -21,9 +21,19 @@ from ..growth.seeds import Seeds
 from ..tetrahedra.geometry import squared_edges
 from ..tetrahedra.tree import TetrahedralTree
 from .asset_parts import PlacedAssets, SharedAssets
-from .contents import Contents, Held, Holdings, Totals, bounding_box, in_the_root, large_polygons, sums
+from .contents import (
+    Contents,
+    Held,
+    Holdings,
+    Slack,
+    Totals,
+    bounding_box,
+    in_the_root,
+    large_polygons,
+    push_down,
+    sums,
+)
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
-from .descent import Slack, push_down
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
 from .settings import RefinementSettings

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from .extras import dead_part
 from .growing import Ages, NodeLaw, Nodes, PartGrown, rounded_least
 from .habit import with_habit
 from .members import expected_leaf_area
@@ -109,11 +108,11 @@ def with_age(species: Species, years: float) -> Species:
 def _scaled(species: Species, factor: float) -> Species:
     """A species of another size and the same form."""
     trunk, *rest = species.orders
-    orders = (replace(trunk, length=_times(trunk.length, factor)), *rest)
-    orders = tuple(replace(order, leaf_size=_times(order.leaf_size, factor)) for order in orders)
+    orders = (replace(trunk, length=trunk.length.scaled(factor)), *rest)
+    orders = tuple(replace(order, leaf_size=order.leaf_size.scaled(factor)) for order in orders)
     spur, bud, form = species.spur, species.bud, species.form
     if spur is not None:
-        spur = replace(spur, length=_times(spur.length, factor), leaf_size=_times(spur.leaf_size, factor))
+        spur = replace(spur, length=spur.length.scaled(factor), leaf_size=spur.leaf_size.scaled(factor))
     if bud is not None:
         bud = replace(bud, length=factor * bud.length)
     if form is not None:
@@ -125,10 +124,6 @@ def _stem(species: Species) -> int:
     """Number of the order that stands upright: 1 for shrubs, whose stems grow from a stool."""
     first, *rest = species.orders
     return int(bool(rest) and first.length.mean < 1.0 and rest[0].length.mean > 2.0)
-
-
-def _times(value: Range, factor: float) -> Range:
-    return Range(factor * value.mean, factor * value.variation)
 
 
 class _Aged:
@@ -200,10 +195,10 @@ class _Aged:
         spur, dead = one.spur, one.dead
         if spur is not None:
             size = min(1.0, _LEAF * self.height / max(spur.length.high, 1e-9))
-            spur = self._barked(replace(spur, length=_times(spur.length, size), leaf_size=self._leaf(spur)))
+            spur = self._barked(replace(spur, length=spur.length.scaled(size), leaf_size=self._leaf(spur)))
         if dead is not None:
             number, on_limbs = (self._dead_nodes(o)[0] for o in range(2))
-            dead = replace(self._dead(), number=_times(dead.number, number), on_limbs=_times(dead.on_limbs, on_limbs))
+            dead = replace(self._dead(), number=dead.number.scaled(number), on_limbs=dead.on_limbs.scaled(on_limbs))
         bud = None if self.dead else one.bud
         return replace(one, orders=orders, spur=spur, dead=dead, bud=bud)
 
@@ -228,11 +223,11 @@ class _Aged:
         ramp = min(_RAMP / max(order.branches.mean * numbers[0], 1e-9), 0.35) * min(abs(size - 1) / _NEAR, 1)
         settled = 1.0 if o <= self.stem else float(np.clip(1 - abs(now - 1) / _NEAR, 0, 1))
         changes: dict[str, Any] = {
-            "length": _times(order.length, now if o == 0 else now / self.now[o - 1]),
+            "length": order.length.scaled(now if o == 0 else now / self.now[o - 1]),
             "thickness": self._thickness(o),
             "growing": PartGrown(size, settled, *nodes, conical, (ramp, ramp)),
-            "branches": _times(order.branches, numbers[0]),
-            "spurs": _times(order.spurs, numbers[1]),
+            "branches": order.branches.scaled(numbers[0]),
+            "spurs": order.spurs.scaled(numbers[1]),
         }
         for name in ("branch_start", "spur_start"):
             start = getattr(order, name)
@@ -252,7 +247,7 @@ class _Aged:
                 order.angle_tip + (order.angle.mean - order.angle_tip) * lean, order.angle.variation
             )
             if order.attraction.mean < 0:
-                changes["attraction"] = _times(order.attraction, 0.2 + 0.8 * old)
+                changes["attraction"] = order.attraction.scaled(0.2 + 0.8 * old)
         return self._barked(replace(order, **changes))
 
     def _bare(self, o: int, start: float) -> float:
@@ -326,7 +321,7 @@ class _Aged:
             factor = self.stout[o] / self.stout[o - 1]
             if before.pipe > 0:
                 factor *= max(self._sorts(o - 1)[0][0], 1e-3) ** (1 / max(before.pipe, 1.0))
-        return _times(order.thickness, min(factor, 0.95 / order.thickness.high))
+        return order.thickness.scaled(min(factor, 0.95 / order.thickness.high))
 
     def _radius(self, o: int) -> float:
         """Typical radius at the base, metres."""
@@ -342,13 +337,13 @@ class _Aged:
 
     def _leaf(self, order: Order) -> Range:
         largest = order.leaf_size.high * max(order.leaf_size_tip, 1.0) * max(order.leaf_size_young, 1.0)
-        return _times(order.leaf_size, min(1.0, _LEAF * self.height / largest))
+        return order.leaf_size.scaled(min(1.0, _LEAF * self.height / largest))
 
     def _leaves(self, o: int) -> dict[str, Any]:
         """Leaves of an order: as many on a metre; on what is as short as a twig, as many as on twigs."""
         order, now = self.one.orders[o], self.now[o]
         own = order.leaves.mean * now * self.leafless
-        changes = {"leaves": _times(order.leaves, now * self.leafless), "leaf_size": self._leaf(order)}
+        changes = {"leaves": order.leaves.scaled(now * self.leafless), "leaf_size": self._leaf(order)}
         bearers = [p for p in range(o + 1, self.last + 1) if self.one.orders[p].leaves.high > 0]
         twig = self.one.orders[bearers[-1]] if bearers else order
         if not bearers or twig.leaf_envelope != "none":
@@ -385,9 +380,9 @@ class _Aged:
         if dead is None or o > 1:
             return 0.0, Nodes(0.0, 0.0, 0.0)
         start, now = self.one.orders[o].branch_start.mean, 1.0 if o < self.stem else self.now[o]
-        begin, end = dead_part(dead, start)
+        begin, end = dead.part(start)
         law = NodeLaw(begin, end, 1.0, 1.0, begin / (end - begin))
-        ends = np.array(dead_part(self._dead(), min(self._bare(o, start) / now, 0.99))) * now
+        ends = np.array(self._dead().part(min(self._bare(o, start) / now, 0.99))) * now
         number = float(np.diff(law.number_at(ends))[0])
         return number, Nodes(1 / number, law.below / number, begin, end)
 

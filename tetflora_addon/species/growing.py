@@ -160,7 +160,8 @@ class PartGrown:
 
 #: Lowest part of the children that live for a while in which they are the shorter the sooner they go.
 _FADING = 0.9
-_EVEN = (np.arange(256) + 0.5) / 256
+#: Middles of equal parts of a whole, over which expectations are means.
+EVEN = (np.arange(256) + 0.5) / 256
 
 
 def some_nodes(ends: ArrayLike, extra: float) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
@@ -183,9 +184,9 @@ def some_nodes(ends: ArrayLike, extra: float) -> tuple[NDArray[np.float64], NDAr
     """
     base, some, tip = ends
     weight = np.array([tip - base, extra * (tip - some)])
-    node = np.concatenate([base + (tip - base) * _EVEN, some + (tip - some) * _EVEN])
-    weight = np.repeat(weight / max(weight.mean(), 1e-12), len(_EVEN))
-    return node, weight, np.repeat([False, True], len(_EVEN))
+    node = np.concatenate([base + (tip - base) * EVEN, some + (tip - some) * EVEN])
+    weight = np.repeat(weight / max(weight.mean(), 1e-12), len(EVEN))
+    return node, weight, np.repeat([False, True], len(EVEN))
 
 
 def faded(fraction: NDArray[np.float64], first: ArrayLike, extra: NDArray[np.bool_]) -> NDArray[np.float64]:

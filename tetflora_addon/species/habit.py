@@ -50,45 +50,33 @@ def with_habit(species: Species, habit: float) -> Species:
     left = (1 - starts["branch_start"].mean) / (1 - trunk.branch_start.mean)
     trunk = replace(
         trunk,
-        thickness=_scaled(trunk.thickness, 1 - habit * SLIMMER, ORDER_KEYS["thickness"].low),
-        branches=_scaled(trunk.branches, left),
-        spurs=_scaled(trunk.spurs, (1 - starts["spur_start"].mean) / (1 - trunk.spur_start.mean)),
+        thickness=trunk.thickness.scaled(trunk.thickness.allowed(1 - habit * SLIMMER, ORDER_KEYS["thickness"])),
+        branches=trunk.branches.scaled(left),
+        spurs=trunk.spurs.scaled((1 - starts["spur_start"].mean) / (1 - trunk.spur_start.mean)),
         fork_at=min(trunk.fork_at + bare * (1 - trunk.fork_at), ORDER_KEYS["fork_at"].high),
         **starts,
     )
     dead = species.dead
     if dead is not None:  # as close together on a bole that is bare for longer
         longer = starts["branch_start"].mean / max(before.branch_start.mean, 1e-6)
-        dead = replace(dead, number=_scaled(dead.number, min(longer, _MORE_DEAD)))
-    limb = replace(_thinned(limb, shorter), length=_scaled(limb.length, shorter, ORDER_KEYS["length"].low))
+        dead = replace(dead, number=dead.number.scaled(min(longer, _MORE_DEAD)))
+    # As many branches, leaves and short shoots on a metre.
+    fewer = {name: getattr(limb, name).scaled(shorter) for name in ("branches", "leaves", "spurs")}
+    limb = replace(limb, length=limb.length.scaled(limb.length.allowed(shorter, ORDER_KEYS["length"])), **fewer)
     # Limbs are as slim as the trunk; what they bear is not.
-    rest = [
-        _same_size(order, 1 / shorter, (1 - habit * SLIMMER) ** -_LIMBS) if i == 0 else order
-        for i, order in enumerate(rest)
-    ]
+    rest[:1] = [_same_size(order, 1 / shorter, (1 - habit * SLIMMER) ** -_LIMBS) for order in rest[:1]]
     leafy = 1 - habit * (1 - species.stand_leaves)
     orders = (trunk, limb, *rest)
     if leafy < 1:
-        orders = tuple(replace(order, leaves=_scaled(order.leaves, leafy)) for order in orders)
+        orders = tuple(replace(order, leaves=order.leaves.scaled(leafy)) for order in orders)
     return replace(species, orders=orders, dead=dead)
-
-
-def _thinned(order: Order, factor: float) -> Order:
-    """As many branches, leaves and short shoots on a metre of a branch that is shorter by a factor."""
-    return replace(order, **{name: _scaled(getattr(order, name), factor) for name in ("branches", "leaves", "spurs")})
 
 
 def _same_size(order: Order, longer: float, thicker: float) -> Order:
     """Branches as long and as thick in metres as before, of parents whose length and girth are divided by factors."""
     length = min(longer, LENGTH_HIGH / order.length.high)
     thickness = max(min(thicker, ORDER_KEYS["thickness"].high / order.thickness.high), 1.0)
-    return replace(order, length=_scaled(order.length, length), thickness=_scaled(order.thickness, thickness))
-
-
-def _scaled(value: Range, factor: float, low: float = 0.0) -> Range:
-    """A range times a factor, not below a limit."""
-    factor = max(factor, low / value.low) if value.low > 0 else factor
-    return Range(factor * value.mean, factor * value.variation)
+    return replace(order, length=order.length.scaled(length), thickness=order.thickness.scaled(thickness))
 
 
 def _raised(start: Range, bare: float, key: str) -> Range:

@@ -14,11 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
-from .extras import dead_part
-from .growing import faded, shortened, some_nodes
+from .growing import EVEN, faded, shortened, some_nodes
 from .species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts, whole_cuts
-
-_FRACTIONS = (np.arange(256) + 0.5) / 256
 
 
 @dataclass(frozen=True)
@@ -83,7 +80,7 @@ def expected_leaf_area(species: Species) -> float:
 
 def _laterals(order: Order) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | float]:
     """Places (n,) of laterals on a branch of an order, length ratios (n,), and how many each stands for (n,)."""
-    start, fraction, shorter, weight = order.branch_start.mean, _FRACTIONS, 1.0, 1.0
+    start, fraction, shorter, weight = order.branch_start.mean, EVEN, 1.0, 1.0
     at = start + (1 - start) * fraction
     own = order.growing
     if own is not None and order.branches.mean > 0:
@@ -112,7 +109,7 @@ def least_length(order: Order) -> float:
 
 def expected_forks(forks: Range, power: float = 1.0) -> float:
     """Mean of n^power, for the n stems into which a branch divides (`growth.branch_counts`)."""
-    wanted = forks.mean + forks.variation * (2 * _FRACTIONS - 1)
+    wanted = forks.mean + forks.variation * (2 * EVEN - 1)
     below = np.floor(wanted)
     more = wanted - below  # how likely one more is
     return float(((1 - more) * np.maximum(below, 1) ** power + more * np.maximum(below + 1, 1) ** power).mean())
@@ -150,11 +147,11 @@ def expected_polygons(species: Species) -> float:
 
 def _dead_on(dead: Dead, order: Order, i: int, cuts: list[float], fold: np.ndarray) -> np.ndarray:
     """Expected dead branches (2,) by their order on one trunk, or on one limb."""
-    low, high = dead_part(dead, order.branch_start.mean)
+    low, high = dead.part(order.branch_start.mean)
     wanted = (dead.on_limbs if i else dead.number).mean
-    at = low + (high - low) * _FRACTIONS
+    at = low + (high - low) * EVEN
     stems = fold[np.searchsorted(cuts[1:-1], at, side="right")]
-    full = 1 - dead.orders[0].count_by_length * (1 - dead_vigour(_FRACTIONS))
+    full = 1 - dead.orders[0].count_by_length * (1 - dead_vigour(EVEN))
     return wanted * np.array([stems.mean(), dead.orders[0].branches.mean * (full * stems).mean()])
 
 

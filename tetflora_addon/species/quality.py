@@ -81,8 +81,8 @@ def with_quality(species: Species, quality: float) -> Species:
         )
     if species.dead is not None and quality < 1:  # too few to be thinned out in the end
         dead = species.dead
-        number, on_limbs = (_times(some, quality) for some in (dead.number, dead.on_limbs))
-        species = replace(species, dead=replace(dead, number=number, on_limbs=on_limbs))
+        few = {"number": dead.number.scaled(quality), "on_limbs": dead.on_limbs.scaled(quality)}
+        species = replace(species, dead=replace(dead, **few))
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
     detail = _bisected(lambda d: expected_polygons(_thinned(_shaped(species, _shapes(species, d)), d)), target)
     shaped = _shaped(species, [(round(k), round(s)) for k, s in _shapes(species, detail)])
@@ -101,14 +101,10 @@ def _with_tiers(species: Species, tiers: list[Order]) -> Species:
     return replace(species, orders=tuple(tiers[:number]), spur=tiers[number] if len(tiers) > number else None)
 
 
-def _branches(members: Members, species: Species) -> list[float]:
-    """Expected number on one plant of the branches of each of `_tiers`."""
-    return [*members.branches, members.spurs][: len(_tiers(species))]
-
-
-def _leaves(members: Members, species: Species) -> list[float]:
-    """Likewise of leaves."""
-    return [*members.leaves, members.spur_leaves][: len(_tiers(species))]
+def _numbers(members: Members, species: Species) -> tuple[list[float], list[float]]:
+    """Expected numbers on one plant of the branches of each of `_tiers`, and of their leaves."""
+    every = [*members.branches, members.spurs], [*members.leaves, members.spur_leaves]
+    return tuple(numbers[: len(_tiers(species))] for numbers in every)
 
 
 def _bisected(polygons: Callable[[float], float], target: float) -> float:
@@ -123,7 +119,7 @@ def _bisected(polygons: Callable[[float], float], target: float) -> float:
 def _shapes(species: Species, detail: float) -> list[tuple[float, float]]:
     """Sides and segments of each order, not yet whole numbers."""
     shapes = []
-    for order, number in zip(_tiers(species), _branches(expected_members(species), species), strict=True):
+    for order, number in zip(_tiers(species), _numbers(expected_members(species), species)[0], strict=True):
         if detail >= 1:
             more = detail - 1
             rounder = _ROUNDER ** (min(more, _ROUND) + _SLOWER * max(more - _ROUND, 0.0))
@@ -163,46 +159,37 @@ def _thinned(species: Species, detail: float) -> Species:
     """The species with other numbers of branches and leaves, and leaves of such a size that their area is kept."""
     members = expected_members(species)
     branches, tiers = members.branches, _tiers(species)
-    foliage = _left(max(sum(_leaves(members, species)), 2 * _FEW), detail)
+    foliage = _left(max(sum(_numbers(members, species)[1]), 2 * _FEW), detail)
     spurs = _left(members.spurs, detail, _crowd(members.spurs))
     there = 1.0  # factor on the number of branches of this order
     for i, order in enumerate(species.orders):
         count = 1.0
         if i + 1 < len(branches):
-            count = _within(order.branches, _left(branches[i + 1], detail, _crowd(branches[i + 1])) / there, "branches")
-        tiers[i] = replace(
-            order,
-            branches=_times(order.branches, count),
-            spurs=_times(order.spurs, _within(order.spurs, spurs / there, "spurs")),
-            leaves=_times(order.leaves, _within(order.leaves, foliage / there, "leaves")),
-        )
+            count = _allowed(order, "branches", _left(branches[i + 1], detail, _crowd(branches[i + 1])) / there)
+        fewer = _scaled(order, spurs=spurs / there, leaves=foliage / there)
+        tiers[i] = replace(fewer, branches=order.branches.scaled(count))
         there *= count
     if species.spur is not None:
-        leaves = species.spur.leaves
-        tiers[-1] = replace(species.spur, leaves=_times(leaves, _within(leaves, foliage / spurs, "leaves")))
+        tiers[-1] = _scaled(species.spur, leaves=foliage / spurs)
     return _with_tiers(species, tiers)
 
 
-def _within(value: Range, factor: float, key: str) -> float:
-    """The factor, or the nearest to it that keeps a range with a mean above 0 within the limits of its key."""
-    limits = ORDER_KEYS[key]
-    if value.high > 0:
-        factor = min(factor, limits.high / value.high)
-    if value.low < 0:
-        factor = min(factor, limits.low / value.low)
-    elif value.low > 0:
-        factor = max(factor, limits.low / value.low)
-    return factor
+def _allowed(order: Order, name: str, factor: float) -> float:
+    """The factor on a range of an order, or the nearest to it that its key allows."""
+    return getattr(order, name).allowed(factor, ORDER_KEYS[name])
 
 
-def _times(value: Range, factor: float) -> Range:
-    return Range(value.mean * factor, value.variation * factor)
+def _scaled(order: Order, **factors: float) -> Order:
+    """An order with some of its ranges times factors, as far as their keys allow."""
+    return replace(
+        order, **{name: getattr(order, name).scaled(_allowed(order, name, factors[name])) for name in factors}
+    )
 
 
 def _kept(described: Species, changed: Species) -> Species:
     """The changed species with leaves, lengths, thicknesses and bends such that it looks like the one described."""
-    before, after = expected_members(described), expected_members(changed)
-    leaves, leaves_left = _leaves(before, described), _leaves(after, changed)
+    branches, leaves = _numbers(expected_members(described), described)
+    branches_left, leaves_left = _numbers(expected_members(changed), changed)
     widened = described
     if sum(leaves) > 0:
         widened = _widened_forms(described, math.sqrt(sum(leaves) / sum(leaves_left)))
@@ -211,9 +198,9 @@ def _kept(described: Species, changed: Species) -> Species:
     for i, order in enumerate(tiers):
         if order.leaves.mean > 0:
             area = _ratio(leaves[i], leaves_left[i]) * _form_area(described, order) / _form_area(widened, order)
-            sizes[i] = _within(order.leaf_size, math.sqrt(area), "leaf_size")
+            sizes[i] = _allowed(order, "leaf_size", math.sqrt(area))
     shorter = _shortening(described, sizes)
-    fewer = [_ratio(n, m) for n, m in zip(_branches(before, described), _branches(after, changed), strict=True)]
+    fewer = [_ratio(n, m) for n, m in zip(branches, branches_left, strict=True)]
     thicker, out = 1.0, []  # factor on the radius of this order
     for i, (old, new) in enumerate(zip(tiers, _tiers(changed), strict=True)):
         spur = i == len(described.orders)
@@ -225,13 +212,13 @@ def _kept(described: Species, changed: Species) -> Species:
             thicker *= (fewer[i] / fewer[i - 1]) ** (1 / tiers[i - 1].pipe)
         else:
             length = shorter if i > 0 and not spur else 1.0
-            thick = _within(old.thickness, wanted / length / (1.0 if spur else thicker), "thickness")
+            thick = _allowed(old, "thickness", wanted / length / (1.0 if spur else thicker))
             thicker *= thick
         new = replace(
             new,
-            length=_times(old.length, shorter) if i == 1 and not spur else old.length,
-            thickness=_times(old.thickness, thick),
-            leaf_size=_times(old.leaf_size, sizes[i]),
+            length=old.length.scaled(shorter) if i == 1 and not spur else old.length,
+            thickness=old.thickness.scaled(thick),
+            leaf_size=old.leaf_size.scaled(sizes[i]),
         )
         out.append(_bent_alike(old, new))
     return replace(_with_tiers(changed, out), leaf=widened.leaf, blossom=widened.blossom, quality=1.0)
@@ -326,13 +313,9 @@ def _bent_alike(old: Order, new: Order) -> Order:
     mean = min(max(old.curvature.mean * factor, -high), high)
     tip = min(max((moved - inner_left * mean) / outer_left, -high), high)
     variation = old.curvature.variation * min(sway / _random_sway(t), _SWAY_HIGH)
-    pull = _within(old.attraction, (inner + outer) / (inner_left + outer_left), "attraction")
-    return replace(
-        new,
-        curvature=Range(mean, min(variation, high - abs(mean))),
-        curvature_tip=tip,
-        attraction=_times(old.attraction, pull),
-    )
+    pull = _allowed(old, "attraction", (inner + outer) / (inner_left + outer_left))
+    bent = Range(mean, min(variation, high - abs(mean)))
+    return replace(new, curvature=bent, curvature_tip=tip, attraction=old.attraction.scaled(pull))
 
 
 def _sways(segments: int) -> tuple[float, float]:

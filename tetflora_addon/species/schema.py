@@ -8,20 +8,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..errors import SpeciesError, shown
 from ..files import json_of, read_whole
 from ..leaves.schema import read_forms
-from ..parameters import FileReader, keys_of
+from ..parameters import FileReader, Rgb, keys_of
 from .ecology import Ecology
-from .extras import read_dead
 from .growing import Ages
 from .members import expected_polygons
 from .skeletons import MAX_ORDERS
-from .species import LEAF_KINDS, Bud, Order, Species
-from .year import read_year
+from .species import LEAF_KINDS, Bud, Dead, Order, Species
+from .year import DAYS, MAX_AUTUMN, LeafYear, Year
 
 FORMAT = 1
 MAX_FILE_BYTES = 4_000_000
@@ -38,6 +38,22 @@ SPECIES_KEYS = (
 DEFAULT_SPUR = {"length": [0.05, 0.02], "thickness": [0.03, 0.005], "angle": [50, 15], "leaves": [4, 1]}
 
 
+#: Of the wood that has lost its bark, and of bark without life.
+_GREY = [[0.14, 0.122, 0.102], [0.03, 0.027, 0.023]]
+#: Dead branches of a species that only says how many: broken off or bare, with bare twigs.
+DEFAULT_DEAD = (
+    {
+        "length": [0.06, 0.045], "thickness": [0.085, 0.025], "taper": [0.45, 0.2], "segments": 4, "sides": 4,
+        "curvature": [0, 60], "angle": [88, 14], "angle_tip": 70, "azimuth": [137.5, 60], "branches": [6, 3],
+        "branch_start": 0.2, "branch_colour": _GREY,
+    },
+    {
+        "length": [0.4, 0.26], "thickness": [0.32, 0.08], "taper": 0.4, "segments": 3, "sides": 3,
+        "curvature": [0, 80], "angle": [58, 18], "azimuth": [137.5, 40], "branch_colour": _GREY,
+    },
+)  # fmt: skip
+
+
 def _read_order(reader: FileReader, data: Any, where: str, first: bool, last: bool) -> Order:
     order = reader.read(Order, data, where)
     if not first:
@@ -49,6 +65,37 @@ def _read_order(reader: FileReader, data: Any, where: str, first: bool, last: bo
     if order.leaf_envelope != "none" and order.forks.high > 0:
         raise reader.fail(f"{where}.leaf_envelope", 'must be "none", because the branch forks; or set forks to [0, 0]')
     return order
+
+
+def _read_dead(reader: FileReader, data: Any, name: str) -> Dead:
+    """The key ``dead`` of a species."""
+
+    def read_orders(value: Any, name: str) -> tuple[Order, ...]:
+        if not isinstance(value, list) or not 1 <= len(value) <= 2:
+            raise reader.fail(name, "must be a list of 1 or 2 orders: dead branches, and twigs on them")
+        last = len(value) - 1
+        return tuple(_read_order(reader, one, f"{name}[{i}]", False, i == last) for i, one in enumerate(value))
+
+    whole = {"orders": list(DEFAULT_DEAD), **data} if isinstance(data, dict) else data
+    dead = reader.read(Dead, whole, name, {"orders": read_orders})
+    for i, order in enumerate(dead.orders):
+        for key in ("leaves", "spurs", "forks", "flare", "pipe"):
+            value = getattr(order, key)
+            if (value if isinstance(value, float) else value.high) > 0:
+                raise reader.fail(f"{name}.orders[{i}].{key}", "must be 0: dead branches are bare and do not grow")
+    return dead
+
+
+def _read_leaf_year(reader: FileReader, data: Any, name: str) -> LeafYear:
+    def colours(value: Any, name: str) -> tuple[Rgb, ...]:
+        if not isinstance(value, list) or len(value) > MAX_AUTUMN:
+            raise reader.fail(name, f"must be a list of up to {MAX_AUTUMN} colors [r, g, b]")
+        return tuple(reader.rgb(one, f"{name}[{i}]") for i, one in enumerate(value))
+
+    year = reader.read(LeafYear, data, name, {"autumn": colours})
+    reader.number(year.turn, f"{name}.turn", year.appear, year.appear + DAYS)
+    reader.number(year.fall, f"{name}.fall", year.turn, year.appear + DAYS)
+    return year
 
 
 def species_from_dict(data: Any, identifier: str, source: str) -> Species:
@@ -89,13 +136,11 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
             if getattr(spur, key).high > 0:
                 raise reader.fail(f"spur.{key}", "must be [0, 0], because a short shoot has only leaves")
     parts: dict[str, Callable[[Any, str], Any]] = {
-        "bud": lambda value, name: reader.read(Bud, value, name),
-        "dead": lambda value, name: read_dead(
-            reader, value, name, lambda order, at, last: _read_order(reader, order, at, False, last)
-        ),
-        "year": lambda value, name: read_year(reader, value, name),
-        "age": lambda value, name: reader.read(Ages, value, name),
-        "ecology": lambda value, name: reader.read(Ecology, value, name),
+        "bud": partial(reader.read, Bud),
+        "dead": partial(_read_dead, reader),
+        "year": partial(reader.read, Year, readers=dict.fromkeys(LEAF_KINDS, partial(_read_leaf_year, reader))),
+        "age": partial(reader.read, Ages),
+        "ecology": partial(reader.read, Ecology),
     }
     others = {name: part(data[name], name) for name, part in parts.items() if data.get(name) is not None}
     values = reader.values(Species, data, "")

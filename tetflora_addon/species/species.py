@@ -179,6 +179,10 @@ class Dead:
     on_limbs: Range = limited(Range(0, 0), 0, 1000, "number on each limb (branch of order 1), likewise")
     orders: tuple[Order, ...] = ()
 
+    def part(self, start: float) -> tuple[float, float]:
+        """From where to where they are, fractions of an axis that is bare up to a fraction of it."""
+        return self.low * start, start + self.high * (1 - start)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Species:

@@ -10,9 +10,8 @@ research and practice", 1918) is that of eastern North America.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
-from ..parameters import FileReader, Rgb, described, limited
+from ..parameters import Rgb, described, limited
 
 DAYS = 365.0
 """Length of the year; a date beyond it is one of the next year."""
@@ -111,30 +110,3 @@ def _days_north(day: float) -> float:
     place = day / half if spring else (day - half) / (DAYS - half)
     near = min(1.0, 4.0 * min(place, 1.0 - place))
     return near * (_SPRING_DAYS if spring else -_AUTUMN_DAYS)
-
-
-def read_year(reader: FileReader, data: Any, name: str) -> Year:
-    """The key ``year`` of a species.
-
-    Raises
-    ------
-    SpeciesError
-        Names the field and what it may be.
-    """
-
-    def read(data: Any, name: str) -> LeafYear:
-        return _read_leaf_year(reader, data, name)
-
-    return reader.read(Year, data, name, {"leaf": read, "blossom": read})
-
-
-def _read_leaf_year(reader: FileReader, data: Any, name: str) -> LeafYear:
-    def colours(value: Any, name: str) -> tuple[Rgb, ...]:
-        if not isinstance(value, list) or len(value) > MAX_AUTUMN:
-            raise reader.fail(name, f"must be a list of up to {MAX_AUTUMN} colors [r, g, b]")
-        return tuple(reader.rgb(one, f"{name}[{i}]") for i, one in enumerate(value))
-
-    year = reader.read(LeafYear, data, name, {"autumn": colours})
-    reader.number(year.turn, f"{name}.turn", year.appear, year.appear + DAYS)
-    reader.number(year.fall, f"{name}.fall", year.turn, year.appear + DAYS)
-    return year

@@ -1,6 +1,11 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rings of vertices around branches, from which tubes are made: at joints, or finer along a curve."""
+"""Rings of vertices around branches, from which tubes are made: at joints, or finer along a curve.
+
+Where wood begins it has collars, the joints of forks, buttresses of trunks, and roots from these into the ground. All
+of it is for near wood only, and grows with its size in the image. Buttresses take as much at some angles as they give
+at others, so that a trunk is as thick on average as from afar.
+"""
 
 from __future__ import annotations
 
@@ -12,23 +17,12 @@ from numpy.typing import NDArray
 from ..arrays import spread, unit
 from ..compiled.averages import tube_perimeter
 from ..compiled.flora import Flora
+from ..compiled.placed import bounds
 from ..growth.axes import Axes
 from ..growth.branches import Branches
-from ..growth.growth import WholeBranches, radius_at
-from .feet import (
-    PLACES,
-    below_base,
-    below_forks,
-    beyond,
-    beyond_tip,
-    collars,
-    depths,
-    has_foot,
-    root_number,
-    roots,
-    swelling,
-    widening,
-)
+from ..growth.growth import WholeBranches, branch_counts, radius_at
+from ..growth.hashing import Draw, child_key, uniform
+from ..growth.rows import FORK, ranged
 from .wood_detail import Curve, Fineness, Pixels, curve, parts, unit_of
 
 _SHORTEST = 1e-9  # metres of a branch that has just begun to grow
@@ -248,3 +242,204 @@ def _ring_axes(lines: Axes, branch: NDArray[np.int64], t: NDArray[np.float64]) -
         for axis in range(2):
             out[axis][:, at_joint] = unit(before[:, :, axis] + out[axis][:, at_joint].T).T
     return out
+
+
+#: Buttresses of a trunk, at least and at most.
+LEAST, MOST = 4, 7
+#: A collar over the radius of its branch, and the longest in radii of the branch.
+_COLLAR, _LONGEST = 0.55, 4.0
+#: Radius of a parent over that of its child by the pipe model, about: it is not known which parent a branch has.
+_PIPED = 2.0
+#: Narrowness of a buttress, its height over that of the flare, its size over that of the flare.
+_NARROW, _HIGH, _STRONG = 13.0, 2.4, 1.1
+#: A buttress takes no more of the radius than this leaves.
+_LEAST_RADIUS = 0.55
+_FALL = 8 * np.log(100.0)  # as of the flare
+#: Child index below which random numbers of roots are drawn.
+_ROOTS = 1 << 28
+#: Fraction of a branch from which on it widens toward a fork.
+_WIDENS = 0.65
+#: Places along a root, and how deep the stump of a trunk is in the ground, in its radii.
+PLACES, SUNK = 14, 0.6
+#: Rings of the ball in which a stem begins beyond a fork, and the angle of the last one below its equator.
+_BALL, _ROUND = 4, np.radians(72.0)
+#: Rings that close an end, and how oblique a break is at most, in radii to a radius.
+_CAP, _SPLINTERS = 3, 1.6
+
+
+def collars(rows: NDArray[np.void], branches: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How much thicker branches (n,) are at their base, over their radius, and over which length that falls, metres.
+
+    The base lies on the axis of the parent: what is seen begins a radius of the parent further out.
+    """
+    row = branches.row
+    thickness = np.maximum(ranged(rows, "thickness", row, branches.key, Draw.THICKNESS), 0.1)
+    parent = branches.radius * np.where(rows["pipe"][row] > 0, _PIPED, 1.0) / thickness
+    length = np.minimum(np.minimum(1.2 * parent, _LONGEST * branches.radius), branches.length / 3.0)
+    grown = (rows["order"][row] > 0) & (rows["order"][row] < 100) & ~rows["continues"][row] & (rows["flare"][row] <= 0)
+    return np.where(grown & ~rows["drawn"][row], _COLLAR, 0.0), np.maximum(length, 1e-9)
+
+
+def has_foot(rows: NDArray[np.void], branches: Branches) -> NDArray[np.bool_]:
+    """Branches (n,) with buttresses and roots: flared trunks."""
+    row = branches.row
+    return (rows["order"][row] == 0) & (rows["flare"][row] > 0) & ~rows["continues"][row] & ~rows["phantom"][row]
+
+
+def below_base(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
+    """Rings (n,) below the base of near branches: of trunks in the ground, of stems beyond a fork within their parent.
+
+    The end of what forks and the base of such a stem are circles around one place, as wide as each other. At an angle
+    they leave a wedge open. A ball around both fills it, of which either has a half.
+    """
+    row = branches.row
+    ball = rows["continues"][row] & ~rows["phantom"][row] & ~rows["drawn"][row]
+    return np.where(has_foot(rows, branches), 1, np.where(ball, _BALL, 0))
+
+
+def beyond_tip(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
+    """Rings (n,) beyond the end of near branches: the half of a ball where they fork, a cap where they end."""
+    return np.where(rows["next"][branches.row, FORK] >= 0, _BALL, _CAP)
+
+
+def beyond(
+    rows: NDArray[np.void], branches: Branches, branch: NDArray[np.int64], number: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """How far rings (m,) of branches, numbered from 1, lie beyond the end, how wide and how oblique they are.
+
+    All in radii there. Ends are round; dead ones are broken off, with a hollow in the oblique break.
+    """
+    row = branches.row[branch]
+    ball, dead = rows["next"][row, FORK] >= 0, rows["dead"][row]
+    deep, narrow = depths(np.zeros(len(row), bool), number)
+    angle = np.pi / 2 * number / _CAP
+    deep, narrow = np.where(ball, deep, np.sin(angle)), np.where(ball, narrow, np.maximum(np.cos(angle), 0.0))
+    slant = np.where(dead, _SPLINTERS * (0.25 + 0.75 * uniform(branches.key[branch], Draw.BROKEN)), 0.0)
+    at = np.minimum(number, _CAP) - 1
+    deep = np.where(dead, slant * np.array([1.0, 0.85, 0.5])[at], deep)
+    return deep, np.where(dead, np.array([0.96, 0.6, 0.0])[at], narrow), slant
+
+
+def depths(footed: NDArray[np.bool_], number: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How far rings (n,), numbered from 1, lie beyond an end, and how wide they are, in radii there.
+
+    Those of the ``footed`` are in the ground, others on a ball.
+    """
+    angle = _ROUND * number / _BALL
+    return np.where(footed, SUNK, np.sin(angle)), np.where(footed, 1.0, np.cos(angle))
+
+
+def below_forks(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
+    """How much wider branches (n,) are where they fork, over their radius there: as wide as the stems beyond begin.
+
+    Stems share the cross-section of what forks, and flare at their base by what the expected number of them takes.
+    Where there are fewer, they would begin wider than what they come from.
+    """
+    beyond = rows["next"][branches.row, FORK]
+    number = np.maximum(branch_counts(rows, branches, FORK), 1)
+    wider = (1.0 + rows["flare"][beyond]) * number ** (-1.0 / np.maximum(rows["fork_power"][branches.row], 1e-9))
+    return np.where(beyond >= 0, wider, 1.0)
+
+
+def widening(wider: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Factor (n,) of the radius at fractions t (n,) of branches that are so much wider (n,) at their end."""
+    x = np.clip((t - _WIDENS) / (1.0 - _WIDENS), 0.0, 1.0)
+    return 1.0 + (wider - 1.0) * x * x * (3.0 - 2.0 * x)
+
+
+def root_number(key: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """Number (n,) of the buttresses of trunks, each with a root."""
+    return LEAST + np.floor((MOST - LEAST + 1) * uniform(child_key(key, _ROOTS), 0)).astype(np.int64)
+
+
+def buttresses(key: NDArray[np.uint64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Angles and sizes (n, MOST) of the buttresses of trunks; those that a trunk has not are 0 large."""
+    number = root_number(key)[:, None]
+    each = np.arange(MOST)
+    own = child_key(key[:, None], _ROOTS + 1 + each)
+    angle = 2 * np.pi * (each + 0.75 * (uniform(own, 0) - 0.5)) / number
+    return angle, np.where(each < number, 0.45 + 0.55 * uniform(own, 1), 0.0)
+
+
+def root_sides(sides: int) -> int:
+    """Sides of the roots of a trunk of so many."""
+    return max(sides // 4, 6)
+
+
+def keep_inside(flora: Flora, branches: Branches, owner: NDArray[np.int64], points: NDArray[np.float32]) -> None:
+    """Move points (m, 3), in place, that lie outside the bounds of their branches (n,) to the border of these.
+
+    Hardly any: bounds are those of whole sub-plants, and wider than what a foot or a collar adds to wood.
+    """
+    bound, pad = bounds(flora, branches)
+    radius, low, high = bound.T
+    offset = points - branches.position[owner]
+    along = np.einsum("ni,ni->n", offset, branches.frame[owner, :, 2])
+    aside = offset - along[:, None] * branches.frame[owner, :, 2]
+    across = np.sqrt(np.einsum("ni,ni->n", aside, aside))
+    most, least, highest = radius[owner], low[owner], high[owner]
+    beside, above = np.maximum(across - most, 0.0), along - np.clip(along, least, highest)
+    beyond = np.hypot(beside, above)
+    out = np.flatnonzero(beyond > pad[owner])
+    if len(out):
+        back = (1.0 - pad[owner[out]] / beyond[out])[:, None]
+        aside, across = aside[out], np.maximum(across[out], 1e-12)[:, None]
+        move = beside[out, None] * aside / across + above[out, None] * branches.frame[owner[out], :, 2]
+        points[out] -= (back * move).astype(np.float32)
+
+
+def swelling(
+    rows: NDArray[np.void],
+    branches: Branches,
+    weight: NDArray[np.float64],
+    owner: NDArray[np.int64],
+    t: NDArray[np.float64],
+    radius: NDArray[np.float64],
+    sides: int,
+) -> NDArray[np.float32] | None:
+    """Factors (sides, r) of the radius (r,) of rings at fractions t (r,) of branches (n,); None where all are 1."""
+    footed = has_foot(rows, branches)
+    if not footed.any():
+        return None
+    flare = rows["flare"][branches.row] * branches.radius * weight * footed * _STRONG
+    size = flare[owner] * np.exp(-_FALL / _HIGH * t) / np.maximum(radius, 1e-12)
+    angle, sizes = buttresses(branches.key)
+    around = 2 * np.pi * np.arange(sides) / sides
+    bump = np.exp(_NARROW * (np.cos(around[:, None, None] - angle) - 1.0)) - np.i0(_NARROW) * np.exp(-_NARROW)
+    shape = (bump * sizes).sum(axis=2)  # (sides, n)
+    return np.maximum(1.0 + size * shape[:, owner], _LEAST_RADIUS).astype(np.float32)
+
+
+def roots(
+    rows: NDArray[np.void], trunks: Branches, weight: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Surface roots of trunks (n,): they leave the buttresses, wind along the ground and lead into it.
+
+    Returns
+    -------
+    path : (m, PLACES, 3) float64
+        In the frames of the trunks' bases, metres.
+    width : (m, PLACES) float64
+        Radii, metres.
+    trunk : (m,) int64
+    """
+    angle, size = buttresses(trunks.key)
+    trunk, which = spread(root_number(trunks.key))
+    own = child_key(trunks.key[trunk], _ROOTS + 64 + which)
+    angle, size = angle[trunk, which], size[trunk, which]
+    base = trunks.radius[trunk]
+    flare = rows["flare"][trunks.row][trunk]
+    x = np.linspace(0.0, 1.0, PLACES)
+    away = base[:, None] * (0.5 + 0.4 * flare[:, None] + (1.4 + 1.8 * uniform(own, 0))[:, None] * x)
+    wave = (
+        0.35 * np.sin(2 * np.pi * (uniform(own, 1)[:, None] + 1.1 * x))
+        - 0.35 * np.sin(2 * np.pi * uniform(own, 1))[:, None]
+    )
+    turn = angle[:, None] + wave * x
+    width = (base * (0.14 + 0.16 * size) * np.minimum(flare + 0.4, 1.2))[:, None] * (1.0 - 0.72 * x)
+    # Nearly level at first, with what is over the ground less and less; sunk as a whole where seen from afar.
+    steep = 0.7 + 0.5 * uniform(own, 2)[:, None]
+    bumps = 0.05 * np.sin(9 * x + 6 * angle[:, None]) * x
+    high = base[:, None] * (0.3 * size[:, None] * (1 - x) ** 1.5 - steep * x**3 + bumps)
+    high = high - (1.0 - weight[trunk])[:, None] * (width + 0.2 * base[:, None])
+    return np.stack([away * np.cos(turn), away * np.sin(turn), high], axis=2), width, trunk

@@ -17,9 +17,19 @@ from ..growth.colours import branch_colours
 from ..growth.growth import WholeBranches
 from ..growth.wind import moment
 from .buds import BUD_RINGS, bud_numbers, bud_rings, bud_sides
-from .feet import PLACES, keep_inside, root_sides
 from .pieces import chunks
-from .rings import Rings, fine_counts, fine_numbers, fine_rings, foot_rings, ring_counts, rings_of
+from .rings import (
+    PLACES,
+    Rings,
+    fine_counts,
+    fine_numbers,
+    fine_rings,
+    foot_rings,
+    keep_inside,
+    ring_counts,
+    rings_of,
+    root_sides,
+)
 from .wood_detail import Fineness, Pixels, fineness
 
 #: Rings that are worked on at a time: some ten megabytes.

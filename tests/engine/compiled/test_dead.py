@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tests.engine import support
+from tetflora_addon.compiled.clumping import fingerprint
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.growth import WholeBranches
 from tetflora_addon.growth.rows import DEAD_ORDER
-from tetflora_addon.species.fingerprints import fingerprint
 from tetflora_addon.species.habit import with_habit
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.species.quality import with_quality

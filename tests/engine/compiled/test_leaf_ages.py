@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.compiled.averages import own_leaf_integrals
+from tetflora_addon.compiled.clumping import fingerprint
 from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.growth.foliage import YOUTH, leaf_lights, leaf_sizes, youth
 from tetflora_addon.proxies.microsurfaces import subplant_facets
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
-from tetflora_addon.species.fingerprints import fingerprint
 from tetflora_addon.subplants.pieces import Pieces, piece_leaf_colours
 
 AGES: dict[str, Any] = {

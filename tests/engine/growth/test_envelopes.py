@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tests.engine import support
 from tests.engine.refinement.test_loop import check, run
 from tetflora_addon.arrays import spread
+from tetflora_addon.compiled.clumping import fingerprint
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.emission.plants import expanded_blocks
@@ -25,7 +26,6 @@ from tetflora_addon.growth.growth import leaf_counts, trunks
 from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies.facet_weights import facet_weights, fitting
 from tetflora_addon.refinement.shares import SharedPlants
-from tetflora_addon.species.fingerprints import fingerprint
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 
 SOLIDS, RADIUS, BARE = LEAF_ENVELOPES[1:], 0.3, 0.2

@@ -9,9 +9,8 @@ import pytest
 
 from tests.engine import support
 from tetflora_addon.compiled.crowns import crown_of
-from tetflora_addon.planting.distances import CROWN_RADII, suggested_distance
 from tetflora_addon.planting.places import place
-from tetflora_addon.planting.rules import Rules
+from tetflora_addon.planting.rules import CROWN_RADII, Rules, suggested_distance
 from tetflora_addon.planting.terrain import Terrain
 from tetflora_addon.species.catalogue import load_species
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tetflora_addon.planting.ages import plant_ages
+from tetflora_addon.planting.places import plant_ages
 
 SEEDS = np.arange(20_000)
 

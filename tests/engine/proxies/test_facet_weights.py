@@ -18,8 +18,8 @@ from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import facet_weights as subject
 from tetflora_addon.proxies import sights
 from tetflora_addon.proxies.drawn import facet_mesh
+from tetflora_addon.proxies.facet_weights import variants
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, piece_facets, subplant_facets
-from tetflora_addon.proxies.weight_variants import variants
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterise import occluder_depth
 from tetflora_addon.species.catalogue import list_species, load_species

@@ -20,10 +20,9 @@ from tetflora_addon.emission.polygons import mended, polygon_blocks, polygon_buf
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.proxies.summaries import summarise
-from tetflora_addon.refinement.contents import Contents, Held, in_the_root
+from tetflora_addon.refinement.contents import Contents, Held, cut, in_the_root, push_down
 from tetflora_addon.refinement.contents import sums as sums_by_node
 from tetflora_addon.refinement.decisions import Decision
-from tetflora_addon.refinement.descent import cut, push_down
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, area_fractions
 from tetflora_addon.refinement.settings import RefinementSettings

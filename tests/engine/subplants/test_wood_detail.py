@@ -16,8 +16,8 @@ from tetflora_addon.compiled.averages import tube_perimeter
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.growth import WholeBranches, radius_at
 from tetflora_addon.growth.rows import FORK
-from tetflora_addon.subplants.feet import PLACES, buttresses, has_foot, root_number, roots
 from tetflora_addon.subplants.pieces import expand
+from tetflora_addon.subplants.rings import PLACES, buttresses, has_foot, root_number, roots
 from tetflora_addon.subplants.tubes import tube_buffers
 from tetflora_addon.subplants.wood_detail import DEVIATION, MOST_SIDES, Pixels, fine_sides, fineness, finer, round_up_to
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...compiled.crowns import Crown
 from ...errors import SpeciesError
-from ...planting.distances import suggested_distance
+from ...planting.rules import suggested_distance
 from ..scene.crowns import crown_for, crown_to_draw
 from ..scene.skeletons import aged_kind
 from ..species.catalogue import default_species

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
-from ...planting.ages import plant_ages
-from ...planting.places import Placement
+from ...planting.places import Placement, plant_ages
 from ..assets.marks import measure_all
 from ..runtime import JobData, guarded, is_there
 from ..scene.crowns import crown_steps

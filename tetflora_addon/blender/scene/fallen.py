@@ -9,7 +9,7 @@ from contextlib import suppress
 import bpy
 
 from ...errors import TetFloraError
-from ...growth.fallen import is_gone
+from ...growth.seasons import is_gone
 from ..settings import season_of
 from ..species.edits import edited_infos, species_for
 
