@@ -72,6 +72,12 @@ def bilinear(values: NDArray[np.floating], place: NDArray[np.floating]) -> NDArr
     return bottom * (1.0 - rise) + top * rise
 
 
+def smoothstep(x: NDArray[np.float64], low: float = 0.0, high: float = 1.0) -> NDArray[np.float64]:
+    """0 up to ``low``, 1 from ``high`` on, without a bend between (Hermite)."""
+    part = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return part * part * (3.0 - 2.0 * part)
+
+
 class Arrays:
     """Base of dataclasses whose fields are columns: one row for each of n things.
 

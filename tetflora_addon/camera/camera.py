@@ -260,6 +260,14 @@ class Camera:
 MOST = 0.5
 
 
+def to_eye(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors (m, 3) from points to the camera."""
+    if camera.kind == "ORTHO":
+        return np.tile(camera.frame[:, 2], (len(points), 1))
+    away = camera.eye - points
+    return away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+
+
 def blur_margins(camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.float64]) -> tuple[float, float]:
     """Fractions of the image's width and height by which blur reaches beyond it.
 

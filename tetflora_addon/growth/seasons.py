@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, smoothstep
 from ..errors import TetFloraError
 from ..setting import setting
 from ..species.species import LEAF_KINDS, Species
@@ -267,8 +267,8 @@ def _springtime(
     """Whether leaves have appeared, their sizes, and how fresh they are; (...) as days and deviations together."""
     age = day - year["appear"] - year["appear_spread"] * deviation
     growth = np.maximum(year["growth"], 1e-6)
-    size = _FIRST_SIZE + (1.0 - _FIRST_SIZE) * _smooth(age / growth)
-    return age >= 0.0, size, np.where(year["any_fresh"], 1.0 - _smooth(age / (_FRESH * growth)), 0.0)
+    size = _FIRST_SIZE + (1.0 - _FIRST_SIZE) * smoothstep(age / growth)
+    return age >= 0.0, size, np.where(year["any_fresh"], 1.0 - smoothstep(age / (_FRESH * growth)), 0.0)
 
 
 def _autumntime(
@@ -279,14 +279,8 @@ def _autumntime(
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Whether leaves still hang, and how far they have turned; likewise."""
     since = day - year["turn"] - year["turn_spread"] * turns
-    turned = np.where(year["colours"] > 0, _smooth(since / np.maximum(year["turning"], 1e-6) + 0.5), 0.0)
+    turned = np.where(year["colours"] > 0, smoothstep(since / np.maximum(year["turning"], 1e-6) + 0.5), 0.0)
     return since < year["fall"] + year["fall_spread"] * falls, turned
-
-
-def _smooth(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """From 0 to 1 as x does, without a bend."""
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)
 
 
 @lru_cache(maxsize=256)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera.camera import Camera
+from ..camera.camera import Camera, to_eye
 from ..refinement.lights import Light
 from ..tetrahedra.geometry import volume
 from .buffers import LightBuffer
@@ -33,7 +33,7 @@ from .scattering import (
     particle_direct,
     scattered_fractions,
 )
-from .sources import World, arriving, to_eye
+from .sources import World, arriving
 
 #: Maximum ratio of an order of scattering to the one before: 1 would never end.
 _MOST_AGAIN = 0.97

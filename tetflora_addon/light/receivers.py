@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays
 from ..compiled.flora import Flora
+from ..proxies.microsurfaces import trapped
 from ..proxies.summaries import extinction_matrices, summarise
 from ..refinement.loop import Refinement
 from ..tetrahedra.geometry import barycentric, barycentric_gradients, volume
@@ -64,9 +65,7 @@ class Clouds(Arrays):
         """All cells of a refinement, in the order of ``refinement.nodes``.
 
         Where ``even`` (n,) is set, nothing else stands for the leaves, and the cloud dims what they scatter as their
-        clumps do: what leaves one surface meets another of its clump with the probability p = 1 − effective / whole
-        area, so that the colour ω becomes ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple parameterizations of
-        the radiation budget of uniform broadleaved and coniferous canopies", 2005).
+        clumps do, of whose area the effective one is a fraction; see `proxies.microsurfaces.trapped`.
         """
         nodes, contents = refinement.nodes, refinement.contents
         # Large polygons are walls, not fog: they are occluders.
@@ -79,12 +78,9 @@ class Clouds(Arrays):
         matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
         colour = summaries.colour
         if even is not None:
-            volumes = volume(vertices)
-            again = 1.0 - summaries.effective_area(volumes) / np.where(
-                summaries.optical_area > 0.0, summaries.optical_area, np.inf
-            )
-            again = np.where(even & (summaries.optical_area > 0.0), np.clip(again, 0.0, 1.0), 0.0)[:, None]
-            colour = colour * (1.0 - again) / (1.0 - again * colour)
+            whole = summaries.optical_area
+            part = summaries.effective_area(volume(vertices)) / np.where(whole > 0.0, whole, np.inf)
+            colour = trapped(colour, np.where(even & (whole > 0.0), part, 1.0))
         return cls(vertices, matrices, colour, summaries.transmission, normal, plane)
 
     @cached_property

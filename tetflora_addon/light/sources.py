@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import GOLDEN_ANGLE, spiral
-from ..camera.camera import Camera
+from ..camera.camera import Camera, to_eye
 from ..refinement.lights import Light, image_size, lamp_views, light_views
 from .buffers import LightBuffer
 from .receivers import Clouds, Sheets
@@ -138,14 +138,6 @@ class Near:
 def light_resolution(camera: Camera) -> int:
     """Longer side in pixels of a lamp's buffer: that of the image (paper: "of proportional size")."""
     return int(np.clip(max(camera.width, camera.height), *LAMP_PIXELS))
-
-
-def to_eye(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors (m, 3) from points to the camera."""
-    if camera.kind == "ORTHO":
-        return np.tile(camera.frame[:, 2], (len(points), 1))
-    away = camera.eye - points
-    return away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
 
 
 def buffers_of(

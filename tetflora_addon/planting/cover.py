@@ -11,6 +11,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import smoothstep
 from ..growth.hashing import child_key, key_of_seed
 from ..jobs import mapped
 from .canopy import Canopy, Sheet, fallen_on, light_on
@@ -91,12 +92,12 @@ class Floor:
         """The same for each cell, (cells,), without patches."""
         light = self.light
         if habitat is Habitat.LIGHT:
-            return _step(light, 0.12, 0.6)
+            return smoothstep(light, 0.12, 0.6)
         if habitat is Habitat.HALF_SHADE:
-            return self._smothered() * _step(light, 0.03, 0.2) * (1.0 - 0.85 * _step(light, 0.45, 0.95))
+            return self._smothered() * smoothstep(light, 0.03, 0.2) * (1.0 - 0.85 * smoothstep(light, 0.45, 0.95))
         if habitat is Habitat.SHADE:
-            shade = np.maximum(1.0 - _step(light, 0.25, 0.85), 0.1)
-            return self._smothered() * shade * np.maximum(_step(light, 0.0, 0.06), _LEAST)
+            shade = np.maximum(1.0 - smoothstep(light, 0.25, 0.85), 0.1)
+            return self._smothered() * shade * np.maximum(smoothstep(light, 0.0, 0.06), _LEAST)
         if habitat.falls:
             whole = self.fallen.sum(axis=0)
             if species is not None and not 0 <= species < len(self.fallen):
@@ -154,9 +155,3 @@ def tinted(strata: Sequence[Stratum], soil: NDArray[np.float64], cells: int) -> 
     mean = sum((area[:, None] * one.colour for area, one in zip(areas, strata, strict=True)), np.zeros((cells, 3)))
     hidden = covered(strata, cells)[:, None]
     return (1.0 - hidden) * soil + hidden * mean / whole[:, None]
-
-
-def _step(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.float64]:
-    """0 up to ``low``, 1 from ``high`` on, smooth between."""
-    fraction = np.clip((values - low) / (high - low), 0.0, 1.0)
-    return fraction * fraction * (3.0 - 2.0 * fraction)

@@ -134,6 +134,18 @@ class Lines:
         return np.hypot(rest[:, 0], rest[:, 1])
 
 
+def lines_along(lines: Sequence[NDArray[np.float64]], reach: Sequence[float]) -> Lines | None:
+    """Lines through points (k, 2) each, and how far from them it matters, metres; None without any.
+
+    A line of one point is a place of its own.
+    """
+    ends = [np.repeat(line, 2, axis=0) if len(line) == 1 else line for line in lines]
+    if not ends:
+        return None
+    far = np.repeat(np.asarray(reach, np.float64), [len(line) - 1 for line in ends])
+    return Lines(np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]), far)
+
+
 def _cut(
     start: NDArray[np.float64], end: NDArray[np.float64], reach: NDArray[np.float64], longest: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -160,7 +172,7 @@ class Neighbours:
         """Sort the points by cell; the distance is at least `NO_DISTANCE`, metres."""
         self.distance = distance
         self.cell = distance / np.sqrt(2.0)
-        cells = _cells(points, self.cell)
+        cells = cells_of(points, self.cell)
         order = np.argsort(cells)
         self.points, cells = points[order], cells[order]
         first = np.flatnonzero(np.diff(cells, prepend=cells[:1] - 1))
@@ -173,7 +185,7 @@ class Neighbours:
         met_so_far = np.zeros(len(points), np.int64)
         far = np.arange(len(points))
         for step in _NEAR:
-            wanted = _cells(points[far], self.cell, step)
+            wanted = cells_of(points[far], self.cell, step)
             place = np.minimum(np.searchsorted(self.cells, wanted), len(self.cells) - 1)
             met = np.flatnonzero(self.cells[place] == wanted)
             asking, place, end = far[met], self.first[place[met]], self.first[place[met] + 1]
@@ -219,7 +231,7 @@ class Spacing:
         chosen = []
         while len(undecided):
             # One speaker a cell, the earliest; those with no earlier speaker nearby are in.
-            _, first = np.unique(_cells(candidates[undecided], self.cell), return_index=True)
+            _, first = np.unique(cells_of(candidates[undecided], self.cell), return_index=True)
             speakers = np.sort(undecided[first])
             winners = speakers[~self._outranked(candidates[speakers])]
             chosen.append(winners)
@@ -231,11 +243,11 @@ class Spacing:
     def _outranked(self, speakers: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which speakers, one a cell and in order of rank, have an earlier one too close."""
         outranked = np.zeros(len(speakers), bool)
-        own = _cells(speakers, self.cell)
+        own = cells_of(speakers, self.cell)
         order = np.argsort(own)
         cells = own[order]
         for step in _NEAR:
-            wanted = _cells(speakers, self.cell, step)
+            wanted = cells_of(speakers, self.cell, step)
             place = np.minimum(np.searchsorted(cells, wanted), len(cells) - 1)
             other = order[place]
             met = np.flatnonzero((cells[place] == wanted) & (other < np.arange(len(speakers))))
@@ -244,9 +256,14 @@ class Spacing:
         return outranked
 
 
-def _cells(points: NDArray[np.float64], cell: float, step: tuple[int, int] = (0, 0)) -> NDArray[np.int64]:
-    place = np.floor(points / cell).astype(np.int64) + np.array(step)
-    return place[:, 0] * np.int64(2**32) + place[:, 1]
+def cells_of(points: NDArray[np.float64], cell: float, step: tuple[int, int] = (0, 0)) -> NDArray[np.int64]:
+    """`packed` cells (n,) of a side that points (n, 2) are in, or those so many cells beside."""
+    return packed(np.floor(points / cell).astype(np.int64) + np.array(step))
+
+
+def packed(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """One number (n,) for each cell (n, 2)."""
+    return cells[:, 0] * np.int64(2**32) + cells[:, 1]
 
 
 # The lattice's cell for a metre from clump to clump: peaks of the noise are counted in the tests.

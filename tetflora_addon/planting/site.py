@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .cover import Suits
-from .plane import NO_DISTANCE, Lines, clumps, inside_any
+from .plane import NO_DISTANCE, Lines, clumps, inside_any, lines_along
 from .rules import Rules
 from .terrain import Path, Terrain, border_of, sampled
 from .wetness import wet_ground
@@ -227,12 +227,7 @@ class Site:
 def lines_of_paths(paths: Sequence[Path]) -> Lines | None:
     """Paths as what points can be asked for their nearness to; None if they keep nothing free."""
     kept_free = [p for p in paths if p.half_width > NO_DISTANCE and len(p.points)]
-    if not kept_free:
-        return None
-    # A line of one point is a place of its own.
-    ends = [np.repeat(p.points, 2, axis=0) if len(p.points) == 1 else p.points for p in kept_free]
-    reach = np.concatenate([np.full(len(e) - 1, float(p.half_width)) for e, p in zip(ends, kept_free, strict=True)])
-    return Lines(np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]), reach)
+    return lines_along([p.points for p in kept_free], [p.half_width for p in kept_free])
 
 
 def _mean(corners: NDArray[np.float64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..setting import LENGTH, setting
+from .plane import NO_DISTANCE, Spacing, cells_of, packed
 from .rules import species_by_weight
 
 #: Cells that one dab looks at; a wider circle, or a higher density, is refused by `paint`.
 MOST_CELLS = 200_000
 _TRIES = 6  # places in a cell that are tried before it stays empty
-_TINY = 1e-9
+_TINY, _MOST_DABS = 1e-9, 64
 
 
 class _Draw(IntEnum):
@@ -147,7 +148,7 @@ def paint(
     grid = np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij")
     cells = np.stack(grid, axis=-1).reshape(-1, 2)
     standing = standing[within(standing, middle, reach_of(brush)), :2]
-    cells = cells[~np.isin(_packed(cells), _packed(np.floor(standing / side).astype(np.int64)))]
+    cells = cells[~np.isin(packed(cells), cells_of(standing, side))]
     cell_keys = child_key(child_key(key, cells[:, 0]), cells[:, 1])
     if brush.strength < 1.0:
         lucky = uniform(child_key(cell_keys, dab), _Draw.CHANCE) < brush.strength
@@ -168,7 +169,7 @@ def paint(
         left = np.ones(len(cells), bool)
         left[chosen] = False
         cells, cell_keys = cells[left], cell_keys[left]
-        if brush.min_distance <= _TINY or not len(cells):
+        if brush.min_distance < NO_DISTANCE or not len(cells):
             break
     return np.concatenate(found), np.concatenate(keys)
 
@@ -191,8 +192,7 @@ def thin(
     """
     near = np.flatnonzero(within(standing, centre, reach_of(brush)))
     near = near[np.argsort(_ranks(standing[near, :2]), kind="stable")]
-    cells = _packed(np.floor(standing[near, :2] / cell_size(brush.density)).astype(np.int64))
-    _, first = np.unique(cells, return_index=True)
+    _, first = np.unique(cells_of(standing[near, :2], cell_size(brush.density)), return_index=True)
     winners = near[np.sort(first)]
     winners = winners[admitted(standing[winners, :2], np.zeros((0, 2)), brush.min_distance)]
     gone = np.sort(near[~np.isin(near, winners)])
@@ -217,19 +217,13 @@ def individuals(brush: Brush, keys: NDArray[np.uint64]) -> dict[str, NDArray]:
     }
 
 
-def dabs_along(last: Sequence[float], to: Sequence[float], spacing: float, most: int = 64) -> NDArray[np.float64]:
+def dabs_along(last: Sequence[float], to: Sequence[float], spacing: float) -> NDArray[np.float64]:
     """Places of dabs from one to another place of the mouse, the first left out and the last kept, (n, 3).
 
-    Parameters
-    ----------
-    last, to : sequence of 3 floats
-    spacing : float
-        Metres between dabs.
-    most : int
-        Dabs at most; the distance between them grows then.
+    They are about ``spacing`` metres apart, or farther where there would be more than `_MOST_DABS`.
     """
     a, b = np.asarray(last, float), np.asarray(to, float)
-    number = int(np.clip(np.ceil(np.linalg.norm(b - a) / max(spacing, _TINY)), 1, most))
+    number = int(np.clip(np.ceil(np.linalg.norm(b - a) / max(spacing, _TINY)), 1, _MOST_DABS))
     return a + (b - a) * (np.arange(1, number + 1) / number)[:, None]
 
 
@@ -238,49 +232,7 @@ def admitted(places: NDArray[np.float64], standing: NDArray[np.float64], distanc
 
     The earlier of two places goes first, as if they were set one after the other.
     """
-    free = np.ones(len(places), bool)
-    if distance <= _TINY or not len(places):
-        return np.flatnonzero(free)
-    free[_close(places, standing, distance)[0]] = False
-    undecided = np.flatnonzero(free)
-    first, second = _close(places[undecided], places[undecided], distance)
-    early = first < second
-    first, second = first[early], second[early]
-    state = np.zeros(len(undecided), np.int8)  # 0 undecided, 1 in, -1 out
-    while (open_ := state == 0).any():
-        # Whoever has no earlier neighbour that may yet come in is in; its later neighbours are out.
-        waits = np.zeros(len(state), bool)
-        waits[second[state[first] == 0]] = True
-        state[open_ & ~waits] = 1
-        state[second[state[first] == 1]] = -1
-    return undecided[state == 1]
-
-
-def _close(
-    a: NDArray[np.float64], b: NDArray[np.float64], distance: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of numbers of places, (n, 2) and (m, 2), that are closer than a distance."""
-    if not len(a) or not len(b):
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    cells_b = _packed(np.floor(b / distance).astype(np.int64))
-    order = np.argsort(cells_b, kind="stable")
-    sorted_b, home = cells_b[order], np.floor(a / distance).astype(np.int64)
-    firsts, seconds = [], []
-    for step in np.ndindex(3, 3):
-        wanted = _packed(home + (np.array(step) - 1))
-        begin, end = np.searchsorted(sorted_b, wanted), np.searchsorted(sorted_b, wanted, side="right")
-        counts = end - begin
-        i = np.repeat(np.arange(len(a)), counts)
-        j = order[np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts - begin, counts)]
-        gap = a[i] - b[j]
-        near = np.einsum("ij,ij->i", gap, gap) < distance * distance
-        firsts.append(i[near])
-        seconds.append(j[near])
-    return np.concatenate(firsts), np.concatenate(seconds)
-
-
-def _packed(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    return cells[..., 0] * np.int64(2**32) + cells[..., 1]
+    return Spacing(distance, standing).admit(places, len(places))
 
 
 def _drawn(brush: Brush, numbers: NDArray[np.int64], key: NDArray[np.uint64], dab: int) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..setting import LENGTH, setting
-from .plane import Lines
+from .plane import Lines, lines_along
 from .rules import GroundLimits
 from .terrain import sampled
 from .wetness import WetGround
@@ -132,11 +132,7 @@ class Zone:
 
 def distance_lines(lines: tuple[NDArray[np.float64], ...], limits: Limits) -> Lines | None:
     """Lines on the map, (k, 2) each, to measure the distances that limits ask for; None without any."""
-    ends = [np.repeat(line, 2, axis=0) if len(line) == 1 else line for line in lines]
-    if not ends or not np.isfinite(_reach(limits)):
-        return None
-    start, end = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
-    return Lines(start, end, np.full(len(start), _reach(limits)))
+    return lines_along(lines, [_reach(limits)] * len(lines)) if np.isfinite(_reach(limits)) else None
 
 
 def _reach(limits: Limits) -> float:

@@ -18,6 +18,7 @@ from ..growth.hashing import signed, uniform
 from ..refinement.asset_parts import AssetParts, PlacedAssets
 from ..refinement.contents import Totals
 from .facet_sizes import FacetPixels, FacetSizes
+from .facet_weights import by_number
 from .microsurfaces import Facets, facet_numbers, trapped
 from .thrown_shadows import ThrownShadows
 
@@ -68,12 +69,7 @@ def facet_totals(placed: PlacedAssets, parts: AssetParts) -> Totals:
 
 def asset_weights(placed: PlacedAssets, parts: AssetParts, number: NDArray[np.float64]) -> NDArray[np.float64]:
     """Fraction (n,) of their area that facets of clusters (n,) get, of which there are so many (n,) each."""
-    table = placed.assets.clusters.weights[parts.cluster]
-    place = np.log(np.maximum(number, 1e-12) / COUNTS[0]) / np.log(COUNTS[1] / COUNTS[0])
-    place = np.clip(place, 0.0, len(COUNTS) - 1.0)
-    low = np.minimum(place.astype(np.int64), len(COUNTS) - 2)
-    rows = np.arange(len(parts))
-    return table[rows, low] + (place - low) * (table[rows, low + 1] - table[rows, low])
+    return by_number(placed.assets.clusters.weights, parts.cluster, number, COUNTS)
 
 
 def facets_of_assets(

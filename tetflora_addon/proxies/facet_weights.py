@@ -41,7 +41,7 @@ from ..growth.envelopes import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
 from ..growth.seeds import Seeds
-from ..jobs import at_once
+from ..jobs import at_once, mapped
 from ..refinement.contents import piece_totals, subplant_totals
 from ..species.ages import ages_of, with_age
 from ..species.species import Species
@@ -109,22 +109,25 @@ def _with_share(
 ) -> NDArray[np.float64]:
     """Weights (n,) between those of two shares, where the inverse is nearly linear in the share."""
     if share is None or len(tables) == 1:
-        return _between(tables[0], row, count)
-    out, shares = _between(tables[0], row, count), np.array(SHARES)
+        return by_number(tables[0], row, count)
+    out, shares = by_number(tables[0], row, count), np.array(SHARES)
     # Parts that bear little besides cones or blossoms may have fewer leaves than any plant has.
     low = np.clip(np.searchsorted(-shares, -share), 1, len(tables) - 1)
     for node in np.unique(low[share < 1.0]).tolist():
         some = np.flatnonzero((low == node) & (share < 1.0))
-        less, more = (1.0 / _between(tables[i], row[some], count[some]) for i in (node, node - 1))
+        less, more = (1.0 / by_number(tables[i], row[some], count[some]) for i in (node, node - 1))
         place = np.maximum(share[some] - shares[node], 0.0) / (shares[node - 1] - shares[node])
         out[some] = 1.0 / (less + place * (more - less))
     return out
 
 
-def _between(table: NDArray[np.float64], row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
-    place = np.log(np.maximum(count, 1e-12) / COUNTS[0]) / np.log(COUNTS[1] / COUNTS[0])
-    place = np.clip(place, 0.0, len(COUNTS) - 1.0)
-    low = np.minimum(place.astype(np.int64), len(COUNTS) - 2)
+def by_number(
+    table: NDArray[np.floating], row: NDArray[np.integer], count: NDArray[np.float64], counts: NDArray = COUNTS
+) -> NDArray[np.float64]:
+    """Weights (n,) of rows (n,) of a table (r, k) for ``counts`` (k,) of facets, for numbers of facets (n,) between."""
+    place = np.log(np.maximum(count, 1e-12) / counts[0]) / np.log(counts[1] / counts[0])
+    place = np.clip(place, 0.0, len(counts) - 1.0)
+    low = np.minimum(place.astype(np.int64), len(counts) - 2)
     return table[row, low] + (place - low) * (table[row, low + 1] - table[row, low])
 
 
@@ -183,13 +186,8 @@ def _measuring(flora: Flora, number: int) -> Generator[tuple[str, float], None, 
     """Measure the weights of one species, unless they are known."""
     if _known(flora, number) is not None:
         return
-    work, name = fitting(flora, number, RAYS), flora.species[number].name
-    while True:
-        try:
-            yield name, next(work)
-        except StopIteration as stop:
-            found = stop.value
-            break
+    name = flora.species[number].name
+    found = yield from mapped(fitting(flora, number, RAYS), lambda done: (name, done))
     content = digest(flora, number)
     _keep(content, remembered(_KIND, content, found.shape, lambda: found))
 
@@ -251,17 +249,12 @@ def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float,
         Fraction that is done.
     """
     rows = np.flatnonzero(flora.rows["species"] == number)
-    out, seen, done = np.ones((2, len(rows), len(COUNTS))), {}, 0
+    out, seen, done, every = np.ones((2, len(rows), len(COUNTS))), {}, 0, 2 * len(rows)
     for row, families in _families(flora, number).items():
         apart = _apart(flora, families)
         for kind, make in enumerate((Families.of_subplants, Families.of_branches)):
-            fitted = _fitted(make(flora, *apart), rays, seen)
-            while True:
-                try:
-                    yield min((done + next(fitted)) / (2 * len(rows)), 1.0)
-                except StopIteration as stop:
-                    out[kind, row - rows[0]] = stop.value
-                    break
+            steps = _fitted(make(flora, *apart), rays, seen)
+            out[kind, row - rows[0]] = yield from mapped(steps, lambda part, done=done: min((done + part) / every, 1.0))
             done += 1
     return out
 

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera.camera import Camera
+from ..camera.camera import Camera, to_eye
 from ..compiled.flora import Flora
 from ..compiled.placed import extents
 from ..growth.branches import Branches
@@ -109,7 +109,7 @@ def light_ratios(
     radius, low, high = extents(flora, subplants, farthest=False).T
     volume = _FILLED * np.pi * radius**2 * (high - low) * subplants.length**3
     extinction = 0.5 * flora.leaf_areas(subplants) / np.maximum(volume, 1e-300)
-    leaf, eye = np.sqrt(flora.one_leaf_area(subplants)), _towards_eye(camera, place)
+    leaf, eye = np.sqrt(flora.one_leaf_area(subplants)), to_eye(camera, place)
     total, strength = np.zeros(len(place)), np.zeros(len(place))
     for light in lights:
         towards, away = -light.direction, 1.0
@@ -120,11 +120,3 @@ def light_ratios(
         total += own * balance(np.linalg.norm(eye - towards, axis=1), extinction, leaf, facet)
         strength += own
     return np.where(strength > 0.0, total / np.maximum(strength, 1e-300), 1.0)
-
-
-def _towards_eye(camera: Camera, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors (n, 3) from places to the eye."""
-    if camera.kind == "ORTHO":
-        return np.broadcast_to(camera.frame[:, 2], places.shape)
-    way = camera.eye - places
-    return way / np.maximum(np.linalg.norm(way, axis=1), 1e-9)[:, None]

@@ -10,7 +10,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, smoothstep
 from ..camera.camera import Camera
 from ..tetrahedra.geometry import squared_edges, volume
 from ..tetrahedra.tree import TetrahedralTree
@@ -38,8 +38,7 @@ def real_fraction(pixels: NDArray[np.float64], limit: float) -> NDArray[np.float
 
     It is 0 up to a limit in pixels and 1 from `BAND` times that on (beyond the paper, which switches at once).
     """
-    place = np.clip(np.log(np.maximum(pixels, 1e-300) / limit) / np.log(BAND), 0.0, 1.0)
-    return place * place * (3.0 - 2.0 * place)
+    return smoothstep(np.log(np.maximum(pixels, 1e-300) / limit) / np.log(BAND))
 
 
 class Decision(IntEnum):

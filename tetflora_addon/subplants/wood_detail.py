@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, cross, dot, spread, unit
+from ..arrays import Arrays, cross, dot, smoothstep, spread, unit
 from ..compiled.flora import Flora
 from ..growth.axes import Axes
 from ..growth.branches import Branches
@@ -97,8 +97,8 @@ def fineness(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Fineness:
     size = np.minimum(size, limit)
     if len(near):
         size[near] = _largest(flora, whole.take(near), pixels)
-    weight = np.clip(np.log(np.maximum(size, 1e-300) / limit) / np.log(_BAND), 0.0, 1.0)
-    return Fineness(fine_sides(sides, size), weight * weight * (3.0 - 2.0 * weight), size)
+    weight = smoothstep(np.log(np.maximum(size, 1e-300) / limit) / np.log(_BAND))
+    return Fineness(fine_sides(sides, size), weight, size)
 
 
 def _largest(flora: Flora, whole: WholeBranches, pixels: Pixels) -> NDArray[np.float64]:
