@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -147,9 +147,7 @@ def _plants(rows: NDArray[np.void], first: int, polygons: NDArray[np.float64]) -
     one = max(polygons[first], 1)
     number = int(np.clip(_POLYGONS / one, 2 if 2 * one <= _PAIR else 1, _PLANTS))
     seed = mix(key_of_seed(np.arange(number)) ^ np.uint64(0xC1A3)).view(np.int64)
-    frame = np.tile(np.eye(3), (number, 1, 1))
-    species = np.full(number, rows["species"][first], np.int32)
-    plants = trunks(rows, Seeds(("",), species, seed, np.zeros((number, 3)), frame, np.ones(number)))
+    plants = trunks(rows, replace(Seeds.upright(number, rows["species"][first]), seed=seed))
     if one > _LARGEST:
         number = _PLANTS
     while polygons[plants.row].max() > _LARGEST:

@@ -83,9 +83,7 @@ def crown_of(species: Species) -> Crown:
 
 def _crown_of(species: Species) -> Crown:
     flora = compile_species([species])
-    number = np.arange(_PLANTS)
-    origin, upright, one = np.zeros((_PLANTS, 3)), np.tile(np.eye(3), (_PLANTS, 1, 1)), np.ones(_PLANTS)
-    trunk = trunks(flora.rows, Seeds((species.name,), np.zeros(_PLANTS, np.int32), number, origin, upright, one))
+    trunk = trunks(flora.rows, Seeds.upright(_PLANTS))
     row, length = int(trunk.row[0]), float(trunk.length.mean())
     points = flora.samples.leaves if flora.leaf_count[row] > 0 else flora.samples.wood
     first, samples = int(points.first[row, -1]), int(points.number[row, -1])

@@ -14,26 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import gathered
+from ..growth import seasons
 from ..growth.branches import Branches
-from ..growth.seasons import (
-    AREA,
-    AUTUMN,
-    DRY,
-    FRESH,
-    PRESENT,
-    SIZE,
-    Season,
-    expected,
-    leaf_table,
-    mean_autumn_colours,
-    plant_days,
-    seasonal_rows,
-)
 from ..species.species import LEAF_KINDS, Species
 from .averages import Averages, RowLeaves, average, quadratic
 
 KINDS = len(LEAF_KINDS)
-_SEEN = (AREA, FRESH, AUTUMN, DRY)
+_SEEN = (seasons.AREA, seasons.FRESH, seasons.AUTUMN, seasons.DRY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +65,7 @@ class DayTotals:
     def left(self, branches: Branches, kind: int | NDArray[np.integer], *columns: int) -> list[NDArray[np.float64]]:
         """What is left of leaves of a kind, or of kinds (n,), on the days of branches (n): some columns (n,)."""
         which = self.table[branches.row, kind]
-        return expected(self.tables, self.origin, which, branches.year[:, 0], columns)
+        return seasons.expected(self.tables, self.origin, which, branches.year[:, 0], columns)
 
     def _summed(self, subplants: Branches, each: NDArray[np.float64], column: int) -> NDArray[np.float64]:
         """Sum (n,) over kinds of leaves of what they have in summer (n, k) and the day leaves."""
@@ -91,16 +78,16 @@ class DayTotals:
         """
         area = np.einsum("nj,njk->nk", quadratic(subplants.outward), self.area[subplants.row])
         area = area if formed is None else area * formed
-        return self._summed(subplants, area, AREA)
+        return self._summed(subplants, area, seasons.AREA)
 
     def leaf_counts(self, subplants: Branches) -> NDArray[np.float64]:
         """Number (n,) of leaves, likewise."""
-        return self._summed(subplants, self.count[subplants.row], PRESENT)
+        return self._summed(subplants, self.count[subplants.row], seasons.PRESENT)
 
     def leaf_faces(self, subplants: Branches, formed: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Number (n,) of faces of leaves, likewise."""
         faces = self.faces[subplants.row]
-        return self._summed(subplants, faces if formed is None else faces * formed, PRESENT)
+        return self._summed(subplants, faces if formed is None else faces * formed, seasons.PRESENT)
 
     def leaf_colours(self, subplants: Branches) -> NDArray[np.float64]:
         """Mean colours (n, 3) of leaves, weighted by area; black where there are none."""
@@ -147,8 +134,8 @@ class DayTotals:
     def widths(self, subplants: Branches, leaf: NDArray[np.float64], bare: NDArray[np.float64]) -> NDArray[np.float64]:
         """Widths (n,) between those of leaves in summer (n,) and of what bears them (n,), by number and by growth."""
         count = self.count[subplants.row]
-        every, left = count.sum(axis=1), self._summed(subplants, count, PRESENT)
-        size = self._summed(subplants, count, SIZE) / np.maximum(left, 1e-300)
+        every, left = count.sum(axis=1), self._summed(subplants, count, seasons.PRESENT)
+        size = self._summed(subplants, count, seasons.SIZE) / np.maximum(left, 1e-300)
         share = left / np.maximum(every, 1e-300)
         return np.where(every > 0, bare + share * (leaf * size - bare), leaf)
 
@@ -158,7 +145,7 @@ class DayTotals:
         days = _days_of_plants(rows[trunk])
         area = self.area[trunk].mean(axis=0)
         every = (np.full(len(days), table) for table in self.table[trunk].tolist())
-        left = [expected(self.tables, self.origin, which, days, [AREA])[0] for which in every]
+        left = [seasons.expected(self.tables, self.origin, which, days, [seasons.AREA])[0] for which in every]
         share = area @ np.array(left) / area.sum() if area.sum() > 0 else np.ones(1)
         return float(share.min()), float(share.max())
 
@@ -166,7 +153,7 @@ class DayTotals:
         """Area (n,) of leaves over that in summer, 1 where there are never any."""
         area = self.area[subplants.row].mean(axis=1)
         all_year = area.sum(axis=1)
-        left = self._summed(subplants, area, AREA)
+        left = self._summed(subplants, area, seasons.AREA)
         return np.where(all_year > 0, left / np.where(all_year > 0, all_year, 1.0), 1.0)
 
 
@@ -180,13 +167,13 @@ def _mixed(
     """Area times colour (n, 3) of leaves on a day, from those in summer (n, 3) of areas (n,), by columns of `_SEEN`."""
     every, *others = left
     out = (every - sum(others))[:, None] * summer
-    for part, colour in zip(others, (year["fresh"], mean_autumn_colours(year, hue), year["dry"]), strict=True):
+    for part, colour in zip(others, (year["fresh"], seasons.mean_autumn_colours(year, hue), year["dry"]), strict=True):
         out += (area * part)[:, None] * colour
     return out
 
 
 def totals_of_day(
-    rows: NDArray[np.void], species: Sequence[Species], season: Season, totals: Averages, leaf: RowLeaves
+    rows: NDArray[np.void], species: Sequence[Species], season: seasons.Season, totals: Averages, leaf: RowLeaves
 ) -> tuple[NDArray[np.void], DayTotals] | None:
     """Rows on a day, and totals of their sub-plants; None where no plant is other than in summer.
 
@@ -194,7 +181,7 @@ def totals_of_day(
     ----------
     rows : (r,) parameter table
     species : sequence of Species
-    season : Season
+    season : seasons.Season
     totals : Averages
         Of the same rows.
     leaf : RowLeaves
@@ -202,11 +189,11 @@ def totals_of_day(
     """
     if all(one.year is None for one in species):
         return None
-    rows = seasonal_rows(rows, species, season)
+    rows = seasons.seasonal_rows(rows, species, season)
     own = [one.year and one.year.at_latitude(abs(season.latitude)) for one in species]
     kinds = [[None if year is None else year.of_kind(k) for k in range(KINDS)] for year in own]
     every = list(dict.fromkeys(leaf for some in kinds for leaf in some))
-    tables = np.stack([leaf_table(one) for one in every])
+    tables = np.stack([seasons.leaf_table(one) for one in every])
     origin = np.array([0.0 if one is None else one.origin for one in every])
     of_species = np.array([[every.index(one) for one in some] for some in kinds])
     years = np.zeros((len(species), KINDS), rows.dtype["year"])
@@ -239,7 +226,7 @@ def _by_kind(rows: NDArray[np.void], totals: Averages, leaf: RowLeaves) -> tuple
 
 def _days_of_plants(trunk: np.void) -> NDArray[np.float64]:
     """Days (n,) that it may be for plants of a species, by the row of its trunk."""
-    return plant_days(trunk["day"], max(trunk["spring"], trunk["autumn"]))
+    return seasons.plant_days(trunk["day"], max(trunk["spring"], trunk["autumn"]))
 
 
 def _differs(rows: NDArray[np.void], made: DayTotals, of_species: NDArray[np.int64]) -> bool:
@@ -249,7 +236,7 @@ def _differs(rows: NDArray[np.void], made: DayTotals, of_species: NDArray[np.int
     for row, which in zip(rows[trunk], of_species, strict=True):
         days = _days_of_plants(row)
         for table in which.tolist():
-            left = expected(made.tables, made.origin, np.full(len(days), table), days)
+            left = seasons.expected(made.tables, made.origin, np.full(len(days), table), days)
             if np.abs(np.array(left) - summer).max() > 1e-9:
                 return True
     return False

@@ -362,10 +362,7 @@ def _mean_tips(
 
 def beyond_limbs(rows: NDArray[np.void], first: int, species: int) -> Beyond:
     """How far twigs and leaves of a species reach, whose trunk is row ``first``."""
-    n = _KNOWN_PLANTS
-    upright = np.tile(np.eye(3), (n, 1, 1))
-    seeds = Seeds(("",), np.full(n, species, np.int32), np.arange(n), np.zeros((n, 3)), upright, np.ones(n))
-    plants = trunks(rows, seeds)
+    n, plants = _KNOWN_PLANTS, trunks(rows, Seeds.upright(_KNOWN_PLANTS, species))
     limbs, over = [], 0.0
     for grown, lines in [] if rows["phantom"][first] else _stems(rows, plants):
         owner, tip = _leaf_tips(rows, grown, lines)

@@ -277,23 +277,8 @@ def _skies_around(n: int, upright: bool, met: NDArray[np.float64]) -> NDArray[np
 
 def _looked_at(row: int, length: float, sky: NDArray[np.float64]) -> Branches:
     """Branches of a row, of length 1, with the sky in given directions (n, 3) of their axes."""
-    n = len(sky)
-    key = mix(key_of_seed(np.arange(n)) ^ np.uint64(0x0E1E))
-    frame = _frames_along(sky).transpose(0, 2, 1)
-    one, none = np.ones(n), np.zeros(n)
-    scale = np.full(n, 1 / max(length, 1e-9))
-    return Branches(
-        np.full(n, row, np.int32),
-        np.arange(n, dtype=np.int32),
-        key,
-        np.zeros((n, 3)),
-        frame,
-        one,
-        one,
-        scale,
-        one,
-        none,
-    )
+    key = mix(key_of_seed(np.arange(len(sky))) ^ np.uint64(0x0E1E))
+    return Branches.apart(row, key, _frames_along(sky).transpose(0, 2, 1), 1.0, 1 / max(length, 1e-9))
 
 
 def _some_children(

@@ -258,11 +258,8 @@ class _Walk:
             half = (_TILTS[1] - _TILTS[0]) / 2
             cos = np.clip(_TILTS[stand // _ROLLS] + half * (2 * evenly(key, _TILT) - 1), -1, 1)
             frame = _turned(cos, 2 * np.pi * (stand % _ROLLS + evenly(key, _ROLL)) / _ROLLS)
-        one, none = np.ones(n), np.zeros(n)
-        size, scale = np.full(n, self.length[row - self.first]), np.full(n, self.scale)
-        kind, plant = np.full(n, row, np.int32), np.arange(n, dtype=np.int32)
-        branches = Branches(kind, plant, key, np.zeros((n, 3)), frame, size, one, scale, one, none)
-        return _Arrived(branches, one, np.full((self.slot[-1] + 1, n), -1, np.int32))
+        branches = Branches.apart(row, key, frame, self.length[row - self.first], self.scale)
+        return _Arrived(branches, np.ones(n), np.full((self.slot[-1] + 1, n), -1, np.int32))
 
     def sampled(
         self, points: _Points | None, row: int, expected: NDArray[np.float64]

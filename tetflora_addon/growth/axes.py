@@ -244,47 +244,36 @@ _FALL = 8 * np.log(100.0)  # the flare falls to a hundredth over the first eight
 
 def profile(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint64], t: NDArray[np.float64]) -> NDArray:
     """Radius (n,) at fractions t (n,) of branches of rows (n,) and keys (n,), divided by that of the base unflared."""
-    taper = ranged(rows, "taper", row, key, Draw.TAPER)
-    out = 1 - (1 - taper) * t
-    hand = np.flatnonzero(rows["drawn"][row])
-    if len(hand):
-        out[hand] = _drawn(rows, row[hand], t[hand])[0]
-    piped = np.flatnonzero(rows["pipe"][row] > 0)
-    if len(piped):
-        power, start, tip = _pipe(rows, row[piped], taper[piped])
-        fraction = np.clip((t[piped] - start) / (1 - start), 0, 1)
-        out[piped] = (tip + (1 - tip) * (1 - fraction)) ** (1 / power)
-    flared = np.flatnonzero(rows["flare"][row] > 0)
-    if len(flared):
-        out[flared] += rows["flare"][row[flared]] * np.maximum(np.exp(-_FALL * t[flared]) - 0.01, 0)
-    return out
+    return _profile(rows, row, key, t, summed=False)
 
 
 def profile_integral(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint64], t: NDArray[np.float64]) -> NDArray:
     """Integral (n,) of `profile` from 0 to t; differences of it are exact under any sequence of cuts."""
+    return _profile(rows, row, key, t, summed=True)
+
+
+def _profile(rows: NDArray[np.void], row: NDArray, key: NDArray, t: NDArray[np.float64], summed: bool) -> NDArray:
     taper = ranged(rows, "taper", row, key, Draw.TAPER)
-    out = t - (1 - taper) * t * t / 2
+    out = t - (1 - taper) * t * t / 2 if summed else 1 - (1 - taper) * t
     hand = np.flatnonzero(rows["drawn"][row])
     if len(hand):
-        out[hand] = _drawn(rows, row[hand], t[hand])[1]
+        out[hand] = _drawn(rows, row[hand], t[hand])[summed]
     piped = np.flatnonzero(rows["pipe"][row] > 0)
     if len(piped):
-        power, start, tip = _pipe(rows, row[piped], taper[piped])
-        fraction = np.clip((t[piped] - start) / (1 - start), 0, 1)
-        q = 1 + 1 / power
-        fallen = 1 - (tip + (1 - tip) * (1 - fraction)) ** q
-        out[piped] = np.minimum(t[piped], start) + (1 - start) * fallen / (q * np.maximum(1 - tip, 1e-12))
+        power, start, own = rows["pipe"][row[piped]], rows["start"][row[piped], 0, 0], t[piped]
+        # A tip as thick as the base has nothing to distribute; the limit keeps divisions finite.
+        tip = np.minimum(taper[piped], 1 - 1e-6) ** power
+        left, q = tip + (1 - tip) * (1 - np.clip((own - start) / (1 - start), 0, 1)), summed + 1 / power
+        fallen = (1 - start) * (1 - left**q) / (q * np.maximum(1 - tip, 1e-12))
+        out[piped] = np.minimum(own, start) + fallen if summed else left**q
     flared = np.flatnonzero(rows["flare"][row] > 0)
     if len(flared):
-        end = np.minimum(t[flared], FLARE_END)
-        out[flared] += rows["flare"][row[flared]] * ((1 - np.exp(-_FALL * end)) / _FALL - 0.01 * end)
+        end = np.minimum(t[flared], FLARE_END) if summed else t[flared]
+        fall = np.exp(-_FALL * end)
+        out[flared] += rows["flare"][row[flared]] * (
+            (1 - fall) / _FALL - 0.01 * end if summed else np.maximum(fall - 0.01, 0)
+        )
     return out
-
-
-def _pipe(rows: NDArray[np.void], row: NDArray, taper: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    power = rows["pipe"][row]
-    # A tip as thick as the base has nothing to distribute; the limit keeps divisions finite.
-    return power, rows["start"][row, 0, 0], np.minimum(taper, 1 - 1e-6) ** power
 
 
 def _drawn(rows: NDArray[np.void], row: NDArray, t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:

@@ -81,6 +81,13 @@ class Branches(Arrays):
     year: NDArray[np.float64] | None = None
     crown: NDArray[np.float32] | None = None
 
+    @classmethod
+    def apart(cls, row: int, key: NDArray, frame: NDArray, length: float, scale: float) -> Branches:
+        """Branches (n,) of one row at the origin, of radius 1, as long as any and each a plant of its own."""
+        one, kind = np.ones(len(key)), np.full(len(key), row, np.int32)
+        plant, place = np.arange(len(key), dtype=np.int32), np.zeros((len(key), 3))
+        return cls(kind, plant, key, place, frame, length * one, one, scale * one, one, 0.0 * one)
+
     def moved(self) -> Branches:
         """The same a moment later; only where that is known."""
         return replace(self, **vars(self.later), later=None)

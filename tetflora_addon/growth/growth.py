@@ -8,7 +8,7 @@ A branch is also a *sub-plant*: it and all that grows on it. Functions take any 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,22 +16,11 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, by_component, columns, dot, spread
 from ..species.growing import faded
 from ..species.members import dead_vigour
+from . import formed
 from .axes import Axes, axes, profile
 from .branches import Branches, Pose
 from .crown_forms import BASE
 from .envelopes import BOX
-from .formed import (
-    along,
-    are_formed,
-    bare_part,
-    dead_end,
-    formed_trunks,
-    fractions,
-    handed_on,
-    numbers,
-    reaches,
-    sparser,
-)
 from .grown_rows import FADES, NOW, Grown, child_number, fullness_of, grown_nodes, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .rows import DEAD, FORK, LATERAL, SPUR, flare_rings, ranged, varied
@@ -96,8 +85,8 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     later = _later(seeds, frame, sky, moment(rows)) if moment(rows) else None
     year, crown = plant_years(rows, row, key), None
     if seeds.crown is not None:
-        crown, girth = formed_trunks(rows, row, frame, seeds.crown)
-        length, radius = length * along(rows, row, crown), radius * girth
+        crown, girth = formed.formed_trunks(rows, row, frame, seeds.crown)
+        length, radius = length * formed.along(rows, row, crown), radius * girth
     return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later, year, crown)
 
 
@@ -130,23 +119,14 @@ def chosen_drawn(
         return at.position + start, at.frame @ rows["frames"][row, 0]
 
     position, frame = begun(plant)
-    return Branches(
-        row,
-        plant.plant,
+    # The drawing is bent when its lines are asked for.
+    later = None if plant.later is None else Pose(*begun(plant.later), plant.later.sky)
+    key, size = (
         child_key(plant.key, index + _DRAWN_PATH),
-        position,
-        frame,
-        length * plant.scale,
-        radius * plant.scale,
-        plant.scale,
-        vigour,
-        outward,
-        plant.sky,
-        # The drawing is bent when its lines are asked for.
-        None if plant.later is None else Pose(*begun(plant.later), plant.later.sky),
-        plant.year,
-        plant.crown,
+        {"length": length * plant.scale, "radius": radius * plant.scale},
     )
+    where = {"position": position, "frame": frame, "later": later}
+    return replace(plant, row=row, key=key, vigour=vigour, outward=outward, **where, **size)
 
 
 def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
@@ -164,9 +144,9 @@ def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERA
         number = np.maximum(np.floor(wanted + uniform(key, _ROUND[sort])), 1)  # what divides goes on
         return np.where(child >= 0, number, 0).astype(np.int64)
     whorl = np.maximum(rows["whorl"][child], 1)
-    if are_formed(rows, branches):
+    if formed.are_formed(rows, branches):
         start = rows["start"][row, DEAD, 0] if sort == DEAD else _started(rows, branches, sort)
-        wanted = wanted * numbers(rows, row, branches.crown[:, BASE], sort, start)
+        wanted = wanted * formed.numbers(rows, row, branches.crown[:, BASE], sort, start)
     nodes = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64)
     grown = living_nodes(rows, branches, sort)
     if grown is not None:
@@ -181,19 +161,19 @@ def living_nodes(rows: NDArray[np.void], branches: Branches, sort: int) -> Grown
         return None
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
     wanted = varied(rows["count"][row, sort], key, _COUNT[sort]) * fullness(rows, branches) / whorl
-    start, draw, formed = rows["start"][row, sort], np.zeros(len(row)), None
+    start, draw, ends = rows["start"][row, sort], np.zeros(len(row)), None
     if sort != DEAD:
         draw = signed(key, _START[sort])
     start = start[:, 0] if sort == DEAD else start[:, 0] + start[:, 1] * draw
-    if are_formed(rows, branches):
+    if formed.are_formed(rows, branches):
         base, none = branches.crown[:, BASE], np.zeros(len(row))
-        bare = bare_part(rows, row, base)
+        bare = formed.bare_part(rows, row, base)
         if sort == LATERAL:
-            formed, wanted = (bare, none), wanted * sparser(rows, row, base)
+            ends, wanted = (bare, none), wanted * formed.sparser(rows, row, base)
         elif sort == DEAD:
-            formed = none, bare
+            ends = none, bare
     chance = uniform(key, _ROUND[sort])
-    return grown_nodes(rows, branches, sort, int(_PATHS[sort]), wanted, start, draw, chance, formed)
+    return grown_nodes(rows, branches, sort, int(_PATHS[sort]), wanted, start, draw, chance, ends)
 
 
 def _started(rows: NDArray[np.void], branches: Branches, sort: int) -> NDArray[np.float64]:
@@ -250,7 +230,7 @@ def chosen_children(
         index, more, extra = grown.chosen(owner, index, rows["whorl"][row])
         path = path + more
     key = child_key(parent.key, child_number(index, path))
-    fading, formed = 1.0, are_formed(rows, parents)
+    fading, shaped = 1.0, formed.are_formed(rows, parents)
     if sort == FORK:
         whorl, node, within, fraction = counts[owner], np.zeros_like(index), index, np.ones(len(index))
         t = np.ones(len(index))
@@ -261,24 +241,24 @@ def chosen_children(
         first = child_key(parent.key, child_number(node * whorl, path))
         place = signed(np.where(within > 0, first, key), Draw.PLACE)
         fraction = (node + 0.5 + _PLACE_JITTER * place) / np.maximum(counts[owner] // whorl, 1)
-        base = parent.crown[:, BASE] if formed else None
+        base = parent.crown[:, BASE] if shaped else None
         if sort == DEAD:
             start, end = rows["start"][parent.row, sort].T
-            end = dead_end(rows, parent.row, base) if formed else end
+            end = formed.dead_end(rows, parent.row, base) if shaped else end
         else:
             start, end = _started(rows, parent, sort), 1.0
-            if formed and sort == LATERAL:
-                start = np.maximum(start, bare_part(rows, parent.row, base))
+            if shaped and sort == LATERAL:
+                start = np.maximum(start, formed.bare_part(rows, parent.row, base))
         t = start + (end - start) * fraction
         if grown is not None:
             there, part, own = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
             on = grown.on[owner]
             t, fraction = np.where(on, there, t), np.where(on, part, fraction)
-        among = fractions(rows, parent.row, base) if formed and sort == LATERAL else rows["fraction"][parent.row, sort]
-        low, high = among.T
+        among = rows["fraction"][parent.row, sort]
+        low, high = (formed.fractions(rows, parent.row, base) if shaped and sort == LATERAL else among).T
         fraction = low + (high - low) * fraction
         if grown is not None:
-            first, last = rows["fraction"][parent.row, sort].T
+            first, last = among.T
             fading = faded(first + (last - first) * own, rows["growing"][parent.row, sort, FADES], extra)
     position, frame = lines.at(owner, t)
     sky = lines.sky_at(owner, t)
@@ -295,10 +275,10 @@ def chosen_children(
     if sort == FORK:
         angle = np.where(counts[owner] > 1, angle, 0.0)
     full_length, reach = parent.length, 1.0
-    if formed:
-        lean, reach = reaches(rows, parent, azimuth, sort)
+    if shaped:
+        lean, reach = formed.reaches(rows, parent, azimuth, sort)
         angle = angle * lean
-        full_length = full_length / along(rows, parent.row, parent.crown)
+        full_length = full_length / formed.along(rows, parent.row, parent.crown)
     frame = turned(frame, azimuth, angle)
     around = parent.outward
     limb = (rows["order"][parent.row] == 1) & (sort != FORK)
@@ -318,8 +298,8 @@ def chosen_children(
         measure = full_length * rows["nominal"][parent.row] * vigour
     elif sort == FORK:
         vigour, measure = parent.vigour, full_length  # which follows the crown already
-        if formed:
-            measure = measure * along(rows, row, parent.crown)
+        if shaped:
+            measure = measure * formed.along(rows, row, parent.crown)
         radius = radius * np.maximum(whorl, 1) ** (-1 / rows["fork_power"][parent.row])
     else:
         vigour, measure = np.ones(len(index)), parent.scale
@@ -331,7 +311,7 @@ def chosen_children(
         again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)
         later = Pose(again.position, again.frame, again.sky)
     own = row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, sky, later, parent.year
-    return Branches(*own, None if parent.crown is None else handed_on(parent, sort, reach, azimuth, angle))
+    return Branches(*own, None if parent.crown is None else formed.handed_on(parent, sort, reach, azimuth, angle))
 
 
 def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:

@@ -46,6 +46,12 @@ class Seeds(Arrays):
     crown: NDArray[np.float64] | None = None
     motion: NDArray[np.float64] | None = None
 
+    @classmethod
+    def upright(cls, number: int, species: int = 0) -> Seeds:
+        """So many plants of a species at the origin, of scale 1, with seeds from 0 on."""
+        frame, kind = np.tile(np.eye(3), (number, 1, 1)), np.full(number, species, np.int32)
+        return cls(("",), kind, np.arange(number), np.zeros((number, 3)), frame, np.ones(number))
+
     def counted_from(self, origin: NDArray[np.float64]) -> Seeds:
         """The same plants in coordinates that begin at a place (3,) of the present ones."""
         return replace(self, position=self.position - origin) if origin.any() else self

@@ -18,21 +18,9 @@ from numpy.typing import NDArray
 from ..camera.camera import Camera, to_eye
 from ..refinement.lights import Light
 from ..tetrahedra.geometry import volume
+from . import scattering
 from .buffers import LightBuffer
 from .receivers import Clouds, Sheets
-from .scattering import (
-    DIRECTIONS,
-    HARMONICS,
-    SOLID_ANGLE,
-    facet_ambient,
-    facet_direct,
-    fluence,
-    harmonics,
-    irradiance,
-    particle_ambient,
-    particle_direct,
-    scattered_fractions,
-)
 from .sources import World, arriving
 
 #: Maximum ratio of an order of scattering to the one before: 1 would never end.
@@ -76,7 +64,7 @@ class Illumination:
         # Sheets of the sky's buffers, and the number that each of ``sheets`` has among them.
         self._sky, self._world, (self._sky_sheets, self._number) = sky, world, fewer
         self._ground = np.zeros(3)
-        self.ambient = np.zeros((len(clouds), 4, HARMONICS, 3), np.float32)
+        self.ambient = np.zeros((len(clouds), 4, scattering.HARMONICS, 3), np.float32)
 
     @property
     def nbytes(self) -> int:
@@ -117,7 +105,7 @@ class Illumination:
         Linear between the samples of a tetrahedron's key points (paper, section 7); elsewhere the sky's buffers are
         looked up again. Parameters as for `direct`.
         """
-        result = np.zeros((len(points), HARMONICS, 3))
+        result = np.zeros((len(points), scattering.HARMONICS, 3))
         inside = np.flatnonzero(cells >= 0)
         weights = self.clouds.weights(points[inside], cells[inside])
         result[inside] = np.einsum("mk,mkhc->mhc", weights, self.ambient[cells[inside]])
@@ -135,7 +123,7 @@ class Illumination:
         For vertices or faces of meshes; ``cells`` as for `direct`, by default none.
         """
         cells = np.full(len(points), -1) if cells is None else cells
-        result = irradiance(self.around(points, cells), normals)
+        result = scattering.irradiance(self.around(points, cells), normals)
         for towards, light in self.direct(points, cells):
             result += light * np.maximum(np.sum(normals * towards, axis=1), 0.0)[:, None]
         return result
@@ -175,12 +163,12 @@ class Illumination:
         front, back = np.zeros((2, len(centre), 3), np.float32)
         for start in range(0, len(centre), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
-            fractions = scattered_fractions(colour[part], transmission[part])
+            fractions = scattering.scattered_fractions(colour[part], transmission[part])
             view = None if camera is None else to_eye(camera, centre[part])
-            sides = facet_ambient(normal[part], fractions, self.around(centre[part], cells[part]), view)
+            sides = scattering.facet_ambient(normal[part], fractions, self.around(centre[part], cells[part]), view)
             on = None if sheets is None else sheets[part]
             for towards, light in self.direct(centre[part], cells[part], on):
-                added = facet_direct(normal[part], fractions, towards, light, view)
+                added = scattering.facet_direct(normal[part], fractions, towards, light, view)
                 sides = sides[0] + added[0], sides[1] + added[1]
             front[part], back[part] = sides
         return front, back
@@ -213,18 +201,21 @@ class Illumination:
         result = np.zeros((len(points), 3), np.float32)
         for start in range(0, len(points), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
-            fractions, view = scattered_fractions(colour[part], transmission[part]), to_eye(camera, points[part])
+            fractions, view = (
+                scattering.scattered_fractions(colour[part], transmission[part]),
+                to_eye(camera, points[part]),
+            )
             around = self.around(points[part], cells[part])
-            particles, planes = particle_ambient(fractions, around, view), 0.0
+            particles, planes = scattering.particle_ambient(fractions, around, view), 0.0
             if plane is not None:
                 axis = normal[part]
                 axis = axis * np.where(np.sum(axis * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
-                planes = facet_ambient(axis, fractions, around, view)[0]
+                planes = scattering.facet_ambient(axis, fractions, around, view)[0]
             on = None if sheets is None else sheets[part]
             for towards, light in self.direct(points[part], cells[part], on):
-                particles += particle_direct(fractions, towards, light, view)
+                particles += scattering.particle_direct(fractions, towards, light, view)
                 if plane is not None:
-                    planes = planes + facet_direct(axis, fractions, towards, light, view)[0]
+                    planes = planes + scattering.facet_direct(axis, fractions, towards, light, view)[0]
             weight = 0.0 if plane is None else plane[part][:, None]
             result[part] = (1.0 - weight) * particles + weight * planes
         return result
@@ -248,7 +239,7 @@ class Illumination:
         count = len(self.clouds)
         points, cells, sheets, keys = self.sheets.samples(self.clouds)
         up = np.array([[0.0, 0.0, 1.0]])
-        bright = irradiance(self._world.parts.sum(axis=0)[None], up)[0]
+        bright = scattering.irradiance(self._world.parts.sum(axis=0)[None], up)[0]
         for lit in self.lamps:
             if lit.light.kind == "SUN":
                 bright += lit.light.colour * max(-lit.light.direction[2], 0.0)
@@ -257,22 +248,22 @@ class Illumination:
             return
         sky = keys.means(self._from_sky(points, cells, sheets))
         yield 1.0 / (orders + 1)
-        first = fluence(sky)
+        first = scattering.fluence(sky)
         for _, light in self.direct(points, cells, sheets):
             first += keys.means(light)
         gathered = last = np.zeros_like(sky)
         for order in range(orders):
-            passing = keys.by_cell(first + fluence(gathered))
+            passing = keys.by_cell(first + scattering.fluence(gathered))
             self._shine(self.clouds.albedo * passing / (4.0 * np.pi))
             before, every = last, keys.means(self._from_clouds(points))
             last, gathered = every - gathered, every
             if order == orders - 1:
-                ratio = self._again(fluence(before), fluence(last))
+                ratio = self._again(scattering.fluence(before), scattering.fluence(last))
                 gathered = gathered + last * (ratio / (1.0 - ratio))
             yield (order + 2.0) / (orders + 1)
-        passing = keys.by_cell(first + fluence(gathered))
+        passing = keys.by_cell(first + scattering.fluence(gathered))
         self._shine(self.clouds.albedo * passing / (4.0 * np.pi))
-        self.ambient[:] = (sky + gathered).reshape(count, 4, HARMONICS, 3)
+        self.ambient[:] = (sky + gathered).reshape(count, 4, scattering.HARMONICS, 3)
 
     def _again(self, before: NDArray[np.float64], last: NDArray[np.float64]) -> NDArray[np.float64]:
         """Ratio (3,) of each further order of scattering to the one before, from two: means over all surfaces."""
@@ -305,12 +296,12 @@ class Illumination:
         self, points: NDArray[np.float64], cells: NDArray[np.integer], sheets: NDArray[np.integer] | None = None
     ) -> NDArray[np.float64]:
         """Light of the sky (m, 9, 3) that nothing blocks."""
-        result = np.zeros((len(points), HARMONICS, 3))
+        result = np.zeros((len(points), scattering.HARMONICS, 3))
         if self._world.dark:
             return result
         if sheets is not None:
             sheets = np.append(self._number, -1)[sheets]
-        for part, buffer, towards in zip(self._world.parts, self._sky, DIRECTIONS, strict=True):
+        for part, buffer, towards in zip(self._world.parts, self._sky, scattering.DIRECTIONS, strict=True):
             through = np.ones(len(points))
             if buffer is not None:
                 through = self._through([buffer], points, cells, towards, sheets)
@@ -326,9 +317,9 @@ class Illumination:
 
     def _from_clouds(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Light (m, 9, 3) that tetrahedra and polygons scatter."""
-        result = np.zeros((len(points), HARMONICS, 3))
-        for buffer, towards in zip(self._sky, DIRECTIONS, strict=True):
+        result = np.zeros((len(points), scattering.HARMONICS, 3))
+        for buffer, towards in zip(self._sky, scattering.DIRECTIONS, strict=True):
             if buffer is not None:
                 light = buffer.scattered(points)
-                result += harmonics(towards)[:, None] * light[:, None, :] * SOLID_ANGLE
+                result += scattering.harmonics(towards)[:, None] * light[:, None, :] * scattering.SOLID_ANGLE
         return result

@@ -261,11 +261,7 @@ def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float,
 
 def _families(flora: Flora, number: int) -> dict[int, list[Branches]]:
     """Sub-plants of each row of a species that grow together, in a few plants."""
-    n = FAMILIES
-    which = np.full(n, number, np.int32)
-    names = tuple(s.identifier for s in flora.species)
-    seeds = Seeds(names, which, np.arange(n), np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.ones(n))
-    level, plant, found = trunks(flora.rows, seeds), np.arange(n), {}
+    level, plant, found = trunks(flora.rows, Seeds.upright(FAMILIES, number)), np.arange(FAMILIES), {}
     while len(level):
         some = []
         for row in np.unique(level.row):

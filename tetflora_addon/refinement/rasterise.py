@@ -148,8 +148,8 @@ def _fragments(vertices: NDArray[np.float64], camera: Camera, width: int, height
     parts, below = [Fragments.empty()], least.sum(axis=1)
     for count in range(5):
         for rows in _rows(box, np.flatnonzero(below == count)):
-            hit, bounds = _within(planes, count, ends, rows, x, y)
-            cell, row, column = rows.cell[hit.row], rows.number[hit.row], hit.column
+            own, column, bounds = _within(planes, count, ends, rows, x, y)
+            cell, row = rows.cell[own], rows.number[own]
             enter, leave = bounds if parallel else (1.0 / bounds[1], 1.0 / bounds[0])
             metres = _ray_metres(camera, x[column], y[row])
             # Half the memory of intp; a heavy scene has millions of fragments.
@@ -168,13 +168,10 @@ class _Rows:
     first: NDArray[np.int64]
     wide: NDArray[np.int64]
 
-
-@dataclass(frozen=True)
-class _Hits:
-    """Pixels (h,) that are hit: in which of the rows, and their columns in the image."""
-
-    row: NDArray[np.int64]
-    column: NDArray[np.int64]
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """Columns (h,) of all their pixels."""
+        return np.arange(int(self.wide.sum())) + np.repeat(self.first - np.cumsum(self.wide) + self.wide, self.wide)
 
 
 def _within(
@@ -184,13 +181,12 @@ def _within(
     rows: _Rows,
     x: NDArray[np.float64],
     y: NDArray[np.float64],
-) -> tuple[_Hits, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Pixels of rows whose rays pass through tetrahedra, and the bounds (h,) of their depths or reciprocals.
+) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Rows and columns (h,) of pixels whose rays pass through tetrahedra, and bounds (h,) of depths or reciprocals.
 
     The first ``count`` of four planes (n, 4), each a constant and slopes along x and y, are lower bounds.
     """
-    before = np.cumsum(rows.wide) - rows.wide
-    column = np.arange(int(rows.wide.sum())) + np.repeat(rows.first - before, rows.wide)
+    column = rows.columns
     px, py = x[column], y[rows.number]
     least, most = (np.full(len(column), end) for end in ends)
     for face in range(4):
@@ -204,7 +200,7 @@ def _within(
             np.minimum(most, value, out=most)
     hit = np.flatnonzero(most > least)
     row = np.repeat(np.arange(len(rows.wide)), rows.wide)[hit]
-    return _Hits(row, column[hit]), (least[hit], most[hit])
+    return row, column[hit], (least[hit], most[hit])
 
 
 def _rows(box: NDArray[np.int64], which: NDArray[np.intp]) -> Iterator[_Rows]:
@@ -282,7 +278,8 @@ def _draw_triangles(
     sides = np.cross(flat, np.roll(flat, -1, axis=1))
     near, far = camera.near, camera.far
     x, y = _centres(camera, width, height)
-    for cell, col, row in _pairs(box):
+    for rows in _rows(box, np.arange(len(box))):
+        cell, row, col = np.repeat(rows.cell, rows.wide), np.repeat(rows.number, rows.wide), rows.columns
         px, py = x[col], y[row]
         lowest, highest = np.full(len(cell), np.inf), np.full(len(cell), -np.inf)
         for side in range(3):
@@ -330,21 +327,3 @@ def _pixel_box(
     first = np.ceil(np.clip((low - corner) / step - 0.5 - 1e-5, 0, size))
     last = np.floor(np.clip((high - corner) / step - 0.5 + 1e-5, -1, size - 1))
     return np.stack([first[:, 0], last[:, 0], first[:, 1], last[:, 1]], axis=1).astype(np.int64)
-
-
-def _pairs(box: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]]:
-    """All pixels of all boxes, some at a time: index of the box, column, row."""
-    wide = np.maximum(box[:, 1] - box[:, 0] + 1, 0)
-    count = wide * np.maximum(box[:, 3] - box[:, 2] + 1, 0)
-    some = np.flatnonzero(count)
-    ends = np.cumsum(count[some])
-    start = 0
-    while start < len(some):
-        before = ends[start - 1] if start else 0
-        stop = max(start + 1, int(np.searchsorted(ends, before + PAIRS_AT_ONCE, side="right")))
-        which = some[start:stop]
-        cell = np.repeat(which, count[which])
-        inside = np.arange(len(cell)) - np.repeat(ends[start:stop] - count[which] - before, count[which])
-        row, column = np.divmod(inside, wide[cell])
-        yield cell, box[cell, 0] + column, box[cell, 2] + row
-        start = stop
