@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make the table of facet weights of the shipped species: ``python -m devtools.facet_tables [--anew]``.
 
-Each species is measured as described, with fewer leaves, and at other ages (`proxies.weight_variants`). A fit takes up
+Each species is measured as described, with fewer leaves, and at other ages (`proxies.facet_weights`). A fit takes up
 to a minute; those that have not changed since are kept, and what is done is written all the time.
 """
 

@@ -16,9 +16,7 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import facet_weights as subject
-from tetflora_addon.proxies import sights
 from tetflora_addon.proxies.drawn import facet_mesh
-from tetflora_addon.proxies.facet_weights import variants
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, piece_facets, subplant_facets
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterise import occluder_depth
@@ -93,7 +91,7 @@ def test_tables_of_shipped_species_are_those_of_today() -> None:
 
 def test_every_shipped_species_has_a_table() -> None:
     for identifier in list_species():
-        for name, flora in variants(load_species(identifier)):
+        for name, flora in subject.variants(load_species(identifier)):
             assert subject.digest(flora, 0) in subject.shipped(), name
 
 
@@ -125,9 +123,9 @@ def test_the_least_weight_with_which_a_triangle_reaches_a_ray() -> None:
     )
     for point, expected in (((0.0, 0.0), 0.0), ((0.0, -0.5), 1.0), ((0.0, 1.0), 1.0), ((0.0, -0.25), 0.25)):
         moved = replace(one, centre=np.array([[-point[0] * 1.0, -point[1] * 1.0, 0.0]]))
-        view = sights.View(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), 1000.0)
+        view = subject.View(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), 1000.0)
         far = replace(moved, centre=moved.centre + 0.0)
-        least = sights.least_weights(view, far)
+        least = subject.least_weights(view, far)
         assert len(least) == 1
         assert least[0] == pytest.approx(expected, abs=1e-9)
 
