@@ -162,13 +162,7 @@ def _integral(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
-    """Expected totals of every row.
-
-    Parameters
-    ----------
-    rows : (r,) parameter table
-    leaf : RowLeaves
-    """
+    """Expected totals of every row (r,)."""
     r = len(rows)
     exact = rows.copy()  # means of what is linear in its ranges
     exact["taper"][:, 1] = 0
@@ -275,24 +269,13 @@ def children_sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
     weight, fading = 1.0, 1.0
     if row["growing"][sort, NOW] > 0:
         t, fraction, weight, fading = spread_children(row, sort)
-    vigour = np.ones_like(t)
-    if sort == LATERAL:
-        vigour = lengths(rows, np.full(t.shape, i), fraction) * fading
-    elif sort == DEAD:
-        vigour = dead_vigour(fraction)
-    full = fullness_of(rows, np.full(t.shape, row["next"][sort]), vigour)
     if sort == SPUR:
         mean, variation = child["length"]
-        size, radius = np.full(t.shape, (mean**2 + variation**2 / 3) * thickness), thickness
+        vigour, size, radius = np.ones_like(t), np.full(t.shape, (mean**2 + variation**2 / 3) * thickness), thickness
     else:
-        here = np.full(t.shape, i)
-        piped = sort == LATERAL and row["pipe"] > 0
-        thick = row["pipe_radius"] * vigour if piped else profile(rows, here, np.zeros(len(t), np.uint64), t)
-        size, radius = (
-            vigour * row["nominal"] * child["length"][0] * thick * thickness,
-            float((weight * thick).mean() * thickness),
-        )
-    full = weight * full
+        vigour, thick, size = side_branches(rows, i, sort, t, fraction, fading)
+        radius = float((weight * thick).mean() * thickness)
+    full = weight * fullness_of(rows, np.full(t.shape, row["next"][sort]), vigour)
     nodes = number * full.mean() * np.eye(3)
     if row["order"] == 1:
         outward = row["part"][0] + (row["part"][1] - row["part"][0]) * t
@@ -300,6 +283,22 @@ def children_sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
     length = float(row["nominal"] * child["length"][0] * (weight * vigour).mean())
     means = (float(number * m.mean()) for m in (full, weight * size, size * full))
     return _Sums(number, *means, nodes, length, radius)
+
+
+def side_branches(
+    rows: NDArray[np.void], i: int, sort: int, t: NDArray, fraction: NDArray, fading: NDArray | float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Laterals or dead branches (k,) of a row: vigours, what radii are in proportion to, and lengths × radii.
+
+    All relative to their parent's. They are at fractions t (k,) of it and (k,) of its children; laterals are shorter by
+    factors ``fading`` (k,).
+    """
+    row, here = rows[i], np.full(t.shape, i)
+    child = rows[row["next"][sort]]
+    vigour = lengths(rows, here, fraction) * fading if sort == LATERAL else dead_vigour(fraction)
+    piped = sort == LATERAL and row["pipe"] > 0
+    thick = row["pipe_radius"] * vigour if piped else profile(rows, here, np.zeros(len(t), np.uint64), t)
+    return vigour, thick, vigour * row["nominal"] * child["length"][0] * thick * child["thickness"][0]
 
 
 def _fork_sums(rows: NDArray[np.void], i: int) -> _Sums:

@@ -8,10 +8,10 @@ sub-plant are kept as a few hundred sample points, drawn by following random pat
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,15 @@ from .day import DayTotals, totals_of_day
 from .formed_totals import FormedTotals, formed_totals
 from .orientation import Orientation, orientation_of
 from .samples import Samples, draw_samples
+
+
+def _in_summer(find_out: Callable[[Flora], Any]) -> Any:
+    """A property that is found out once when first asked for, of the flora in summer without wind.
+
+    Only proxies need what takes rays or samples to know, and few scenes have crown forms.
+    """
+    name = find_out.__name__
+    return cached_property(lambda flora: find_out(flora) if flora.in_leaf is flora else getattr(flora.in_leaf, name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,35 +157,26 @@ class Flora:
         coloured = (self.rows["leaf_colour_young"] != self.rows["leaf_colour"][:, 0]).any()
         return bool(coloured or (self.rows["leaf_size_young"] != 1).any())
 
-    @cached_property
+    @_in_summer
     def samples(self) -> Samples:
-        """Points on the leaves and wood of sub-plants; drawn when first asked for, as only proxies need them."""
-        if self.in_leaf is not self:
-            return self.in_leaf.samples
+        """Points on the leaves and wood of sub-plants."""
         totals = self.averages
         return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length)
 
-    @cached_property
+    @_in_summer
     def sampled_bound(self) -> NDArray[np.float64]:
         """`bounds.sampled_bounds` of all samples (r, 6); unit is the branch's length."""
-        if self.in_leaf is not self:
-            return self.in_leaf.sampled_bound
-        parts = (self.samples.leaves, self.samples.wood)
-        return sampled_bounds(parts, len(self.rows))
+        return sampled_bounds((self.samples.leaves, self.samples.wood), len(self.rows))
 
-    @cached_property
+    @_in_summer
     def orientation(self) -> Orientation:
-        """How the surfaces of sub-plants are turned; likewise."""
-        if self.in_leaf is not self:
-            return self.in_leaf.orientation
+        """How the surfaces of sub-plants are turned."""
         totals = self.averages
         return orientation_of(self.rows, self.forms, totals.leaf_area[:, 1], _wood_totals(totals), totals.length)
 
-    @cached_property
+    @_in_summer
     def clumping(self) -> Clumping:
-        """How much lighter sub-plants are than even fogs of their area; fitted when first asked for, as above."""
-        if self.in_leaf is not self:
-            return self.in_leaf.clumping
+        """How much lighter sub-plants are than even fogs of their area."""
         totals = self.averages
         wood = _wood_totals(totals) * (totals.length * totals.radius)[:, None]
         area = totals.leaf_area[:, 1] + wood / 2
@@ -252,11 +252,9 @@ class Flora:
             faces[some] *= self.formed_totals.leaves(subplants.take(some), faces=True)
         return faces
 
-    @cached_property
+    @_in_summer
     def formed_totals(self) -> FormedTotals:
-        """What crown forms change; computed when first asked for, as few scenes have any."""
-        if self.in_leaf is not self:
-            return self.in_leaf.formed_totals
+        """What crown forms change."""
         return formed_totals(self.rows, self.averages, self.leaf.polygons)
 
     def _formed(self, subplants: Branches) -> NDArray[np.intp]:

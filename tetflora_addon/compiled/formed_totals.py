@@ -15,16 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..growth.axes import profile
 from ..growth.branches import Branches
 from ..growth.crown_forms import BASE, MOST, WIDTH
 from ..growth.formed import LIGHT, are_stools, bare_part, dead_end, fractions, raised, sparser
-from ..growth.grown_rows import NOW, fullness_of, lengths, living, spread_children
+from ..growth.grown_rows import NOW, fullness_of, living, spread_children
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..species.growing import EVEN
-from ..species.members import dead_vigour
 from ..species.species import LEAF_KINDS
-from .averages import Averages, children_sums
+from .averages import Averages, children_sums, side_branches
 
 _BASES = np.linspace(0.0, MOST[BASE], 39)
 _GAUSS = np.polynomial.legendre.leggauss(5)[0]
@@ -152,14 +150,11 @@ def _trunk_of(rows: NDArray[np.void], i: int) -> int:
 def _limbs(rows: NDArray[np.void], i: int, sort: int, base: float) -> tuple[float, ...]:
     """Expected sums over the laterals or dead branches of a row whose crown has a base.
 
-    Returns
-    -------
-    tuple of float
-        Their number; the sums of what new ones lack of their numbers, of that × vigour; of length × radius over the
-        parent's; and of that × the first and the second.
+    Their number; the sums of what new ones lack of their numbers, of that × vigour; of length × radius over the
+    parent's; and of that × the first and the second.
     """
     at, row = np.array([i]), rows[i]
-    child, number = rows[row["next"][sort]], float(row["count"][sort, 0])
+    number = float(row["count"][sort, 0])
     bare = float(bare_part(rows, at, base)[0])
     among = fractions(rows, at, base)[0] if sort == LATERAL else row["fraction"][sort]
     weight, fading = 1.0, 1.0
@@ -179,14 +174,10 @@ def _limbs(rows: NDArray[np.void], i: int, sort: int, base: float) -> tuple[floa
         t, fraction = start + (1 - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
     if sort == LATERAL:
         number *= float(sparser(rows, at, base)[0])
-    here = np.full(t.shape, i)
-    vigour = lengths(rows, here, fraction) * fading if sort == LATERAL else dead_vigour(fraction)
+    vigour, _, size = side_branches(rows, i, sort, t, fraction, fading)
     # Numbers of a branch on which nothing follows the length: all but those of new branches.
     plain = rows[[row["next"][sort]]].copy()
     plain["count_by_length"] = 0
     bears = fullness_of(plain, np.zeros(t.shape, np.int64), vigour)
-    piped = sort == LATERAL and row["pipe"] > 0
-    thick = row["pipe_radius"] * vigour if piped else profile(rows, here, np.zeros(len(t), np.uint64), t)
-    size = vigour * row["nominal"] * child["length"][0] * thick * child["thickness"][0]
     means = (float((weight * one).mean()) for one in (bears, bears * vigour, size, size * bears, size * bears * vigour))
     return number, *(number * mean for mean in means)

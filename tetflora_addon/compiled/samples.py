@@ -108,15 +108,15 @@ def draw_samples(
     length : (r,) float64
         Typical length of a branch, metres.
     """
-    leaves, wood = _Collector(len(rows)), _Collector(len(rows))
+    leaves, wood = [], []
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
     for first, end in zip(trunk, [*trunk[1:], len(rows)], strict=True):
         walk = _Walk(rows, int(first), int(end), leaf_area, length)
         for row in range(first, end):
             for points, area, out in ((walk.leaves, leaf_area, leaves), (walk.wood, wood_area, wood)):
                 if area[row].sum() > 0:
-                    out.add(row, *walk.sampled(points, row, area[row]))
-    return Samples(leaves.points(), wood.points())
+                    out.append((row, *walk.sampled(points, row, area[row])))
+    return Samples(_joined(leaves, len(rows)), _joined(wood, len(rows)))
 
 
 def _turned(cos: NDArray[np.float64], azimuth: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -185,14 +185,8 @@ class _Walk:
     """Paths through one species; rows are counted from its trunk.
 
     Each path keeps a line of ancestors: the number of the branch of each row that it has come through, or −1. Rows that
-    are drawn by hand share a slot of it, as none grows on another, and their branches are numbered on.
-
-    Attributes
-    ----------
-    branches : list of Branches
-        Those of each row that paths have followed.
-    leaves, wood : _Points
-        What they have met.
+    are drawn by hand share a slot of it, as none grows on another, and their branches are numbered on. ``branches`` are
+    those of each row that paths have followed, ``leaves`` and ``wood`` what they have met.
     """
 
     def __init__(
@@ -264,19 +258,10 @@ class _Walk:
     def sampled(
         self, points: _Points | None, row: int, expected: NDArray[np.float64]
     ) -> tuple[_Points, NDArray[np.int64], NDArray[np.int64]]:
-        """Samples of what grows on branches of a row, drawn by area, in their axes.
+        """Samples of what grows on branches of a row, and first sample and number of samples for each class (c,), (c,).
 
-        Parameters
-        ----------
-        points : _Points
-            Where from: leaves, or wood.
-        row : int
-        expected : (r,) float64
-            Expected area in a sub-plant by the row that contributes it.
-
-        Returns
-        -------
-        _Points, and first sample and number of samples for each class (c,), (c,)
+        They are drawn by area from points on leaves or wood, in the axes of the branches. ``expected`` (r,) is the
+        expected area in a sub-plant by the row that contributes it.
         """
         i = row - self.first
         number = np.zeros(0) if points is None else points.line[:, self.slot[i]] - self.start[i]
@@ -372,31 +357,22 @@ def _one_child_each(rows: NDArray[np.void], one: _Arrived, lines: Axes, sort: in
     return _Arrived(children, (one.weight * counts)[alive], one.line[:, alive])
 
 
-class _Collector:
-    """Samples of one row after the other."""
+def _joined(found: list[tuple[int, _Points, NDArray[np.int64], NDArray[np.int64]]], rows: int) -> Points:
+    """Samples of one row after the other: row, points, and first sample and number of each class."""
+    first, number = np.zeros((2, rows, _CLASSES), np.int64)
+    of_row: list[int] = []
+    for row, points, begins, counts in found:
+        first[row], number[row] = len(of_row) + begins, counts
+        of_row += [row] * len(points.row)
+    parts = [points for _, points, *_ in found]
 
-    def __init__(self, rows: int) -> None:
-        self.first, self.number = np.zeros((2, rows, _CLASSES), np.int64)
-        self.parts: list[_Points] = []
-        self.rows: list[int] = []
+    def whole(name: str, shape: tuple[int, ...] = (), kind: type = np.float32) -> NDArray:
+        return np.concatenate([np.zeros((0, *shape)), *(getattr(p, name) for p in parts)]).astype(kind, "C")
 
-    def add(self, row: int, points: _Points, first: NDArray[np.int64], number: NDArray[np.int64]) -> None:
-        """Samples of a row."""
-        self.first[row], self.number[row] = len(self.rows) + first, number
-        self.parts.append(points)
-        self.rows += [row] * len(points.row)
-
-    def points(self) -> Points:
-        """All of them."""
-
-        def whole(name: str, shape: tuple[int, ...], kind: type = np.float32) -> NDArray:
-            return np.concatenate([np.zeros((0, *shape)), *(getattr(p, name) for p in self.parts)]).astype(kind, "C")
-
-        limbs = Limbs.concatenate([p.limbs for p in self.parts])
-        shares = Shares.of(limbs, np.array(self.rows, np.int64), len(self.first))
-        vectors, numbers = whole("position", (3,)), [whole(name, ()) for name in ("outward", "light", "young")]
-        own = vectors, whole("frame", (3, 3)), whole("row", (), np.int32), *numbers
-        return Points(self.first, self.number, *own, limbs, shares)
+    limbs = Limbs.concatenate([p.limbs for p in parts])
+    numbers = (whole(name) for name in ("outward", "light", "young"))
+    own = whole("position", (3,)), whole("frame", (3, 3)), whole("row", (), np.int32), *numbers
+    return Points(first, number, *own, limbs, Shares.of(limbs, np.array(of_row, np.int64), rows))
 
 
 #: Classes of samples: on the trunk itself, on stems beyond forks, on limbs of the one and of the others.

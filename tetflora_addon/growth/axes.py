@@ -110,21 +110,10 @@ def _to_front(array: NDArray) -> NDArray:
 
 
 def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
-    """Centre lines of branches.
+    """Centre lines of branches (n,), of as many segments as the row has that has most.
 
     Each joint bends by its part of the order's curvature and turns to the sky or the ground (Weber and Penn, "Creation
     and rendering of realistic trees", SIGGRAPH 1995, sections 4.1 and 4.8).
-
-    Parameters
-    ----------
-    rows : (r,) parameter table
-    branches : Branches
-        n of them.
-
-    Returns
-    -------
-    Axes
-        Knots (n, s + 1, 3) in metres and frames (n, s, 3, 3), with s the segments of the row that has most.
     """
     lines = _axes(rows, branches)
     if branches.later is None:

@@ -39,18 +39,9 @@ _START = (Draw.BRANCH_START, Draw.BRANCH_START, Draw.SPUR_START)
 
 
 def turned(frame: NDArray[np.float64], azimuth: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Frames turned by an azimuth about their z and then tilted by an angle away from it.
+    """Frames (n, 3, 3) turned by an azimuth (n,) about their z and then tilted by an angle (n,) away from it, radians.
 
-    Parameters
-    ----------
-    frame : (n, 3, 3) float64
-    azimuth, angle : (n,) float64
-        Radians.
-
-    Returns
-    -------
-    (n, 3, 3) float64
-        Third column leans by ``angle``; first column is the same lean a right angle further.
+    The third column leans by the angle; the first is the same lean a right angle further.
     """
     x, y, z = frame[:, :, 0], frame[:, :, 1], frame[:, :, 2]
     ca, sa, cd, sd = (f(v)[:, None] for v in (azimuth, angle) for f in (np.cos, np.sin))
@@ -202,7 +193,7 @@ def chosen_children(
     counts: NDArray[np.int64],
     sort: int = LATERAL,
 ) -> Branches:
-    """Some children of branches.
+    """Some children (m,) of branches.
 
     Parameters
     ----------
@@ -217,10 +208,6 @@ def chosen_children(
         Number of children of this sort of each parent.
     sort : int
         ``rows.LATERAL``, ``rows.FORK``, ``rows.SPUR`` or ``rows.DEAD``.
-
-    Returns
-    -------
-    Branches of m
     """
     parent = parents.take(owner)
     path = int(_PATHS[sort])

@@ -77,16 +77,7 @@ class Draw(IntEnum):
 
 
 def mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Scramble 64-bit integers (the finaliser of SplitMix64; Steele, Lea and Flood, OOPSLA 2014).
-
-    Parameters
-    ----------
-    z : (...) uint64
-
-    Returns
-    -------
-    (...) uint64
-    """
+    """64-bit integers (...) scrambled (the finaliser of SplitMix64; Steele, Lea and Flood, OOPSLA 2014)."""
     z = np.asarray(z, dtype=np.uint64)
     with np.errstate(over="ignore"):  # only scalars warn; wrapping is what is wanted
         z = z ^ (z >> np.uint64(30))  # a new array, in which all that follows is worked out
@@ -118,14 +109,7 @@ def mix_draw(key: NDArray[np.uint64], draw: int) -> NDArray[np.uint64]:
 
 
 def uniform(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
-    """Numbers in [0, 1), one for each key.
-
-    Parameters
-    ----------
-    key : (...) uint64
-    draw : int
-        What it is for, see `Draw`; different draws of a key are independent.
-    """
+    """Numbers (...) in [0, 1), one for each key (...); different draws of a key are independent, see `Draw`."""
     z = mix_draw(key, draw)
     z >>= np.uint64(11)
     out = z.astype(np.float64)

@@ -96,13 +96,7 @@ radius, vigour and place between inside and outside.
 
 
 def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
-    """Table of parameters.
-
-    Returns
-    -------
-    (r,) array of `ROW_DTYPE`
-        The rows of each species follow one another, its trunk first.
-    """
+    """Table of parameters, (r,) of `ROW_DTYPE`: the rows of each species follow one another, its trunk first."""
     kinds: list[np.void] = []
     for s, one in enumerate(species):
         kinds += _rows_of_species(one, s, len(kinds))
@@ -113,6 +107,14 @@ def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
         children = np.concatenate([row["next"][row["next"] >= 0], np.arange(*row["drawn_rows"])])
         row["tropic"] = here or rows["tropic"][children].any()
     return rows
+
+
+def with_columns(rows: NDArray[np.void], columns: list[tuple]) -> NDArray[np.void]:
+    """A copy of rows (r,) with other columns besides, which are 0."""
+    out = np.zeros(len(rows), np.dtype(rows.dtype.descr + columns))
+    for name in rows.dtype.names:
+        out[name] = rows[name]
+    return out
 
 
 def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:

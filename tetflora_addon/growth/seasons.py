@@ -26,6 +26,7 @@ from ..setting import setting
 from ..species.species import LEAF_KINDS, Species
 from ..species.year import DAYS, MAX_AUTUMN, LeafYear
 from .hashing import Draw, mix_draw, uniform
+from .rows import with_columns
 
 #: Bits of a leaf's number for its days, for its colour, and for whether it follows the year at all.
 _BITS, _TINT_BITS = 13, 12
@@ -123,22 +124,8 @@ plants differ."""
 
 
 def seasonal_rows(rows: NDArray[np.void], species: Sequence[Species], season: Season) -> NDArray[np.void]:
-    """Rows on a day of the year.
-
-    Parameters
-    ----------
-    rows : (r,) array of `rows.ROW_DTYPE`
-    species : sequence of Species
-        That they count through.
-    season : Season
-
-    Returns
-    -------
-    (r,) array of `rows.ROW_DTYPE` and `YEAR_COLUMN`
-    """
-    out = np.zeros(len(rows), np.dtype(rows.dtype.descr + YEAR_COLUMN))
-    for name in rows.dtype.names:
-        out[name] = rows[name]
+    """Rows (r,), which count through some species, on a day of the year: with `YEAR_COLUMN` besides."""
+    out = with_columns(rows, YEAR_COLUMN)
     out["day"] = season.northern_day
     out["year"]["turnover"] = 0.0
     for number, one in enumerate(species):

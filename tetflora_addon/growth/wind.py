@@ -25,7 +25,7 @@ from ..errors import TetFloraError
 from ..setting import setting
 from .branches import Branches
 from .hashing import Draw, uniform
-from .rows import SPUR_ORDER
+from .rows import SPUR_ORDER, with_columns
 
 #: Radians by which the tip of a trunk `_SLENDER` times as long as thick leans at `_STRONG` m/s; and over that for
 #: limbs, their branches, and all beyond, as they carry more leaves for their wood. A cantilever leans by the fourth
@@ -139,22 +139,11 @@ class Wind:
 def windy_rows(
     rows: NDArray[np.void], length: NDArray[np.float64], radius: NDArray[np.float64], wind: Wind
 ) -> NDArray[np.void]:
-    """Rows with what a wind does to them.
+    """Rows (r,) with what a wind does to them, in `WIND_COLUMNS` besides.
 
-    Parameters
-    ----------
-    rows : (r,) parameter table
-    length, radius : (r,) float64
-        Typical ones of their branches; only their ratio counts.
-    wind : Wind
-
-    Returns
-    -------
-    (r,) array with `WIND_COLUMNS` besides
+    ``length`` and ``radius`` (r,) are typical of their branches; only their ratio counts.
     """
-    out = np.zeros(len(rows), np.dtype(rows.dtype.descr + WIND_COLUMNS))
-    for name in rows.dtype.names:
-        out[name] = rows[name]
+    out = with_columns(rows, WIND_COLUMNS)
     slender = rows["nominal"] * length / np.maximum(radius, 1e-9)
     # A part of a branch between forks leans by its part.
     order = np.minimum(np.where(rows["order"] == SPUR_ORDER, 2, rows["order"]), len(_OVER_TRUNK) - 1)

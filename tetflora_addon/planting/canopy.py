@@ -156,13 +156,9 @@ def light_on(sheet: Sheet, canopy: Canopy) -> Generator[float, None, NDArray[np.
 
 
 def fallen_on(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, NDArray[np.float64]]:
-    """Leaf area that falls on each cell from the plants of each species, m² on a square meter.
+    """Leaf area (kinds, rows · columns) that falls on each cell from the plants of each species, m² on a square meter.
 
     Yields the fraction of the work that is done.
-
-    Returns
-    -------
-    (kinds, rows · columns) float64
     """
     canopy = canopy.ordered()
     out = np.zeros((kinds, sheet.rows * sheet.columns))

@@ -251,13 +251,7 @@ class _Sowing:
         return tuple(np.concatenate(column) for column in zip(none, *self._parts, strict=True))
 
     def reason(self, kept: int) -> str:
-        """Why there are fewer plants than wanted.
-
-        Raises
-        ------
-        SceneError
-            No place was suitable, and many were tried.
-        """
+        """Why there are fewer plants than wanted; a `SceneError` if no place was suitable, and many were tried."""
         rules = self.rules
         if not self.drawn:
             return (

@@ -22,17 +22,10 @@ _ENTRIES = 3_000_000  # about as many pieces of lines are noted in the cells
 
 
 def inside_any(points: NDArray[np.float64], polygons: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
-    """Which points lie in at least one polygon.
+    """Which points (n, 2) lie in at least one polygon, (n,).
 
-    Parameters
-    ----------
-    points : (n, 2) float64
-    polygons : sequence of (k, 2) float64
-        Closed; the last corner is followed by the first. Where one crosses itself, what is wound twice is outside.
-
-    Returns
-    -------
-    (n,) bool
+    Polygons (k, 2) are closed: the last corner is followed by the first. Where one crosses itself, what is wound twice
+    is outside.
     """
     inside = np.zeros(len(points), bool)
     for polygon in polygons:

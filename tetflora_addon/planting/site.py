@@ -293,16 +293,10 @@ def _near_areas(
     uv: NDArray[np.float64] | None,
     located: bool,
 ) -> tuple[NDArray[np.int64], NDArray, NDArray | None, NDArray | None, NDArray | None]:
-    """Parts of triangles near areas: large ones are divided, so that few places are drawn in vain.
+    """Parts (n,) of triangles near areas: large ones are divided, so that few places are drawn in vain.
 
-    Returns
-    -------
-    source : (n,) int64
-        Triangle of each part.
-    triangles, weight, uv
-        Of the parts.
-    within : (n, 3, 3) float64 or None
-        Where their corners are in their triangles, barycentric, if they shall be ``located``.
+    Triangle (n,) of each part; triangles, weights and texture of the parts; and where their corners are in their
+    triangles, barycentric (n, 3, 3), if they shall be ``located``.
     """
     boxes = [(area.min(axis=0), area.max(axis=0)) for area in areas]
     columns = [triangles, *([] if weight is None else [weight[..., None]]), *([] if uv is None else [uv])]

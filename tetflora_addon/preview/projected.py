@@ -88,10 +88,6 @@ def project(vertices: NDArray[np.float64], extinction: NDArray[np.float64], came
     camera : Camera
         Perspective or orthographic; panoramas have no straight edges.
 
-    Returns
-    -------
-    Projected
-
     Raises
     ------
     ValueError

@@ -112,19 +112,9 @@ def feature_pixels(
 
 
 def decide(cells: Terminals, transmittance: NDArray[np.float64], settings: RefinementSettings) -> NDArray[np.int8]:
-    """Decide for terminal tetrahedra.
+    """Values (n,) of `Decision` for terminal tetrahedra (n,).
 
-    Parameters
-    ----------
-    cells : Terminals of n
-    transmittance : (n,) float64
-        Fraction of each one's light that nothing in front blocks; 0 out of view.
-    settings : RefinementSettings
-
-    Returns
-    -------
-    (n,) int8
-        Values of `Decision`.
+    ``transmittance`` (n,) is the fraction of each one's light that nothing in front blocks; 0 out of view.
 
     Notes
     -----

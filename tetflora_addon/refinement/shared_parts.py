@@ -88,15 +88,7 @@ def lowered(tree: TetrahedralTree, points: SharePoints, some: NDArray[np.intp] |
 
 @dataclass(frozen=True)
 class _Figures(Arrays):
-    """What a pass asks of all parts (n).
-
-    Attributes
-    ----------
-    reach : (n,) float64
-        Extent of those that can be opened, metres; 0 of others.
-    area, polygons, width : (n,) float64
-        Of their totals.
-    """
+    """What a pass asks of all parts (n): the extent of those that can be opened (metres, else 0), their totals."""
 
     reach: NDArray[np.float64]
     area: NDArray[np.float64]

@@ -158,17 +158,10 @@ class AlphaBuffer:
                 setattr(self, name, np.take(getattr(self, name), stay))
 
     def transmittance(self, rank: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Fraction of each tetrahedron's light, 0 to 1, that nothing in front blocks; 0 out of view.
+        """Fraction (numbers,) of each tetrahedron's light, 0 to 1, that nothing in front blocks; 0 out of view.
 
-        Parameters
-        ----------
-        rank : (numbers,) int
-            Front-to-back rank by number, as `TetrahedralTree.order` gives it; smaller is nearer, none negative. What
-            has been ranked before keeps its place relative to each other.
-
-        Returns
-        -------
-        (numbers,) float64
+        ``rank`` (numbers,) is the front-to-back rank by number, as `TetrahedralTree.order` gives it; smaller is nearer,
+        none negative. What has been ranked before keeps its place relative to each other.
         """
         # Only where something has come or gone is there anything to sort again.
         some = np.flatnonzero(self._changed[self._pixel])

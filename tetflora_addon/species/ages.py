@@ -129,18 +129,10 @@ def _stem(species: Species) -> int:
 class _Aged:
     """One species at one age, which is not that of its description.
 
-    Attributes
-    ----------
-    stem, last : int
-        Order of the stem, and of the twigs.
-    whole : list of float
-        Typical lengths when full-grown, metres, by order.
-    now, before : list of float
-        Lengths over those, now and a year ago.
-    stout : list of float
-        Radii over those when full-grown.
-    fresh, thin : float
-        Fraction of the branches on which there are more that live for a while; factor on the number of leaves.
+    ``stem`` and ``last`` are the order of the stem, and of the twigs. By order, ``whole`` are typical lengths when
+    full-grown, metres; ``now`` and ``before`` lengths over those, now and a year ago; ``stout`` radii over those when
+    full-grown. ``fresh`` is the fraction of the branches on which there are more that live for a while, ``thin`` a
+    factor on the number of leaves.
     """
 
     def __init__(self, species: Species, ages: Ages, years: float) -> None:

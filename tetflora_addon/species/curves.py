@@ -178,10 +178,6 @@ def joined_edges(chains: Chains) -> tuple[NDArray[np.float64], NDArray[np.int64]
     A chain begins on another where its first point, or else its last, is nearer to the other's line than its radius
     there, or than 1 % of the size of all.
 
-    Parameters
-    ----------
-    chains : Chains
-
     Returns
     -------
     points : (p, 4) float64

@@ -90,16 +90,8 @@ class StandSettings:
 def grow(site: StandSite, guilds: Sequence[Guild], settings: StandSettings) -> Generator[Progress, object, Records]:
     """Grow a stand; a job, which yields after each year and returns its records.
 
-    Parameters
-    ----------
-    site : StandSite
-    guilds : sequence of Guild
-    settings : StandSettings
-
-    Returns
-    -------
-    Records : plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is gone;
-        with an interval of 0 those of the end alone
+    These are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
+    gone; with an interval of 0 those of the end alone.
 
     Raises
     ------

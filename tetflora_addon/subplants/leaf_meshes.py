@@ -312,19 +312,11 @@ def _by_row(rows: NDArray[np.integer]) -> Iterator[tuple[int, slice]]:
 
 
 class _Bearers:
-    """Branches of one row, and which of their leaves are wanted.
+    """Branches (n,) of one row, and which of their leaves are wanted.
 
-    Parameters
-    ----------
-    flora : Flora
-    row : int
-    whole : WholeBranches of n
-    step : int
-        The leaves that are wanted here: -1 kites, 0 models of the species, from 1 on their levels.
-    fraction, kites : (n,) float64, optional
-        Fraction of the leaves that is wanted at all, and of these as kites.
-    lengths : (n,) float64, optional
-        Of leaves, as of `leaf_meshes`; where it is given, only those of the step are wanted.
+    ``step`` says which: -1 kites, 0 models of the species, from 1 on their levels. ``fraction`` (n,) of the leaves is
+    wanted at all, and of these ``kites`` (n,) as kites; where ``lengths`` (n,) of leaves are given, as of
+    `leaf_meshes`, only those of the step are.
     """
 
     def __init__(

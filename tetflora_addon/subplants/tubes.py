@@ -77,20 +77,10 @@ def tube_faces(flora: Flora, whole: WholeBranches, pixels: Pixels | None = None)
 
 @dataclass(frozen=True)
 class _Sort:
-    """Branches of one number of sides.
+    """Branches (n,) of one number of sides.
 
-    Attributes
-    ----------
-    whole : WholeBranches of n
-    sides : int
-    rings, beside : (n,) int64
-        Rings of tubes, and those of roots, of which there are `PLACES` to each.
-    buds : (n,) int64 or None
-        Rings of buds, `BUD_RINGS` to each.
-    fine : Fineness of n, or None
-        Where branches are more than coarse tubes.
-    counts : (n, S) int64 or None
-        Parts of the segments of these.
+    ``rings`` (n,) are those of tubes, ``beside`` (n,) those of roots, `PLACES` to each, ``buds`` (n,) those of buds,
+    `BUD_RINGS` to each. Where branches are more than coarse tubes, ``counts`` (n, S) are parts of their segments.
     """
 
     whole: WholeBranches
@@ -153,15 +143,10 @@ def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None, most_sides
 class _Tubes:
     """Tubes under construction: the arrays of the whole mesh, and how far they are filled.
 
-    Parameters
-    ----------
-    vertices, faces : int
-        How many there will be; there are as many edges as both together.
-    moving : bool
-        Whether vertices have velocities.
+    There are as many edges as vertices and faces together; vertices that are ``moving`` have velocities.
     """
 
-    def __init__(self, vertices: int, faces: int, moving: bool = False) -> None:
+    def __init__(self, vertices: int, faces: int, moving: bool) -> None:
         self.vertices = self.edges = self.faces = 0
         self.positions = np.zeros((vertices, 3), np.float32)
         self.velocity = np.zeros_like(self.positions) if moving else None
@@ -174,20 +159,13 @@ class _Tubes:
     def buffers(self) -> MeshBuffers:
         """The mesh."""
         faces = len(self.corner_verts)
-        motion = {} if self.velocity is None else {"velocity": ("POINT", self.velocity)}
         return MeshBuffers(
             positions=self.positions,
             edge_verts=self.edge_verts,
             corner_verts=self.corner_verts.reshape(-1),
             corner_edges=self.corner_edges.reshape(-1),
             face_offsets=np.arange(0, 4 * faces + 1, 4, dtype=np.int32),
-            attributes={
-                "UVMap": ("CORNER", self.uv.reshape(-1, 2)),
-                "tf_colour": ("FACE", self.colour),
-                "tf_transmission": ("FACE", np.zeros(faces, np.float32)),
-                "tf_girth": ("FACE", self.girth),
-                **motion,
-            },
+            attributes=wood_attributes(self.uv.reshape(-1, 2), self.colour, self.girth, self.velocity),
             smooth=True,
         )
 
@@ -272,6 +250,15 @@ class _Tubes:
         new += high.astype(np.float32)[:, None] * at_high
         new += u
         self.colour[self.faces : self.faces + number] = np.repeat(colour, sides, axis=0)
+
+
+def wood_attributes(
+    uv: NDArray[np.float32], colour: NDArray[np.float32], girth: NDArray[np.float32], velocity: NDArray | None
+) -> dict[str, tuple[str, NDArray]]:
+    """Attributes of a mesh of wood: of its corners, of its faces, and of its vertices where these move."""
+    motion = {} if velocity is None else {"velocity": ("POINT", velocity)}
+    faces = {"tf_colour": colour, "tf_transmission": np.zeros(len(colour), np.float32), "tf_girth": girth}
+    return {"UVMap": ("CORNER", uv), **{name: ("FACE", values) for name, values in faces.items()}, **motion}
 
 
 def base_girth(branches: Branches) -> NDArray[np.float64]:

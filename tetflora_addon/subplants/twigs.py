@@ -8,8 +8,6 @@ from any direction is that of the tubes, whose far side is never seen.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +21,7 @@ from ..growth.growth import WholeBranches, radius_at
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
 from .pieces import Pieces, wood_areas
-from .tubes import base_girth
+from .tubes import base_girth, wood_attributes
 
 
 def twig_buffers(
@@ -81,8 +79,9 @@ def _triangles(flora: Flora, whole: WholeBranches, times: NDArray[np.float64]) -
     uv = np.zeros((number, 3, 2))
     uv[:, 1, 0], uv[:, 2, 0], uv[:, 2, 1] = 1.0, 0.5, _height(branches)
     edges = np.stack([each, each + np.tile(np.array([1, 1, -2], np.int32), number)], axis=1)
-    faces = _Faces(edges, each, each, 3 * np.arange(number + 1), uv.reshape(-1, 2))
-    return _buffers(flora, branches, np.arange(number), corners.reshape(-1, 3), velocity, faces)
+    topology = edges, each, each, 3 * np.arange(number + 1)
+    corners, uv = corners.reshape(-1, 3), uv.reshape(-1, 2)
+    return _buffers(flora, branches, np.arange(number), corners, velocity, uv, topology)
 
 
 def _ribbons(flora: Flora, whole: WholeBranches, times: NDArray[np.float64], parts: NDArray[np.int64]) -> MeshBuffers:
@@ -110,19 +109,8 @@ def _ribbons(flora: Flora, whole: WholeBranches, times: NDArray[np.float64], par
     high = place * _height(branches)[ring]
     across = np.array([0.0, 1.0, 1.0, 0.0])[None] + np.zeros((len(first), 1))
     uv = np.stack([across, np.stack([high[first], high[first], high[first + 1], high[first + 1]], axis=1)], axis=2)
-    faces = _Faces(edges, quads.ravel(), border.ravel(), 4 * np.arange(len(first) + 1), uv.reshape(-1, 2))
-    return _buffers(flora, branches, ring[first], corners, velocity, faces)
-
-
-@dataclass(frozen=True)
-class _Faces:
-    """Topology of a mesh as of `MeshBuffers`, and texture coordinates (c, 2) of its corners."""
-
-    edges: NDArray[np.integer]
-    verts: NDArray[np.integer]
-    corner_edges: NDArray[np.integer]
-    offsets: NDArray[np.integer]
-    uv: NDArray[np.float64]
+    topology = edges, quads.ravel(), border.ravel(), 4 * np.arange(len(first) + 1)
+    return _buffers(flora, branches, ring[first], corners, velocity, uv.reshape(-1, 2), topology)
 
 
 def _buffers(
@@ -131,26 +119,17 @@ def _buffers(
     owner: NDArray[np.integer],
     corners: NDArray[np.float64],
     velocity: NDArray[np.float64] | None,
-    faces: _Faces,
+    uv: NDArray[np.float64],
+    topology: tuple[NDArray[np.integer], ...],
 ) -> MeshBuffers:
-    """Buffers of faces (f,) of branches (f,), with vertices (v, 3) that move at velocities (v, 3)."""
-    motion = {} if velocity is None else {"velocity": ("POINT", velocity.astype(np.float32))}
-    colour = branch_colours(flora.rows, branches.row, branches.key)
-    return MeshBuffers(
-        positions=corners.astype(np.float32),
-        edge_verts=faces.edges.astype(np.int32),
-        corner_verts=faces.verts.astype(np.int32),
-        corner_edges=faces.corner_edges.astype(np.int32),
-        face_offsets=faces.offsets.astype(np.int32),
-        attributes={
-            "UVMap": ("CORNER", faces.uv.astype(np.float32)),
-            "tf_colour": ("FACE", colour[owner].astype(np.float32)),
-            "tf_transmission": ("FACE", np.zeros(len(owner), np.float32)),
-            "tf_girth": ("FACE", base_girth(branches)[owner].astype(np.float32)),
-            **motion,
-        },
-        smooth=True,
-    )
+    """Buffers of faces (f,) of branches (f,), with vertices (v, 3) that move at velocities (v, 3).
+
+    ``topology`` are the four arrays of `MeshBuffers`, in their order.
+    """
+    colour, girth = branch_colours(flora.rows, branches.row, branches.key), base_girth(branches)
+    light = (None if of is None else of.astype(np.float32) for of in (uv, colour[owner], girth[owner], velocity))
+    whole = (of.astype(np.int32) for of in topology)
+    return MeshBuffers(corners.astype(np.float32), *whole, wood_attributes(*light), smooth=True)
 
 
 def _turned(branches: Branches, frame: NDArray[np.float64]) -> NDArray[np.float64]:
