@@ -109,7 +109,7 @@ def formed_totals(rows: NDArray[np.void], totals: Averages, polygons: NDArray[np
         own[:, 0, _LEAF_FACES] += totals.leaves[i, i] * polygons[i] * kinds[i]
         own[:, 0, _FACES] += totals.fixed_faces[i, i]
         own[:, 0, _WOOD] += totals.fixed_wood[i, i]
-        below, above = raised(_BASES, rows["part"][_trunk_of(rows, i), 1])
+        below, above = raised(_BASES, rows["part"][np.argmax(rows["species"] == rows["species"][i]), 1])
         stretch = above if rows["continues"][i] else below
         for sort in np.flatnonzero(rows["next"][i] >= 0):
             j = rows["next"][i, sort]
@@ -141,10 +141,6 @@ def formed_totals(rows: NDArray[np.void], totals: Averages, polygons: NDArray[np
                     own[b, 0, _SPURS] += still * spurs
                     own[b, 1, _SPURS] += grows * spurs
     return FormedTotals(formed, power)
-
-
-def _trunk_of(rows: NDArray[np.void], i: int) -> int:
-    return int(np.flatnonzero(rows["species"] == rows["species"][i])[0])
 
 
 def _limbs(rows: NDArray[np.void], i: int, sort: int, base: float) -> tuple[float, ...]:

@@ -23,7 +23,7 @@ from .crown_forms import BASE
 from .envelopes import BOX
 from .grown_rows import FADES, NOW, Grown, child_number, fullness_of, grown_nodes, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
-from .rows import DEAD, FORK, LATERAL, SPUR, flare_rings, ranged, varied
+from .rows import DEAD, FLARE_RINGS, FORK, LATERAL, SPUR, ranged, varied
 from .seasons import plant_years
 from .seeds import Seeds
 from .wind import axis_and_angle, is_windy, moment, turned_by, turned_vectors
@@ -350,7 +350,7 @@ class WholeBranches(Arrays):
         t = knot / np.take(self.lines.segments, owner)
         position = self.lines.knot(owner, knot)
         if rings.any():  # the first segment is cut where the flare bends most
-            at = np.concatenate([[0.0], flare_rings(int(rings.max()))])
+            at = np.array([0.0, *FLARE_RINGS[: int(rings.max())]])
             cut = np.flatnonzero((index <= rings[owner]) & (index > 0) & (rings[owner] > 0))
             t[cut] = at[index[cut]]
             position[cut] = self.lines.at(owner[cut], t[cut])[0]

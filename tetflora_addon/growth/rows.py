@@ -50,7 +50,7 @@ _NUMBERS = (
 )  # fmt: skip
 _INTEGERS = ("segments", "sides", "whorl", "leaf_whorl")
 #: Where a flared base gets rings of its own, fractions of the length; as far as they lie on the first segment.
-_FLARE_RINGS = (0.012, 0.035, 0.08)
+FLARE_RINGS = (0.012, 0.035, 0.08)
 # A fork that no pipe model describes keeps the cross-section.
 _FORK_POWER = 2.0
 
@@ -325,12 +325,7 @@ def _radius(order: Order, u: float) -> float:
 
 
 def _flare_rings(row: np.void) -> int:
-    return sum(ring < 0.98 / row["segments"] for ring in _FLARE_RINGS) if row["flare"] > 0 else 0
-
-
-def flare_rings(number: int) -> NDArray[np.float64]:
-    """Fractions (number,) of the length at which a flared base has rings of its own."""
-    return np.array(_FLARE_RINGS[:number])
+    return sum(ring < 0.98 / row["segments"] for ring in FLARE_RINGS) if row["flare"] > 0 else 0
 
 
 def _pipe_radius(row: np.void, thickest: float) -> float:

@@ -147,14 +147,9 @@ def _each_level(model: LeafModel, shape: Shape) -> Iterator[LeafLevel]:
         error = made.error
 
 
-def leaf_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
-    """Finer levels of a model, the coarsest of them first; none of a model that is flat and has no shape."""
-    return tuple(_finer(model).until()[0])
-
-
-def leaf_level(model: LeafModel, number: int) -> LeafLevel:
-    """One of the finer levels of a model, from 1 on; coarser ones are made, finer ones are not."""
-    return _finer(model).until(number=number)[0][number - 1]
+def leaf_levels(model: LeafModel, number: int = 1 << 10) -> tuple[LeafLevel, ...]:
+    """Finer levels of a model, the coarsest of them first, at least so many; none where it is flat, without shape."""
+    return tuple(_finer(model).until(number=number)[0])
 
 
 def level_errors(model: LeafModel, finest: float = 0.0) -> NDArray[np.float64]:

@@ -86,11 +86,6 @@ def fluence(light: NDArray[np.float64]) -> NDArray[np.float64]:
     return light[..., 0, :] * np.sqrt(4.0 * np.pi)
 
 
-def nearest_direction(directions: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Index (m,) of the direction among `DIRECTIONS` that is nearest to unit vectors (m, 3)."""
-    return np.argmax(directions @ DIRECTIONS.T, axis=1)
-
-
 def scattered_fractions(colour: NDArray[np.float64], transmission: NDArray[np.float64]) -> Fractions:
     """Fractions of light that sheets reflect (n, 3) and transmit (n, 3) diffusely, and that they mirror (n,)."""
     through = transmission[:, None]

@@ -15,7 +15,7 @@ from ..camera.camera import Camera, to_eye
 from ..refinement.lights import Light, image_size, lamp_views, light_views
 from .buffers import LightBuffer
 from .receivers import Clouds, Sheets
-from .scattering import DIRECTIONS, HARMONICS, harmonics, nearest_direction
+from .scattering import DIRECTIONS, HARMONICS, harmonics
 
 #: Maximum number of points on an area light along each of its sides.
 AREA_POINTS = 3
@@ -109,7 +109,7 @@ class World:
         index = np.arange(SKY_POINTS) + 0.5
         towards = spiral(1.0 - 2.0 * index / SKY_POINTS, index, GOLDEN_ANGLE)
         seen = np.broadcast_to(np.asarray(radiance(towards), np.float64), (SKY_POINTS, 3)) * (4.0 * np.pi / SKY_POINTS)
-        part, basis = nearest_direction(towards), harmonics(towards)
+        part, basis = np.argmax(towards @ DIRECTIONS.T, axis=1), harmonics(towards)
         parts = np.zeros((len(DIRECTIONS), HARMONICS, 3))
         for k in range(HARMONICS):
             for channel in range(3):

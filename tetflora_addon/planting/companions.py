@@ -55,7 +55,8 @@ class Company:
                 # Who seeks its own kind, or what comes later, needs founders; those left alone go in the end.
                 others = self._standing(rule.other)
                 founds = np.zeros(len(points), bool)
-                if self._awaited(rule):
+                # Where both seek each other, the others come later; `lonely` then decides in the end.
+                if self._reaches(rule.other, rule.species, set()):
                     founds = asks & (uniform(keys, SiteDraw.FOUNDER) < _FOUNDERS)
                     others = np.concatenate([others, points[founds]]) if rule.other == species else others
                 fine[asks] = founds[asks] | Neighbours(others, rule.distance).near(points[asks])
@@ -90,10 +91,6 @@ class Company:
 
     def _seeks(self, species: int, other: int) -> bool:
         return any(r.species == species and r.other == other and r.strength > 0.0 for _, r in self.rules)
-
-    def _awaited(self, rule: Companion) -> bool:
-        """Whether the others come later because both seek each other; `lonely` then decides in the end."""
-        return self._reaches(rule.other, rule.species, set())
 
     def _reaches(self, start: int, goal: int, seen: set[int]) -> bool:
         if start == goal:

@@ -302,9 +302,4 @@ def suggested_distance(
     distance = CROWN_RADII * scale * sqrt(area)
     if density is not None and density > 0.0:
         distance = min(distance, SQUARE_SIDES / sqrt(density))
-    return _two_digits(distance)
-
-
-def _two_digits(value: float) -> float:
-    """A positive value in two digits, as an artist would write it."""
-    return round(value, 1 - floor(log10(value))) if value > 0.0 else 0.0
+    return round(distance, 1 - floor(log10(distance))) if distance > 0.0 else 0.0  # as an artist would write it

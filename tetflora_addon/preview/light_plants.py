@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from ..camera.camera import origin_near
 from ..compiled.flora import Flora
 from ..compiled.placed import extents, outlines
-from ..compiled.samples import Points
 from ..growth.branches import Branches
 from ..growth.growth import trunks
 from ..growth.seeds import Seeds
@@ -120,14 +119,12 @@ def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Sha
     """Compiled bounds of plants as edges of boxes: the extent of their samples in the direction of their trunks."""
     of, origin, trunk = _shown(flora, seeds, most)
     radius, low, high = extents(flora, trunk).T * trunk.length
-    corner = np.array([(x, y, z) for z in (0, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float)
+    corner, edges = _box(1.0, 0.0, 1.0)
     local = corner * [1.0, 1.0, 0.0] * radius[:, None, None]
     local[:, :, 2] = np.where(corner[:, 2] > 0.0, high[:, None], low[:, None])
     positions = np.einsum("nij,nvj->nvi", trunk.frame, local) + trunk.position[:, None]
-    edges = [(i, (i + 1) % 4) for i in range(4)]
-    edges += [(a + 4, b + 4) for a, b in edges] + [(i, i + 4) for i in range(4)]
     colours = np.repeat(as_shown(np.maximum(flora.leaf_colours(trunk), flora.wood_colour[trunk.row])), 8, axis=0)
-    indices = _repeated(np.array(edges), 8, len(trunk))
+    indices = _repeated(edges, 8, len(trunk))
     return Shapes(positions.reshape(-1, 3).astype(np.float32), colours, indices, len(trunk), of, origin)
 
 
@@ -161,7 +158,8 @@ def _shown(flora: Flora, seeds: Seeds, most: int) -> tuple[int, NDArray[np.float
 def _profile(flora: Flora, row: int) -> NDArray[np.float64]:
     """Lowest and highest leaves of a species, and radii of its crown's rings, for a trunk of length 1."""
     points = flora.samples.leaves if flora.leaf_count[row] > 0 else flora.samples.wood
-    position = _upright(points, row)
+    first = int(points.first[row, -1])  # of an upright trunk
+    position = points.position[first : first + int(points.number[row, -1])].astype(np.float64)
     across, along = np.hypot(position[:, 0], position[:, 1]), position[:, 2]
     low, high = np.quantile(along, [_BELOW, _ABOVE])
     high = max(high, low + 0.05)
@@ -170,12 +168,6 @@ def _profile(flora: Flora, row: int) -> NDArray[np.float64]:
         band = np.abs((along - low) / (high - low) - fraction) <= _BAND
         radii.append(np.quantile(across[band] if band.any() else across, _WITHIN))
     return np.array([low, high, *radii])
-
-
-def _upright(points: Points, row: int) -> NDArray[np.float64]:
-    """Samples (k, 3) of an upright trunk, in units of its length."""
-    first, number = int(points.first[row, -1]), int(points.number[row, -1])
-    return points.position[first : first + number].astype(np.float64)
 
 
 def _faces() -> NDArray[np.int64]:
@@ -233,11 +225,10 @@ def simple_crowns(
     positions = corners @ shown[:, :3, :3].transpose(0, 2, 1) + (shown[:, None, :3, 3] - origin)
     shade = np.interp(corners[:, 2], [0.0, size[2]], _SHADES)
     colours = as_shown(np.clip(np.asarray(colour) * shade[:, None], 0.0, 1.0))
-    every = indices[None] + len(corners) * np.arange(len(shown))[:, None, None]
     return Shapes(
         positions.reshape(-1, 3).astype(np.float32),
         np.tile(colours, (len(shown), 1)).astype(np.float32),
-        every.reshape(-1, indices.shape[1]).astype(np.int32),
+        _repeated(indices, len(corners), len(shown)),
         len(shown),
         of,
         origin,

@@ -100,7 +100,9 @@ def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
     row, leaf = branches.row, flora.leaf
     size, variation = flora.rows["leaf_size"][row].T
     leaves = flora.rows["leaves"][row, 0] * fullness(flora.rows, branches) * leaf_fraction(flora, pieces)
-    area = leaves * (size**2 + variation**2 / 3) * leaf.area[row] * branches.scale**2 * _size_factors(flora, pieces)
+    area = leaves * (size**2 + variation**2 / 3) * leaf.area[row] * branches.scale**2
+    if flora.rows["gradient"].any():
+        area = area * piece_leaf_integrals(flora, pieces)[0]
     if branches.year is not None:
         left = flora.day.left(branches, flora.rows["leaf_kind"][row], AREA, PRESENT)
         area, leaves = area * left[0], leaves * left[1]
@@ -118,13 +120,6 @@ def polygon_totals(polygons: Polygons, width: NDArray[np.float64] | None = None)
     if width is None:
         width = meshes.width[face] * meshes.mean_scale[polygons.instance]
     return Totals(np.where(solid, 0.0, area), np.where(solid, area, 0.0), np.ones(len(face)), width)
-
-
-def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
-    """Mean factor (n,) on the area of leaves of pieces, by their place in the crown and on the branch."""
-    if not flora.rows["gradient"].any():
-        return 1.0
-    return piece_leaf_integrals(flora, pieces)[0]
 
 
 def sums(totals: Totals, cells: NDArray[np.integer], number: int) -> Totals:

@@ -127,7 +127,7 @@ def estimate(
 
 def _primitives(stand: Stand, camera: Camera, settings: RefinementSettings) -> float:
     """Polygons and facets that a picture needs without limits."""
-    _, pixel, each = _seen(stand, camera)
+    _, pixel, each = seen(stand, camera)
     # Leaves that are larger than facets are drawn as they are: there are fewer of them for each pixel.
     dense = FACETS_PER_PIXEL / np.maximum(settings.facet, stand.leaf / pixel) ** 2
     picture = camera.width * camera.height
@@ -136,12 +136,7 @@ def _primitives(stand: Stand, camera: Camera, settings: RefinementSettings) -> f
     return float((1.0 + UNSEEN) * stand.weight * np.minimum(stand.polygons, full * dense * each).sum())
 
 
-def covered_pixels(stand: Stand, camera: Camera) -> NDArray[np.float64]:
-    """Pixels (k,) of the picture that each known plant covers by itself."""
-    return _seen(stand, camera)[2]
-
-
-def _seen(stand: Stand, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def seen(stand: Stand, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Fraction (k,) of each known plant in the picture, metres (k,) that a pixel spans there, pixels (k,) it covers."""
     middle = stand.foot + stand.height[:, None] * np.array([0.0, 0.0, 0.5])
     across = np.sqrt(stand.radius * np.maximum(stand.height / 2.0, stand.radius))  # of the disc of equal area

@@ -19,6 +19,7 @@ from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from ..growth.seeds import Seeds
 from ..tetrahedra.geometry import squared_edges
+from ..tetrahedra.roots import view_root, world_root
 from ..tetrahedra.tree import TetrahedralTree
 from .asset_parts import PlacedAssets, SharedAssets
 from .contents import (
@@ -41,7 +42,7 @@ from .shared_parts import SharedParts
 from .shares import SharedPlants
 from .statistics import Step, Stopwatch
 from .strays import Strays, strays_of
-from .views import buffers_for, is_anchored, pixels_of_buffer, root_for, widened_for
+from .views import PanoramaBuffers, is_anchored, pixels_of_buffer, widened_for
 from .visibility import AlphaBuffer, Buffers
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight parts.
@@ -181,7 +182,8 @@ def refine(
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
     own = Held.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
-    tree = root_for(camera, settings, _bounds(flora, plants, assets, polygons))
+    bounds = _bounds(flora, plants, assets, polygons)
+    tree = world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
     holdings, most = Holdings(push_down(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
     divided = np.arange(len(tree)) == 0
     shared = plants, assets
@@ -190,7 +192,8 @@ def refine(
     clock.lap("update")
     shadowed = bool(lights) and settings.shadow_cutoff > 0.0
     ground = seen_ground(camera, occluders, _height(seeds, polygons, placed)) if shadowed else None
-    buffers = buffers_for(camera, settings.visibility_resolution, occluders)
+    kind = PanoramaBuffers if camera.kind == "PANO" else Buffers
+    buffers = kind(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
     cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, shared, holdings, np.ones(len(tree), bool)))
@@ -236,8 +239,8 @@ def refine(
         dividing, edge = np.zeros(len(tree), bool), np.zeros(len(tree))
         dividing[parents] = True
         edge[parents] = np.sqrt(squared_edges(tree.vertices(parents)).max(axis=1))
-        loose = slack if len(holdings) <= most else _no_cuts
-        new = push_down(tree, holdings.take_out(dividing), loose)
+        may_cut = len(holdings) <= most
+        new = push_down(tree, holdings.take_out(dividing), slack if may_cut else lambda at: np.full(len(at), np.inf))
         holdings.put(new)
         changed = plants.update(tree, dividing, edge) | assets.update(tree, dividing, edge)
         changed[new.cell] = True
@@ -299,11 +302,6 @@ def _slack(camera: Camera, resolution: int) -> Slack:
         return pixels * camera.extent_around(points)
 
     return slack
-
-
-def _no_cuts(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A slack beyond which nothing reaches."""
-    return np.full(len(points), np.inf)
 
 
 def _on_day(settings: RefinementSettings, flora: Flora, plants: Branches) -> RefinementSettings:

@@ -16,14 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..camera.camera import LEAST_COSINE, Camera, blur_margins
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
-from ..tetrahedra.roots import view_root, world_root
-from ..tetrahedra.tree import TetrahedralTree
 from .asset_parts import AssetParts
 from .contents import bounding_cylinders
 from .polygons import Polygons
 from .rasterise import buffer_size, occluder_depth, pixel_rays
 from .settings import RefinementSettings
-from .visibility import AlphaBuffer, Buffers, Outline, fitting, hiding
+from .visibility import AlphaBuffer, Outline, fitting, hiding
 
 #: Side of a face for the longer side of a buffer. A face spans a quarter of the way round; in its corners its pixels
 #: are several times as dense as in the middle.
@@ -180,18 +178,6 @@ def widened_for(
 def is_anchored(camera: Camera, settings: RefinementSettings) -> bool:
     """Whether the root stays where it is in the world; a panorama has no pyramid that a root could begin with."""
     return settings.anchored or camera.kind == "PANO"
-
-
-def root_for(camera: Camera, settings: RefinementSettings, bounds: NDArray[np.float64]) -> TetrahedralTree:
-    """Root for a box (2, 3) around all that is in the scene, metres."""
-    return world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
-
-
-def buffers_for(
-    camera: Camera, resolution: int, occluders: NDArray[np.float64] | None = None
-) -> Buffers | PanoramaBuffers:
-    """Alpha buffers of a camera, finest ``resolution`` pixels along the longer side; occluders as `Buffers` takes."""
-    return (PanoramaBuffers if camera.kind == "PANO" else Buffers)(camera, resolution, occluders)
 
 
 def pixels_of_buffer(camera: Camera, resolution: int) -> float:

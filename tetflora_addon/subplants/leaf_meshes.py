@@ -38,7 +38,7 @@ from ..growth.hashing import Draw, uniform
 from ..growth.seasons import is_seasonal
 from ..growth.wind import moment
 from ..leaves.kites import KITE, LeafKites, leaf_kites
-from ..leaves.levels import LeafLevel, chosen_level, leaf_level
+from ..leaves.levels import LeafLevel, chosen_level, leaf_levels
 from ..leaves.models import LeafModel
 from .pieces import chunks
 
@@ -289,7 +289,7 @@ def leaf_meshes(
 def _copies(model: LeafModel, step: int, number: int, transmission: float, moving: bool) -> LeafCopies:
     """Room for a number of leaves of one step."""
     if step > 0:
-        return LevelCopies(leaf_level(model, step), number, transmission, moving)
+        return LevelCopies(leaf_levels(model, step)[step - 1], number, transmission, moving)
     if step == _KITE and not model.textured:
         return KiteCopies(leaf_kites(model), number, transmission, moving)
     return LeafCopies(model, number, transmission, moving)

@@ -64,11 +64,6 @@ class Rings:
     colour: NDArray[np.float64] | None = None
 
 
-def ring_counts(flora: Flora, branches: Branches, segments: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Number (n,) of the rings of coarse tubes."""
-    return segments + flora.rows["rings"][branches.row] + 1
-
-
 def rings_of(flora: Flora, whole: WholeBranches) -> Rings:
     """Rings at the joints of branches, and some where a base is flared."""
     rows, branches = flora.rows, whole.branches

@@ -26,7 +26,6 @@ from .rings import (
     fine_rings,
     foot_rings,
     keep_inside,
-    ring_counts,
     rings_of,
     root_sides,
 )
@@ -128,7 +127,7 @@ def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None, most_sides
         fine = fineness(flora, whole, pixels)
         near = fine.weight > 0
     far = np.flatnonzero(~near)
-    rings = ring_counts(flora, whole.branches, whole.lines.segments)
+    rings = whole.lines.segments + flora.rows["rings"][whole.branches.row] + 1
     for k in np.unique(sides[far]):
         own = far[sides[far] == k]
         yield _Sort(whole.take(own), int(k), rings[own])

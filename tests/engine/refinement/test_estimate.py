@@ -11,7 +11,7 @@ import pytest
 
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.refinement import estimate as model
-from tetflora_addon.refinement.estimate import Stand, covered_pixels, estimate
+from tetflora_addon.refinement.estimate import Stand, estimate, seen
 from tetflora_addon.refinement.settings import QUALITIES, RefinementSettings
 
 SETTINGS = RefinementSettings()
@@ -40,15 +40,15 @@ def test_one_tree_covers_its_ellipse_and_none_behind_the_camera():
     camera = _camera()
     tree = replace(_stand(1), foot=np.array([[0.0, 100.0, -2.5]]))
     side = camera.pixel_size * 100.0
-    assert covered_pixels(tree, camera)[0] == pytest.approx(np.pi * 2.7 * 7.5 / side**2, rel=1e-6)
+    assert seen(tree, camera)[2][0] == pytest.approx(np.pi * 2.7 * 7.5 / side**2, rel=1e-6)
     behind = replace(tree, foot=np.array([[0.0, -100.0, 0.0]]))
-    assert covered_pixels(behind, camera)[0] == 0.0
+    assert seen(behind, camera)[2][0] == 0.0
     beyond = replace(tree, foot=np.array([[0.0, 10.0 * camera.far, 0.0]]))
-    assert covered_pixels(beyond, camera)[0] == 0.0
+    assert seen(beyond, camera)[2][0] == 0.0
     beside = replace(tree, foot=np.array([[500.0, 100.0, 0.0]]))
-    assert covered_pixels(beside, camera)[0] == 0.0
+    assert seen(beside, camera)[2][0] == 0.0
     around = replace(tree, foot=camera.position[None] - [0.0, 0.0, 7.5])
-    assert covered_pixels(around, camera)[0] <= 1920 * 1080
+    assert seen(around, camera)[2][0] <= 1920 * 1080
 
 
 def test_numbers_follow_pixels_and_not_plants_once_the_picture_is_full():
