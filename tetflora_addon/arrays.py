@@ -23,6 +23,12 @@ from numpy.typing import DTypeLike, NDArray
 
 from .parallel import blocks
 
+#: Arrays by what they hold. A table has one structured row for each kind of branch, see `growth.rows`.
+Floats = NDArray[np.float64]
+Integers = NDArray[np.integer]
+Keys = NDArray[np.uint64]
+Mask = NDArray[np.bool_]
+Table = NDArray[np.void]
 #: Steps in radians that spread directions evenly about an axis: full turns by the golden section, and the golden angle.
 GOLDEN_TURN, GOLDEN_ANGLE = np.pi * (1.0 + np.sqrt(5.0)), np.pi * (3.0 - np.sqrt(5.0))
 #: Room to spare where columns of `Growing` are made larger: one part in so many of what is there.

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Table
 from ..growth.axes import profile, profile_integral
 from ..growth.foliage import YOUTH
 from ..growth.grown_rows import NOW, fullness_of, lengths, spread_children
@@ -41,11 +42,11 @@ class RowLeaves:
     transmission : (r,) float64
     """
 
-    area: NDArray[np.float64]
-    polygons: NDArray[np.float64]
-    width: NDArray[np.float64]
-    reach: NDArray[np.float64]
-    transmission: NDArray[np.float64]
+    area: Floats
+    polygons: Floats
+    width: Floats
+    reach: Floats
+    transmission: Floats
 
 
 @dataclass(frozen=True)
@@ -70,36 +71,34 @@ class Averages:
         Typical size of a branch of the row at plant scale 1, metres.
     """
 
-    leaves: NDArray[np.float64]
-    leaf_area: NDArray[np.float64]
-    leaf_colour: NDArray[np.float64]
-    fixed_wood: NDArray[np.float64]
-    full_wood: NDArray[np.float64]
-    spur_wood: NDArray[np.float64]
-    fixed_faces: NDArray[np.float64]
-    full_faces: NDArray[np.float64]
-    length: NDArray[np.float64]
-    radius: NDArray[np.float64]
+    leaves: Floats
+    leaf_area: Floats
+    leaf_colour: Floats
+    fixed_wood: Floats
+    full_wood: Floats
+    spur_wood: Floats
+    fixed_faces: Floats
+    full_faces: Floats
+    length: Floats
+    radius: Floats
 
 
-def quadratic(outward: NDArray[np.float64]) -> NDArray[np.float64]:
+def quadratic(outward: Floats) -> Floats:
     """Weights (n, 3) of the values at `NODES` for values at places (n,) between 0 and 1 (Lagrange)."""
     o = np.asarray(outward)
     return np.stack([2 * (o - 0.5) * (o - 1), 4 * o * (1 - o), 2 * o * (o - 0.5)], axis=-1)
 
 
-def tube_perimeter(sides: NDArray[np.integer]) -> NDArray[np.float64]:
+def tube_perimeter(sides: Integers) -> Floats:
     """Perimeter (n,) of branches' cross-sections, regular polygons of ``sides`` (n,), divided by their radius."""
     return 2 * sides * np.sin(np.pi / sides)
 
 
-def row_leaves(
-    rows: NDArray[np.void], forms: Sequence[Sequence[Sequence[LeafModel]]], transmission: NDArray
-) -> RowLeaves:
+def row_leaves(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]], transmission: NDArray) -> RowLeaves:
     """Means over the forms of leaves of species and kinds; ``transmission`` is (species, kinds)."""
     kind = rows["species"], rows["leaf_kind"]
 
-    def by_row(name: str, function: object) -> NDArray[np.float64]:
+    def by_row(name: str, function: object) -> Floats:
         table = [[function([getattr(m, name) for m in kinds]) if kinds else 0.0 for kinds in one] for one in forms]
         return np.array(table, dtype=np.float64)[kind]
 
@@ -108,11 +107,11 @@ def row_leaves(
 
 
 def own_leaf_integrals(
-    size_tip: NDArray[np.float64],
-    size_young: NDArray[np.float64],
-    outward: tuple[NDArray[np.float64], NDArray[np.float64]],
-    along: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    size_tip: Floats,
+    size_young: Floats,
+    outward: tuple[Floats, Floats],
+    along: tuple[Floats, Floats] | None,
+) -> tuple[Floats, Floats, Floats]:
     """Means over leaves that sit evenly between two places.
 
     Parameters
@@ -133,7 +132,7 @@ def own_leaf_integrals(
     low, high = outward
     k = size_tip - 1
 
-    def moment(power: int) -> NDArray[np.float64]:  # mean of o^power over the interval, exact where it is a point
+    def moment(power: int) -> Floats:  # mean of o^power over the interval, exact where it is a point
         terms = [low ** (power - i) * high**i for i in range(power + 1)]
         return sum(terms) / (power + 1)
 
@@ -153,7 +152,7 @@ def own_leaf_integrals(
     )
 
 
-def _integral(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _integral(values: Floats) -> Floats:
     """Integral (n,) of values (n, nodes) over the interval.
 
     Not a product of matrices: the last bit of those depends on which rows there are beside.
@@ -161,7 +160,7 @@ def _integral(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return sum(values[:, node] * weight for node, weight in enumerate(_WEIGHTS))
 
 
-def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
+def average(rows: Table, leaf: RowLeaves) -> Averages:
     """Expected totals of every row (r,)."""
     r = len(rows)
     exact = rows.copy()  # means of what is linear in its ranges
@@ -252,12 +251,12 @@ class _Sums:
     full: float
     wood: float
     full_wood: float
-    nodes: NDArray[np.float64]
+    nodes: Floats
     length: float
     radius: float
 
 
-def children_sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
+def children_sums(rows: Table, i: int, sort: int) -> _Sums:
     """Sums over the children of a sort of a mean branch of row ``i``."""
     row, child = rows[i], rows[rows["next"][i, sort]]
     number, thickness = float(row["count"][sort, 0]), child["thickness"][0]
@@ -286,8 +285,8 @@ def children_sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
 
 
 def side_branches(
-    rows: NDArray[np.void], i: int, sort: int, t: NDArray, fraction: NDArray, fading: NDArray | float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    rows: Table, i: int, sort: int, t: NDArray, fraction: NDArray, fading: NDArray | float
+) -> tuple[Floats, Floats, Floats]:
     """Laterals or dead branches (k,) of a row: vigours, what radii are in proportion to, and lengths × radii.
 
     All relative to their parent's. They are at fractions t (k,) of it and (k,) of its children; laterals are shorter by
@@ -301,7 +300,7 @@ def side_branches(
     return vigour, thick, vigour * row["nominal"] * child["length"][0] * thick * child["thickness"][0]
 
 
-def _fork_sums(rows: NDArray[np.void], i: int) -> _Sums:
+def _fork_sums(rows: Table, i: int) -> _Sums:
     row, child = rows[i], rows[rows["next"][i, FORK]]
     forks, power = Range(*row["count"][FORK]), 1 - 1 / row["fork_power"]
     summed, number = expected_forks(forks, power), expected_forks(forks)

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Table
 from ..growth.envelopes import reaches
 from ..growth.grown_rows import NOW
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
@@ -26,7 +27,7 @@ _ANGLES = 33
 _CROWN_SLOPE = 1 / 0.3  # steepest of the crown shapes
 
 
-def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def _axis_envelope(row: Table) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """At each knot of a unit branch: widest radius, lowest and highest z; and the widest turn of each segment."""
     segments = int(row["segments"])
     # Turns of joints add up at most. The joint in the middle of an even number belongs to the outer half.
@@ -40,7 +41,7 @@ def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, ND
     return radius, low, high, turn
 
 
-def _joint_turns(row: NDArray[np.void]) -> NDArray[np.float64]:
+def _joint_turns(row: Table) -> Floats:
     """Widest turn (..., 2) of a joint of the inner and of the outer half of branches of rows (...)."""
     back = np.stack([np.abs(row["curvature"][..., 0]), np.abs(row["curvature_tip"])], axis=-1)
     variation = row["curvature"][..., 1, None]
@@ -49,7 +50,7 @@ def _joint_turns(row: NDArray[np.void]) -> NDArray[np.float64]:
     return (np.hypot(back + variation, variation) + pulled + widest_sway(row)[..., None]) / row["segments"][..., None]
 
 
-def ring_stretch(rows: NDArray[np.void]) -> NDArray[np.float64]:
+def ring_stretch(rows: Table) -> Floats:
     """Greatest distance (r,) of a tube's vertices from its axis at joints, in radii.
 
     Notes
@@ -62,7 +63,7 @@ def ring_stretch(rows: NDArray[np.void]) -> NDArray[np.float64]:
     return np.where(rows["segments"] > 1, 2 / np.sqrt(3 + np.cos(turn)), 1.0)
 
 
-def widest_radii(rows: NDArray[np.void]) -> NDArray[np.float64]:
+def widest_radii(rows: Table) -> Floats:
     """Greatest distance (r,) of the wood of sub-plants from their axes, in radii of the base; without short shoots."""
     out = np.maximum(1 + rows["flare"], np.where(rows["drawn"], np.sqrt(2.0), ring_stretch(rows)))
     for index in range(len(rows) - 1, -1, -1):
@@ -77,7 +78,7 @@ def widest_radii(rows: NDArray[np.void]) -> NDArray[np.float64]:
     return out
 
 
-def own_leaf_reaches(rows: NDArray[np.void], model_reach: NDArray[np.float64]) -> NDArray[np.float64]:
+def own_leaf_reaches(rows: Table, model_reach: Floats) -> Floats:
     """How far leaves stick out beyond the axes that bear them (r,), at plant scale 1, metres; see `leaf_reaches`."""
     factor = np.maximum(rows["leaf_size_tip"], 1) * np.maximum(rows["leaf_size_young"], 1)
     largest = rows["leaf_size"].sum(axis=1) * factor
@@ -103,7 +104,7 @@ def _tilted(bound: NDArray, angle: NDArray, scale: NDArray) -> tuple[NDArray, ND
     return scale * (far.max(1) + slack), scale * (bottom.min(1) - slack), scale * (top.max(1) + slack)
 
 
-def unit_bounds(rows: NDArray[np.void], raised: bool = False) -> NDArray[np.float64]:
+def unit_bounds(rows: Table, raised: bool = False) -> Floats:
     """Cylinders that hold every axis of every sub-plant whose branch has unit length.
 
     Parameters
@@ -124,7 +125,7 @@ def unit_bounds(rows: NDArray[np.void], raised: bool = False) -> NDArray[np.floa
     return bounds
 
 
-def limb_reaches(rows: NDArray[np.void], bounds: NDArray[np.float64]) -> NDArray[np.float64]:
+def limb_reaches(rows: Table, bounds: Floats) -> Floats:
     """How far anything is from where its limb leaves the trunk (r,), for trunks of length 1; 0 for other rows."""
     out = np.zeros(len(rows))
     for index in np.flatnonzero(rows["order"] == 0)[::-1]:
@@ -136,9 +137,7 @@ def limb_reaches(rows: NDArray[np.void], bounds: NDArray[np.float64]) -> NDArray
     return out
 
 
-def leaf_reaches(
-    rows: NDArray[np.void], bounds: NDArray[np.float64], model_reach: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def leaf_reaches(rows: Table, bounds: Floats, model_reach: Floats) -> Floats:
     """How far leaves and short shoots stick out beyond the axes of sub-plants at plant scale 1, metres.
 
     Parameters
@@ -164,7 +163,7 @@ def leaf_reaches(
     return reach
 
 
-def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64], raised: bool) -> NDArray[np.float64]:
+def _unit_bound(rows: Table, index: int, bounds: Floats, raised: bool) -> Floats:
     row = rows[index]
     radius, low, high, turn = _axis_envelope(row)
     solid = float(reaches(row))
@@ -218,14 +217,14 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64],
     return bound
 
 
-def _crown_most(row: NDArray[np.void], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+def _crown_most(row: Table, low: Floats, high: Floats) -> Floats:
     """Greatest length ratio of children between two fractions (n,) of them."""
     inner = np.linspace(low, high, 5, axis=1)
     ratio = crown_ratio(np.full(inner.shape, row["crown"]), 1 - inner).max(axis=1)
     return np.minimum(ratio + _CROWN_SLOPE * (high - low) / 8, 1)
 
 
-def sampled_bounds(parts: Sequence[Points], rows: int) -> NDArray[np.float64]:
+def sampled_bounds(parts: Sequence[Points], rows: int) -> Floats:
     """Cylinders (r, 6) that hold the samples of each row.
 
     Radius across the branch, and lowest and highest place along it. Then how far across the limbs leave that they are

@@ -24,7 +24,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_TURN, spiral
+from ..arrays import GOLDEN_TURN, Floats, Mask, Table, spiral
 from ..growth.branches import Branches
 from ..growth.growth import trunks
 from ..growth.hashing import key_of_seed, mix, uniform
@@ -70,13 +70,13 @@ class Clumping:
         Usual length of the branch at plant scale 1, metres.
     """
 
-    whole: NDArray[np.float64]
-    own: NDArray[np.float64]
-    root: NDArray[np.float64]
-    density: NDArray[np.float64]
-    length: NDArray[np.float64]
+    whole: Floats
+    own: Floats
+    root: Floats
+    density: Floats
+    length: Floats
 
-    def coefficients(self, branches: Branches, offset: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coefficients(self, branches: Branches, offset: Floats) -> Floats:
         """What is constant and what is divided by √h (n, 2), for branches with the offsets of `whole` or `own`."""
         row = branches.row
         relative = np.log(np.maximum(branches.length, 1e-12) / (branches.scale * self.length[row]))
@@ -84,18 +84,18 @@ class Clumping:
         return np.stack([constant, self.root[row] * np.sqrt(branches.scale)], axis=1)
 
 
-def factors(coefficients: NDArray[np.float64], volumes: NDArray[np.float64]) -> NDArray[np.float64]:
+def factors(coefficients: Floats, volumes: Floats) -> Floats:
     """Factor on the extinction (n,) of cells, from the area-weighted means (n, 2) of `Clumping.coefficients`."""
     return np.clip(coefficients[:, 0] + coefficients[:, 1] * volumes ** (-1 / 6), LEAST, MOST)
 
 
 def fit_clumping(
-    rows: NDArray[np.void],
+    rows: Table,
     forms: Sequence[Sequence[Sequence[LeafModel]]],
-    area: NDArray[np.float64],
-    polygons: NDArray[np.float64],
-    width: NDArray[np.float64],
-    length: NDArray[np.float64],
+    area: Floats,
+    polygons: Floats,
+    width: Floats,
+    length: Floats,
 ) -> Clumping:
     """Fit every species.
 
@@ -123,13 +123,8 @@ def fit_clumping(
 
 
 def _fitted(
-    rows: NDArray[np.void],
-    forms: Sequence[Sequence[LeafModel]],
-    every: slice,
-    polygons: NDArray[np.float64],
-    width: float,
-    usual: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    rows: Table, forms: Sequence[Sequence[LeafModel]], every: slice, polygons: Floats, width: float, usual: Floats
+) -> Floats:
     """Roots, densities and own offsets (3, r) of the rows of one species."""
     orders, group = np.unique(rows["order"][every], return_inverse=True)
     group = group.reshape(-1)
@@ -142,7 +137,7 @@ def _fitted(
     return np.stack([np.full(len(own), found[0] * unit), np.full(len(own), found[1]), own])
 
 
-def _plants(rows: NDArray[np.void], first: int, polygons: NDArray[np.float64]) -> list[Branches]:
+def _plants(rows: Table, first: int, polygons: Floats) -> list[Branches]:
     """Plants of a species, or the sub-plants of some that are large."""
     one = max(polygons[first], 1)
     number = int(np.clip(_POLYGONS / one, 2 if 2 * one <= _PAIR else 1, _PLANTS))
@@ -161,7 +156,7 @@ def _plants(rows: NDArray[np.void], first: int, polygons: NDArray[np.float64]) -
     return [plants.take(slice(i, i + 1)) for i in range(len(plants))]
 
 
-def _directions(plant: int, plants: int) -> NDArray[np.float64]:
+def _directions(plant: int, plants: int) -> Floats:
     """Directions (n, 3) on the half sphere from which one of some plants is seen, others for each."""
     number = max(_VIEWS // plants, _LEAST_VIEWS)
     i = plant + np.arange(number) * plants + 0.5
@@ -213,9 +208,7 @@ def _rays(
             yield met[some][use], depth, np.full(len(use), 1 / max(len(use), 1))
 
 
-def _looked_at(
-    things: Things, direction: NDArray[np.float64], offset: float
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _looked_at(things: Things, direction: Floats, offset: float) -> tuple[Floats, Mask]:
     """Origins (k, 3) of parallel rays on a grid over a sub-plant, and whether each meets anything (k,)."""
     u, v = basis(direction)
     flat = np.stack([sum(axis[k] * things.middle[k] for k in range(3)) for axis in (u, v)])
@@ -240,9 +233,7 @@ def _looked_at(
     return at[:, :1] * u + at[:, 1:] * v, met
 
 
-def _solved(
-    met: NDArray[np.bool_], depth: NDArray[np.float64], weight: NDArray[np.float64], unit: float
-) -> NDArray[np.float64]:
+def _solved(met: Mask, depth: Floats, weight: Floats, unit: float) -> Floats:
     """Coefficients (k,) with which depths (n, k) let through as many rays as meet nothing, by Newton's method.
 
     Equations are weighted by the contribution of each coefficient to a ray's depth: one for each. The first coefficient
@@ -268,7 +259,7 @@ def _solved(
 #: Fields that depend on what other species there are, one that others give, and one that changes no area.
 _PLACES = {"species", "next", "drawn_rows", "sunlit", "dead"}
 #: Fields that came later, with the values that change nothing: species without them keep their fingerprint.
-_LATER: dict[str, Callable[[NDArray[np.void]], NDArray[np.float64] | float]] = {
+_LATER: dict[str, Callable[[Table], Floats | float]] = {
     "leaf_light_tip": lambda rows: rows["leaf_light"][:, 0],
     "leaf_size_young": lambda _: 1.0,
     "leaf_colour_young": lambda rows: rows["leaf_colour"][:, 0],
@@ -281,7 +272,7 @@ _LATER: dict[str, Callable[[NDArray[np.void]], NDArray[np.float64] | float]] = {
 _FIRST_SORTS = 3
 
 
-def fingerprint(rows: NDArray[np.void], forms: Sequence[Sequence[LeafModel]], method: int) -> str:
+def fingerprint(rows: Table, forms: Sequence[Sequence[LeafModel]], method: int) -> str:
     """Hash of a species' parameters and the forms of its leaves: 16 hexadecimal digits.
 
     Parameters

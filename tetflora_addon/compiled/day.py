@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import gathered
+from ..arrays import Floats, Integers, Table, gathered
 from ..growth import seasons
 from ..growth.branches import Branches
 from ..species.species import LEAF_KINDS, Species
@@ -47,31 +46,31 @@ class DayTotals:
         Mean width of what bears the leaves of sub-plants, metres at plant scale 1; without leaves that of the branch.
     """
 
-    years: NDArray[np.void]
-    table: NDArray[np.int64]
-    tables: NDArray[np.float64]
-    origin: NDArray[np.float64]
-    area: NDArray[np.float64]
-    colour: NDArray[np.float64]
-    count: NDArray[np.float64]
-    faces: NDArray[np.float64]
-    twig: NDArray[np.float64]
+    years: Table
+    table: Integers
+    tables: Floats
+    origin: Floats
+    area: Floats
+    colour: Floats
+    count: Floats
+    faces: Floats
+    twig: Floats
 
     @property
-    def kinds(self) -> NDArray[np.int64]:
+    def kinds(self) -> Integers:
         """Kinds of leaves that any plants bear."""
         return np.flatnonzero(self.count.any(axis=0))
 
-    def left(self, branches: Branches, kind: int | NDArray[np.integer], *columns: int) -> list[NDArray[np.float64]]:
+    def left(self, branches: Branches, kind: int | Integers, *columns: int) -> list[Floats]:
         """What is left of leaves of a kind, or of kinds (n,), on the days of branches (n): some columns (n,)."""
         which = self.table[branches.row, kind]
         return seasons.expected(self.tables, self.origin, which, branches.year[:, 0], columns)
 
-    def _summed(self, subplants: Branches, each: NDArray[np.float64], column: int) -> NDArray[np.float64]:
+    def _summed(self, subplants: Branches, each: Floats, column: int) -> Floats:
         """Sum (n,) over kinds of leaves of what they have in summer (n, k) and the day leaves."""
         return sum(each[:, kind] * self.left(subplants, kind, column)[0] for kind in self.kinds)
 
-    def leaf_areas(self, subplants: Branches, formed: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    def leaf_areas(self, subplants: Branches, formed: Floats | None = None) -> Floats:
         """Area (n,) of leaves at plant scale 1, without the fullness of sub-plants.
 
         ``formed`` (n, k) are factors by kind of leaf, because of crown forms.
@@ -80,16 +79,16 @@ class DayTotals:
         area = area if formed is None else area * formed
         return self._summed(subplants, area, seasons.AREA)
 
-    def leaf_counts(self, subplants: Branches) -> NDArray[np.float64]:
+    def leaf_counts(self, subplants: Branches) -> Floats:
         """Number (n,) of leaves, likewise."""
         return self._summed(subplants, self.count[subplants.row], seasons.PRESENT)
 
-    def leaf_faces(self, subplants: Branches, formed: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    def leaf_faces(self, subplants: Branches, formed: Floats | None = None) -> Floats:
         """Number (n,) of faces of leaves, likewise."""
         faces = self.faces[subplants.row]
         return self._summed(subplants, faces if formed is None else faces * formed, seasons.PRESENT)
 
-    def leaf_colours(self, subplants: Branches) -> NDArray[np.float64]:
+    def leaf_colours(self, subplants: Branches) -> Floats:
         """Mean colours (n, 3) of leaves, weighted by area; black where there are none."""
         weights = quadratic(subplants.outward)
         area = np.einsum("nj,njk->nk", weights, self.area[subplants.row])
@@ -104,10 +103,10 @@ class DayTotals:
     def own_colours(
         self,
         branches: Branches,
-        kind: NDArray[np.integer],
-        summer: NDArray[np.float64],
-        owner: NDArray[np.integer] | None = None,
-    ) -> NDArray[np.float64]:
+        kind: Integers,
+        summer: Floats,
+        owner: Integers | None = None,
+    ) -> Floats:
         """Mean colours (n, 3) of leaves of one kind (n,), of which those in summer are known (n, 3).
 
         ``owner`` (n,) are their branches, if not one for each.
@@ -122,7 +121,7 @@ class DayTotals:
             out[some] = factor[which, None] * summer[some] + added[which]
         return out
 
-    def _mixture(self, branches: Branches, kind: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _mixture(self, branches: Branches, kind: int) -> tuple[Floats, Floats]:
         """Factor (n,) on the mean colour of leaves in summer on the day of branches, and what is added to it (n, 3)."""
         left = self.left(branches, kind, *_SEEN)
         one, none = np.ones(len(branches)), np.zeros((len(branches), 3))
@@ -131,7 +130,7 @@ class DayTotals:
         every = np.where(some, left[0], 1.0)
         return np.where(some, (left[0] - left[1] - left[2] - left[3]) / every, 1.0), added / every[:, None]
 
-    def widths(self, subplants: Branches, leaf: NDArray[np.float64], bare: NDArray[np.float64]) -> NDArray[np.float64]:
+    def widths(self, subplants: Branches, leaf: Floats, bare: Floats) -> Floats:
         """Widths (n,) between those of leaves in summer (n,) and of what bears them (n,), by number and by growth."""
         count = self.count[subplants.row]
         every, left = count.sum(axis=1), self._summed(subplants, count, seasons.PRESENT)
@@ -139,7 +138,7 @@ class DayTotals:
         share = left / np.maximum(every, 1e-300)
         return np.where(every > 0, bare + share * (leaf * size - bare), leaf)
 
-    def share_range(self, rows: NDArray[np.void], species: int) -> tuple[float, float]:
+    def share_range(self, rows: Table, species: int) -> tuple[float, float]:
         """Least and greatest `leaf_share` of plants of a species on the day of rows (r,)."""
         trunk = np.flatnonzero(rows["species"] == species)[0]
         days = _days_of_plants(rows[trunk])
@@ -149,7 +148,7 @@ class DayTotals:
         share = area @ np.array(left) / area.sum() if area.sum() > 0 else np.ones(1)
         return float(share.min()), float(share.max())
 
-    def leaf_share(self, subplants: Branches) -> NDArray[np.float64]:
+    def leaf_share(self, subplants: Branches) -> Floats:
         """Area (n,) of leaves over that in summer, 1 where there are never any."""
         area = self.area[subplants.row].mean(axis=1)
         all_year = area.sum(axis=1)
@@ -157,13 +156,7 @@ class DayTotals:
         return np.where(all_year > 0, left / np.where(all_year > 0, all_year, 1.0), 1.0)
 
 
-def _mixed(
-    summer: NDArray[np.float64],
-    area: NDArray[np.float64],
-    left: list[NDArray[np.float64]],
-    year: NDArray[np.void],
-    hue: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _mixed(summer: Floats, area: Floats, left: list[Floats], year: Table, hue: Floats) -> Floats:
     """Area times colour (n, 3) of leaves on a day, from those in summer (n, 3) of areas (n,), by columns of `_SEEN`."""
     every, *others = left
     out = (every - sum(others))[:, None] * summer
@@ -173,8 +166,8 @@ def _mixed(
 
 
 def totals_of_day(
-    rows: NDArray[np.void], species: Sequence[Species], season: seasons.Season, totals: Averages, leaf: RowLeaves
-) -> tuple[NDArray[np.void], DayTotals] | None:
+    rows: Table, species: Sequence[Species], season: seasons.Season, totals: Averages, leaf: RowLeaves
+) -> tuple[Table, DayTotals] | None:
     """Rows on a day, and totals of their sub-plants; None where no plant is other than in summer.
 
     Parameters
@@ -209,7 +202,7 @@ def totals_of_day(
     return (rows, made) if _differs(rows, made, of_species) else None
 
 
-def _by_kind(rows: NDArray[np.void], totals: Averages, leaf: RowLeaves) -> tuple[NDArray[np.float64], ...]:
+def _by_kind(rows: Table, totals: Averages, leaf: RowLeaves) -> tuple[Floats, ...]:
     """``area``, ``colour``, ``count`` and ``faces`` of `DayTotals`."""
     kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]  # (r, k), which kind each contributing row bears
     area = totals.leaf_area @ kinds
@@ -224,12 +217,12 @@ def _by_kind(rows: NDArray[np.void], totals: Averages, leaf: RowLeaves) -> tuple
     return area, colour, totals.leaves @ kinds, (totals.leaves * leaf.polygons) @ kinds
 
 
-def _days_of_plants(trunk: np.void) -> NDArray[np.float64]:
+def _days_of_plants(trunk: np.void) -> Floats:
     """Days (n,) that it may be for plants of a species, by the row of its trunk."""
     return seasons.plant_days(trunk["day"], max(trunk["spring"], trunk["autumn"]))
 
 
-def _differs(rows: NDArray[np.void], made: DayTotals, of_species: NDArray[np.int64]) -> bool:
+def _differs(rows: Table, made: DayTotals, of_species: Integers) -> bool:
     """Whether any plant may have other leaves than in summer."""
     summer = np.array([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]])
     trunk = np.unique(rows["species"], return_index=True)[1]

@@ -14,8 +14,8 @@ from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Table
 from ..errors import SpeciesError
 from ..growth.branches import Branches
 from ..growth.envelopes import reaches
@@ -105,25 +105,25 @@ class Flora:
 
     species: tuple[Species, ...]
     forms: tuple[tuple[tuple[LeafModel, ...], ...], ...]
-    rows: NDArray[np.void]
-    first_row: NDArray[np.int64]
+    rows: Table
+    first_row: Integers
     leaf: RowLeaves
-    bound: NDArray[np.float64]
-    widest: NDArray[np.float64]
-    leaf_reach: NDArray[np.float64]
-    leaf_width: NDArray[np.float64]
-    leaf_count: NDArray[np.float64]
-    fixed_wood: NDArray[np.float64]
-    full_wood: NDArray[np.float64]
-    spur_wood: NDArray[np.float64]
-    polygons: NDArray[np.float64]
-    leaf_faces: NDArray[np.float64]
-    fixed_faces: NDArray[np.float64]
-    wood_colour: NDArray[np.float64]
-    transmission: NDArray[np.float64]
+    bound: Floats
+    widest: Floats
+    leaf_reach: Floats
+    leaf_width: Floats
+    leaf_count: Floats
+    fixed_wood: Floats
+    full_wood: Floats
+    spur_wood: Floats
+    polygons: Floats
+    leaf_faces: Floats
+    fixed_faces: Floats
+    wood_colour: Floats
+    transmission: Floats
     averages: Averages
-    area_nodes: NDArray[np.float64]
-    colour_nodes: NDArray[np.float64]
+    area_nodes: Floats
+    colour_nodes: Floats
     calm: Flora | None = None
     summer: Flora | None = None
     day: DayTotals | None = None
@@ -164,7 +164,7 @@ class Flora:
         return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length)
 
     @_in_summer
-    def sampled_bound(self) -> NDArray[np.float64]:
+    def sampled_bound(self) -> Floats:
         """`bounds.sampled_bounds` of all samples (r, 6); unit is the branch's length."""
         return sampled_bounds((self.samples.leaves, self.samples.wood), len(self.rows))
 
@@ -183,20 +183,20 @@ class Flora:
         return fit_clumping(self.rows, self.forms, area, self.polygons, self.leaf_width, totals.length)
 
     @cached_property
-    def raised_bound(self) -> NDArray[np.float64]:
+    def raised_bound(self) -> Floats:
         """`bound` of plants with crown bases."""
         return unit_bounds(self.rows, raised=True)
 
     @cached_property
-    def limb_reach(self) -> NDArray[np.float64]:
+    def limb_reach(self) -> Floats:
         """How far anything is from where its limb leaves the trunk (r,), for trunks of length 1."""
         return limb_reaches(self.rows, self.bound)
 
-    def species_of(self, row: NDArray[np.integer]) -> NDArray[np.integer]:
+    def species_of(self, row: Integers) -> Integers:
         """Index (n,) of the species that rows (n,) belong to."""
         return self.rows["species"][row]
 
-    def leaf_areas(self, subplants: Branches) -> NDArray[np.float64]:
+    def leaf_areas(self, subplants: Branches) -> Floats:
         """Expected one-sided area (n,) of the leaves of sub-plants, m²."""
         if subplants.year is None:
             area, some = self._at_place(self.area_nodes, subplants), self._formed(subplants)
@@ -206,14 +206,14 @@ class Flora:
             area = self.day.leaf_areas(subplants, self._formed_kinds(subplants))
         return fullness(self.rows, subplants) * area * subplants.scale**2
 
-    def leaf_colours(self, subplants: Branches) -> NDArray[np.float64]:
+    def leaf_colours(self, subplants: Branches) -> Floats:
         """Mean linear RGB (n, 3) of the leaves of sub-plants, weighted by area; black where they have none."""
         if subplants.year is not None:
             return self.day.leaf_colours(subplants)
         area = self._at_place(self.area_nodes, subplants)
         return self._at_place(self.colour_nodes, subplants) / np.maximum(area, 1e-300)[:, None]
 
-    def wood_areas(self, subplants: Branches) -> NDArray[np.float64]:
+    def wood_areas(self, subplants: Branches) -> Floats:
         """Expected surface (n,) of the branches of sub-plants, m²."""
         row, full = subplants.row, fullness(self.rows, subplants)
         relative, spurs = self.fixed_wood[row] + full * self.full_wood[row], full * self.spur_wood[row]
@@ -224,7 +224,7 @@ class Flora:
             spurs[some] *= short
         return relative * subplants.length * subplants.radius + spurs * subplants.scale**2
 
-    def face_counts(self, subplants: Branches) -> NDArray[np.float64]:
+    def face_counts(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of sub-plants, leaves and branches."""
         row, fixed = subplants.row, self.fixed_faces[subplants.row]
         faces = self.polygons[row]
@@ -238,11 +238,11 @@ class Flora:
             counts[some] += wood + (self._leaf_faces(own) - self._leaf_faces(replace(own, crown=None)))
         return counts
 
-    def branch_faces(self, subplants: Branches) -> NDArray[np.float64]:
+    def branch_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the branches of sub-plants."""
         return self.face_counts(subplants) - fullness(self.rows, subplants) * self._leaf_faces(subplants)
 
-    def _leaf_faces(self, subplants: Branches) -> NDArray[np.float64]:
+    def _leaf_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the leaves of sub-plants, without their fullness."""
         if subplants.year is not None:
             return self.day.leaf_faces(subplants, self._formed_kinds(subplants, faces=True))
@@ -257,13 +257,13 @@ class Flora:
         """What crown forms change."""
         return formed_totals(self.rows, self.averages, self.leaf.polygons)
 
-    def _formed(self, subplants: Branches) -> NDArray[np.intp]:
+    def _formed(self, subplants: Branches) -> Integers:
         """Sub-plants (k,) of (n,) whose totals crown forms change."""
         if subplants.crown is None or not (self.rows["order"] == 0)[subplants.row].any():
             return np.zeros(0, np.intp)
         return np.flatnonzero(self.formed_totals.formed[subplants.row])
 
-    def _formed_kinds(self, subplants: Branches, faces: bool = False) -> NDArray[np.float64] | None:
+    def _formed_kinds(self, subplants: Branches, faces: bool = False) -> Floats | None:
         """`FormedTotals.leaves` (n, k) of sub-plants, 1 where nothing is formed; None where nothing is at all."""
         some = self._formed(subplants)
         if not len(some):
@@ -272,7 +272,7 @@ class Flora:
         out[some] = self.formed_totals.leaves(subplants.take(some), faces, kinds=True)
         return out
 
-    def one_leaf_area(self, branches: Branches) -> NDArray[np.float64]:
+    def one_leaf_area(self, branches: Branches) -> Floats:
         """Mean one-sided area (n,) of a single leaf of sub-plants, m²; 0 where they have none."""
         if branches.year is not None:
             area, count = self.day.leaf_areas(branches), self.day.leaf_counts(branches)
@@ -280,7 +280,7 @@ class Flora:
             area, count = self._at_place(self.area_nodes, branches), self.leaf_count[branches.row]
         return area / np.maximum(count, 1e-300) * branches.scale**2
 
-    def _at_place(self, nodes: NDArray[np.float64], subplants: Branches) -> NDArray[np.float64]:
+    def _at_place(self, nodes: Floats, subplants: Branches) -> Floats:
         """Values at the places of sub-plants between the inside and the outside of the crown."""
         return np.einsum("nk,nk...->n...", quadratic(subplants.outward), nodes[subplants.row])
 
@@ -365,7 +365,7 @@ def _windy(flora: Flora, wind: Wind) -> Flora:
     )
 
 
-def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[np.float64]:
+def _with_drawn(rows: Table, bound: Floats) -> Floats:
     """Bounds in which plants drawn by hand have theirs: the drawing, and what grows on it in any direction."""
     bound = bound.copy()
     for i in np.flatnonzero(rows["phantom"]):
@@ -383,7 +383,7 @@ def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[n
     return bound
 
 
-def _wood_totals(totals: Averages) -> NDArray[np.float64]:
+def _wood_totals(totals: Averages) -> Floats:
     """Expected surface (r, r) of branches of typical size by contributing row, over length × radius of the own one."""
     size = np.maximum(totals.length * totals.radius, 1e-300)
     return totals.fixed_wood + totals.full_wood + totals.spur_wood / size[:, None]

@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Mask, Table
 from ..growth.branches import Branches
 from ..growth.crown_forms import BASE, MOST, WIDTH
 from ..growth.formed import LIGHT, are_stools, bare_part, dead_end, fractions, raised, sparser
@@ -47,25 +47,25 @@ class FormedTotals:
         Of what follows the power 0, 1 or 2 of the factor on the lengths of limbs, for `_BASES`.
     """
 
-    formed: NDArray[np.bool_]
-    power: NDArray[np.float64]
+    formed: Mask
+    power: Floats
 
-    def leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> NDArray[np.float64]:
+    def leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats:
         """Area or number of faces (n,) of leaves of sub-plants over that of plants as described; (n, k) by kind."""
         some = _LEAF_FACES if faces else _AREA
         own, plain = (one[:, some] if kinds else one[:, some].sum(axis=1) for one in self._values(subplants))
         return _over(own, plain)
 
-    def faces(self, subplants: Branches) -> NDArray[np.float64]:
+    def faces(self, subplants: Branches) -> Floats:
         """Faces (n,) of branches, likewise."""
         return _over(*(one[:, _FACES] for one in self._values(subplants)))
 
-    def wood(self, subplants: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def wood(self, subplants: Branches) -> tuple[Floats, Floats]:
         """Surface (n,) over length × radius, and that of short shoots (n,), likewise."""
         own, plain = self._values(subplants)
         return _over(own[:, _WOOD], plain[:, _WOOD]), _over(own[:, _SPURS], plain[:, _SPURS])
 
-    def _values(self, subplants: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _values(self, subplants: Branches) -> tuple[Floats, Floats]:
         """Totals (n, t) of sub-plants that are formed, and of the same as described."""
         crown, row = subplants.crown.astype(np.float64), subplants.row
         step = crown[:, BASE] / (_BASES[1] - _BASES[0])
@@ -79,11 +79,11 @@ class FormedTotals:
         return (factors * power).sum(axis=1), (np.ones((1, 3, 1)) * plain).sum(axis=1)
 
 
-def _over(own: NDArray[np.float64], plain: NDArray[np.float64]) -> NDArray[np.float64]:
+def _over(own: Floats, plain: Floats) -> Floats:
     return np.where(plain > 0, own / np.where(plain > 0, plain, 1.0), 1.0)
 
 
-def formed_totals(rows: NDArray[np.void], totals: Averages, polygons: NDArray[np.float64]) -> FormedTotals:
+def formed_totals(rows: Table, totals: Averages, polygons: Floats) -> FormedTotals:
     """Totals of all rows.
 
     Parameters
@@ -143,7 +143,7 @@ def formed_totals(rows: NDArray[np.void], totals: Averages, polygons: NDArray[np
     return FormedTotals(formed, power)
 
 
-def _limbs(rows: NDArray[np.void], i: int, sort: int, base: float) -> tuple[float, ...]:
+def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:
     """Expected sums over the laterals or dead branches of a row whose crown has a base.
 
     Their number; the sums of what new ones lack of their numbers, of that × vigour; of length × radius over the

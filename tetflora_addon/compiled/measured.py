@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Floats, Integers, Mask, Table, spread
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.crown_forms import BASE, LEAST, MOST, PLAIN, WIDTH
@@ -45,7 +45,7 @@ _CLOSE = 0.015
 _known: WeakKeyDictionary[Flora, dict[int, Beyond]] = WeakKeyDictionary()
 
 
-def measured(flora: Flora, seeds: Seeds) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
     """Heights of plants, to the highest leaf or wood, and means of the extents of their crowns to east and north.
 
     Returns
@@ -55,16 +55,14 @@ def measured(flora: Flora, seeds: Seeds) -> tuple[NDArray[np.float64], NDArray[n
     """
     height, width = np.zeros((2, len(seeds)))
 
-    def work(some: NDArray[np.intp]) -> None:
+    def work(some: Integers) -> None:
         height[some], width[some], _ = _sizes(flora.in_leaf, seeds.take(some))
 
     _by_kind(flora, seeds, work)
     return height, width
 
 
-def fitted(
-    flora: Flora, seeds: Seeds, height: NDArray[np.float64], width: NDArray[np.float64], times: int = 4
-) -> NDArray[np.float64]:
+def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int = 4) -> Floats:
     """Factors that give plants the heights and crown widths that were measured.
 
     Parameters
@@ -84,7 +82,7 @@ def fitted(
     """
     out = np.ones((len(seeds), 2))
 
-    def work(some: NDArray[np.intp]) -> None:
+    def work(some: Integers) -> None:
         own, wanted, factor = seeds.take(some), width[some] / height[some], np.ones(len(some))
         crown = np.tile(PLAIN, (len(own), 1)) if own.crown is None else own.crown
         row = flora.first_row[own.species]
@@ -109,7 +107,7 @@ def fitted(
     return out
 
 
-def _by_kind(flora: Flora, seeds: Seeds, work: Callable[[NDArray[np.intp]], None]) -> None:
+def _by_kind(flora: Flora, seeds: Seeds, work: Callable[[Integers], None]) -> None:
     """Do some work on some plants (k,) at a time, each kind apart, as kinds have more or fewer limbs."""
     order = np.argsort(seeds.species, kind="stable")
     ends = np.flatnonzero(np.diff(seeds.species[order])) + 1
@@ -127,7 +125,7 @@ def _beyond(flora: Flora, species: int) -> Beyond:
     return known[species]
 
 
-def _sizes(flora: Flora, seeds: Seeds) -> tuple[NDArray[np.float64], NDArray[np.float64], Outermost | None]:
+def _sizes(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats, Outermost | None]:
     """Heights and crown widths (n,), (n,) of plants of one species, and what reaches farthest, if they have limbs."""
     plants, beyond = trunks(flora.rows, seeds), _beyond(flora, int(seeds.species[0]))
     if beyond.whole[0] > 0:
@@ -137,9 +135,7 @@ def _sizes(flora: Flora, seeds: Seeds) -> tuple[NDArray[np.float64], NDArray[np.
     return *found.sizes(), found
 
 
-def _solved(
-    found: Outermost, wanted: NDArray[np.float64], least: NDArray[np.float64], most: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _solved(found: Outermost, wanted: Floats, least: Floats, most: Floats) -> Floats:
     """Factors (n,) on limbs, between limits (n,), by which crown widths over heights become what is wanted (n,)."""
     low, high = least, np.maximum(most, least)
     for _ in range(_BISECTIONS):
@@ -200,12 +196,12 @@ class Outermost:
     """
 
     plant: NDArray[np.int32]
-    root: NDArray[np.float64]
-    limb: NDArray[np.float64]
-    stem: NDArray[np.bool_]
-    width: NDArray[np.float64]
+    root: Floats
+    limb: Floats
+    stem: Mask
+    width: Floats
 
-    def sizes(self, factor: NDArray[np.float64] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sizes(self, factor: Floats | None = None) -> tuple[Floats, Floats]:
         """Heights and crown widths (n,), (n,) if limbs were so many times (n,) as long, about; metres."""
         if factor is None:
             reach = self.root + self.limb
@@ -218,7 +214,7 @@ class Outermost:
         return far[UP], far[:UP].sum(axis=0) / 2
 
 
-def outermost(rows: NDArray[np.void], plants: Branches, beyond: Beyond) -> Outermost:
+def outermost(rows: Table, plants: Branches, beyond: Beyond) -> Outermost:
     """What reaches farthest on plants (n) of one species, trunks of which are given."""
     stems = _stems(rows, plants)
     chosen = _likely(rows, stems, len(plants))
@@ -256,7 +252,7 @@ def outermost(rows: NDArray[np.void], plants: Branches, beyond: Beyond) -> Outer
     return Outermost(plant[order], root, limb, stem[order], width)
 
 
-def _stems(rows: NDArray[np.void], plants: Branches) -> list[tuple[Branches, Axes]]:
+def _stems(rows: Table, plants: Branches) -> list[tuple[Branches, Axes]]:
     """Trunks and the stems beyond their forks, a generation at a time, numbered by plant, with their axes."""
     out, grown = [], replace(plants, plant=np.arange(len(plants), dtype=np.int32))
     while len(grown):
@@ -268,20 +264,18 @@ def _stems(rows: NDArray[np.void], plants: Branches) -> list[tuple[Branches, Axe
     return out
 
 
-def _farthest(lines: Axes, origin: NDArray[np.float64]) -> NDArray[np.float64]:
+def _farthest(lines: Axes, origin: Floats) -> Floats:
     """How far axes (n,) reach in each of `WAYS` (n, 5) from places (n, 3)."""
     return np.maximum(_in_ways(lines.knots.max(axis=1) - origin), _in_ways(lines.knots.min(axis=1) - origin))
 
 
-def _in_ways(place: NDArray[np.float64]) -> NDArray[np.float64]:
+def _in_ways(place: Floats) -> Floats:
     """Places (n, 3) along each of `WAYS` (n, 5)."""
     x, y, z = place.T
     return np.stack([x, -x, y, -y, z]).T
 
 
-def _likely(
-    rows: NDArray[np.void], stems: list[tuple[Branches, Axes]], n: int
-) -> list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]]:
+def _likely(rows: Table, stems: list[tuple[Branches, Axes]], n: int) -> list[tuple[Integers, Integers, Integers]]:
     """Limbs of stems that are likely to reach farthest: by generation counts, stems (m,) and limbs (m,) of these."""
     found = [_mean_tips(rows, *one) for one in stems]
     tree = np.concatenate([grown.plant[owner] for (grown, _), (_, owner, _, _) in zip(stems, found, strict=True)])
@@ -309,9 +303,7 @@ def _likely(
     return out
 
 
-def _mean_tips(
-    rows: NDArray[np.void], stems: Branches, lines: Axes
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
+def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Integers, Integers, NDArray[np.float32]]:
     """Counts of limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `WAYS`.
 
     As `growth.chosen_children` has it, but for what differs at random from limb to limb.
@@ -360,7 +352,7 @@ def _mean_tips(
     return counts, owner, index, tips
 
 
-def beyond_limbs(rows: NDArray[np.void], first: int, species: int) -> Beyond:
+def beyond_limbs(rows: Table, first: int, species: int) -> Beyond:
     """How far twigs and leaves of a species reach, whose trunk is row ``first``."""
     n, plants = _KNOWN_PLANTS, trunks(rows, Seeds.upright(_KNOWN_PLANTS, species))
     limbs, over = [], 0.0
@@ -386,7 +378,7 @@ def beyond_limbs(rows: NDArray[np.void], first: int, species: int) -> Beyond:
     return Beyond(_fitted(rows, limbs.take(side), False), _fitted(rows, limbs.take(high), True), over)
 
 
-def _fitted(rows: NDArray[np.void], limbs: Branches, up: bool) -> tuple[float, float]:
+def _fitted(rows: Table, limbs: Branches, up: bool) -> tuple[float, float]:
     """How far what grows on limbs reaches beyond them, in the way that they lead or up: metres, and of their length."""
     factor = np.resize(_FACTORS, len(limbs))
     limbs = replace(limbs, length=limbs.length * factor, vigour=limbs.vigour * factor)
@@ -402,9 +394,7 @@ def _fitted(rows: NDArray[np.void], limbs: Branches, up: bool) -> tuple[float, f
     return float(metres), float(part + luck)
 
 
-def _leaf_tips(
-    rows: NDArray[np.void], branches: Branches, lines: Axes
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _leaf_tips(rows: Table, branches: Branches, lines: Axes) -> tuple[Integers, Floats]:
     """Branch (m,) and end (m, 3) of the leaves of branches."""
     counts = leaf_counts(rows, branches)
     owner, index = spread(counts)
@@ -415,11 +405,11 @@ def _leaf_tips(
     return owner, leaves.position + leaves.size[:, None] * frame[:, :, 1]
 
 
-def _all_extremes(rows: NDArray[np.void], base: Branches, ways: NDArray[np.float64]) -> NDArray[np.float64]:
+def _all_extremes(rows: Table, base: Branches, ways: Floats) -> Floats:
     """How far wood and leaves of sub-plants (n,) reach from their bases in directions (n, k, 3) of each."""
     out = np.zeros(ways.shape[:2])
 
-    def meet(owner: NDArray[np.integer], place: NDArray[np.float64]) -> None:
+    def meet(owner: Integers, place: Floats) -> None:
         away = np.einsum("mi,mki->mk", place - base.position[owner], ways[owner])
         np.maximum.at(out, owner, away)
 

@@ -16,9 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_ANGLE, columns, cross, perpendicular, spiral
+from ..arrays import GOLDEN_ANGLE, Floats, Integers, Table, columns, cross, perpendicular, spiral
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.envelopes import axis_places
@@ -58,22 +57,22 @@ class Orientation:
         The same over its wood.
     """
 
-    leaves: NDArray[np.float64]
-    own_leaves: NDArray[np.float64]
-    wood: NDArray[np.float64]
+    leaves: Floats
+    own_leaves: Floats
+    wood: Floats
 
 
-def leaf_moments(orientation: Orientation, subplants: Branches) -> NDArray[np.float64]:
+def leaf_moments(orientation: Orientation, subplants: Branches) -> Floats:
     """Mean of n nᵀ over the leaves of sub-plants, (n, 3, 3) float64 of trace 1 (0 for rows without leaves)."""
     return _evaluated(orientation.leaves, subplants.row, subplants.frame, subplants.outward)
 
 
 def own_leaf_moments(
     orientation: Orientation,
-    row: NDArray[np.integer],
-    axis: NDArray[np.float64],
-    outward: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    row: Integers,
+    axis: Floats,
+    outward: Floats,
+) -> Floats:
     """The same (n, 3, 3) over the leaves that straight pieces of branches bear.
 
     They are given by row (n,), axis (n, 3), and place (n,) between inside and outside of the crown.
@@ -81,17 +80,17 @@ def own_leaf_moments(
     return _evaluated(orientation.own_leaves, row, _frames_along(axis), outward)
 
 
-def wood_moments(orientation: Orientation, subplants: Branches) -> NDArray[np.float64]:
+def wood_moments(orientation: Orientation, subplants: Branches) -> Floats:
     """Mean of n nᵀ over the branches of sub-plants, (n, 3, 3) float64 of trace 1."""
     return _evaluated(orientation.wood, subplants.row, subplants.frame, subplants.outward)
 
 
 def _evaluated(
-    coefficients: NDArray[np.float64],
-    row: NDArray[np.integer],
-    frame: NDArray[np.float64],
-    outward: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    coefficients: Floats,
+    row: Integers,
+    frame: Floats,
+    outward: Floats,
+) -> Floats:
     """Moments (n, 3, 3) in the world for branches with frames (n, 3, 3), so far outside in the crown (n,).
 
     By polynomials (r, 1, 33, 6) of rows (n,), or (r, 3, 33, 6) at `NODES`.
@@ -110,7 +109,7 @@ def _evaluated(
     return _turned(local / np.where(trace > 0, trace, 1), frame)
 
 
-def _basis(sky: NDArray[np.float64]) -> NDArray[np.float64]:
+def _basis(sky: Floats) -> Floats:
     """Functions (n, 33) of directions (n, 3): polynomials of degree 4, and the first harmonics of the azimuth."""
     out = np.empty((_TERMS, len(sky)))
     powers = [[np.ones(len(sky))] for _ in range(3)]
@@ -130,37 +129,37 @@ def _basis(sky: NDArray[np.float64]) -> NDArray[np.float64]:
     return out.T
 
 
-def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _product(a: Floats, b: Floats) -> Floats:
     """Product of a tall array (n, k) and a small one, in pieces so small that no library starts threads for them."""
     whole = len(a) // _PIECE * _PIECE
     pieces = np.ascontiguousarray(a[:whole]).reshape(-1, _PIECE, a.shape[1]) @ b
     return np.concatenate([pieces.reshape(whole, b.shape[1]), a[whole:] @ b])
 
 
-def _turned(six: NDArray[np.float64], frame: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turned(six: Floats, frame: Floats) -> Floats:
     """R M Rᵀ (n, 3, 3) of symmetric M given by six numbers (n, 6)."""
     full = six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
     return frame @ full @ frame.transpose(0, 2, 1)
 
 
-def _six(moments: NDArray[np.float64], frame: NDArray[np.float64]) -> NDArray[np.float64]:
+def _six(moments: Floats, frame: Floats) -> Floats:
     """Rᵀ M R as six numbers (n, 6) of symmetric M (n, 3, 3)."""
     local = frame.transpose(0, 2, 1) @ moments @ frame
     return np.stack([local[:, i, j] for i, j in _PAIRS], axis=1)
 
 
-def _frames_along(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+def _frames_along(axis: Floats) -> Floats:
     """Frames (n, 3, 3) whose third column is an axis (n, 3), turned about it as may be."""
     x = perpendicular(axis)
     return columns(x, cross(axis, x), axis)
 
 
 def orientation_of(
-    rows: NDArray[np.void],
+    rows: Table,
     forms: Sequence[Sequence[Sequence[LeafModel]]],
-    leaf: NDArray[np.float64],
-    wood: NDArray[np.float64],
-    length: NDArray[np.float64],
+    leaf: Floats,
+    wood: Floats,
+    length: Floats,
 ) -> Orientation:
     """Orientation of every row.
 
@@ -211,11 +210,11 @@ def orientation_of(
 class _Sums:
     """What was met on each of n branches: sums of moments × weights (n, 3, 3), and of weights (n,)."""
 
-    moment: NDArray[np.float64]
-    weight: NDArray[np.float64]
+    moment: Floats
+    weight: Floats
 
     @classmethod
-    def of(cls, n: int, owner: NDArray[np.int64], moment: NDArray[np.float64], weight: NDArray[np.float64]) -> _Sums:
+    def of(cls, n: int, owner: Integers, moment: Floats, weight: Floats) -> _Sums:
         """Sums over things (m,) on branches (m,) of n, with moments (m, 3, 3)."""
         values = (moment * weight[:, None, None]).reshape(-1, 9).T
         sums = np.stack([np.bincount(owner, one, n) for one in values], axis=1)
@@ -228,7 +227,7 @@ class _Sums:
         a, b = (part / max(p.weight.sum(), 1e-300) for p, part in ((self, fraction), (other, 1 - fraction)))
         return _Sums(self.moment * a + other.moment * b, self.weight * a + other.weight * b)
 
-    def fitted(self, branches: Branches, basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    def fitted(self, branches: Branches, basis: Floats) -> Floats:
         """Coefficients (33, 6), by weighted least squares; ``basis`` (n, 33) for the sky of the branches."""
         whole = max(self.weight.sum(), 1e-300)
         normal = _inner(basis, basis * (self.weight / whole)[:, None])
@@ -237,16 +236,16 @@ class _Sums:
         return np.linalg.solve(normal, _inner(basis, _six(self.moment / whole, branches.frame)))
 
 
-def _inner(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _inner(a: Floats, b: Floats) -> Floats:
     """aᵀ b of tall arrays, in pieces so small that no library starts threads for them."""
     whole = len(a) // _PIECE * _PIECE
     left, right = (x[:whole].reshape(-1, _PIECE, x.shape[1]) for x in (a, b))
     return (left.transpose(0, 2, 1) @ right).sum(axis=0) + a[whole:].T @ b[whole:]
 
 
-def _skies_met(rows: NDArray[np.void], length: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _skies_met(rows: Table, length: Floats) -> list[Floats]:
     """Directions (m, 3) of the sky in the axes of some branches of each row, on plants that stand as they should."""
-    met: list[list[NDArray[np.float64]]] = [[] for _ in rows]
+    met: list[list[Floats]] = [[] for _ in rows]
     out = []
     for i in range(len(rows)):
         if met[i]:
@@ -265,7 +264,7 @@ def _skies_met(rows: NDArray[np.void], length: NDArray[np.float64]) -> list[NDAr
     return out
 
 
-def _skies_around(n: int, upright: bool, met: NDArray[np.float64]) -> NDArray[np.float64]:
+def _skies_around(n: int, upright: bool, met: Floats) -> Floats:
     """Directions (n, 3) of the sky, every other one of those that are met, the rest all around."""
     cos = 1 - 2 * (np.arange(n) + 0.5) / n
     if upright:  # most plants stand, and few lie
@@ -275,15 +274,13 @@ def _skies_around(n: int, upright: bool, met: NDArray[np.float64]) -> NDArray[np
     return sky
 
 
-def _looked_at(row: int, length: float, sky: NDArray[np.float64]) -> Branches:
+def _looked_at(row: int, length: float, sky: Floats) -> Branches:
     """Branches of a row, of length 1, with the sky in given directions (n, 3) of their axes."""
     key = mix(key_of_seed(np.arange(len(sky))) ^ np.uint64(0x0E1E))
     return Branches.apart(row, key, _frames_along(sky).transpose(0, 2, 1), 1.0, 1 / max(length, 1e-9))
 
 
-def _some_children(
-    rows: NDArray[np.void], branches: Branches, lines: Axes
-) -> tuple[Branches, NDArray[np.int64], NDArray[np.float64]]:
+def _some_children(rows: Table, branches: Branches, lines: Axes) -> tuple[Branches, Integers, Floats]:
     """One child of each sort of each branch that has any: the children, their parents, and how many each stands for.
 
     Of plants that are drawn by hand all branches that are drawn.
@@ -312,9 +309,7 @@ def _straight(branches: Branches) -> Axes:
     return Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
 
 
-def _own_leaves(
-    rows: NDArray[np.void], branches: Branches, lines: Axes, turn: NDArray[np.float64], place: float | None
-) -> _Sums:
+def _own_leaves(rows: Table, branches: Branches, lines: Axes, turn: Floats, place: float | None) -> _Sums:
     """Some leaves of each branch, all turned to the sky as leaves in one place between inside and outside, if so."""
     counts = leaf_counts(rows, branches)
     if not counts.any():
@@ -350,7 +345,7 @@ def _own_leaves(
     return out
 
 
-def _own_wood(rows: NDArray[np.void], branches: Branches, lines: Axes) -> _Sums:
+def _own_wood(rows: Table, branches: Branches, lines: Axes) -> _Sums:
     """A place on each branch."""
     t = uniform(branches.key, _ALONG)
     _, frame = lines.at(np.arange(len(branches)), t)
@@ -360,7 +355,7 @@ def _own_wood(rows: NDArray[np.void], branches: Branches, lines: Axes) -> _Sums:
     return _Sums(moment * radius[:, None, None], radius)
 
 
-def _model_moments(rows: NDArray[np.void], forms: Sequence[Sequence[Sequence[LeafModel]]]) -> NDArray[np.float64]:
+def _model_moments(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) -> Floats:
     """Orientation moment (r, 3, 3) of the leaf that each row bears, in the leaf's own axes."""
     table = np.zeros((len(forms), max(len(one) for one in forms), 3, 3))
     for s, one in enumerate(forms):

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import gathered
+from ..arrays import Floats, Integers, Mask, Table, gathered
 from ..growth.branches import Branches
 from ..growth.crown_forms import BASE, WIDTH
 from ..growth.formed import LIGHT, MOST_LEANING, along, are_stools, bare_part, first_forks, raised
@@ -22,7 +22,7 @@ from .flora import Flora
 from .samples import LIMB, STEM, STEM_LIMB, Limbs, Points, Shares
 
 
-def formed_subplants(rows: NDArray[np.void], subplants: Branches) -> NDArray[np.intp]:
+def formed_subplants(rows: Table, subplants: Branches) -> Integers:
     """Sub-plants (k,) of (n,) that are trunks, or stems of these, with a crown form other than the plain one."""
     crown = subplants.crown
     if crown is None:
@@ -35,10 +35,10 @@ def placed_samples(
     flora: Flora,
     points: Points,
     subplants: Branches,
-    owner: NDArray[np.integer],
-    pick: NDArray[np.integer],
-    turn: NDArray[np.float64] | None = None,
-) -> tuple[NDArray[np.floating], NDArray[np.float64] | None]:
+    owner: Integers,
+    pick: Integers,
+    turn: Floats | None = None,
+) -> tuple[NDArray[np.floating], Floats | None]:
     """Samples of sub-plants: places in units of their lengths and in their axes, and what each stands for.
 
     Parameters
@@ -79,13 +79,8 @@ def placed_samples(
 
 
 def _moved(
-    rows: NDArray[np.void],
-    own: Branches,
-    on: Limbs,
-    place: NDArray[np.float64],
-    which: NDArray[np.integer],
-    light: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    rows: Table, own: Branches, on: Limbs, place: Floats, which: Integers, light: Floats
+) -> tuple[Floats, Floats, Floats]:
     """Places (m, 3) of samples on limbs, ``which`` (m,) of sub-plants (n,), in lengths of those as described.
 
     ``light`` (m, 2) is where crowns reach farther.
@@ -101,7 +96,7 @@ def _moved(
     stretch = np.where(rows["continues"][row], above, below)
     stool, limb, stem = are_stools(rows, row)[which], on.kind >= LIMB, (on.kind == STEM) | (on.kind == STEM_LIMB)
 
-    def reach(way: NDArray[np.float64]) -> NDArray[np.float64]:
+    def reach(way: Floats) -> Floats:
         level = way[:, :2] / np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-9)[:, None]
         return crown[which, WIDTH] * (1 + level[:, 0] * light[:, 0] + level[:, 1] * light[:, 1])
 
@@ -126,13 +121,8 @@ def _moved(
 
 
 def _other_lengths(
-    rows: NDArray[np.void],
-    own: Branches,
-    which: NDArray[np.integer],
-    root: NDArray[np.float64],
-    height: NDArray[np.float64],
-    stem: NDArray[np.bool_],
-) -> NDArray[np.float64] | float:
+    rows: Table, own: Branches, which: Integers, root: Floats, height: Floats, stem: Mask
+) -> Floats | float:
     """Factors (m,) on the lengths of limbs of trunks that fork, because these are higher or lower in the crown.
 
     ``height`` (m,) is where limbs at ``root`` (m, 3) are on the trunk, if they are not on a ``stem`` (m,).
@@ -153,7 +143,7 @@ def _other_lengths(
     return np.clip(ratio[0] / ratio[1], 0.5, 2.0)
 
 
-def _tilted(way: NDArray[np.float64], factor: NDArray[np.float64]) -> NDArray[np.float64]:
+def _tilted(way: Floats, factor: Floats) -> Floats:
     """Vectors (m, 3) of the same lengths whose level parts are so many times (m,) as long, as far as they can be."""
     level = way[:, :2] * factor[:, None]
     rest = (way**2).sum(axis=1) - (level**2).sum(axis=1)
@@ -166,11 +156,11 @@ def _shares(
     own: Branches,
     shares: Shares,
     on: Limbs,
-    which: NDArray[np.integer],
-    reach: NDArray[np.float64],
-    sparse: NDArray[np.float64],
+    which: Integers,
+    reach: Floats,
+    sparse: Floats,
     leafy: bool,
-) -> NDArray[np.float64]:
+) -> Floats:
     """What samples (m,) stand for, 1 on the mean; see `_moved`."""
     totals, crown = flora.formed_totals, own.crown.astype(np.float64)
     ratio = np.where(totals.formed[own.row], totals.leaves(own) if leafy else totals.wood(own)[0], 1.0)
@@ -193,7 +183,7 @@ def _shares(
     return np.where(are_stools(flora.rows, own.row)[which], 1.0, many[which, on.kind] * bearing)
 
 
-def extents(flora: Flora, subplants: Branches, farthest: bool = True) -> NDArray[np.float64]:
+def extents(flora: Flora, subplants: Branches, farthest: bool = True) -> Floats:
     """Radius, lowest and highest place (n, 3) that hold the samples of sub-plants, in units of their lengths.
 
     Without ``farthest``, the radius of crowns that lean is about the mean of all sides.
@@ -219,9 +209,7 @@ def extents(flora: Flora, subplants: Branches, farthest: bool = True) -> NDArray
     return bound[:, :3]
 
 
-def outlines(
-    flora: Flora, plants: Branches, low: NDArray[np.float64], high: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def outlines(flora: Flora, plants: Branches, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """About how the crowns of plants (n,) differ from those of their species, whose ends are at heights (n,), (n,).
 
     Returns
@@ -244,7 +232,7 @@ def outlines(
     return length, high - (high - low) * left, crown[:, WIDTH], crown[:, LIGHT][:, :2]
 
 
-def bounds(flora: Flora, subplants: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def bounds(flora: Flora, subplants: Branches) -> tuple[Floats, Floats]:
     """Bounds of sub-plants (n, 3) as `Flora.bound`, and how far (n,) these may reach beyond that; metres."""
     bound = flora.bound[subplants.row] * subplants.length[:, None]
     out = subplants.radius * flora.widest[subplants.row] + flora.leaf_reach[subplants.row] * subplants.scale

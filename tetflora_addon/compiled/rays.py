@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Floats, Integers, Table, spread
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_forms, leaf_keys, leaf_places, place_leaves, settled
@@ -29,7 +29,7 @@ _PLANES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, -1, 0], [0, 1, -1], [1,
 _NUMBER = np.array([0, 1, 2, 0, 0, 3, 4, 5])
 
 
-def basis(direction: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def basis(direction: Floats) -> tuple[Floats, Floats]:
     """Two unit vectors across a unit vector (3,), and across one another."""
     helper = np.eye(3)[2] if abs(direction[2]) < 0.9 else np.eye(3)[0]
     u = np.cross(helper, direction)
@@ -37,9 +37,7 @@ def basis(direction: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
     return u, np.cross(direction, u)
 
 
-def covered(
-    corners: NDArray[np.float64], first: NDArray[np.integer], number: NDArray[np.integer]
-) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
+def covered(corners: Floats, first: Integers, number: Integers) -> tuple[Integers, Integers]:
     """Points of whole coordinates that flat polygons cover, by the even-odd rule.
 
     Parameters
@@ -78,7 +76,7 @@ def covered(
     return polygon[some], np.stack([begin[part] + step, row[some]], axis=1)
 
 
-def cell_numbers(points: Sequence[NDArray[np.float64]], shape: NDArray[np.int64]) -> NDArray[np.int64]:
+def cell_numbers(points: Sequence[Floats], shape: Integers) -> Integers:
     """Tetrahedron (n,) of 6 × x × y × z that each point (3, n) is in; those beside the lattice are moved into it."""
     cube = [np.clip(along.astype(np.int64), 0, most - 1) for along, most in zip(points, shape, strict=True)]
     x, y, z = (along - low for along, low in zip(points, cube, strict=True))
@@ -86,9 +84,7 @@ def cell_numbers(points: Sequence[NDArray[np.float64]], shape: NDArray[np.int64]
     return ((cube[0] * shape[1] + cube[1]) * shape[2] + cube[2]) * 6 + kind
 
 
-def path_lengths(
-    origin: NDArray[np.float64], direction: NDArray[np.float64], shape: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[Integers, Integers, Floats]:
     """Ways of parallel rays through the tetrahedra of a lattice.
 
     Parameters
@@ -137,7 +133,7 @@ _SKY = np.array([0.0, 0.0, 1.0])
 WIDEST = 1.5
 
 
-def opened(rows: NDArray[np.void], subplants: Branches) -> tuple[Branches, Axes, Branches]:
+def opened(rows: Table, subplants: Branches) -> tuple[Branches, Axes, Branches]:
     """Branches (m,) of sub-plants (n,), their axes, and the sub-plants on them; forms drawn by hand have several."""
     phantom = rows["phantom"][subplants.row]
     if phantom.any():
@@ -147,7 +143,7 @@ def opened(rows: NDArray[np.void], subplants: Branches) -> tuple[Branches, Axes,
     return subplants, lines, children(rows, subplants, lines)[0]
 
 
-def _inwards(frame: NDArray[np.floating], direction: NDArray[np.float64]) -> NDArray[np.float64]:
+def _inwards(frame: NDArray[np.floating], direction: Floats) -> Floats:
     """A direction in the axes of frames (n, 3, 3), by component (3, n)."""
     return sum(direction[k] * frame[:, k].T for k in range(3))
 
@@ -157,31 +153,31 @@ class LeafOutlines:
     """Leaves of one form: n of them."""
 
     model: LeafModel
-    base: NDArray[np.float64]
-    frame: NDArray[np.float64]
-    size: NDArray[np.float64]
+    base: Floats
+    frame: Floats
+    size: Floats
 
     def __len__(self) -> int:
         return len(self.size)
 
     @property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Floats:
         """Middle (n, 3) of each."""
         centre = self.model.positions.mean(axis=0)
         return self.base + self.size[:, None] * sum(self.frame[:, :, k] * centre[k] for k in range(3))
 
     @property
-    def radius(self) -> NDArray[np.float64]:
+    def radius(self) -> Floats:
         """Distance (n,) within which all of each is."""
         positions = self.model.positions
         return self.size * np.linalg.norm(positions - positions.mean(axis=0), axis=1).max()
 
-    def shown(self, direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shown(self, direction: Floats) -> Floats:
         """Area (n,) that the faces of each show in a direction, m²."""
         local = _inwards(self.frame, direction)
         return sum(np.abs(face @ local) for face in self.model.face_vectors) * self.size**2
 
-    def outlines(self, near: NDArray[np.intp], u: NDArray, v: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def outlines(self, near: Integers, u: NDArray, v: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Corners (c, 2) of the faces of some, seen along the third of three axes, first corners and numbers (f,)."""
         model, base, frame, size = self.model, self.base[near], self.frame[near], self.size[near]
         flat = [
@@ -196,29 +192,29 @@ class LeafOutlines:
 class WoodOutlines:
     """Straight parts of branches with the radii of circles that are as wide as their tubes on the mean."""
 
-    ends: NDArray[np.float64]
-    radii: NDArray[np.float64]
+    ends: Floats
+    radii: Floats
 
     def __len__(self) -> int:
         return len(self.radii)
 
     @property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Floats:
         """Middle (n, 3) of each."""
         return self.ends.mean(axis=1)
 
     @property
-    def radius(self) -> NDArray[np.float64]:
+    def radius(self) -> Floats:
         """Distance (n,) within which all of each is."""
         return np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1) / 2 + self.radii.max(axis=1)
 
-    def shown(self, direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shown(self, direction: Floats) -> Floats:
         """Area (n,) that each part shows in a direction, m²: that of its outline."""
         along = self.ends[:, 1] - self.ends[:, 0]
         across = along - (along @ direction)[:, None] * direction
         return self.radii.sum(axis=1) * np.linalg.norm(across, axis=1)
 
-    def outlines(self, near: NDArray[np.intp], u: NDArray, v: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def outlines(self, near: Integers, u: NDArray, v: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Corners (4 n, 2), first corners and numbers (n,), as `LeafOutlines.outlines`; one quad each."""
         flat = self.ends[near] @ np.stack([u, v], axis=1)
         along = flat[:, 1] - flat[:, 0]
@@ -238,19 +234,19 @@ class Things:
     """
 
     parts: list[LeafOutlines | WoodOutlines]
-    middle: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    group: NDArray[np.intp]
-    dense: NDArray[np.float64]
+    middle: Floats
+    radius: Floats
+    group: Integers
+    dense: Floats
 
 
 def things_of(
-    rows: NDArray[np.void],
+    rows: Table,
     forms: Sequence[Sequence[LeafModel]],
     subplants: Branches,
-    group: NDArray[np.intp],
+    group: Integers,
     first: int,
-    length: NDArray[np.float64],
+    length: Floats,
     orders: int | None = None,
 ) -> Things:
     """Grow a sub-plant to its last leaf.
@@ -283,7 +279,7 @@ def things_of(
     return Things(parts, middle, radius, np.concatenate(groups), np.concatenate(dense))
 
 
-def _wood(rows: NDArray[np.void], bodies: Branches, lines: Axes) -> tuple[WoodOutlines, NDArray[np.int64]]:
+def _wood(rows: Table, bodies: Branches, lines: Axes) -> tuple[WoodOutlines, Integers]:
     owner, index = spread(lines.segments)
     some, number = bodies.take(owner), lines.segments[owner]
     ends = np.stack([lines.knot(owner, index + k) for k in (0, 1)], axis=1)
@@ -292,8 +288,8 @@ def _wood(rows: NDArray[np.void], bodies: Branches, lines: Axes) -> tuple[WoodOu
 
 
 def _leaves(
-    rows: NDArray[np.void], forms: Sequence[Sequence[LeafModel]], bodies: Branches, lines: Axes
-) -> Iterator[tuple[LeafOutlines, NDArray[np.int64]]]:
+    rows: Table, forms: Sequence[Sequence[LeafModel]], bodies: Branches, lines: Axes
+) -> Iterator[tuple[LeafOutlines, Integers]]:
     counts = leaf_counts(rows, bodies)
     for row in np.unique(bodies.row[counts > 0]):
         some = np.flatnonzero((bodies.row == row) & (counts > 0))

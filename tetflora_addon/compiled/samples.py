@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, dot, gathered
+from ..arrays import Arrays, Floats, Integers, Table, column, dot, gathered
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, youth
@@ -67,8 +67,8 @@ class Points:
     shares : Shares of r
     """
 
-    first: NDArray[np.int64]
-    number: NDArray[np.int64]
+    first: Integers
+    number: Integers
     position: NDArray[np.float32]
     frame: NDArray[np.float32]
     row: NDArray[np.int32]
@@ -78,7 +78,7 @@ class Points:
     limbs: Limbs
     shares: Shares
 
-    def runs(self, subplants: Branches) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def runs(self, subplants: Branches) -> tuple[Integers, Integers]:
         """First sample and number of samples (n,), (n,) that stand for sub-plants as they are turned to the sky."""
         stand = _stand_classes(subplants.frame[:, 2, :])
         return self.first[subplants.row, stand], self.number[subplants.row, stand]
@@ -92,12 +92,7 @@ class Samples:
     wood: Points
 
 
-def draw_samples(
-    rows: NDArray[np.void],
-    leaf_area: NDArray[np.float64],
-    wood_area: NDArray[np.float64],
-    length: NDArray[np.float64],
-) -> Samples:
+def draw_samples(rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats) -> Samples:
     """Sample every row.
 
     Parameters
@@ -119,21 +114,21 @@ def draw_samples(
     return Samples(_joined(leaves, len(rows)), _joined(wood, len(rows)))
 
 
-def _turned(cos: NDArray[np.float64], azimuth: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turned(cos: Floats, azimuth: Floats) -> Floats:
     """Frames (n, 3, 3) at tilts of given cosines (n,) that lean along the world's x, with the sky at azimuths (n,)."""
     sin, c, s = np.sqrt(np.clip(1 - cos * cos, 0, 1)), np.cos(azimuth), np.sin(azimuth)
     zero = np.zeros_like(cos)
     return np.stack([[-c * cos, -s * cos, sin], [s, -c, zero], [c * sin, s * sin, cos]]).transpose(2, 0, 1)
 
 
-def _stand_classes(sky: NDArray[np.floating]) -> NDArray[np.int64]:
+def _stand_classes(sky: NDArray[np.floating]) -> Integers:
     """Class (n,) of how branches stand, from the direction (n, 3) of the sky in their own axes."""
     tilt = np.rint((sky[:, 2].clip(-1, 1) + 1) / 2 * (len(_TILTS) - 1)).astype(np.int64)
     turn = np.arctan2(sky[:, 1], sky[:, 0]) / (2 * np.pi)
     return tilt * _ROLLS + (np.floor((turn % 1.0) * _ROLLS).astype(np.int64) % _ROLLS)
 
 
-def _at_least_some(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+def _at_least_some(counts: Integers) -> Integers:
     """The same counts; one each where things are so rare that no path has met any, but some are expected."""
     return counts if counts.any() else np.ones_like(counts)
 
@@ -147,20 +142,18 @@ class _Points(Arrays):
     """
 
     line: NDArray[np.int32]
-    position: NDArray[np.float64]
-    offset: NDArray[np.float64]
+    position: Floats
+    offset: Floats
     frame: NDArray[np.floating]
     row: NDArray[np.int32]
-    outward: NDArray[np.float64]
-    light: NDArray[np.float64]
-    young: NDArray[np.float64]
-    area: NDArray[np.float64]
+    outward: Floats
+    light: Floats
+    young: Floats
+    area: Floats
     limbs: Limbs | None = None
 
     @classmethod
-    def on(
-        cls, rows: NDArray[np.void], one: _Arrived, branch: NDArray[np.int64], position: NDArray, *rest: NDArray
-    ) -> _Points:
+    def on(cls, rows: Table, one: _Arrived, branch: Integers, position: NDArray, *rest: NDArray) -> _Points:
         """Points on branches, given by number."""
         row = one.branches.row[branch]
         short = rows["order"][row[:1]] == SPUR_ORDER
@@ -177,7 +170,7 @@ class _Arrived:
     """
 
     branches: Branches
-    weight: NDArray[np.float64]
+    weight: Floats
     line: NDArray[np.int32]
 
 
@@ -189,9 +182,7 @@ class _Walk:
     those of each row that paths have followed, ``leaves`` and ``wood`` what they have met.
     """
 
-    def __init__(
-        self, rows: NDArray[np.void], first: int, end: int, leaf_area: NDArray[np.float64], length: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, rows: Table, first: int, end: int, leaf_area: Floats, length: Floats) -> None:
         self.rows, self.first = rows, first
         self.length = np.where(length[first:end] > 0, length[first:end], 1.0) / max(length[first], 1e-9)
         self.scale = 1 / max(length[first], 1e-9)
@@ -255,9 +246,7 @@ class _Walk:
         branches = Branches.apart(row, key, frame, self.length[row - self.first], self.scale)
         return _Arrived(branches, np.ones(n), np.full((self.slot[-1] + 1, n), -1, np.int32))
 
-    def sampled(
-        self, points: _Points | None, row: int, expected: NDArray[np.float64]
-    ) -> tuple[_Points, NDArray[np.int64], NDArray[np.int64]]:
+    def sampled(self, points: _Points | None, row: int, expected: Floats) -> tuple[_Points, Integers, Integers]:
         """Samples of what grows on branches of a row, and first sample and number of samples for each class (c,), (c,).
 
         They are drawn by area from points on leaves or wood, in the axes of the branches. ``expected`` (r,) is the
@@ -302,7 +291,7 @@ class _Walk:
         return replace(points, position=(axis * way.T[:, None]).sum(axis=0).T, frame=frame)
 
 
-def _in_bands(points: _Points, own: NDArray[np.int64], base: Branches, under: NDArray[np.int64]) -> NDArray[np.float64]:
+def _in_bands(points: _Points, own: Integers, base: Branches, under: Integers) -> Floats:
     """Where points are (n,), 0 to 1: bands along the branch, and within each from the axis outwards."""
     way = gathered(points.position, own) - gathered(base.position, under)
     along = dot(way, gathered(base.frame[:, :, 2], under))
@@ -313,7 +302,7 @@ def _in_bands(points: _Points, own: NDArray[np.int64], base: Branches, under: ND
     return (band + across / max(across.max(), 1e-12)) / _BANDS
 
 
-def _wood_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
+def _wood_points(rows: Table, one: _Arrived, lines: Axes) -> _Points:
     """A place on the wood of each branch."""
     branches, every = one.branches, np.arange(len(one.branches))
     along = evenly(branches.key, _ALONG)
@@ -323,7 +312,7 @@ def _wood_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
     return _Points.on(rows, one, every, position, frame, outwardness(rows, branches, every, along), none, none, area)
 
 
-def _leaf_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
+def _leaf_points(rows: Table, one: _Arrived, lines: Axes) -> _Points:
     """Some leaves of each branch that bears any, spread along it: how they are turned differs most on one branch."""
     branches = one.branches
     counts = _at_least_some(leaf_counts(rows, branches))
@@ -341,14 +330,14 @@ def _leaf_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
     return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, light, young, area)
 
 
-def _drawn_child(rows: NDArray[np.void], one: _Arrived, number: int, places: int) -> _Arrived:
+def _drawn_child(rows: Table, one: _Arrived, number: int, places: int) -> _Arrived:
     """One of the branches drawn by hand, of some of the plants."""
     owner = thinned(len(one.weight), places)
     weight = one.weight[owner] * (len(one.weight) / places)
     return _Arrived(chosen_drawn(rows, one.branches, owner, np.full(places, number)), weight, one.line[:, owner])
 
 
-def _one_child_each(rows: NDArray[np.void], one: _Arrived, lines: Axes, sort: int) -> _Arrived:
+def _one_child_each(rows: Table, one: _Arrived, lines: Axes, sort: int) -> _Arrived:
     """A child of one sort of each branch that has any."""
     counts = _at_least_some(branch_counts(rows, one.branches, sort))
     alive = np.flatnonzero(counts)
@@ -357,7 +346,7 @@ def _one_child_each(rows: NDArray[np.void], one: _Arrived, lines: Axes, sort: in
     return _Arrived(children, (one.weight * counts)[alive], one.line[:, alive])
 
 
-def _joined(found: list[tuple[int, _Points, NDArray[np.int64], NDArray[np.int64]]], rows: int) -> Points:
+def _joined(found: list[tuple[int, _Points, Integers, Integers]], rows: int) -> Points:
     """Samples of one row after the other: row, points, and first sample and number of each class."""
     first, number = np.zeros((2, rows, _CLASSES), np.int64)
     of_row: list[int] = []
@@ -410,11 +399,11 @@ class Shares:
         Mean over those on limbs.
     """
 
-    kinds: NDArray[np.float64]
-    follows: NDArray[np.float64]
+    kinds: Floats
+    follows: Floats
 
     @classmethod
-    def of(cls, limbs: Limbs, row: NDArray[np.integer], rows: int) -> Shares:
+    def of(cls, limbs: Limbs, row: Integers, rows: int) -> Shares:
         """Of samples (k,) of rows (k,), of which there are so many."""
         on = limbs.kind >= LIMB
         kinds = np.bincount(row.astype(np.int64) * 4 + limbs.kind, minlength=4 * rows).reshape(rows, 4)
@@ -423,12 +412,12 @@ class Shares:
 
 
 def limbs_of(
-    rows: NDArray[np.void],
+    rows: Table,
     first: int,
     i: int,
-    number: NDArray[np.integer],
+    number: Integers,
     branches: Sequence[Branches],
-    row: NDArray[np.integer],
+    row: Integers,
     base: Branches,
 ) -> Limbs:
     """The limbs of samples of one row.

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, by_component, columns, cross, gathered
+from ..arrays import Arrays, Floats, Integers, Keys, Table, by_component, columns, cross, gathered
 from .branches import Branches
 from .hashing import Draw, signed
 from .rows import ranged, varied
@@ -40,17 +40,17 @@ class Axes(Arrays):
         The same lines a moment later, where it is asked how plants move.
     """
 
-    knots: NDArray[np.float64]
-    frames: NDArray[np.float64]
-    segments: NDArray[np.int64]
-    skies: NDArray[np.float64] | None = None
+    knots: Floats
+    frames: Floats
+    segments: Integers
+    skies: Floats | None = None
     later: Axes | None = None
 
     @staticmethod
     def _rows(own: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:
         return own.take(index) if isinstance(own, Arrays) else _selected(own, index)
 
-    def at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+    def at(self, branch: Integers, t: Floats) -> tuple[NDArray, NDArray]:
         """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
         number = self.segments[branch]
         along = t * number
@@ -59,7 +59,7 @@ class Axes(Arrays):
         step = self.knot(branch, segment + 1) - start
         return start + (along - segment)[:, None] * step, self.frame(branch, segment)
 
-    def bend(self) -> NDArray[np.float64]:
+    def bend(self) -> Floats:
         """How far (n,) axes are from the straight line between their ends, metres."""
         chord = self.knots[:, -1] - self.knots[:, 0]
         direction = chord / np.maximum(np.linalg.norm(chord, axis=1), 1e-300)[:, None]
@@ -68,18 +68,18 @@ class Axes(Arrays):
         square = np.einsum("nsi,nsi->ns", between, between) - along**2
         return np.sqrt(np.maximum(square, 0.0).max(axis=1, initial=0.0))
 
-    def sky_at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def sky_at(self, branch: Integers, t: Floats) -> Floats | None:
         """Sky (m, 3) at the fractions t (m,) of the axes of branches (m,); None without wind."""
         if self.skies is None:
             return None
         number = self.segments[branch]
         return _picked(self.skies, branch, np.minimum((t * number).astype(np.int64), number - 1))
 
-    def knot(self, branch: NDArray[np.integer], number: NDArray[np.integer]) -> NDArray[np.float64]:
+    def knot(self, branch: Integers, number: Integers) -> Floats:
         """Positions (m, 3) of knots given by branch (m,) and number (m,)."""
         return _picked(self.knots, branch, number)
 
-    def frame(self, branch: NDArray[np.integer], segment: NDArray[np.integer]) -> NDArray[np.float64]:
+    def frame(self, branch: Integers, segment: Integers) -> Floats:
         """Frames (m, 3, 3) of segments given by branch (m,) and number (m,)."""
         return _picked(self.frames, branch, segment)
 
@@ -91,7 +91,7 @@ def _selected(array: NDArray, index: NDArray | slice) -> NDArray:
     return _to_front(np.take(_to_back(array), index, axis=-1))
 
 
-def _picked(array: NDArray, first: NDArray[np.integer], second: NDArray[np.integer]) -> NDArray:
+def _picked(array: NDArray, first: Integers, second: Integers) -> NDArray:
     """``array[first, second]`` of an array whose first axis is the last in memory and whose second the one before."""
     flat = _to_back(array)
     flat = flat.reshape(*flat.shape[:-2], -1)
@@ -109,7 +109,7 @@ def _to_front(array: NDArray) -> NDArray:
     return array.transpose(-1, -2, *range(array.ndim - 2))
 
 
-def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
+def axes(rows: Table, branches: Branches) -> Axes:
     """Centre lines of branches (n,), of as many segments as the row has that has most.
 
     Each joint bends by its part of the order's curvature and turns to the sky or the ground (Weber and Penn, "Creation
@@ -121,7 +121,7 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
     return replace(lines, later=_axes(rows, branches.moved(), moment(rows)))
 
 
-def _axes(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> Axes:
+def _axes(rows: Table, branches: Branches, ahead: float = 0.0) -> Axes:
     """Centre lines so many seconds after the moment of the rows."""
     segments = rows["segments"][branches.row]
     most = int(segments.max(initial=1))
@@ -170,7 +170,7 @@ def _axes(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> Axe
     return Axes(knots, frames, segments, skies)
 
 
-def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int) -> tuple[NDArray, NDArray, NDArray]:
+def _drawn_axes(rows: Table, branches: Branches, most: int) -> tuple[NDArray, NDArray, NDArray]:
     """Knots (n, most + 1, 3) and frames (n, most, 3, 3) of branches drawn by hand; their plants' frames (n, 3, 3)."""
     local, line = rows["frames"][branches.row], rows["knots"][branches.row]
     turn = branches.frame @ local[:, 0].transpose(0, 2, 1)
@@ -180,7 +180,7 @@ def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int) -> tuple[
 
 
 def _leant(
-    rows: NDArray[np.void], branches: Branches, turn: NDArray, knots: NDArray, frames: NDArray, ahead: float
+    rows: Table, branches: Branches, turn: NDArray, knots: NDArray, frames: NDArray, ahead: float
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Knots, frames and skies of branches drawn by hand in the wind, whose plants have the axes ``turn`` (n, 3, 3)."""
     line = rows["knots"][branches.row, 0]
@@ -198,7 +198,7 @@ def _leant(
     return bent, turned_by(frames.reshape(-1, 3, 3), axis, angle).reshape(frames.shape), skies
 
 
-def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:
+def _bent(frame: Floats, pitch: Floats, yaw: Floats) -> Floats:
     """Rotate about the local y by pitch, then about the new local x by yaw."""
     x, y, z = frame[:, :, 0], frame[:, :, 1], frame[:, :, 2]
     cp, sp, cy, sy = (f(v)[:, None] for v in (pitch, yaw) for f in (np.cos, np.sin))
@@ -206,9 +206,7 @@ def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[n
     return columns(cp * x - sp * z, cy * y + sy * forward, cy * forward - sy * y)
 
 
-def _pulled(
-    frame: NDArray[np.float64], pull: NDArray[np.float64], sky: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]:
+def _pulled(frame: Floats, pull: Floats, sky: Floats | None = None) -> Floats:
     """Turn frames to the sky by an angle (n,) times the sine of their tilt, about the level axis (Rodrigues)."""
     if sky is not None:
         axis, level = axis_and_angle(cross(frame[:, :, 2], sky))
@@ -231,17 +229,17 @@ FLARE_END = 1 / 8
 _FALL = 8 * np.log(100.0)  # the flare falls to a hundredth over the first eighth
 
 
-def profile(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint64], t: NDArray[np.float64]) -> NDArray:
+def profile(rows: Table, row: NDArray, key: Keys, t: Floats) -> NDArray:
     """Radius (n,) at fractions t (n,) of branches of rows (n,) and keys (n,), divided by that of the base unflared."""
     return _profile(rows, row, key, t, summed=False)
 
 
-def profile_integral(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint64], t: NDArray[np.float64]) -> NDArray:
+def profile_integral(rows: Table, row: NDArray, key: Keys, t: Floats) -> NDArray:
     """Integral (n,) of `profile` from 0 to t; differences of it are exact under any sequence of cuts."""
     return _profile(rows, row, key, t, summed=True)
 
 
-def _profile(rows: NDArray[np.void], row: NDArray, key: NDArray, t: NDArray[np.float64], summed: bool) -> NDArray:
+def _profile(rows: Table, row: NDArray, key: NDArray, t: Floats, summed: bool) -> NDArray:
     taper = ranged(rows, "taper", row, key, Draw.TAPER)
     out = t - (1 - taper) * t * t / 2 if summed else 1 - (1 - taper) * t
     hand = np.flatnonzero(rows["drawn"][row])
@@ -265,7 +263,7 @@ def _profile(rows: NDArray[np.void], row: NDArray, key: NDArray, t: NDArray[np.f
     return out
 
 
-def _drawn(rows: NDArray[np.void], row: NDArray, t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+def _drawn(rows: Table, row: NDArray, t: Floats) -> tuple[NDArray, NDArray]:
     """Profile of branches that are drawn by hand, linear between their knots, and its integral."""
     radii, number = rows["radii"][row], rows["segments"][row]
     along = t * number

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column
+from ..arrays import Arrays, Floats, Keys, column
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class Pose(Arrays):
     sky : (n, 3) float64
     """
 
-    position: NDArray[np.float64]
-    frame: NDArray[np.float64]
-    sky: NDArray[np.float64]
+    position: Floats
+    frame: Floats
+    sky: Floats
 
 
 @dataclass(frozen=True)
@@ -68,17 +68,17 @@ class Branches(Arrays):
 
     row: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     plant: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    key: NDArray[np.uint64] = field(metadata=column(dtype=np.uint64))
-    position: NDArray[np.float64] = field(metadata=column(3))
-    frame: NDArray[np.float64] = field(metadata=column(3, 3))
-    length: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    vigour: NDArray[np.float64]
-    outward: NDArray[np.float64]
-    sky: NDArray[np.float64] | None = None
+    key: Keys = field(metadata=column(dtype=np.uint64))
+    position: Floats = field(metadata=column(3))
+    frame: Floats = field(metadata=column(3, 3))
+    length: Floats
+    radius: Floats
+    scale: Floats
+    vigour: Floats
+    outward: Floats
+    sky: Floats | None = None
     later: Pose | None = None
-    year: NDArray[np.float64] | None = None
+    year: Floats | None = None
     crown: NDArray[np.float32] | None = None
 
     @classmethod

@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import gathered
+from ..arrays import Floats, Integers, Keys, Table, gathered
 from .hashing import Draw, signed
 from .seasons import Stages, autumn_colours, in_season
 
@@ -16,14 +15,14 @@ _UNEVEN = 0.25
 
 
 def leaf_colours(
-    rows: NDArray[np.void],
-    row: NDArray[np.integer],
-    key: NDArray[np.uint64],
-    outward: NDArray[np.float64] | None = None,
-    young: NDArray[np.float64] | None = None,
+    rows: Table,
+    row: Integers,
+    key: Keys,
+    outward: Floats | None = None,
+    young: Floats | None = None,
     stages: Stages | None = None,
-    hue: NDArray[np.float64] | None = None,
-) -> NDArray[np.float64]:
+    hue: Floats | None = None,
+) -> Floats:
     """Linear RGB (n, 3) of leaves of the rows (n,), or all of one row (1,).
 
     ``outward`` (n,) is 0 inside the crown, ``young`` (n,) is `foliage.youth`; both or neither are given. ``stages`` are
@@ -39,13 +38,8 @@ def leaf_colours(
 
 
 def leaf_colours_at(
-    rows: NDArray[np.void],
-    row: NDArray[np.integer],
-    summer: NDArray[np.float64],
-    stages: Stages,
-    hue: NDArray[np.float64],
-    deviation: NDArray[np.float64] | float = 0.0,
-) -> NDArray[np.float64]:
+    rows: Table, row: Integers, summer: Floats, stages: Stages, hue: Floats, deviation: Floats | float = 0.0
+) -> Floats:
     """Linear RGB (n, 3) of leaves at their stages, from those in summer (n, 3) and hues of their plants (n,).
 
     ``deviation`` (n,) is how bright leaves are that have turned or died, −1 to 1.
@@ -57,9 +51,7 @@ def leaf_colours_at(
     return np.clip(colours, 0, 1, out=colours)
 
 
-def mean_leaf_colours(
-    rows: NDArray[np.void], row: NDArray[np.integer], outward: NDArray[np.float64], young: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def mean_leaf_colours(rows: Table, row: Integers, outward: Floats, young: Floats) -> Floats:
     """Mean linear RGB (n, 3) of leaves of rows (n,) at places between inside (0) and outside (1) of the crown.
 
     ``young`` (n,) is their `youth`.
@@ -74,12 +66,12 @@ def mean_leaf_colours(
     return mean
 
 
-def branch_colours(rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64]) -> NDArray[np.float64]:
+def branch_colours(rows: Table, row: Integers, key: Keys) -> Floats:
     """Linear RGB (n, 3) of branches of the rows (n,), or all of one row (1,)."""
     return _colours(rows["branch_colour"][row], signed(key, Draw.BRANCH_COLOUR))
 
 
-def _colours(colour: NDArray[np.float64], draw: NDArray[np.float64]) -> NDArray[np.float64]:
+def _colours(colour: Floats, draw: Floats) -> Floats:
     mean, variation = colour.transpose(1, 2, 0)
     out = variation * draw
     out += mean

@@ -9,7 +9,9 @@ the crown that was measured. Such plants have a row of five numbers beside their
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
 
 #: Columns: factor on the lengths of limbs; bare fraction of the trunk, 0 as described; by which fraction limbs to the
 #: east and to the north are longer, and those opposite shorter; factor on the radius of the trunk.
@@ -21,7 +23,7 @@ LEAST = np.array([0.2, 0.0, -0.8, -0.8, 0.2])
 MOST = np.array([3.0, 0.95, 0.8, 0.8, 5.0])
 
 
-def farthest(forms: NDArray[np.float64] | None) -> NDArray[np.float64] | float:
+def farthest(forms: Floats | None) -> Floats | float:
     """How many times as far as described plants (n,) reach at most, by their crown forms (n, 5)."""
     if forms is None:
         return 1.0
@@ -35,7 +37,7 @@ def crown_forms(
     east: ArrayLike = 0.0,
     north: ArrayLike = 0.0,
     girth: ArrayLike = 1.0,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Crown forms (number, 5) of plants, within the limits; each argument is one number or (number,)."""
     out = np.empty((number, len(PLAIN)))
     for column, value in enumerate((width, base, east, north, girth)):

@@ -7,9 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import perpendicular
+from ..arrays import Floats, Integers, perpendicular
 from ..errors import SpeciesError
 from ..species.skeletons import DrawnBranches
 
@@ -37,14 +36,14 @@ class DrawnLines:
         Of the whole line; at its base; and where between inside and outside of the crown it leaves its limb.
     """
 
-    order: NDArray[np.int64]
-    segments: NDArray[np.int64]
-    knots: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    frames: NDArray[np.float64]
-    length: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    outward: NDArray[np.float64]
+    order: Integers
+    segments: Integers
+    knots: Floats
+    radii: Floats
+    frames: Floats
+    length: Floats
+    radius: Floats
+    outward: Floats
 
 
 def drawn_lines(branches: DrawnBranches) -> DrawnLines:
@@ -76,7 +75,7 @@ def drawn_lines(branches: DrawnBranches) -> DrawnLines:
     )  # fmt: skip
 
 
-def _frames(knots: NDArray[np.float64], segments: NDArray[np.int64]) -> NDArray[np.float64]:
+def _frames(knots: Floats, segments: Integers) -> Floats:
     """Frames along lines, each turned from the one before by the least rotation (Bishop, 1975)."""
     step = np.diff(knots, axis=1)
     size = np.linalg.norm(step, axis=2, keepdims=True)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Keys, Mask, Table
 from ..species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 from .axes import Axes
 from .branches import Branches
@@ -35,24 +36,22 @@ _COSINES = {
 }
 
 
-def leaf_start(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
+def leaf_start(rows: Table, branches: Branches) -> Floats:
     """Fraction (n,) of each branch's axis that is bare of leaves."""
     return ranged(rows, "leaf_start", branches.row, branches.key, Draw.LEAF_START)
 
 
-def reaches(rows: NDArray[np.void]) -> NDArray[np.float64]:
+def reaches(rows: Table) -> Floats:
     """How far the solids that leaves fill reach from the axes of branches (r,), in lengths of these."""
     return rows["envelope_radius"] * np.where(rows["envelope"] == BOX, np.sqrt(2.0), 1.0)
 
 
-def are_solids(rows: NDArray[np.void]) -> NDArray[np.bool_]:
+def are_solids(rows: Table) -> Mask:
     """Rows (r,) of branches that bear nothing but leaves in a solid."""
     return (rows["envelope"] > 0) & (rows["next"] < 0).all(axis=1)
 
 
-def axis_places(
-    rows: NDArray[np.void], branches: Branches, row: NDArray[np.integer], owner: NDArray, t: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def axis_places(rows: Table, branches: Branches, row: Integers, owner: NDArray, t: Floats) -> Floats:
     """Fractions (m,) of axes at the height of leaves at places t (m,) of branches, of rows (m,) or (1,).
 
     The inverses of the fractions of the solids below a height u, from 0 to 1: u²(3 − 2u) of a sphere, 1 − (1 − u)³ of a
@@ -69,14 +68,14 @@ def axis_places(
 
 
 def leaf_sites(
-    rows: NDArray[np.void],
+    rows: Table,
     branches: Branches,
     lines: Axes,
-    row: NDArray[np.integer],
-    owner: NDArray[np.int64],
-    key: NDArray[np.uint64],
-    t: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray, NDArray[np.float64]]:
+    row: Integers,
+    owner: Integers,
+    key: Keys,
+    t: Floats,
+) -> tuple[Floats, NDArray, Floats]:
     """Where leaves are: the middles of those in solids, the bases of others.
 
     Parameters
@@ -110,7 +109,7 @@ def leaf_sites(
     return position, frame, at
 
 
-def inclinations(kind: NDArray[np.integer], number: NDArray[np.float64]) -> NDArray[np.float64]:
+def inclinations(kind: Integers, number: Floats) -> Floats:
     """Angles (m,) between normals and axis, 0 to π/2, from even random numbers (m,), of kinds (m,) or (1,)."""
     out = np.arccos(1.0 - number)  # of a sphere
     for name, (a, b) in _COSINES.items():
@@ -121,7 +120,7 @@ def inclinations(kind: NDArray[np.integer], number: NDArray[np.float64]) -> NDAr
     return out
 
 
-def inclined(frame: NDArray[np.float32], kind: NDArray[np.integer], key: NDArray[np.uint64]) -> NDArray[np.float32]:
+def inclined(frame: NDArray[np.float32], kind: Integers, key: Keys) -> NDArray[np.float32]:
     """Frames (m, 3, 3) of leaves that stand by a distribution, all around their branch and turned in their own plane.
 
     Parameters

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, cross, dot, gathered
+from ..arrays import Arrays, Floats, Integers, Keys, Table, cross, dot, gathered
 from .axes import Axes
 from .branches import Branches
 from .envelopes import EVEN_JITTER, inclined, leaf_sites, leaf_start
@@ -50,24 +50,22 @@ class Leaves(Arrays):
         On a day of the year; None where all are as in summer.
     """
 
-    branch: NDArray[np.int64]
-    key: NDArray[np.uint64]
-    position: NDArray[np.float64]
+    branch: Integers
+    key: Keys
+    position: Floats
     frame: NDArray[np.float32]
-    size: NDArray[np.float64]
-    light: NDArray[np.float64]
+    size: Floats
+    light: Floats
     sky: NDArray[np.floating]
     stages: Stages | None = None
 
 
-def leaf_keys(branches: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]) -> NDArray[np.uint64]:
+def leaf_keys(branches: Branches, owner: Integers, index: Integers) -> Keys:
     """Hash keys (m,) of leaves given by branch and index."""
     return child_key(np.take(branches.key, owner), index + _LEAF_PATH)
 
 
-def leaf_places(
-    rows: NDArray[np.void], branches: Branches, owner: NDArray, index: NDArray, counts: NDArray, key: NDArray[np.uint64]
-) -> NDArray[np.float64]:
+def leaf_places(rows: Table, branches: Branches, owner: NDArray, index: NDArray, counts: NDArray, key: Keys) -> Floats:
     """Fractions (m,) of branches at which leaves sit (see `envelopes`); those of a whorl share that of the first."""
     row = _rows_of(branches, owner)
     whorl = rows["leaf_whorl"][row]
@@ -84,16 +82,14 @@ def leaf_places(
     return start + (1 - start) * fraction
 
 
-def outwardness(
-    rows: NDArray[np.void], branches: Branches, owner: NDArray[np.int64], t: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def outwardness(rows: Table, branches: Branches, owner: Integers, t: Floats) -> Floats:
     """Where leaves at fractions t (m,) of branches lie between the inside of the crown, 0, and the outside, 1."""
     row = _rows_of(branches, owner)
     first, last = rows["part"][row].T
     return np.where(rows["outward"][row], first + (last - first) * t, np.take(branches.outward, owner))
 
 
-def youth(rows: NDArray[np.void], row: NDArray[np.integer], t: NDArray[np.float64]) -> NDArray[np.float64]:
+def youth(rows: Table, row: Integers, t: Floats) -> Floats:
     """How young leaves (m,) of rows (m,) or (1,) are, at fractions t (m,) of branches: 0 old to 1 at the very end.
 
     A power of the place along the branch of the order, so that what is seen as young are a few at the end.
@@ -103,12 +99,12 @@ def youth(rows: NDArray[np.void], row: NDArray[np.integer], t: NDArray[np.float6
 
 
 def leaf_sizes(
-    rows: NDArray[np.void],
-    row: NDArray[np.integer],
-    key: NDArray[np.uint64],
-    outward: NDArray[np.float64],
-    t: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    rows: Table,
+    row: Integers,
+    key: Keys,
+    outward: Floats,
+    t: Floats,
+) -> Floats:
     """Metres (m,) by which models of leaves are scaled at plant scale 1; (1,) where all are alike.
 
     They are on rows (m,) or (1,), at places (m,) between inside and outside, and fractions t (m,) of branches.
@@ -122,9 +118,7 @@ def leaf_sizes(
     return size
 
 
-def leaf_lights(
-    rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64], outward: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def leaf_lights(rows: Table, row: Integers, key: Keys, outward: Floats) -> Floats:
     """How far leaves at places (m,) between inside and outside turn to the sky; (1,) where all are alike."""
     light = ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT)
     if not rows["sunlit"][row].any():
@@ -132,29 +126,27 @@ def leaf_lights(
     return np.clip(light + (rows["leaf_light_tip"][row] - rows["leaf_light"][row, 0]) * outward, 0, 1)
 
 
-def stages_of(
-    rows: NDArray[np.void], branches: Branches, owner: NDArray[np.int64], key: NDArray[np.uint64]
-) -> Stages | None:
+def stages_of(rows: Table, branches: Branches, owner: Integers, key: Keys) -> Stages | None:
     """Stages of leaves with keys (m,) of branches (m,) on their plants' days; None where all are as in summer."""
     if branches.year is None or not may_change(rows, _rows_of(branches, np.arange(len(branches))), branches.year):
         return None
     return leaf_stages(rows, _rows_of(branches, owner), key, np.take(branches.year[:, 0], owner))
 
 
-def _rows_of(branches: Branches, owner: NDArray[np.int64]) -> NDArray[np.int32]:
+def _rows_of(branches: Branches, owner: Integers) -> NDArray[np.int32]:
     """Row (m,) of each branch's parameters, or the only one (1,), which is as good and need not be gathered."""
     row = branches.row
     return row[:1] if len(row) and (row == row[0]).all() else np.take(row, owner)
 
 
 def place_leaves(
-    rows: NDArray[np.void],
+    rows: Table,
     branches: Branches,
     lines: Axes,
-    owner: NDArray[np.int64],
-    index: NDArray[np.int64],
-    key: NDArray[np.uint64],
-    t: NDArray[np.float64],
+    owner: Integers,
+    index: Integers,
+    key: Keys,
+    t: Floats,
 ) -> Leaves:
     """Leaves at given fractions of their branches; call `face_light` to turn them to the sky.
 
@@ -190,12 +182,12 @@ def place_leaves(
 
 
 def leaf_frames(
-    rows: NDArray[np.void],
-    row: NDArray[np.integer],
+    rows: Table,
+    row: Integers,
     frame: NDArray[np.float32],
-    roll: NDArray[np.float64],
-    index: NDArray[np.int64],
-    key: NDArray[np.uint64],
+    roll: Floats,
+    index: Integers,
+    key: Keys,
     sky: NDArray[np.floating] | None = None,
 ) -> NDArray[np.float32]:
     """Frames (m, 3, 3) of leaves before they turn to the light.
@@ -254,7 +246,7 @@ def _leaf_frames(
     return out.transpose(2, 0, 1)
 
 
-def face_light(frame: NDArray[np.floating], light: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:
+def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
     """Turn leaves to the sky, as far as their orders ask for.
 
     Parameters
@@ -296,11 +288,11 @@ def face_light(frame: NDArray[np.floating], light: NDArray[np.float64], sky: NDA
 
 
 def settled(
-    rows: NDArray[np.void],
-    row: NDArray[np.integer],
+    rows: Table,
+    row: Integers,
     frame: NDArray[np.floating],
-    light: NDArray[np.float64],
-    sky: NDArray[np.float64],
+    light: Floats,
+    sky: Floats,
 ) -> NDArray:
     """Leaf frames as they are in the end: turned to the light, then hanging, as far as their orders ask for.
 
@@ -317,7 +309,7 @@ def settled(
 
 
 def in_wind(
-    rows: NDArray[np.void], branches: Branches, leaves: Leaves, frame: NDArray[np.float32], ahead: float = 0.0
+    rows: Table, branches: Branches, leaves: Leaves, frame: NDArray[np.float32], ahead: float = 0.0
 ) -> NDArray[np.float32]:
     """`settled` frames (m, 3, 3) of leaves (m) of branches as the wind turns them; as they are where there is none.
 
@@ -329,7 +321,7 @@ def in_wind(
     return fluttered(rows, _rows_of(branches, leaves.branch), frame, leaves.key, gust, ahead)
 
 
-def hanging(frame: NDArray[np.floating], droop: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:
+def hanging(frame: NDArray[np.floating], droop: Floats, sky: Floats) -> NDArray:
     """Let leaves hang: the midrib turns down as far as ``droop`` (n,) or (1,), the blade follows it."""
     kind = frame.dtype
     droop, sky = droop.astype(kind), sky.astype(kind).T
@@ -364,6 +356,6 @@ def _length(a: NDArray) -> NDArray:
     return np.maximum(np.sqrt(_inner(a, a)), np.finfo(a.dtype).tiny)
 
 
-def leaf_forms(number: int, key: NDArray[np.uint64]) -> NDArray[np.int64]:
+def leaf_forms(number: int, key: Keys) -> Integers:
     """Which of a number of forms each leaf (n,) has."""
     return (uniform(key, Draw.LEAF_FORM) * number).astype(np.int64)

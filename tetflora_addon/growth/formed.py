@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import by_component
+from ..arrays import Floats, Integers, Mask, Table, by_component
 from .branches import Branches
 from .crown_forms import BASE, EAST, GIRTH, NORTH, PLAIN, WIDTH
 from .rows import DEAD, FORK, LATERAL, SPUR
@@ -30,9 +30,7 @@ MOST_LEANING = 1.5
 _STEMS = 2.0
 
 
-def formed_trunks(
-    rows: NDArray[np.void], row: NDArray[np.integer], frame: NDArray[np.float64], forms: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+def formed_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> tuple[NDArray[np.float32], Floats]:
     """The column ``crown`` (n, 5) of trunks, and factors (n,) on their radii.
 
     Parameters
@@ -51,24 +49,24 @@ def formed_trunks(
     return by_component(crown.astype(np.float32)), own[:, GIRTH]
 
 
-def are_formed(rows: NDArray[np.void], branches: Branches) -> bool:
+def are_formed(rows: Table, branches: Branches) -> bool:
     """Whether any of the branches are parts of trunks with crown forms."""
     return branches.crown is not None and bool((rows["order"] == 0)[branches.row].any())
 
 
-def are_stools(rows: NDArray[np.void], row: NDArray[np.integer]) -> NDArray[np.bool_]:
+def are_stools(rows: Table, row: Integers) -> Mask:
     """Whether rows (n,) are those of stools."""
     child = rows["next"][:, LATERAL]
     return ((rows["order"] == 0) & (child >= 0) & (rows["length"][child, 0] > _STEMS))[row]
 
 
-def first_forks(rows: NDArray[np.void], row: NDArray[np.integer]) -> NDArray[np.float64]:
+def first_forks(rows: Table, row: Integers) -> Floats:
     """Where on the trunks of the plants of rows (n,) the first fork is, fractions of their height; 1 without any."""
     first = np.flatnonzero(np.diff(rows["species"], prepend=-1))
     return rows["part"][first[rows["species"]], 1][row]
 
 
-def raised(base: ArrayLike, fork: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def raised(base: ArrayLike, fork: ArrayLike) -> tuple[Floats, Floats]:
     """How many times as long as described trunks (...) are up to their first fork (...), and from there on."""
     fork = np.asarray(fork, np.float64)
     place = np.maximum(fork, base)
@@ -76,19 +74,19 @@ def raised(base: ArrayLike, fork: ArrayLike) -> tuple[NDArray[np.float64], NDArr
     return np.where(fork < 1, place / np.maximum(fork, 1e-9), 1.0), above
 
 
-def along(rows: NDArray[np.void], row: NDArray[np.integer], crown: NDArray[np.float32]) -> NDArray[np.float64]:
+def along(rows: Table, row: Integers, crown: NDArray[np.float32]) -> Floats:
     """How many times as long as described branches of rows (n,) are, which are parts of trunks; 1 for all others."""
     below, above = raised(crown[:, BASE], first_forks(rows, row))
     return np.where(rows["order"][row] > 0, 1.0, np.where(rows["continues"][row], above, below))
 
 
-def bare_part(rows: NDArray[np.void], row: NDArray[np.integer], base: ArrayLike) -> NDArray[np.float64]:
+def bare_part(rows: Table, row: Integers, base: ArrayLike) -> Floats:
     """Fraction (n,) of parts of trunks of rows (n,) that lies below crown bases (n,)."""
     low, high = rows["part"][row].T
     return np.clip((np.minimum(base, first_forks(rows, row)) - low) / (high - low), 0.0, 1.0)
 
 
-def fractions(rows: NDArray[np.void], row: NDArray[np.integer], base: ArrayLike) -> NDArray[np.float64]:
+def fractions(rows: Table, row: Integers, base: ArrayLike) -> Floats:
     """Where laterals of parts of trunks of rows (n,) begin and end among all of them (n, 2), by crown bases (n,)."""
     base = np.minimum(base, first_forks(rows, row) * 0.999)[:, None]
     own = rows["fraction"][row, LATERAL]
@@ -96,15 +94,13 @@ def fractions(rows: NDArray[np.void], row: NDArray[np.integer], base: ArrayLike)
     return np.where(base > 0, np.minimum(own, np.clip((rows["part"][row] - base) / (1 - base), 0.0, 1.0)), own)
 
 
-def dead_end(rows: NDArray[np.void], row: NDArray[np.integer], base: ArrayLike) -> NDArray[np.float64]:
+def dead_end(rows: Table, row: Integers, base: ArrayLike) -> Floats:
     """Where dead branches end on parts of trunks of rows (n,) with crown bases (n,): not below the living ones."""
     start, end = rows["start"][row, DEAD].T
     return np.where(end > start, np.maximum(end, bare_part(rows, row, base)), end)
 
 
-def numbers(
-    rows: NDArray[np.void], row: NDArray[np.integer], base: ArrayLike, sort: int, start: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def numbers(rows: Table, row: Integers, base: ArrayLike, sort: int, start: Floats) -> Floats:
     """Number (n,) of children of a sort over that without crown bases (n,), by their own ``start`` (n,)."""
     if sort == DEAD:
         end = rows["start"][row, DEAD, 1]
@@ -116,14 +112,12 @@ def numbers(
     return whole * sparser(rows, row, base)
 
 
-def sparser(rows: NDArray[np.void], row: NDArray[np.integer], base: ArrayLike) -> NDArray[np.float64]:
+def sparser(rows: Table, row: Integers, base: ArrayLike) -> Floats:
     """How many limbs (n,) the stems beyond forks have because they are shorter; 1 for all others."""
     return np.where(rows["continues"][row] & (rows["order"][row] == 0), raised(base, first_forks(rows, row))[1], 1.0)
 
 
-def reaches(
-    rows: NDArray[np.void], parent: Branches, azimuth: NDArray[np.float64], sort: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def reaches(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> tuple[Floats, Floats]:
     """What the form makes of children of a sort that leave parents (m,) at azimuths (m,).
 
     Returns
@@ -144,9 +138,7 @@ def reaches(
     return np.where(stool, np.minimum(reach, MOST_LEANING), one), np.where(trunk & ~stool, reach, one)
 
 
-def handed_on(
-    parent: Branches, sort: int, length: ArrayLike, azimuth: NDArray[np.float64], angle: NDArray[np.float64]
-) -> NDArray[np.float32]:
+def handed_on(parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, angle: Floats) -> NDArray[np.float32]:
     """The column ``crown`` (m, 5) of children of a sort.
 
     Parameters

@@ -18,8 +18,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Integers, Keys, Mask, Table
 from ..species.growing import NodeLaw, Nodes, faded, shortened, some_nodes
 from ..species.species import crown_ratio
 from .branches import Branches
@@ -105,14 +106,14 @@ def living(row: np.void, sort: int, bare: float = 0.0, dead: float | None = None
     return _alive(law, (starts, own[FRESH], until), own[NOW], own[EXTRA])
 
 
-def varied_begin(begin: ArrayLike, varies: ArrayLike, draw: NDArray[np.float64]) -> NDArray[np.float64]:
+def varied_begin(begin: ArrayLike, varies: ArrayLike, draw: Floats) -> Floats:
     """Where nodes of branches (n,) begin, by random numbers (n,) between -1 and 1."""
     return np.minimum(begin * (1 + varies * draw), np.maximum(begin, 0.999))
 
 
 def spread_children(
-    row: np.void, sort: int, bare: float = 0.0, dead: float = 0.0, among: NDArray[np.float64] | None = None
-) -> tuple[NDArray[np.float64], ...]:
+    row: np.void, sort: int, bare: float = 0.0, dead: float = 0.0, among: Floats | None = None
+) -> tuple[Floats, ...]:
     """Children of one sort of a mean branch of a row that is not full-grown, as many as stand for all.
 
     ``bare`` and ``dead`` are as in `living`; ``among`` (2,) is where the row's children begin and end among those of
@@ -139,7 +140,7 @@ def spread_children(
     return np.clip(law.place_of(node) / own[NOW], 0, 1), fraction, weight, faded(own_fraction, own[FADES], extra)
 
 
-def lengths(rows: NDArray[np.void], row: NDArray[np.integer], fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+def lengths(rows: Table, row: Integers, fraction: Floats) -> Floats:
     """Length ratios (n,) of laterals at fractions (n,) of those of their parents, which are of rows (n,)."""
     out = crown_ratio(rows["crown"][row], 1 - fraction)
     ramps = rows["ramps"][row]
@@ -149,11 +150,11 @@ def lengths(rows: NDArray[np.void], row: NDArray[np.integer], fraction: NDArray[
 
 
 def fullness_of(
-    rows: NDArray[np.void],
-    row: NDArray[np.integer],
-    vigour: NDArray[np.float64],
-    own: NDArray[np.float64] | None = None,
-) -> NDArray[np.float64]:
+    rows: Table,
+    row: Integers,
+    vigour: Floats,
+    own: Floats | None = None,
+) -> Floats:
     """Factor (n,) on the numbers of branches and leaves on branches of rows (n,) and vigours (n,).
 
     ``own`` (n,) are their vigours without the crown forms of their plants.
@@ -172,12 +173,12 @@ def fullness_of(
 _EXTRA, _NEGATIVE = 1 << 27, 1 << 28
 
 
-def child_number(index: NDArray[np.integer], path: int) -> NDArray[np.int64]:
+def child_number(index: Integers, path: int) -> Integers:
     """Child indices (n,), for `hashing.child_key`, of children (n,) of a sort; negative ones have some of their own."""
     return np.where(index < 0, index + _NEGATIVE, index) + path if (index < 0).any() else index + path
 
 
-def _within(key: NDArray[np.uint64]) -> NDArray[np.float64]:
+def _within(key: Keys) -> Floats:
     """Where in their node the children of keys (n,) sit, 0 to 1."""
     return 0.5 + 0.5 * signed(key, Draw.PLACE)
 
@@ -203,18 +204,16 @@ class Grown:
         Where nodes would begin without the crown forms of plants.
     """
 
-    on: NDArray[np.bool_]
-    first: NDArray[np.int64]
-    number: NDArray[np.int64]
-    now: NDArray[np.float64]
+    on: Mask
+    first: Integers
+    number: Integers
+    now: Floats
     law: NodeLaw
-    ends: NDArray[np.float64]
-    density: NDArray[np.float64]
-    described: NDArray[np.float64]
+    ends: Floats
+    density: Floats
+    described: Floats
 
-    def chosen(
-        self, owner: NDArray[np.integer], index: NDArray[np.integer], whorl: NDArray[np.integer]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    def chosen(self, owner: Integers, index: Integers, whorl: Integers) -> tuple[Integers, Integers, Mask]:
         """Index that is theirs for life, where child numbers begin, and which live for a while (m,), of children (m,).
 
         These are given by branch and index among the living; a node bears as many as a whorl has.
@@ -227,11 +226,11 @@ class Grown:
 
     def places(
         self,
-        owner: NDArray[np.integer],
-        node: NDArray[np.integer],
-        within: NDArray[np.float64],
-        extra: NDArray[np.bool_],
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        owner: Integers,
+        node: Integers,
+        within: Floats,
+        extra: Mask,
+    ) -> tuple[Floats, Floats, Floats]:
         """Fractions (m,) for nodes (m,) of branches (m,): of the branch, of its children, and of those as described."""
         own = node + within
         dense = np.where(extra, self.density[1][owner], np.where(own >= 0, self.density[0][owner], 1.0))
@@ -243,15 +242,15 @@ class Grown:
 
 
 def grown_nodes(
-    rows: NDArray[np.void],
+    rows: Table,
     branches: Branches,
     sort: int,
     path: int,
-    wanted: NDArray[np.float64],
-    start: NDArray[np.float64],
-    draw: NDArray[np.float64],
-    chance: NDArray[np.float64],
-    formed: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    wanted: Floats,
+    start: Floats,
+    draw: Floats,
+    chance: Floats,
+    formed: tuple[Floats, Floats] | None = None,
 ) -> Grown:
     """Living nodes of branches for children of one sort.
 
@@ -289,7 +288,7 @@ def grown_nodes(
     ends = np.maximum(ends, ends[0])
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
 
-    def passed(place: NDArray[np.float64], begin: int) -> NDArray[np.int64]:
+    def passed(place: Floats, begin: int) -> Integers:
         node = np.floor(place)
         first = child_key(key, child_number((node * whorl).astype(np.int64), path + begin))
         return node.astype(np.int64) + (_within(first) < place - node)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, by_component, columns, dot, spread
+from ..arrays import Arrays, Floats, Integers, Table, by_component, columns, dot, spread
 from ..species.growing import faded
 from ..species.members import dead_vigour
 from . import formed
@@ -38,7 +38,7 @@ _ROUND = (Draw.BRANCHES_ROUND, Draw.FORKS_ROUND, Draw.SPURS_ROUND, Draw.DEAD_ROU
 _START = (Draw.BRANCH_START, Draw.BRANCH_START, Draw.SPUR_START)
 
 
-def turned(frame: NDArray[np.float64], azimuth: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
+def turned(frame: Floats, azimuth: Floats, angle: Floats) -> Floats:
     """Frames (n, 3, 3) turned by an azimuth (n,) about their z and then tilted by an angle (n,) away from it, radians.
 
     The third column leans by the angle; the first is the same lean a right angle further.
@@ -59,7 +59,7 @@ def level_azimuth(frame: NDArray[np.floating], sky: NDArray[np.floating] | None 
     return np.arctan2(-dot(frame[:, :, 0], sky)[:, 0], dot(frame[:, :, 1], sky)[:, 0])
 
 
-def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
+def trunks(rows: Table, seeds: Seeds) -> Branches:
     """Trunks of plants (order 0)."""
     first = np.flatnonzero(np.diff(rows["species"], prepend=-1))  # of each species
     row = first[seeds.species].astype(np.int32)
@@ -81,7 +81,7 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later, year, crown)
 
 
-def _later(seeds: Seeds, frame: NDArray[np.float64], sky: NDArray[np.float64], seconds: float) -> Pose:
+def _later(seeds: Seeds, frame: Floats, sky: Floats, seconds: float) -> Pose:
     """Trunks so many seconds later: the foot of a plant stands still unless the whole plant moves."""
     if seeds.motion is None:
         return Pose(seeds.position, frame, sky)
@@ -90,22 +90,20 @@ def _later(seeds: Seeds, frame: NDArray[np.float64], sky: NDArray[np.float64], s
     return Pose(seeds.position + step[:, :3], turned_by(frame, *turn), turned_vectors(sky, *turn))
 
 
-def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
+def drawn_children(rows: Table, plants: Branches) -> tuple[Branches, Integers]:
     """Branches (m,) drawn by hand of plants (n,) that have such a form, and the plant (m,) of each."""
     first, last = rows["drawn_rows"][plants.row].T
     owner, index = spread((last - first).astype(np.int64))
     return chosen_drawn(rows, plants, owner, index), owner
 
 
-def chosen_drawn(
-    rows: NDArray[np.void], plants: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]
-) -> Branches:
+def chosen_drawn(rows: Table, plants: Branches, owner: Integers, index: Integers) -> Branches:
     """Some of the branches drawn by hand, given by plant (m,) and number (m,)."""
     plant = plants.take(owner)
     row = (rows["drawn_rows"][plant.row, 0] + index).astype(np.int32)
     length, radius, vigour, outward = rows["size"][row].T
 
-    def begun(at: Branches | Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def begun(at: Branches | Pose) -> tuple[Floats, Floats]:
         start = np.einsum("nij,nj->ni", at.frame, rows["knots"][row, 0]) * plant.scale[:, None]
         return at.position + start, at.frame @ rows["frames"][row, 0]
 
@@ -120,13 +118,13 @@ def chosen_drawn(
     return replace(plant, row=row, key=key, vigour=vigour, outward=outward, **where, **size)
 
 
-def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
+def fullness(rows: Table, branches: Branches) -> Floats:
     """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
     vigour, crown = branches.vigour, branches.crown
     return fullness_of(rows, branches.row, vigour, None if crown is None else vigour / crown[:, 0])
 
 
-def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERAL) -> NDArray[np.int64]:
+def branch_counts(rows: Table, branches: Branches, sort: int = LATERAL) -> Integers:
     """Number (n,) of children of one sort, in whole whorls; its expectation is exactly the range's mean."""
     row, key = branches.row, branches.key
     wanted = varied(rows["count"][row, sort], key, _COUNT[sort])
@@ -145,7 +143,7 @@ def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERA
     return np.where(child >= 0, nodes * whorl, 0)
 
 
-def living_nodes(rows: NDArray[np.void], branches: Branches, sort: int) -> Grown | None:
+def living_nodes(rows: Table, branches: Branches, sort: int) -> Grown | None:
     """Living nodes of branches that are not full-grown; None where all are."""
     row, key = branches.row, branches.key
     if sort == FORK or not rows["growing"][row, sort, NOW].any():
@@ -167,30 +165,30 @@ def living_nodes(rows: NDArray[np.void], branches: Branches, sort: int) -> Grown
     return grown_nodes(rows, branches, sort, int(_PATHS[sort]), wanted, start, draw, chance, ends)
 
 
-def _started(rows: NDArray[np.void], branches: Branches, sort: int) -> NDArray[np.float64]:
+def _started(rows: Table, branches: Branches, sort: int) -> Floats:
     """Part (n,) of branches that their species leaves bare of children of a sort."""
     return varied(rows["start"][branches.row, sort], branches.key, _START[sort])
 
 
-def leaf_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
+def leaf_counts(rows: Table, branches: Branches) -> Integers:
     """Number (n,) of leaves on branches' own axes, in whole whorls; its expectation is exactly the range's mean."""
     wanted = ranged(rows, "leaves", branches.row, branches.key, Draw.LEAVES) * fullness(rows, branches)
     whorl = rows["leaf_whorl"][branches.row]
     return np.floor(wanted / whorl + uniform(branches.key, Draw.LEAVES_ROUND)).astype(np.int64) * whorl
 
 
-def radius_at(rows: NDArray[np.void], branches: Branches, t: NDArray[np.float64]) -> NDArray[np.float64]:
+def radius_at(rows: Table, branches: Branches, t: Floats) -> Floats:
     """Radius at fractions t (n,) of the branches (n,), metres."""
     return branches.radius * profile(rows, branches.row, branches.key, t)
 
 
 def chosen_children(
-    rows: NDArray[np.void],
+    rows: Table,
     parents: Branches,
     lines: Axes,
-    owner: NDArray[np.int64],
-    index: NDArray[np.int64],
-    counts: NDArray[np.int64],
+    owner: Integers,
+    index: Integers,
+    counts: Integers,
     sort: int = LATERAL,
 ) -> Branches:
     """Some children (m,) of branches.
@@ -301,14 +299,12 @@ def chosen_children(
     return Branches(*own, None if parent.crown is None else formed.handed_on(parent, sort, reach, azimuth, angle))
 
 
-def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:
+def sorts_of(rows: Table, parents: Branches) -> list[int]:
     """Sorts of children that any of the branches has."""
     return [sort for sort in (LATERAL, FORK, SPUR, DEAD) if (rows["next"][parents.row, sort] >= 0).any()]
 
 
-def children(
-    rows: NDArray[np.void], parents: Branches, lines: Axes | None = None
-) -> tuple[Branches, NDArray[np.int64]]:
+def children(rows: Table, parents: Branches, lines: Axes | None = None) -> tuple[Branches, Integers]:
     """All children (m,) of branches (n,), and the parent (m,) of each; ``lines`` are the branches' axes if known."""
     lines = axes(rows, parents) if lines is None else lines
     grown, owners = [Branches.empty()], [np.zeros(0, np.int64)]
@@ -333,7 +329,7 @@ class WholeBranches(Arrays):
     branches: Branches
     lines: Axes
 
-    def knots(self, rows: NDArray[np.void]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def knots(self, rows: Table) -> tuple[Integers, Floats, Floats]:
         """Where segments begin and end; a flared base has some more.
 
         Returns

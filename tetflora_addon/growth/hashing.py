@@ -13,7 +13,9 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats, Integers, Keys
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
@@ -76,7 +78,7 @@ class Draw(IntEnum):
     AUTUMN_HUE = 241
 
 
-def mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
+def mix(z: Keys) -> Keys:
     """64-bit integers (...) scrambled (the finaliser of SplitMix64; Steele, Lea and Flood, OOPSLA 2014)."""
     z = np.asarray(z, dtype=np.uint64)
     with np.errstate(over="ignore"):  # only scalars warn; wrapping is what is wanted
@@ -88,27 +90,27 @@ def mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
         return z
 
 
-def key_of_seed(seed: ArrayLike) -> NDArray[np.uint64]:
+def key_of_seed(seed: ArrayLike) -> Keys:
     """Key of a whole plant from its integer seed ((...) any integer type, negative ones too)."""
     seed = np.asarray(seed).astype(np.int64).view(np.uint64)
     with np.errstate(over="ignore"):
         return mix(seed * _GOLDEN + _GOLDEN)
 
 
-def child_key(key: NDArray[np.uint64], index: ArrayLike) -> NDArray[np.uint64]:
+def child_key(key: Keys, index: ArrayLike) -> Keys:
     """Key of the child with a given index of the branches with given keys (both broadcast)."""
     index = np.asarray(index).astype(np.uint64)
     with np.errstate(over="ignore"):
         return mix(np.asarray(key, dtype=np.uint64) ^ mix((index + np.uint64(1)) * _CHILD))
 
 
-def mix_draw(key: NDArray[np.uint64], draw: int) -> NDArray[np.uint64]:
+def mix_draw(key: Keys, draw: int) -> Keys:
     """Random bits, 64 for each key (...); different draws of a key are independent, see `Draw`."""
     with np.errstate(over="ignore"):
         return mix(np.asarray(key, dtype=np.uint64) + np.uint64(draw) * _GOLDEN)
 
 
-def uniform(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+def uniform(key: Keys, draw: int) -> Floats:
     """Numbers (...) in [0, 1), one for each key (...); different draws of a key are independent, see `Draw`."""
     z = mix_draw(key, draw)
     z >>= np.uint64(11)
@@ -117,7 +119,7 @@ def uniform(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
     return out
 
 
-def stepped(key: NDArray[np.uint64], index: NDArray[np.integer]) -> NDArray[np.float64]:
+def stepped(key: Keys, index: Integers) -> Floats:
     """Numbers in [0, 1) that are spread evenly along consecutive indices (n,), beginning where each key (n,) says.
 
     Steps by the golden section (H. Weyl, "Über die Gleichverteilung von Zahlen mod. Eins", 1916): of any run of them,
@@ -127,7 +129,7 @@ def stepped(key: NDArray[np.uint64], index: NDArray[np.integer]) -> NDArray[np.f
     return (turned >> np.uint64(11)).astype(np.float64) * _TO_UNIT
 
 
-def signed(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+def signed(key: Keys, draw: int) -> Floats:
     """Numbers (n,) in [-1, 1), one for each key (n,)."""
     out = uniform(key, draw)
     out *= 2.0
@@ -140,14 +142,14 @@ _STEP = (np.sqrt(5) - 1) / 2
 _THIN = 201  # a draw of this module, beyond those of growth and samples
 
 
-def evenly(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+def evenly(key: Keys, draw: int) -> Floats:
     """Numbers in [0, 1) as from `uniform`, but for all keys (n,) together one in each n-th of the interval."""
     out = np.empty(len(key))
     out[np.argsort(uniform(key, draw), kind="stable")] = (np.arange(len(key)) + 0.5) / len(key)
     return out
 
 
-def thinned(number: int, places: int) -> NDArray[np.int64]:
+def thinned(number: int, places: int) -> Integers:
     """Indices (places,) of some of a number of things in order, or all and some again; one of each run.
 
     Which one of the run is random: a fixed step could fall in with a pattern of the things.
@@ -156,9 +158,7 @@ def thinned(number: int, places: int) -> NDArray[np.int64]:
     return ((each + uniform(key_of_seed(each), _THIN)) * (number / places)).astype(np.int64)
 
 
-def systematic(
-    weights: NDArray[np.float64], group: NDArray[np.int64], sort: NDArray[np.float64], numbers: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def systematic(weights: Floats, group: Integers, sort: Floats, numbers: Integers) -> Integers:
     """Draw things by their weights from each of several groups (systematic resampling).
 
     Parameters

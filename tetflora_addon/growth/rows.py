@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Keys, Table
 from ..species.growing import EVEN
 from ..species.members import expected_forks, least_length, part_segments
 from ..species.skeletons import drawn_branches
@@ -95,7 +96,7 @@ radius, vigour and place between inside and outside.
 """
 
 
-def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
+def build_rows(species: Sequence[Species]) -> Table:
     """Table of parameters, (r,) of `ROW_DTYPE`: the rows of each species follow one another, its trunk first."""
     kinds: list[np.void] = []
     for s, one in enumerate(species):
@@ -109,7 +110,7 @@ def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
     return rows
 
 
-def with_columns(rows: NDArray[np.void], columns: list[tuple]) -> NDArray[np.void]:
+def with_columns(rows: Table, columns: list[tuple]) -> Table:
     """A copy of rows (r,) with other columns besides, which are 0."""
     out = np.zeros(len(rows), np.dtype(rows.dtype.descr + columns))
     for name in rows.dtype.names:
@@ -185,9 +186,7 @@ def _bear_dead(row: np.void, dead: Dead, order: Order, o: int, first: int) -> No
         row["start"][DEAD] = dead.part(order.branch_start.mean)
 
 
-def _drawn_rows(
-    one: Species, drawn: DrawnLines, number: int, first: int, begin: NDArray[np.int64], spur: int
-) -> list[np.void]:
+def _drawn_rows(one: Species, drawn: DrawnLines, number: int, first: int, begin: Integers, spur: int) -> list[np.void]:
     """The phantom row of a plant that is drawn by hand, and a row for each of its branches."""
     height = max(float(np.ptp(drawn.knots[:, :, 2])), 1e-6)
     whole = np.zeros((), dtype=ROW_DTYPE)
@@ -353,7 +352,7 @@ def _exact(some: Order | Dead) -> Order | Dead:
     return replace(some, **still)
 
 
-def ranged(rows: NDArray[np.void], name: str, row: NDArray[np.integer], key: NDArray[np.uint64], draw: int) -> NDArray:
+def ranged(rows: Table, name: str, row: Integers, key: Keys, draw: int) -> NDArray:
     """Value of one parameter for each branch: mean + variation × a signed random number of its key.
 
     Parameters
@@ -375,7 +374,7 @@ def ranged(rows: NDArray[np.void], name: str, row: NDArray[np.integer], key: NDA
     return varied(rows[name][row], key, draw)
 
 
-def varied(values: NDArray[np.float64], key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+def varied(values: Floats, key: Keys, draw: int) -> Floats:
     """Mean + variation × a signed random number, of ranges (n, 2) or (1, 2) and keys (n,)."""
     mean, variation = values[..., 0], values[..., 1]
     if not variation.any():  # most are exact, and hashing is most of the time that this takes

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, smoothstep
+from ..arrays import Arrays, Floats, Integers, Keys, Mask, Table, smoothstep
 from ..errors import TetFloraError
 from ..setting import setting
 from ..species.species import LEAF_KINDS, Species
@@ -123,7 +122,7 @@ day, ``middle`` that in the middle of the life of the species' leaves, ``spring`
 plants differ."""
 
 
-def seasonal_rows(rows: NDArray[np.void], species: Sequence[Species], season: Season) -> NDArray[np.void]:
+def seasonal_rows(rows: Table, species: Sequence[Species], season: Season) -> Table:
     """Rows (r,), which count through some species, on a day of the year: with `YEAR_COLUMN` besides."""
     out = with_columns(rows, YEAR_COLUMN)
     out["day"] = season.northern_day
@@ -144,7 +143,7 @@ def seasonal_rows(rows: NDArray[np.void], species: Sequence[Species], season: Se
     return out
 
 
-def is_seasonal(rows: NDArray[np.void]) -> bool:
+def is_seasonal(rows: Table) -> bool:
     """Whether rows are those of a flora on a day of the year."""
     return "year" in rows.dtype.names
 
@@ -163,9 +162,7 @@ def _numbers(leaf: LeafYear) -> np.void:
     return out
 
 
-def plant_years(
-    rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64]
-) -> NDArray[np.float64] | None:
+def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
     """The day that it is for plants (n, 2), and where they stand among autumn colours, 0 to 1; None without seasons.
 
     Parameters
@@ -185,7 +182,7 @@ def plant_years(
     return np.stack([own["day"] - ahead, uniform(key, Draw.AUTUMN_HUE)], axis=1)
 
 
-def may_change(rows: NDArray[np.void], row: NDArray[np.integer], year: NDArray[np.float64]) -> bool:
+def may_change(rows: Table, row: Integers, year: Floats) -> bool:
     """Whether some leaves on rows (n,) or (1,), of plants with years (n, 2), may not be as in summer."""
     own = rows["year"][row]
     day = (year[:, 0] - own["origin"]) % DAYS
@@ -212,17 +209,15 @@ class Stages(Arrays):
         Its place among the autumn colours but for what is the plant's, 0 to 1.
     """
 
-    there: NDArray[np.bool_]
-    size: NDArray[np.float64]
-    fresh: NDArray[np.float64]
-    turned: NDArray[np.float64]
-    dead: NDArray[np.float64]
-    tint: NDArray[np.float64]
+    there: Mask
+    size: Floats
+    fresh: Floats
+    turned: Floats
+    dead: Floats
+    tint: Floats
 
 
-def leaf_stages(
-    rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64], day: NDArray[np.float64]
-) -> Stages:
+def leaf_stages(rows: Table, row: Integers, key: Keys, day: Floats) -> Stages:
     """Stages of leaves on rows (n,) or (1,), with keys (n,), on days (n,) of their plants."""
     bits = mix_draw(key, Draw.LEAF_YEAR)
     mask = np.uint64((1 << _BITS) - 1)
@@ -248,9 +243,7 @@ def leaf_stages(
     )
 
 
-def _springtime(
-    year: np.void | NDArray[np.void], day: NDArray[np.float64], deviation: NDArray[np.float64]
-) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
+def _springtime(year: np.void | Table, day: Floats, deviation: Floats) -> tuple[Mask, Floats, Floats]:
     """Whether leaves have appeared, their sizes, and how fresh they are; (...) as days and deviations together."""
     age = day - year["appear"] - year["appear_spread"] * deviation
     growth = np.maximum(year["growth"], 1e-6)
@@ -259,11 +252,11 @@ def _springtime(
 
 
 def _autumntime(
-    year: np.void | NDArray[np.void],
-    day: NDArray[np.float64],
-    turns: NDArray[np.float64],
-    falls: NDArray[np.float64],
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    year: np.void | Table,
+    day: Floats,
+    turns: Floats,
+    falls: Floats,
+) -> tuple[Mask, Floats]:
     """Whether leaves still hang, and how far they have turned; likewise."""
     since = day - year["turn"] - year["turn_spread"] * turns
     turned = np.where(year["colours"] > 0, smoothstep(since / np.maximum(year["turning"], 1e-6) + 0.5), 0.0)
@@ -271,7 +264,7 @@ def _autumntime(
 
 
 @lru_cache(maxsize=256)
-def leaf_table(leaf: LeafYear | None) -> NDArray[np.float64]:
+def leaf_table(leaf: LeafYear | None) -> Floats:
     """What to expect of leaves (6, t) every half day from half a year before the middle of their life; see `PRESENT`.
 
     All stages of spring are independent of those of autumn, so that expectations of their products are products.
@@ -295,12 +288,12 @@ def leaf_table(leaf: LeafYear | None) -> NDArray[np.float64]:
 
 
 def expected(
-    tables: NDArray[np.float64],
-    origin: NDArray[np.float64],
-    which: NDArray[np.integer],
-    day: NDArray[np.float64],
+    tables: Floats,
+    origin: Floats,
+    which: Integers,
+    day: Floats,
     columns: Sequence[int] = range(6),
-) -> list[NDArray[np.float64]]:
+) -> list[Floats]:
     """What to expect of leaves, some columns (n,) each, on days (n,), from some (n,) of tables (k, 6, t).
 
     ``origin`` (k,) are the days on which the tables begin.
@@ -317,18 +310,18 @@ def expected(
     return out
 
 
-def plant_days(day: float, most: float) -> NDArray[np.float64]:
+def plant_days(day: float, most: float) -> Floats:
     """Days (n,) that it may be for plants that are early or late by at most so many, no more than half a day apart."""
     return day + np.linspace(-most, most, 4 * int(np.ceil(most)) + 1)
 
 
-def expected_of(leaf: LeafYear | None, days: NDArray[np.float64], column: int) -> NDArray[np.float64]:
+def expected_of(leaf: LeafYear | None, days: Floats, column: int) -> Floats:
     """What to expect of leaves with a year, one column (n,), on days (n,)."""
     origin = np.array([0.0 if leaf is None else leaf.origin])
     return expected(leaf_table(leaf)[None], origin, np.zeros(len(days), np.int64), days, [column])[0]
 
 
-def autumn_colours(year: NDArray[np.void], hue: NDArray[np.float64], tint: NDArray[np.float64]) -> NDArray[np.float64]:
+def autumn_colours(year: Table, hue: Floats, tint: Floats) -> Floats:
     """Autumn colours (n, 3) of leaves, from their years (n,) or (1,), the hues (n,) of plants and their own tints."""
     number = np.maximum(year["colours"], 1)
     place = (1.0 - _OF_PLANT) * tint + _OF_PLANT * hue
@@ -337,7 +330,7 @@ def autumn_colours(year: NDArray[np.void], hue: NDArray[np.float64], tint: NDArr
     return autumn[0][which] if len(autumn) == 1 else autumn[np.arange(len(which)), which]
 
 
-def mean_autumn_colours(year: NDArray[np.void], hue: NDArray[np.float64]) -> NDArray[np.float64]:
+def mean_autumn_colours(year: Table, hue: Floats) -> Floats:
     """Means (n, 3) of the same over the leaves of plants with hues (n,)."""
     number = np.maximum(year["colours"], 1)[:, None]
     first = (_OF_PLANT * hue)[:, None]
@@ -348,12 +341,12 @@ def mean_autumn_colours(year: NDArray[np.void], hue: NDArray[np.float64]) -> NDA
 
 
 def in_season(
-    summer: NDArray[np.float64],
-    fresh: NDArray[np.float64],
+    summer: Floats,
+    fresh: Floats,
     stages: Stages,
-    autumn: NDArray[np.float64],
-    dry: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    autumn: Floats,
+    dry: Floats,
+) -> Floats:
     """Colours (n, 3) of leaves at their stages, from those that they have when they are at the end of each."""
     out = summer + stages.fresh[:, None] * (fresh - summer)
     out += stages.turned[:, None] * (autumn - out)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, Floats, Integers
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class Seeds(Arrays):
 
     identifiers: tuple[str, ...]
     species: NDArray[np.int32]
-    seed: NDArray[np.int64]
-    position: NDArray[np.float64]
-    frame: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    crown: NDArray[np.float64] | None = None
-    motion: NDArray[np.float64] | None = None
+    seed: Integers
+    position: Floats
+    frame: Floats
+    scale: Floats
+    crown: Floats | None = None
+    motion: Floats | None = None
 
     @classmethod
     def upright(cls, number: int, species: int = 0) -> Seeds:
@@ -52,6 +52,6 @@ class Seeds(Arrays):
         frame, kind = np.tile(np.eye(3), (number, 1, 1)), np.full(number, species, np.int32)
         return cls(("",), kind, np.arange(number), np.zeros((number, 3)), frame, np.ones(number))
 
-    def counted_from(self, origin: NDArray[np.float64]) -> Seeds:
+    def counted_from(self, origin: Floats) -> Seeds:
         """The same plants in coordinates that begin at a place (3,) of the present ones."""
         return replace(self, position=self.position - origin) if origin.any() else self

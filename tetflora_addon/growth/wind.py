@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import cross, dot
+from ..arrays import Floats, Integers, Keys, Table, cross, dot
 from ..errors import TetFloraError
 from ..setting import setting
 from .branches import Branches
@@ -136,9 +136,7 @@ class Wind:
         return self.speed / _STRONG * (1 + _STRONG / _STORM) / (1 + self.speed / _STORM)
 
 
-def windy_rows(
-    rows: NDArray[np.void], length: NDArray[np.float64], radius: NDArray[np.float64], wind: Wind
-) -> NDArray[np.void]:
+def windy_rows(rows: Table, length: Floats, radius: Floats, wind: Wind) -> Table:
     """Rows (r,) with what a wind does to them, in `WIND_COLUMNS` besides.
 
     ``length`` and ``radius`` (r,) are typical of their branches; only their ratio counts.
@@ -167,17 +165,17 @@ def windy_rows(
     return out
 
 
-def is_windy(rows: NDArray[np.void]) -> bool:
+def is_windy(rows: Table) -> bool:
     """Whether rows are those of a flora in the wind."""
     return "air" in rows.dtype.names
 
 
-def moment(rows: NDArray[np.void]) -> float:
+def moment(rows: Table) -> float:
     """Seconds to the second moment for which positions are computed; 0 without velocities."""
     return float(rows["air"]["moment"][0]) if is_windy(rows) else 0.0
 
 
-def widest_sway(rows: NDArray[np.void]) -> NDArray[np.float64]:
+def widest_sway(rows: Table) -> Floats:
     """Largest turn (...) of tips of branches of rows (...) at any time, radians (for those drawn by hand by metre)."""
     if not is_windy(rows):
         return np.zeros(rows.shape)
@@ -185,7 +183,7 @@ def widest_sway(rows: NDArray[np.void]) -> NDArray[np.float64]:
     return rows["lean"] * (1 + rows["air"]["gusts"]) * most
 
 
-def sway(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> NDArray[np.float64]:
+def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:
     """Rotation vectors (n, 3), radians, of branches' tips against their bases.
 
     For plants drawn by hand ``branches`` are the whole plants: where they stand, and which way is up; what comes out is
@@ -216,7 +214,7 @@ def sway(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> NDAr
     return cross(branches.frame[:, :, 2], force.T @ air["axes"])
 
 
-def gusts(rows: NDArray[np.void], position: NDArray[np.float64], ahead: float = 0.0) -> NDArray[np.float64]:
+def gusts(rows: Table, position: Floats, ahead: float = 0.0) -> Floats:
     """Strength (n,) of the wind at places (n, 3) over its mean: within 1 ∓ Gusts."""
     air = rows["air"][0]
     position = position + air["origin"]
@@ -229,14 +227,12 @@ def gusts(rows: NDArray[np.void], position: NDArray[np.float64], ahead: float = 
     return out
 
 
-def _whole(air: np.void, rate: NDArray[np.float64] | float) -> NDArray[np.float64]:
+def _whole(air: np.void, rate: Floats | float) -> Floats:
     """Rates that fit a whole number of times, and at least once, into the loop."""
     return np.maximum(np.rint(rate * air["loop"]), 1.0) / air["loop"] if air["loop"] > 0 else rate
 
 
-def _cycles(
-    air: np.void, rate: NDArray[np.float64] | float, ahead: float, phase: NDArray[np.float64] | float
-) -> NDArray[np.float64]:
+def _cycles(air: np.void, rate: Floats | float, ahead: float, phase: Floats | float) -> Floats:
     """Cycles (n,), less than one, that something of a rate (n,) is in at the moment."""
     time = air["time"] + ahead
     if air["loop"] > 0:
@@ -244,31 +240,29 @@ def _cycles(
     return (_whole(air, rate) * time + phase) % 1.0
 
 
-def turned_by(frame: NDArray[np.float64], axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
+def turned_by(frame: Floats, axis: Floats, angle: Floats) -> Floats:
     """Frames (n, 3, 3) turned about unit vectors (n, 3) by angles (n,) (Rodrigues)."""
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, z = (_rotated(frame[:, :, column], axis, cos, sin) for column in (0, 2))
     return np.stack([x.T, cross(z, x).T, z.T], axis=1).transpose(2, 0, 1)
 
 
-def turned_vectors(
-    vector: NDArray[np.float64], axis: NDArray[np.float64], angle: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def turned_vectors(vector: Floats, axis: Floats, angle: Floats) -> Floats:
     """Vectors (n, 3) turned in the same way."""
     return _rotated(vector, axis, np.cos(angle)[:, None], np.sin(angle)[:, None])
 
 
-def _rotated(vector: NDArray, axis: NDArray, cos: NDArray, sin: NDArray) -> NDArray[np.float64]:
+def _rotated(vector: NDArray, axis: NDArray, cos: NDArray, sin: NDArray) -> Floats:
     return cos * vector + sin * cross(axis, vector) + (1 - cos) * dot(axis, vector) * axis
 
 
-def axis_and_angle(turn: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def axis_and_angle(turn: Floats) -> tuple[Floats, Floats]:
     """Unit vectors (n, 3) and lengths (n,) of rotation vectors (n, 3); any axis for no turn."""
     angle = np.sqrt(dot(turn, turn))
     return turn / np.maximum(angle, 1e-300), angle[:, 0]
 
 
-def rotation_vectors(turn: NDArray[np.float64]) -> NDArray[np.float64]:
+def rotation_vectors(turn: Floats) -> Floats:
     """Rotation vectors (n, 3) of rotations (n, 3, 3) by less than half a turn."""
     skew = turn - turn.transpose(0, 2, 1)
     vector = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1) / 2.0
@@ -277,7 +271,7 @@ def rotation_vectors(turn: NDArray[np.float64]) -> NDArray[np.float64]:
     return vector * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 1.0)[:, None]
 
 
-def leant(points: NDArray[np.float64], up: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:
+def leant(points: Floats, up: Floats, turn: Floats) -> Floats:
     """Points of plants drawn by hand, bent over: all at one height turn alike, so that nothing comes apart.
 
     Parameters
@@ -311,11 +305,11 @@ def leant(points: NDArray[np.float64], up: NDArray[np.float64], turn: NDArray[np
 
 
 def fluttered(
-    rows: NDArray[np.void],
-    row: NDArray[np.integer],
+    rows: Table,
+    row: Integers,
     frame: NDArray[np.float32],
-    key: NDArray[np.uint64],
-    gust: NDArray[np.float64],
+    key: Keys,
+    gust: Floats,
     ahead: float = 0.0,
 ) -> NDArray[np.float32]:
     """Frames of leaves (n, 3, 3) turned about their bases: up and down, and about their midribs.

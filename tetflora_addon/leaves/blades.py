@@ -7,8 +7,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..errors import SpeciesError
 from .outlines import Blade, simplified, traced
 from .surfaces import LeafSurface, drawn, joined, surface, tube
@@ -25,13 +25,13 @@ _PETIOLE = 0.011  # radius at the blade, in leaf lengths
 
 
 @lru_cache(maxsize=64)
-def _dense(blade: Blade, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _dense(blade: Blade, side: int) -> tuple[Floats, Floats]:
     """Parameters (n,) and points (n, 2) of one half's margin, to the finest tolerance."""
     s = traced(blade, side, FINEST / 2)
     return s, blade.margin(s, side)
 
 
-def outline(blade: Blade, tolerance: float = FINEST) -> NDArray[np.float64]:
+def outline(blade: Blade, tolerance: float = FINEST) -> Floats:
     """Closed outline (n, 2) of a flat blade within a tolerance, from the base along its right half and back."""
     right, left = (
         points[simplified(points[:, None], tolerance)] for _, points in (_dense(blade, 1), _dense(blade, -1))
@@ -53,12 +53,12 @@ def check_outline(blade: Blade) -> None:
         )
 
 
-def crossings(points: NDArray[np.float64]) -> int:
+def crossings(points: Floats) -> int:
     """Number of pairs of links of a closed line (n, 2) that cross each other."""
     a, b = points, np.roll(points, -1, axis=0)
     link = b - a
 
-    def side(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def side(p: Floats) -> Floats:
         """Which side of link i (rows) points j (columns) lie on."""
         away = p[None] - a[:, None]
         return link[:, None, 0] * away[..., 1] - link[:, None, 1] * away[..., 0]
@@ -103,7 +103,7 @@ def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSu
     return joined([made, _petiole(blade, rows)]) if blade.petiole and tolerance < 0.02 else made
 
 
-def _columns(blade: Blade, step: float) -> NDArray[np.float64]:
+def _columns(blade: Blade, step: float) -> Floats:
     """Fractions of the way from the midrib to the margin at which columns of faces end, for rays a step apart."""
     wide = 1.0 if blade.palmate else blade.width / 2.0
     number = min(int(wide / (3.0 * step)), _MOST_COLUMNS)
@@ -115,12 +115,12 @@ def _columns(blade: Blade, step: float) -> NDArray[np.float64]:
 def _half(
     blade: Blade,
     side: int,
-    s: NDArray[np.float64],
-    margin: NDArray[np.float64],
-    ribs: NDArray[np.float64],
-    columns: NDArray[np.float64],
+    s: Floats,
+    margin: Floats,
+    ribs: Floats,
+    columns: Floats,
     step: float,
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[Floats, Integers]:
     """Flat places (v, 2) and faces (f, 4) of one half whose margin has points (n, 2) of parameters (n,)."""
     if blade.palmate:  # rays begin at the base, and the last one is the midrib
         ribs, rib_s = ribs[:1], np.ones(1)
@@ -159,7 +159,7 @@ def _half(
     return places, faces if side > 0 else faces[:, ::-1]
 
 
-def _strip(inner: NDArray[np.float64], outer: NDArray[np.float64], first: int, second: int) -> NDArray[np.int64]:
+def _strip(inner: Floats, outer: Floats, first: int, second: int) -> Integers:
     """Faces (f, 4) between two lines of vertices from numbers on, with parameters (a,) and (b,)."""
     if len(inner) == len(outer) and (inner == outer).all():
         i = np.arange(len(inner) - 1)
@@ -173,13 +173,13 @@ def _strip(inner: NDArray[np.float64], outer: NDArray[np.float64], first: int, s
     return np.stack([a, b, np.where(inside, a + 1, b + 1), np.where(inside, a + 1, b + 1)], axis=1)
 
 
-def _signed(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _signed(corners: Floats) -> Floats:
     """Signed areas (f,) of flat quads (f, 4, 2)."""
     one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2.0
 
 
-def bend(blade: Blade, flat: NDArray[np.float64], amount: float = 1.0) -> NDArray[np.float64]:
+def bend(blade: Blade, flat: Floats, amount: float = 1.0) -> Floats:
     """Points (k, v, 3) of the variants of a blade whose flat places are given (v, 2), in lengths of the blade.
 
     One half is larger than the other; the blade leans, folds along its midrib, curls, waves and twists.

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_ANGLE, connected, cross, perpendicular
+from ..arrays import GOLDEN_ANGLE, Floats, Integers, connected, cross, perpendicular
 from .models import LeafModel, Spines
 
 #: Angle of all faces around a vertex below which it is a point, and stays: a full turn on flat ground, 4/3 π on an
@@ -22,7 +22,7 @@ from .models import LeafModel, Spines
 _POINTED = np.pi
 
 
-def closed_parts(model: LeafModel) -> NDArray[np.int64]:
+def closed_parts(model: LeafModel) -> Integers:
     """Which closed part each face (f,) belongs to, by the number of one of its faces; -1 for what is open.
 
     A part is closed where each edge has two faces; it may share a vertex with a stalk.
@@ -60,7 +60,7 @@ def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
     fixed = _turns(points, corners) < _POINTED
     area, middle = _areas(points, corners, part), _middles(points, part)
 
-    def scaled(points: NDArray, corners: NDArray, part: NDArray) -> NDArray[np.float64]:
+    def scaled(points: NDArray, corners: NDArray, part: NDArray) -> Floats:
         larger = np.sqrt(area / np.maximum(_areas(points, corners, part, len(area)), 1e-300))
         out = np.where((part >= 0)[:, None], middle[part] + larger[part, None] * (points - middle[part]), points)
         return out * np.minimum(model.reach / np.maximum(np.linalg.norm(out, axis=1), 1e-300), 1.0)[:, None]
@@ -110,9 +110,7 @@ def _divided(
     )
 
 
-def _triangles(
-    model: LeafModel, faces: NDArray[np.intp]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+def _triangles(model: LeafModel, faces: Integers) -> tuple[Integers, Floats, Integers]:
     """Vertices (t, 3), texture (t, 3, 2) and owners (t,) of the triangles of faces: fans around their first corners."""
     first, size = model.face_offsets[:-1][faces], np.diff(model.face_offsets)[faces]
     owner = np.repeat(np.arange(len(faces)), size - 2)
@@ -121,9 +119,7 @@ def _triangles(
     return model.corner_verts[corner].astype(np.int64), model.uv[corner].astype(np.float64), owner
 
 
-def _with_faces(
-    model: LeafModel, points: NDArray, corners: NDArray, uv: NDArray, others: NDArray[np.intp]
-) -> LeafModel:
+def _with_faces(model: LeafModel, points: NDArray, corners: NDArray, uv: NDArray, others: Integers) -> LeafModel:
     """A model of triangles and of some faces of another one."""
     size = np.diff(model.face_offsets)[others]
     kept = np.repeat(model.face_offsets[:-1][others] - np.cumsum(size) + size, size) + np.arange(size.sum())
@@ -136,7 +132,7 @@ def _with_faces(
     )
 
 
-def _turns(points: NDArray[np.float64], corners: NDArray[np.int64]) -> NDArray[np.float64]:
+def _turns(points: Floats, corners: Integers) -> Floats:
     """Angle (v,) of all triangles (t, 3) around vertices, radians."""
     place = points[corners]
     ahead, behind = np.roll(place, -1, axis=1) - place, np.roll(place, 1, axis=1) - place
@@ -145,14 +141,14 @@ def _turns(points: NDArray[np.float64], corners: NDArray[np.int64]) -> NDArray[n
     return np.bincount(corners.ravel(), np.arctan2(sine, cosine).ravel(), len(points))
 
 
-def _areas(points: NDArray, corners: NDArray, part: NDArray, count: int | None = None) -> NDArray[np.float64]:
+def _areas(points: NDArray, corners: NDArray, part: NDArray, count: int | None = None) -> Floats:
     """Area (count,) of the triangles of each closed part, by its number."""
     a, b, c = points[corners].transpose(1, 0, 2)
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return np.bincount(part[corners[:, 0]], area, part.max(initial=0) + 1 if count is None else count)
 
 
-def _middles(points: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.float64]:
+def _middles(points: Floats, part: Integers) -> Floats:
     """Mean place (count, 3) of the vertices of each closed part, by its number."""
     own = np.flatnonzero(part >= 0)
     number = np.maximum(np.bincount(part[own]), 1)
@@ -167,7 +163,7 @@ _CUSHION, _SIDES, _EDGES = (0.07, 0.11), 5, 3
 _BARE = 0.08
 
 
-def spined(model: LeafModel, spines: Spines, part: NDArray[np.int64]) -> tuple[LeafModel, NDArray[np.float32]]:
+def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel, NDArray[np.float32]]:
     """A model with spines on it.
 
     Parameters
@@ -208,9 +204,7 @@ def spined(model: LeafModel, spines: Spines, part: NDArray[np.int64]) -> tuple[L
     return made, np.concatenate(tints).astype(np.float32)
 
 
-def _areoles(
-    body: LeafModel, part: NDArray[np.int64], distance: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _areoles(body: LeafModel, part: Integers, distance: float) -> tuple[Floats, Floats]:
     """Places (n, 3) on a body at least a distance apart, and its unit normals (n, 3) there."""
     first = body.corner_verts[body.face_offsets[:-1]]
     corners = np.add.reduceat(body.positions[body.corner_verts], body.face_offsets[:-1])
@@ -229,13 +223,13 @@ def _areoles(
 
 
 def _pyramids(
-    base: NDArray[np.float64],
-    tip: NDArray[np.float64],
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
+    base: Floats,
+    tip: Floats,
+    x: Floats,
+    y: Floats,
     radius: float,
     sides: int,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Sides (n * sides, 3, 3) of pyramids from bases to tips (n, 3), around axes perpendicular to x and y (n, 3)."""
     angle = 2.0 * np.pi * np.arange(sides + 1) / sides
     ring = base[:, None] + radius * (np.cos(angle)[:, None] * x[:, None] + np.sin(angle)[:, None] * y[:, None])
@@ -243,7 +237,7 @@ def _pyramids(
     return np.stack([ring[:, :-1], ring[:, 1:], top], axis=2).reshape(-1, 3, 3)
 
 
-def _with_triangles(model: LeafModel, points: NDArray[np.float64]) -> LeafModel:
+def _with_triangles(model: LeafModel, points: Floats) -> LeafModel:
     """A model with triangles (t, 3, 3) more, whose texture lies below that of leaves, as that of stalks."""
     corners = len(model.positions) + np.arange(3 * len(points))
     ends = model.face_offsets[-1] + 3 * np.arange(1, len(points) + 1)

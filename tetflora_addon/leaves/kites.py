@@ -15,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from .models import LeafModel, fans, leaf_model
 
 #: The topology of all of them.
@@ -48,12 +49,12 @@ class LeafKites:
         As of the model.
     """
 
-    positions: NDArray[np.float64]
+    positions: Floats
     uv: NDArray[np.float32]
-    share: NDArray[np.float64]
+    share: Floats
     material_index: NDArray[np.int32] | None = None
 
-    def chosen(self, number: NDArray[np.float64]) -> NDArray[np.int64]:
+    def chosen(self, number: Floats) -> Integers:
         """Which kite (n,) copies with random numbers (n,) take."""
         return np.minimum(np.searchsorted(self.share, number, side="right"), len(self.share) - 1)
 
@@ -87,7 +88,7 @@ def leaf_kites(model: LeafModel) -> LeafKites:
     )
 
 
-def _planes(normals: NDArray[np.float64], areas: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+def _planes(normals: Floats, areas: Floats) -> list[Integers]:
     """Faces in groups of about equal area, by how they are tilted across the direction that varies most."""
     values, axes = np.linalg.eigh(np.einsum("f,fi,fj->ij", areas, normals, normals) / areas.sum())
     if values[1] < _FLAT**2:
@@ -100,13 +101,13 @@ def _planes(normals: NDArray[np.float64], areas: NDArray[np.float64]) -> list[ND
     return [order[group == one] for one in np.unique(group)]
 
 
-def _mean_direction(normals: NDArray[np.float64], areas: NDArray[np.float64]) -> NDArray[np.float64]:
+def _mean_direction(normals: Floats, areas: Floats) -> Floats:
     """Mean axis of normals, with the sign of most of them."""
     axis = np.linalg.eigh(np.einsum("f,fi,fj->ij", areas, normals, normals))[1][:, 2]
     return axis if (areas * (normals @ axis)).sum() >= 0.0 else -axis
 
 
-def _fan(model: LeafModel, normals: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _fan(model: LeafModel, normals: Floats) -> tuple[Floats, Floats]:
     """Corners (t, 3, 3) and areas (t,) of triangles that fan out over the faces."""
     face, corners = fans(model)
     points = np.ascontiguousarray(corners.swapaxes(0, 1))
@@ -116,7 +117,7 @@ def _fan(model: LeafModel, normals: NDArray[np.float64]) -> tuple[NDArray[np.flo
     return points, area
 
 
-def _longer_axis(points: NDArray[np.float64], weight: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray:
+def _longer_axis(points: Floats, weight: Floats, normal: Floats) -> NDArray:
     """The direction (3,) in a plane along which triangles (t, 3, 3) about their centroid spread most, and how much."""
     sums = points.sum(axis=1)
     second = np.einsum("tki,tkj->tij", points, points) + sums[:, :, None] * sums[:, None]
@@ -127,7 +128,7 @@ def _longer_axis(points: NDArray[np.float64], weight: NDArray[np.float64], norma
     return along / np.linalg.norm(along)
 
 
-def _sheet(points: NDArray[np.float64], area: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, float]:
+def _sheet(points: Floats, area: Floats) -> tuple[Floats, float, float]:
     """Triangles as a sheet that is folded along its longer axis: its normal (3,), the sine by which both halves rise,
     and the mean square by which normals are off.
     """
@@ -148,10 +149,10 @@ def _sheet(points: NDArray[np.float64], area: NDArray[np.float64]) -> tuple[NDAr
 def _kite(
     model: LeafModel,
     area: float,
-    normal: NDArray[np.float64],
-    fan: tuple[NDArray[np.float64], NDArray[np.float64]],
+    normal: Floats,
+    fan: tuple[Floats, Floats],
     fold: float = 0.0,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Vertices (4, 3) of a kite with an area and a normal, along the model's longer axis across that; both halves rise
     by a fold.
     """
@@ -178,7 +179,7 @@ def _kite(
     return _within(middle + np.array([base, side + across, base + length * along, side - across]), model.reach)
 
 
-def _within(corners: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+def _within(corners: Floats, reach: float) -> Floats:
     """A kite (4, 3), moved until bounds hold it, which count on the farthest vertex of the model."""
     for _ in range(_MOVES):
         away = np.linalg.norm(corners, axis=1)
@@ -189,7 +190,7 @@ def _within(corners: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
     return corners
 
 
-def _texture(model: LeafModel, positions: NDArray[np.float64]) -> NDArray[np.float32]:
+def _texture(model: LeafModel, positions: Floats) -> NDArray[np.float32]:
     """Texture coordinates (k, 4, 2): those of the model, as far as a linear function follows them."""
     corners = model.positions[model.corner_verts]
     fitted = np.linalg.lstsq(np.column_stack([corners, np.ones(len(corners))]), model.uv, rcond=None)[0]

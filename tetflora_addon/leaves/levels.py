@@ -16,6 +16,7 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from .blades import blade_surface
 from .bodies import closed_parts, rounded, spined
 from .compounds import Compound, compound_surface
@@ -152,7 +153,7 @@ def leaf_levels(model: LeafModel, number: int = 1 << 10) -> tuple[LeafLevel, ...
     return tuple(_finer(model).until(number=number)[0])
 
 
-def level_errors(model: LeafModel, finest: float = 0.0) -> NDArray[np.float64]:
+def level_errors(model: LeafModel, finest: float = 0.0) -> Floats:
     """Errors (levels + 1,) of a model and its finer levels, in lengths of the leaf; 0 that of the last one.
 
     None is finer than needed for the finest error that is asked for.
@@ -163,12 +164,12 @@ def level_errors(model: LeafModel, finest: float = 0.0) -> NDArray[np.float64]:
     return errors
 
 
-def level_polygons(model: LeafModel, finest: float = 0.0) -> NDArray[np.float64]:
+def level_polygons(model: LeafModel, finest: float = 0.0) -> Floats:
     """Polygons (levels + 1,) of a model and its finer levels; down to an error, as above."""
     return np.array([model.polygons, *(level.model.polygons for level in _finer(model).until(finest)[0])], float)
 
 
-def chosen_level(model: LeafModel, pixels: NDArray[np.float64]) -> NDArray[np.int64]:
+def chosen_level(model: LeafModel, pixels: Floats) -> Integers:
     """Level (n,) of leaves, 0 the model itself, whose lengths are so many times the tolerated error in the image.
 
     The coarsest one whose error is within it.
@@ -180,7 +181,7 @@ def chosen_level(model: LeafModel, pixels: NDArray[np.float64]) -> NDArray[np.in
     return np.searchsorted(-errors, -1.0 / np.maximum(pixels, 1e-300), side="left").clip(0, len(errors) - 1)
 
 
-def chosen_polygons(model: LeafModel, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+def chosen_polygons(model: LeafModel, pixels: Floats) -> Floats:
     """Polygons (n,) of leaves at the levels that `chosen_level` gives them."""
     level = chosen_level(model, pixels)
     return (
@@ -228,7 +229,7 @@ def _is_round(model: LeafModel) -> bool:
     return not model.textured and model.material_index is None and bool((closed_parts(model) >= 0).any())
 
 
-def _margin(model: LeafModel, stems: bool) -> NDArray[np.float64]:
+def _margin(model: LeafModel, stems: bool) -> Floats:
     """Edges (e, 2, 3) that belong to one face only; all of closed models. Without stems, whose v is negative, if so."""
     edges, of_corner = model.edges
     if not stems:
@@ -239,7 +240,7 @@ def _margin(model: LeafModel, stems: bool) -> NDArray[np.float64]:
     return model.positions[single if len(single) else edges]
 
 
-def _farthest(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def _farthest(one: Floats, other: Floats) -> float:
     """Largest distance of points on edges (e, 2, 3) from others."""
     place = np.linspace(0.0, 1.0, _ON_EDGE)[:, None, None]
     points = (one[:, 0] + place * (one[:, 1] - one[:, 0])).reshape(-1, 3)
@@ -249,7 +250,7 @@ def _farthest(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     return float(np.concatenate(off).max())
 
 
-def _parts(points: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _parts(points: Floats) -> list[Floats]:
     return np.array_split(points, len(points) // 256 + 1)
 
 

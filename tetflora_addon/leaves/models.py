@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import GOLDEN_ANGLE, perpendicular, spiral, spread
+from ..arrays import GOLDEN_ANGLE, Floats, Integers, perpendicular, spiral, spread
 from ..errors import SpeciesError
 from ..parameters import limited
 from .compounds import Compound
@@ -68,7 +68,7 @@ class LeafModel:
         What grows on its closed parts up close.
     """
 
-    positions: NDArray[np.float64]
+    positions: Floats
     corner_verts: NDArray[np.int32]
     face_offsets: NDArray[np.int32]
     uv: NDArray[np.float32]
@@ -116,7 +116,7 @@ class LeafModel:
         return bool((np.bincount(self.edges[1]) == 2).all())
 
     @cached_property
-    def face_vectors(self) -> NDArray[np.float64]:
+    def face_vectors(self) -> Floats:
         """(f, 3) float64: area vector (normal times area) of each face, by Newell's formula."""
         here, there = self.positions[self.corner_verts], self.positions[self.corner_verts[self.next_corner]]
         return 0.5 * np.add.reduceat(np.cross(here, there), self.face_offsets[:-1], axis=0)
@@ -139,7 +139,7 @@ class LeafModel:
         return shown if shown < _SOLID * self.area else self.area
 
     @cached_property
-    def moment(self) -> NDArray[np.float64]:
+    def moment(self) -> Floats:
         """(3, 3) float64: area-weighted mean of n nᵀ over the faces, in the leaf's own axes; its trace is 1."""
         areas = np.linalg.norm(self.face_vectors, axis=1)
         scaled = self.face_vectors / np.sqrt(np.maximum(areas, 1e-300))[:, None]
@@ -156,7 +156,7 @@ class LeafModel:
         return float(np.ptp(self.positions[:, [0, 2]], axis=0).max())
 
 
-def fans(model: LeafModel) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def fans(model: LeafModel) -> tuple[Integers, Floats]:
     """Faces (c,) of triangles that fan out over them, one for each corner, and the corners (3, c, 3) of these."""
     first = model.corner_verts[model.face_offsets[:-1]]
     face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))

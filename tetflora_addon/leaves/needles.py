@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..parameters import limited
 from .surfaces import VARIANTS, LeafSurface, drawn, joined, surface, tube
 
@@ -114,10 +114,10 @@ def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Le
 
 
 def _needles(
-    start: NDArray[np.float64],
-    direction: NDArray[np.float64],
-    towards: NDArray[np.float64],
-    length: NDArray[np.float64],
+    start: Floats,
+    direction: Floats,
+    towards: Floats,
+    length: Floats,
     needles: Needles,
     tolerance: float,
     factor: float,

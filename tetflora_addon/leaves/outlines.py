@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..parameters import limited, named
 
 #: Exponents p and q of the half width 1 - (1 - u)^p, to the power of q, on the way from the end to the widest place.
@@ -79,7 +79,7 @@ class Blade:
         """Fraction of a tooth that rises: teeth point to the tip, or along the lobe that they are on."""
         return 0.5 if self.palmate else _RISE
 
-    def knots(self, side: int) -> NDArray[np.float64]:
+    def knots(self, side: int) -> Floats:
         """Parameters (n,) of one half's tips, notches and ends, in order; between them it is smooth."""
         found = [np.linspace(0.0, 1.0, _START)]
         if self.teeth:
@@ -103,14 +103,14 @@ class Blade:
         every = np.sort(np.clip(np.concatenate(found), 0.0, 1.0))
         return every[np.diff(every, prepend=-1.0) > 1e-9]
 
-    def feet(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
+    def feet(self, s: Floats) -> Floats:
         """Heights (n,) on the midrib where rays of parameters s (n,) begin; 0 base, 1 tip."""
         if self.palmate:
             return np.zeros_like(s)
         y = self._height(s)
         return y - _OBLIQUE * y * (1.0 - y)
 
-    def margin(self, s: NDArray[np.float64], side: int) -> NDArray[np.float64]:
+    def margin(self, s: Floats, side: int) -> Floats:
         """Points (n, 2) of one half's margin; s (n,) leads from the base, 0, to the tip, 1; side is 1 or -1."""
         s = np.asarray(s, dtype=np.float64)
         foot = np.stack([np.zeros_like(s), self.feet(s)], axis=1)
@@ -123,18 +123,18 @@ class Blade:
         points[s >= 1.0] = [0.0, 1.0]
         return points * [side, 1.0]
 
-    def _height(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _height(self, s: Floats) -> Floats:
         """Heights (n,) of unlobed margins; close together at both ends, where they may be round."""
         return (1.0 - np.cos(np.pi * s)) / 2.0
 
-    def _parameter(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _parameter(self, y: Floats) -> Floats:
         """Parameters of fractions y (n,) of the way along the margin, at which teeth stand in even distances."""
         return y if self.palmate else np.arccos(np.clip(1.0 - 2.0 * y, -1.0, 1.0)) / np.pi
 
-    def _along(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _along(self, s: Floats) -> Floats:
         return s if self.palmate else self._height(s)
 
-    def envelope(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def envelope(self, y: Floats) -> Floats:
         """Half widths (n,) of the blade without lobes and teeth at heights y (n,)."""
         (p, q), (r, t) = BASES[self.base], APEXES[self.apex]
         low = np.clip(y / self.widest, 0.0, 1.0)
@@ -142,9 +142,7 @@ class Blade:
         lower, upper = (1.0 - (1.0 - low) ** p) ** q, (1.0 - (1.0 - high) ** r) ** t
         return self.width / 2.0 * np.where(y < self.widest, lower, upper)
 
-    def _pinnate(
-        self, s: NDArray[np.float64], foot: NDArray[np.float64], side: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _pinnate(self, s: Floats, foot: Floats, side: int) -> tuple[Floats, Floats]:
         """Lengths (n,) and directions (n, 2) of rays to the margin without teeth."""
         y = self._height(s)
         wide, height = self.envelope(y), y
@@ -165,7 +163,7 @@ class Blade:
             length = length * (1.0 - self.lobe_depth * (1.0 - lobe) * np.clip(4.0 * y, 0.25, 1.0))
         return length, ray
 
-    def _lobe_phase(self, y: NDArray[np.float64], side: int) -> NDArray[np.float64]:
+    def _lobe_phase(self, y: Floats, side: int) -> Floats:
         """Number (n,) of the lobe, whole at its tip: the last is that of the leaf. Lobes of both sides alternate."""
         return 0.5 + (self.lobes + 0.5) * y * (1.25 - 0.25 * y) + 0.13 * (1 + side) * np.sin(np.pi * y)
 
@@ -175,20 +173,20 @@ class Blade:
         behind = {"attenuate": 0.1, "cuneate": 0.15, "rounded": 0.2, "truncate": 0.25, "cordate": 0.7}[self.base]
         return float(tips[-1] + (np.pi * 0.94 - tips[-1]) * behind)
 
-    def _palm(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _palm(self) -> tuple[Floats, Floats]:
         """Angles from the midrib and lengths of the lobes of one half of a palmate blade, that of the tip first."""
         number = np.arange(max(self.lobes - 1, 2) // 2 + 1)
         step = min(2.0 * np.pi * _PALM / max(self.lobes, 3), _PALM_MOST)
         first = min(self.width / 2.0 / np.sin(step), 1.2)
         return number * step, np.maximum(1.0 + (first - 1.0) * number**1.2, 0.25 * first)
 
-    def _in_lobe(self, angle: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def _in_lobe(self, angle: Floats) -> tuple[Integers, Floats]:
         """Lobe (n,) of a palmate blade on whose far side angles (n,) lie, and how far it is to the next, 0 to 1."""
         ends = np.append(self._palm()[0], self._most_angle())
         i = np.clip(np.searchsorted(ends, angle, side="right") - 1, 0, len(ends) - 2)
         return i, (angle - ends[i]) / (ends[i + 1] - ends[i])
 
-    def _palmate(self, s: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _palmate(self, s: Floats) -> tuple[Floats, Floats]:
         """As `_pinnate`, of rays from the base."""
         most = self._most_angle()
         angle = (1.0 - s) * most
@@ -216,7 +214,7 @@ class Blade:
         ramp = np.clip(s / 0.05, 0.0, 1.0)
         return length * ramp, np.stack([np.sin(angle), np.cos(angle)], axis=1)
 
-    def _teeth(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _teeth(self, s: Floats) -> Floats:
         """Heights (n,) of teeth over the mean margin, lower towards both ends."""
         if not self.teeth:
             return np.zeros_like(s)
@@ -238,21 +236,19 @@ class Blade:
         return self.tooth_size * height
 
 
-def _saw(phase: NDArray[np.float64], rise: float) -> NDArray[np.float64]:
+def _saw(phase: Floats, rise: float) -> Floats:
     """Teeth, 0 to 1, that rise over a fraction of their length and fall over the rest."""
     u = phase % 1.0
     return np.where(u < rise, u / rise, (1.0 - u) / (1.0 - rise))
 
 
-def _straight(
-    a: NDArray[np.float64], b: NDArray[np.float64], angle: NDArray[np.float64], place: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _straight(a: Floats, b: Floats, angle: Floats, place: Floats) -> Floats:
     """Distances (n,) from the base of a straight line between ends at distances a and b, an angle apart."""
     first, second = np.sin(angle * place), np.sin(angle * (1.0 - place))
     return a * b * np.sin(angle) / np.maximum(a * first + b * second, 1e-12)
 
 
-def traced(blade: Blade, side: int, tolerance: float) -> NDArray[np.float64]:
+def traced(blade: Blade, side: int, tolerance: float) -> Floats:
     """Parameters (n,) of points of one half's margin whose straight links keep within a tolerance of the curve."""
     s = blade.knots(side)
     checked = np.arange(1, 4) / 4.0
@@ -268,16 +264,14 @@ def traced(blade: Blade, side: int, tolerance: float) -> NDArray[np.float64]:
     return s
 
 
-def distance_to_links(
-    points: NDArray[np.float64], first: NDArray[np.float64], last: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def distance_to_links(points: Floats, first: Floats, last: Floats) -> Floats:
     """Distances (...) of points (..., d) from straight links between ends (..., d)."""
     link = last - first
     place = np.clip(((points - first) * link).sum(-1) / np.maximum((link * link).sum(-1), 1e-300), 0.0, 1.0)
     return np.linalg.norm(points - first - place[..., None] * link, axis=-1)
 
 
-def simplified(lines: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
+def simplified(lines: Floats, tolerance: float) -> Integers:
     """Indices (m,) of points of lines (n, k, d) whose straight links pass all others within a tolerance.
 
     The same points of all k lines (Douglas and Peucker). What is kept for one tolerance is kept for every smaller one.

@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Mask
+
 #: Leaves of a form that are bent, folded and grown in different ways.
 VARIANTS = 6
 #: Steps towards an area at most, and the relative difference from which on it is reached.
@@ -17,7 +19,7 @@ _FITS, _FITTED = 12, 1e-7
 _GOLDEN = 0.6180339887498949
 
 
-def drawn(number: int) -> NDArray[np.float64]:
+def drawn(number: int) -> Floats:
     """Even numbers (k,) from -1 to 1, one for each variant; others for each number that they are drawn by."""
     step = (_GOLDEN * (number + 1) ** 2 + 0.31 * number) % 1.0
     return 2.0 * ((np.arange(VARIANTS) * (_GOLDEN + 0.4 * step) + step) % 1.0) - 1.0
@@ -47,11 +49,11 @@ class LeafSurface:
         Largest distance from the shape that it stands for.
     """
 
-    positions: NDArray[np.float64]
+    positions: Floats
     corner_verts: NDArray[np.int32]
     face_offsets: NDArray[np.int32]
-    uv: NDArray[np.float64]
-    solid: NDArray[np.bool_]
+    uv: Floats
+    solid: Mask
     error: float = 0.0
 
     @property
@@ -59,7 +61,7 @@ class LeafSurface:
         """Number of faces."""
         return len(self.solid)
 
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """One-sided areas (k,) of the variants."""
         return self._areas_of(self._area_vectors())
 
@@ -76,31 +78,31 @@ class LeafSurface:
             wide = wide * ratio
         return replace(self, positions=self.positions * _along(wide, 1.0, 1.0))
 
-    def _area_vectors(self) -> NDArray[np.float64]:
+    def _area_vectors(self) -> Floats:
         """Twice the area vectors (k, f, 3) of all faces."""
         following = next_corners(self.face_offsets)
         points = self.positions[:, self.corner_verts]
         origin = np.repeat(points[:, self.face_offsets[:-1]], np.diff(self.face_offsets), axis=1)
         return np.add.reduceat(np.cross(points - origin, points[:, following] - origin), self.face_offsets[:-1], axis=1)
 
-    def _areas_of(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _areas_of(self, vectors: Floats) -> Floats:
         return (np.linalg.norm(vectors, axis=2) * np.where(self.solid, 0.25, 0.5)).sum(axis=1)
 
-    def moved(self, matrix: NDArray[np.float64], place: NDArray[np.float64]) -> LeafSurface:
+    def moved(self, matrix: Floats, place: Floats) -> LeafSurface:
         """The surface with its points times a matrix (3, 3) or (k, 3, 3), whose columns are its axes, at a place."""
         points = self.positions @ np.swapaxes(matrix, -1, -2) + np.reshape(place, (-1, 1, 3))
         return replace(self, positions=points)
 
 
-def _along(*factors: float | NDArray[np.float64]) -> NDArray[np.float64]:
+def _along(*factors: float | Floats) -> Floats:
     """Factors of the axes, each one number or one of each variant (k,), for vectors (k, n, 3)."""
     return np.stack(np.broadcast_arrays(*factors), axis=-1)[..., None, :]
 
 
 def surface(
-    positions: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    uv: NDArray[np.float64],
+    positions: Floats,
+    faces: Integers,
+    uv: Floats,
     solid: bool = False,
     error: float = 0.0,
 ) -> LeafSurface:
@@ -142,7 +144,7 @@ def joined(parts: Sequence[LeafSurface]) -> LeafSurface:
     )
 
 
-def tube(points: NDArray[np.float64], radius: NDArray[np.float64], sides: int) -> LeafSurface:
+def tube(points: Floats, radius: Floats, sides: int) -> LeafSurface:
     """A tube along points (k, n, 3), which do not lead upwards, with radii (n,); its texture runs around and along."""
     variants, rings, _ = points.shape
     along = np.gradient(points, axis=1)

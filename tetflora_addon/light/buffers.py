@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Mask
 from ..camera.camera import Camera
 from ..refinement.rasterise import buffer_size, occluder_depth, tetrahedron_fragments
 from ..refinement.visibility import OPAQUE, depth_in_front
@@ -32,9 +33,9 @@ _MOST_CUTS, _MOST_COVERED = 64, 0.98
 class _Taps:
     """The four pixels around each point (m, 4), their weights, and how far away the point is (m,)."""
 
-    pixel: NDArray[np.int64]
-    weight: NDArray[np.float64]
-    metres: NDArray[np.float64]
+    pixel: Integers
+    weight: Floats
+    metres: Floats
 
 
 class LightBuffer:
@@ -61,10 +62,10 @@ class LightBuffer:
         self,
         camera: Camera,
         resolution: int,
-        vertices: NDArray[np.float64],
-        extinction: NDArray[np.float64],
-        occluders: NDArray[np.float64] | None = None,
-        sheets: NDArray[np.float64] | None = None,
+        vertices: Floats,
+        extinction: Floats,
+        occluders: Floats | None = None,
+        sheets: Floats | None = None,
     ) -> None:
         self.camera = camera
         self.width, self.height = buffer_size(camera, resolution)
@@ -101,7 +102,7 @@ class LightBuffer:
         self._by_cell = np.argsort(own).astype(np.int32)
         self._own_key = own[self._by_cell]
 
-    def _sheet_fragments(self, sheets: NDArray[np.float64]) -> Iterator[tuple[NDArray, ...]]:
+    def _sheet_fragments(self, sheets: Floats) -> Iterator[tuple[NDArray, ...]]:
         """Owner, pixel, entry, thickness 0 and optical depth of sheets, those of about the same size at a time.
 
         A sheet that covers the fraction c of a pixel lets 1 − c through: its optical depth is −ln (1 − c).
@@ -140,8 +141,8 @@ class LightBuffer:
                 yield numbers[owner].astype(np.int32), pixel.astype(np.int32), metres, np.zeros(len(owner)), depth
 
     def _gathered_parts(
-        self, points: NDArray[np.float64], owner: NDArray[np.int64], covered: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        self, points: Floats, owner: Integers, covered: Floats
+    ) -> tuple[Integers, Integers, Floats, Floats]:
         """Parts of sheets by sheet and nearest pixel: both (f,), mean distance (f,), and the fraction that they cover.
 
         Parts are at ``points`` (m, 3), of sheets ``owner`` (m,); each of sheet i covers ``covered[i]`` of a pixel.
@@ -156,7 +157,7 @@ class LightBuffer:
         metres = np.bincount(own.ravel(), taps.metres, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
         return owner[first], nearest[first], metres, fraction
 
-    def _near_view(self, sheets: NDArray[np.floating], margin: float) -> NDArray[np.bool_]:
+    def _near_view(self, sheets: NDArray[np.floating], margin: float) -> Mask:
         """Sheets (m,) that may reach into a sun's view, which may show part of the scene; for other lights all."""
         if self.camera.kind != "ORTHO":
             return np.ones(len(sheets), bool)
@@ -175,9 +176,7 @@ class LightBuffer:
         """Memory of the fragments, bytes."""
         return sum(value.nbytes for value in vars(self).values() if isinstance(value, np.ndarray))
 
-    def transmittance(
-        self, points: NDArray[np.float64], cells: NDArray[np.integer], own_depth: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def transmittance(self, points: Floats, cells: Integers, own_depth: Floats) -> tuple[Floats, Mask]:
         """Fraction of the light that reaches points.
 
         Parameters
@@ -216,7 +215,7 @@ class LightBuffer:
             seen[some] = True
         return result, seen
 
-    def light_up(self, sources: NDArray[np.float64], polygons: NDArray[np.float64]) -> None:
+    def light_up(self, sources: Floats, polygons: Floats) -> None:
         """Let tetrahedra and sheets (n + m, 3) and polygons (3,) shine, for `scattered`.
 
         Sources are radiances J that thick tetrahedra and sheets would have; they emit J (1 − e^−τ).
@@ -226,7 +225,7 @@ class LightBuffer:
             self._emitted = emitted.astype(np.float32)
             self._arriving = self._gathered(emitted).astype(np.float32)
 
-    def scattered(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def scattered(self, points: Floats) -> Floats:
         """Radiance (m, 3) that arrives at points (m, 3) along the buffer's rays from what shines in front of them."""
         result = np.zeros((len(points), 3))
         if not len(self):
@@ -241,7 +240,7 @@ class LightBuffer:
             result[np.flatnonzero(inside) + start] = light.sum(axis=1)
         return result
 
-    def _gathered(self, emitted: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _gathered(self, emitted: Floats) -> Floats:
         """Radiance (f, 3) in front of each fragment, by a prefix scan over (transmittance, radiance) of its pixel.
 
         Two stretches in a row are one: T = T₁ T₂, L = L₁ T₂ + L₂. Doubling their length covers all in few rounds
@@ -265,10 +264,10 @@ class LightBuffer:
         before[later] = light[later - 1]
         return before
 
-    def _key(self, pixel: NDArray, metres: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _key(self, pixel: NDArray, metres: Floats) -> Floats:
         return pixel + np.clip(metres / self._reach, 0.0, 1.0) * 0.999999
 
-    def _taps(self, points: NDArray[np.float64]) -> tuple[_Taps, NDArray[np.bool_]]:
+    def _taps(self, points: Floats) -> tuple[_Taps, Mask]:
         """Pixels around those points (k,) that are in view, and which these are (m,)."""
         local = self.camera.to_camera_space(points)
         depth = local[:, 2]
@@ -291,7 +290,7 @@ class LightBuffer:
                 weights.append(np.abs(1 - aside - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1]))
         return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), metres), inside
 
-    def _last_before(self, taps: _Taps) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    def _last_before(self, taps: _Taps) -> tuple[Integers, Mask]:
         """The last fragment (k, 4) that begins in front of each point in each pixel, and whether there is one."""
         key = self._key(taps.pixel, taps.metres[:, None])
         place = np.searchsorted(self._order_key, key.ravel(), side="right").reshape(key.shape) - 1
@@ -299,18 +298,18 @@ class LightBuffer:
         place = np.maximum(place, 0)
         return place, found & (self._pixel[place] == taps.pixel)
 
-    def _own(self, taps: _Taps, cells: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    def _own(self, taps: _Taps, cells: Integers) -> tuple[Integers, Mask]:
         """Fragment (k, 4) of each point's own tetrahedron in each pixel, and whether there is one."""
         key = cells.astype(np.int64)[:, None] * (self.width * self.height) + taps.pixel
         place = np.searchsorted(self._own_key, key.ravel()).reshape(key.shape)
         place = np.minimum(place, len(self) - 1)
         return self._by_cell[place], (self._own_key[place] == key) & (cells >= 0)[:, None]
 
-    def _partly(self, place: NDArray[np.intp], taps: _Taps) -> NDArray[np.float64]:
+    def _partly(self, place: Integers, taps: _Taps) -> Floats:
         """Optical depth of fragments as far as it lies in front of the points."""
         inside = (taps.metres[:, None] - self._entry[place]) / np.maximum(self._thickness[place], 1e-9)
         return self._depth[place] * np.clip(inside, 0.0, 1.0)
 
-    def _up_to(self, place: NDArray[np.intp], taps: _Taps) -> NDArray[np.float64]:
+    def _up_to(self, place: Integers, taps: _Taps) -> Floats:
         """Optical depth in front of the points, through the last fragment that begins there."""
         return self._before[place] + self._partly(place, taps)

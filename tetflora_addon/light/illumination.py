@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..camera.camera import Camera, to_eye
 from ..refinement.lights import Light
 from ..tetrahedra.geometry import volume
@@ -58,7 +59,7 @@ class Illumination:
         lamps: list[Lit],
         sky: list[LightBuffer | None],
         world: World,
-        fewer: tuple[Sheets, NDArray[np.int64]],
+        fewer: tuple[Sheets, Integers],
     ) -> None:
         self.clouds, self.sheets, self.lamps = clouds, sheets, lamps
         # Sheets of the sky's buffers, and the number that each of ``sheets`` has among them.
@@ -73,8 +74,8 @@ class Illumination:
         return self.ambient.nbytes + sum(b.nbytes for b in buffers)
 
     def direct(
-        self, points: NDArray[np.float64], cells: NDArray[np.integer], sheets: NDArray[np.integer] | None = None
-    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        self, points: Floats, cells: Integers, sheets: Integers | None = None
+    ) -> Iterator[tuple[Floats, Floats]]:
         """Light of each lamp at points.
 
         Parameters
@@ -99,7 +100,7 @@ class Illumination:
                 light = light * self._through(lit.buffers, points, cells, towards, sheets)[:, None]
             yield towards, light
 
-    def around(self, points: NDArray[np.float64], cells: NDArray[np.integer]) -> NDArray[np.float64]:
+    def around(self, points: Floats, cells: Integers) -> Floats:
         """Light from all sides at points, as harmonics (m, 9, 3): sky, and what tetrahedra and polygons scatter.
 
         Linear between the samples of a tetrahedron's key points (paper, section 7); elsewhere the sky's buffers are
@@ -115,9 +116,7 @@ class Illumination:
             result[outside] = self._from_sky(points[outside], none) + self._from_clouds(points[outside])
         return result
 
-    def irradiance(
-        self, points: NDArray[np.float64], normals: NDArray[np.float64], cells: NDArray[np.integer] | None = None
-    ) -> NDArray[np.float64]:
+    def irradiance(self, points: Floats, normals: Floats, cells: Integers | None = None) -> Floats:
         """Irradiance (m, 3) of surfaces at points with unit normals, on the side of the normals, W/m².
 
         For vertices or faces of meshes; ``cells`` as for `direct`, by default none.
@@ -130,13 +129,13 @@ class Illumination:
 
     def facet_radiance(
         self,
-        centre: NDArray[np.float64],
-        normal: NDArray[np.float64],
-        colour: NDArray[np.float64],
-        transmission: NDArray[np.float64],
-        cells: NDArray[np.integer],
+        centre: Floats,
+        normal: Floats,
+        colour: Floats,
+        transmission: Floats,
+        cells: Integers,
         camera: Camera | None = None,
-        sheets: NDArray[np.integer] | None = None,
+        sheets: Integers | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Outgoing radiance of facets or leaves.
 
@@ -175,14 +174,14 @@ class Illumination:
 
     def cloud_radiance(
         self,
-        points: NDArray[np.float64],
-        colour: NDArray[np.float64],
-        transmission: NDArray[np.float64],
-        cells: NDArray[np.integer],
+        points: Floats,
+        colour: Floats,
+        transmission: Floats,
+        cells: Integers,
         camera: Camera,
-        normal: NDArray[np.float64] | None = None,
-        plane: NDArray[np.float64] | None = None,
-        sheets: NDArray[np.integer] | None = None,
+        normal: Floats | None = None,
+        plane: Floats | None = None,
+        sheets: Integers | None = None,
     ) -> NDArray[np.float32]:
         """Radiance (m, 3) of microspheres or, the same, of thick clouds around points, as the camera sees them.
 
@@ -230,7 +229,7 @@ class Illumination:
         points, means = c.key_points.reshape(-1, 3), (c.colour[cells], c.transmission[cells])
         return self.cloud_radiance(points, *means, cells, camera, c.normal[cells], c.plane[cells]).reshape(-1, 4, 3)
 
-    def scatter(self, ground: NDArray[np.float64], orders: int) -> Iterator[float]:
+    def scatter(self, ground: Floats, orders: int) -> Iterator[float]:
         """Sample the sky at the key points, then scatter; the last step of `emission.light.shadow_steps`.
 
         Light is reflected by polygons of colour ``ground`` (3,). So many ``orders`` are gathered one by one; the rest
@@ -265,7 +264,7 @@ class Illumination:
         self._shine(self.clouds.albedo * passing / (4.0 * np.pi))
         self.ambient[:] = (sky + gathered).reshape(count, 4, scattering.HARMONICS, 3)
 
-    def _again(self, before: NDArray[np.float64], last: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _again(self, before: Floats, last: Floats) -> Floats:
         """Ratio (3,) of each further order of scattering to the one before, from two: means over all surfaces."""
         c = self.clouds
         weight = np.repeat(np.sqrt(np.maximum(c.matrices[:, :3].sum(axis=1), 0.0)) * volume(c.vertices), 4)
@@ -275,11 +274,11 @@ class Illumination:
     def _through(
         self,
         buffers: list[LightBuffer],
-        points: NDArray[np.float64],
-        cells: NDArray[np.integer],
-        towards: NDArray[np.float64],
-        sheets: NDArray[np.integer] | None,
-    ) -> NDArray[np.float64]:
+        points: Floats,
+        cells: Integers,
+        towards: Floats,
+        sheets: Integers | None,
+    ) -> Floats:
         """Transmittance (m,) through the first of several views that sees each point."""
         empty = np.append(self.sheets.replaced, True)[cells]
         own = np.where(empty, 0.0, self.clouds.own_depth(points, cells, towards))
@@ -292,9 +291,7 @@ class Illumination:
             waiting[some[seen]] = False
         return result
 
-    def _from_sky(
-        self, points: NDArray[np.float64], cells: NDArray[np.integer], sheets: NDArray[np.integer] | None = None
-    ) -> NDArray[np.float64]:
+    def _from_sky(self, points: Floats, cells: Integers, sheets: Integers | None = None) -> Floats:
         """Light of the sky (m, 9, 3) that nothing blocks."""
         result = np.zeros((len(points), scattering.HARMONICS, 3))
         if self._world.dark:
@@ -308,14 +305,14 @@ class Illumination:
             result += through[:, None, None] * part
         return result
 
-    def _shine(self, sources: NDArray[np.float64]) -> None:
+    def _shine(self, sources: Floats) -> None:
         """Let tetrahedra and their sheets emit their radiance (n, 3)."""
         emitted = np.concatenate([sources, sources[self._sky_sheets.cell]])
         for buffer in self._sky:
             if buffer is not None:
                 buffer.light_up(emitted, self._ground)
 
-    def _from_clouds(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _from_clouds(self, points: Floats) -> Floats:
         """Light (m, 9, 3) that tetrahedra and polygons scatter."""
         result = np.zeros((len(points), scattering.HARMONICS, 3))
         for buffer, towards in zip(self._sky, scattering.DIRECTIONS, strict=True):

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, Floats, Integers, Mask
 from ..compiled.flora import Flora
 from ..proxies.microsurfaces import trapped
 from ..proxies.summaries import extinction_matrices, summarise
@@ -53,15 +53,15 @@ class Clouds(Arrays):
         Weight of the plane term, 0 to 1.
     """
 
-    vertices: NDArray[np.float64]
-    matrices: NDArray[np.float64]
-    colour: NDArray[np.float64]
-    transmission: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    plane: NDArray[np.float64]
+    vertices: Floats
+    matrices: Floats
+    colour: Floats
+    transmission: Floats
+    normal: Floats
+    plane: Floats
 
     @classmethod
-    def of(cls, flora: Flora, refinement: Refinement, even: NDArray[np.bool_] | None = None) -> Clouds:
+    def of(cls, flora: Flora, refinement: Refinement, even: Mask | None = None) -> Clouds:
         """All cells of a refinement, in the order of ``refinement.nodes``.
 
         Where ``even`` (n,) is set, nothing else stands for the leaves, and the cloud dims what they scatter as their
@@ -84,30 +84,28 @@ class Clouds(Arrays):
         return cls(vertices, matrices, colour, summaries.transmission, normal, plane)
 
     @cached_property
-    def gradients(self) -> NDArray[np.float64]:
+    def gradients(self) -> Floats:
         """Gradients (n, 4, 3) of the barycentric coordinates, 1/m."""
         return barycentric_gradients(self.vertices)
 
     @cached_property
-    def key_points(self) -> NDArray[np.float64]:
+    def key_points(self) -> Floats:
         """Where light is sampled, (n, 4, 3): one point for each vertex."""
         return np.einsum("kj,njx->nkx", _KEYS, self.vertices)
 
     @cached_property
-    def albedo(self) -> NDArray[np.float64]:
+    def albedo(self) -> Floats:
         """Fraction (n, 3) of the light that is scattered again."""
         return albedo(self.colour, self.transmission)
 
-    def extinction(self, directions: NDArray[np.float64], cells: NDArray | slice = slice(None)) -> NDArray[np.float64]:
+    def extinction(self, directions: Floats, cells: NDArray | slice = slice(None)) -> Floats:
         """κ (m,) of some tetrahedra along unit directions (3,) or (m, 3), 1/m."""
         matrices = self.matrices[cells]
         x, y, z = np.moveaxis(np.broadcast_to(directions, (len(matrices), 3)), 1, 0)
         basis = np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z], axis=1)
         return np.sqrt(np.maximum(np.sum(matrices * basis, axis=1), 0.0))
 
-    def own_depth(
-        self, points: NDArray[np.float64], cells: NDArray[np.integer], towards: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def own_depth(self, points: Floats, cells: Integers, towards: Floats) -> Floats:
         """Optical depth (m,) between points and where light enters their tetrahedra; 0 where the cell is −1.
 
         ``towards`` (3,) or (m, 3) are unit vectors to the light.
@@ -124,14 +122,14 @@ class Clouds(Arrays):
         result[some] = np.where(np.isfinite(lengths), lengths, 0.0) * self.extinction(towards, own)
         return result
 
-    def weights(self, points: NDArray[np.float64], cells: NDArray[np.integer]) -> NDArray[np.float64]:
+    def weights(self, points: Floats, cells: Integers) -> Floats:
         """Weights (m, 4) of the key points' samples for points in tetrahedra: linear in between, constant beyond."""
         inside = barycentric(self.vertices[cells], points)
         inside = np.maximum((inside - (1.0 - INWARDS) / 4.0) / INWARDS, 0.0)
         return inside / np.maximum(inside.sum(axis=1, keepdims=True), 1e-12)
 
 
-def cell_of_node(refinement: Refinement) -> NDArray[np.int64]:
+def cell_of_node(refinement: Refinement) -> Integers:
     """Number (nodes,) in `Clouds.of` of each node of the tree, −1 where it is none of them."""
     index = np.full(len(refinement.tree), -1, dtype=np.int64)
     index[refinement.nodes] = np.arange(len(refinement.nodes))
@@ -152,9 +150,9 @@ class Sheets:
         Tetrahedra that cast no shadow themselves, since their sheets do.
     """
 
-    corners: NDArray[np.float64]
-    cell: NDArray[np.int64]
-    replaced: NDArray[np.bool_]
+    corners: Floats
+    cell: Integers
+    replaced: Mask
 
     def __len__(self) -> int:
         return len(self.cell)
@@ -165,7 +163,7 @@ class Sheets:
         return cls(np.zeros((0, 4, 3)), np.zeros(0, np.int64), np.zeros(count, bool))
 
     @classmethod
-    def of(cls, corners: NDArray[np.float64], cell: NDArray[np.integer], count: int) -> Sheets:
+    def of(cls, corners: Floats, cell: Integers, count: int) -> Sheets:
         """Sheets with corners (m, 4, 3) in metres, by tetrahedron (m,) out of ``count``.
 
         They replace the clouds of tetrahedra that have some. Those with a negative ``cell`` belong to the first.
@@ -182,7 +180,7 @@ class Sheets:
         reach = np.ptp(self.corners.reshape(-1, 3), axis=0).max()
         return int(np.clip(reach / max(_ROOMY * side, 1e-9), *limits))
 
-    def thinned(self, most: int) -> tuple[Sheets, NDArray[np.int64]]:
+    def thinned(self, most: int) -> tuple[Sheets, Integers]:
         """At most so many sheets, larger as they are fewer, and the number (m,) of each of these among them, or −1."""
         step = -(-len(self) // most)
         if step <= 1:
@@ -196,7 +194,7 @@ class Sheets:
         grown = middle + (corners - middle) * np.sqrt(len(self) / len(order))
         return Sheets(grown, self.cell[order], self.replaced), number
 
-    def samples(self, clouds: Clouds) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], KeyMeans]:
+    def samples(self, clouds: Clouds) -> tuple[Floats, Integers, Integers, KeyMeans]:
         """Where light from all sides is sampled.
 
         Returns
@@ -229,11 +227,11 @@ class Sheets:
 class KeyMeans:
     """Means of samples by key point: ``key`` (k,) is that of each sample, among the 4 n of ``count`` tetrahedra."""
 
-    def __init__(self, key: NDArray[np.int64], count: int) -> None:
+    def __init__(self, key: Integers, count: int) -> None:
         self._key, self._count = key, count
         self._number = np.bincount(key, minlength=4 * count).reshape(count, 4)
 
-    def means(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def means(self, values: Floats) -> Floats:
         """Means (4 n, ...) of values (k, ...); a key point without samples has its tetrahedron's mean."""
         flat = values.reshape(len(values), -1)
         sums = np.stack([np.bincount(self._key, column, 4 * self._count) for column in flat.T], axis=1)
@@ -242,7 +240,7 @@ class KeyMeans:
         result = np.where(number > 0, sums / np.maximum(number, 1), every)
         return result.reshape(4 * self._count, *values.shape[1:])
 
-    def by_cell(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def by_cell(self, values: Floats) -> Floats:
         """Means (n, ...) over the samples of each tetrahedron, from those (4 n, ...) of its key points."""
         values = values.reshape(self._count, 4, *values.shape[1:])
         weight = np.where(self._number.any(axis=1, keepdims=True), self._number, 1)

@@ -16,10 +16,11 @@ from __future__ import annotations
 from itertools import permutations, product
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..arrays import Floats
 
 #: Reflected (n, 3), transmitted (n, 3) and mirrored (n,) fractions of light, see `scattered_fractions`.
-Fractions = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+Fractions = tuple[Floats, Floats, Floats]
 
 #: Number of harmonics up to the second band, and the band of each.
 HARMONICS = 9
@@ -36,7 +37,7 @@ THROUGH_TINT = np.array([1.15, 1.1, 0.55])
 GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
 
 
-def _directions() -> NDArray[np.float64]:
+def _directions() -> Floats:
     points = []
     for order in permutations(range(3)):
         odd = sum(order[i] > order[j] for i, j in ((0, 1), (0, 2), (1, 2))) % 2
@@ -54,7 +55,7 @@ DIRECTIONS = _directions()
 SOLID_ANGLE = 4.0 * np.pi / len(DIRECTIONS)
 
 
-def harmonics(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+def harmonics(directions: Floats) -> Floats:
     """Real spherical harmonics up to the second band (..., 9) of unit vectors (..., 3)."""
     x, y, z = np.moveaxis(np.asarray(directions, np.float64), -1, 0)
     return np.stack(
@@ -73,7 +74,7 @@ def harmonics(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
-def irradiance(light: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def irradiance(light: Floats, normals: Floats) -> Floats:
     """Irradiance (..., 3) of surfaces with unit normals (..., 3), W/m², not below 0.
 
     ``light`` (..., 9, 3) is the radiance from all sides by harmonic and colour.
@@ -81,12 +82,12 @@ def irradiance(light: NDArray[np.float64], normals: NDArray[np.float64]) -> NDAr
     return np.maximum(np.einsum("...k,...kc->...c", harmonics(normals) * _COSINE, light), 0.0)
 
 
-def fluence(light: NDArray[np.float64]) -> NDArray[np.float64]:
+def fluence(light: Floats) -> Floats:
     """Light that passes through a point (..., 3), W/m²: the integral of the radiance over all directions."""
     return light[..., 0, :] * np.sqrt(4.0 * np.pi)
 
 
-def scattered_fractions(colour: NDArray[np.float64], transmission: NDArray[np.float64]) -> Fractions:
+def scattered_fractions(colour: Floats, transmission: Floats) -> Fractions:
     """Fractions of light that sheets reflect (n, 3) and transmit (n, 3) diffusely, and that they mirror (n,)."""
     through = transmission[:, None]
     gloss = np.where(transmission > 0.0, GLOSS, 0.0)
@@ -94,13 +95,13 @@ def scattered_fractions(colour: NDArray[np.float64], transmission: NDArray[np.fl
     return rest * (1.0 - through) * colour, rest * through * np.minimum(colour * THROUGH_TINT, 1.0), gloss
 
 
-def albedo(colour: NDArray[np.float64], transmission: NDArray[np.float64]) -> NDArray[np.float64]:
+def albedo(colour: Floats, transmission: Floats) -> Floats:
     """Fraction (n, 3) of light that sheets scatter in any way."""
     reflected, through, gloss = scattered_fractions(colour, transmission)
     return reflected + through + gloss[:, None]
 
 
-def sphere_phase(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+def sphere_phase(cosine: Floats) -> Floats:
     """Phase function 1/sr of a white Lambert sphere by the cosine of the angle α between light and eye, ∫ p = 1.
 
     p = 2 (sin α + (π − α) cos α) / (3π²). Leaves that face all ways and reflect scatter alike; those that let light
@@ -111,7 +112,7 @@ def sphere_phase(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
     return 2.0 / (3.0 * np.pi**2) * (np.sin(alpha) + (np.pi - alpha) * cosine)
 
 
-def _bands() -> NDArray[np.float64]:
+def _bands() -> Floats:
     """2π ∫ p(x) Pₗ(x) dx for l = 0, 1, 2: factors of the phase function on the bands of harmonics."""
     x, weight = np.polynomial.legendre.leggauss(64)
     return np.array([2.0 * np.pi * (weight * sphere_phase(x) * p).sum() for p in (1.0, x, (3.0 * x * x - 1.0) / 2.0)])
@@ -121,12 +122,12 @@ _PHASE_BANDS = _bands()
 
 
 def facet_direct(
-    normal: NDArray[np.float64],
+    normal: Floats,
     fractions: Fractions,
-    towards: NDArray[np.float64],
-    arriving: NDArray[np.float64],
-    view: NDArray[np.float64] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    towards: Floats,
+    arriving: Floats,
+    view: Floats | None = None,
+) -> tuple[Floats, Floats]:
     """Radiance of the front, where normals point, and of the back of facets (n, 3 each) by one light.
 
     All vectors (n, 3) are unit vectors; ``arriving`` (n, 3) is W/m² on a surface that faces the light. Without a
@@ -143,11 +144,8 @@ def facet_direct(
 
 
 def facet_ambient(
-    normal: NDArray[np.float64],
-    fractions: Fractions,
-    light: NDArray[np.float64],
-    view: NDArray[np.float64] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    normal: Floats, fractions: Fractions, light: Floats, view: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Radiance of the front and the back of facets (n, 3 each) by light from all sides, as harmonics (n, 9, 3)."""
     reflected, through, gloss = fractions
     front, back = irradiance(light, normal) / np.pi, irradiance(light, -normal) / np.pi
@@ -165,9 +163,7 @@ def facet_ambient(
     )
 
 
-def _mirrored(
-    normal: NDArray[np.float64], towards: NDArray[np.float64], view: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _mirrored(normal: Floats, towards: Floats, view: Floats) -> Floats:
     """BRDF times cosine (n,) of a rough mirror on the side of the light (GGX; Walter et al. 2007), Fresnel 1."""
     light, eye = np.sum(normal * towards, axis=1), np.sum(normal * view, axis=1)
     half = towards + view
@@ -185,10 +181,10 @@ def _mirrored(
 
 def particle_direct(
     fractions: Fractions,
-    towards: NDArray[np.float64],
-    arriving: NDArray[np.float64],
-    view: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    towards: Floats,
+    arriving: Floats,
+    view: Floats,
+) -> Floats:
     """Radiance (n, 3) of a thick cloud of sheets that face all ways, by one light; the gloss is even."""
     reflected, through, gloss = fractions
     cosine = np.sum(towards * view, axis=1)
@@ -196,11 +192,7 @@ def particle_direct(
     return (phase + gloss[:, None] / (4.0 * np.pi)) * arriving
 
 
-def particle_ambient(
-    fractions: Fractions,
-    light: NDArray[np.float64],
-    view: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def particle_ambient(fractions: Fractions, light: Floats, view: Floats) -> Floats:
     """Radiance (n, 3) of such a cloud by light from all sides, as harmonics (n, 9, 3)."""
     reflected, through, gloss = fractions
     basis = harmonics(view)

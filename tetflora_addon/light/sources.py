@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import GOLDEN_ANGLE, spiral
+from ..arrays import GOLDEN_ANGLE, Floats, spiral
 from ..camera.camera import Camera, to_eye
 from ..refinement.lights import Light, image_size, lamp_views, light_views
 from .buffers import LightBuffer
@@ -41,7 +41,7 @@ def split_areas(lights: tuple[Light, ...]) -> list[Light]:
     return made
 
 
-def _grid_points(span: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _grid_points(span: Floats) -> tuple[Floats, Floats]:
     """Middles of equal parts of a rectangle, in half edges from its middle."""
     length = np.linalg.norm(span, axis=1)
     counts = np.clip(np.ceil(AREA_POINTS * length / max(length.max(), 1e-12)), 1, AREA_POINTS).astype(int)
@@ -49,14 +49,14 @@ def _grid_points(span: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
     return np.repeat(x, len(y)), np.tile(y, len(x))
 
 
-def _disk_points() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _disk_points() -> tuple[Floats, Floats]:
     """Points that stand for equal parts of a disk (Vogel, "A better way to construct the sunflower head", 1979)."""
     index = np.arange(AREA_POINTS**2) + 0.5
     radius, turn = np.sqrt(index / len(index)), GOLDEN_ANGLE * index
     return radius * np.cos(turn), radius * np.sin(turn)
 
 
-def arriving(light: Light, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def arriving(light: Light, points: Floats) -> tuple[Floats, Floats]:
     """Unblocked light at points.
 
     Parameters
@@ -101,10 +101,10 @@ class World:
         Radiance of each part by harmonic and colour; the sum over the visible parts is that of the sky.
     """
 
-    parts: NDArray[np.float64]
+    parts: Floats
 
     @classmethod
-    def of(cls, radiance: Callable[[NDArray[np.float64]], ArrayLike]) -> World:
+    def of(cls, radiance: Callable[[Floats], ArrayLike]) -> World:
         """A sky whose radiance (m, 3) in unit directions (m, 3) is known."""
         index = np.arange(SKY_POINTS) + 0.5
         towards = spiral(1.0 - 2.0 * index / SKY_POINTS, index, GOLDEN_ANGLE)
@@ -131,7 +131,7 @@ class World:
 class Near:
     """The surroundings of an eye (3,), which suns see in views of their own, by radii, the smallest first; metres."""
 
-    eye: NDArray[np.float64]
+    eye: Floats
     radii: tuple[float, ...] = ()
 
 
@@ -144,7 +144,7 @@ def buffers_of(
     light: Light,
     clouds: Clouds,
     sheets: Sheets,
-    occluders: NDArray[np.float64] | None,
+    occluders: Floats | None,
     resolution: int,
     near: Near | None = None,
 ) -> list[LightBuffer]:
@@ -158,7 +158,7 @@ def buffers_of(
     return [_buffer(view, light, clouds, sheets, occluders, resolution) for view in views]
 
 
-def _views(light: Light, clouds: Clouds, occluders: NDArray[np.float64] | None, resolution: int) -> list[Camera]:
+def _views(light: Light, clouds: Clouds, occluders: Floats | None, resolution: int) -> list[Camera]:
     corners = clouds.vertices.reshape(-1, 3)
     if light.kind != "SUN":
         return lamp_views(light.position, corners, resolution)
@@ -186,7 +186,7 @@ def _buffer(
     light: Light,
     clouds: Clouds,
     sheets: Sheets,
-    occluders: NDArray[np.float64] | None,
+    occluders: Floats | None,
     resolution: int,
 ) -> LightBuffer:
     along = light.direction if light.kind == "SUN" else -to_eye(view, clouds.vertices.mean(axis=1))

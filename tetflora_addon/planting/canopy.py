@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, bilinear, spread
+from ..arrays import Arrays, Floats, Integers, bilinear, spread
 
 #: Directions of the sky that light comes from: degrees from the vertical, how many, and the weight of all of them.
 DIRECTIONS = ((0.0, 1, 0.2), (32.0, 5, 0.5), (55.0, 5, 0.3))
@@ -45,11 +45,11 @@ class Canopy(Arrays):
     species : (n,) int32
     """
 
-    position: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    base: NDArray[np.float64]
-    top: NDArray[np.float64]
-    area: NDArray[np.float64]
+    position: Floats
+    radius: Floats
+    base: Floats
+    top: Floats
+    area: Floats
     species: NDArray[np.int32]
 
     def ordered(self) -> Canopy:
@@ -71,13 +71,13 @@ class Sheet:
     columns, rows : int
     """
 
-    low: NDArray[np.float64]
+    low: Floats
     cell: float
     columns: int
     rows: int
 
     @staticmethod
-    def over(points: NDArray[np.float64], cell: float = _CELL, most: int = _MOST_CELLS) -> Sheet:
+    def over(points: Floats, cell: float = _CELL, most: int = _MOST_CELLS) -> Sheet:
         """A sheet over all points (n, 2) or more columns, with at most about so many cells."""
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
         size = np.maximum(high - low, 1e-3)
@@ -85,18 +85,16 @@ class Sheet:
         columns, rows = (int(n) for n in np.ceil(size / cell))
         return Sheet(low, cell, columns, rows)
 
-    def middles(self) -> NDArray[np.float64]:
+    def middles(self) -> Floats:
         """Middles of all cells, (rows · columns, 2), row by row."""
         row, column = np.divmod(np.arange(self.rows * self.columns), self.columns)
         return self.low + (np.stack([column, row], axis=1) + 0.5) * self.cell
 
-    def at(self, values: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, values: Floats, points: Floats) -> Floats:
         """Values (n,) of cells (rows · columns,) at points (n, 2), linear between the middles."""
         return bilinear(values.reshape(self.rows, self.columns), (points - self.low) / self.cell - 0.5)
 
-    def pairs(
-        self, middle: NDArray[np.float64], reach: NDArray[np.float64]
-    ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]:
+    def pairs(self, middle: Floats, reach: Floats) -> Iterator[tuple[Integers, Integers, Floats]]:
         """Cells whose middles may lie within a reach (n,) of points (n, 2), some points at a time.
 
         Yields
@@ -121,7 +119,7 @@ class Sheet:
             yield owner, place[:, 1] * self.columns + place[:, 0], away
 
 
-def light_on(sheet: Sheet, canopy: Canopy) -> Generator[float, None, NDArray[np.float64]]:
+def light_on(sheet: Sheet, canopy: Canopy) -> Generator[float, None, Floats]:
     """Fraction of the light of the sky that reaches each cell of the ground, (rows · columns,) from 0 to 1.
 
     Yields the fraction of the work that is done. The ground is taken to be level around each plant.
@@ -155,7 +153,7 @@ def light_on(sheet: Sheet, canopy: Canopy) -> Generator[float, None, NDArray[np.
     return light
 
 
-def fallen_on(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, NDArray[np.float64]]:
+def fallen_on(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, Floats]:
     """Leaf area (kinds, rows · columns) that falls on each cell from the plants of each species, m² on a square meter.
 
     Yields the fraction of the work that is done.

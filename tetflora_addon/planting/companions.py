@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Keys, Mask
 from ..growth.hashing import uniform
 from .plane import NO_DISTANCE, Neighbours, Spacing
 from .rules import Companion, Rules
@@ -22,7 +23,7 @@ class Company:
     Where plants shun others, it does not matter who came first: an oak that shuns birches keeps new birches away too.
     """
 
-    def __init__(self, rules: Rules, position: NDArray[np.float64], species: NDArray[np.int32]) -> None:
+    def __init__(self, rules: Rules, position: Floats, species: NDArray[np.int32]) -> None:
         """Begin with older plants: places on the map (m, 2), and indices into the weights or -1 (m,)."""
         self.rules = [(n, r) for n, r in enumerate(rules.companions) if r.strength and r.distance >= NO_DISTANCE]
         self.place = {s: [position[species == s]] for s in range(len(rules.weights))}
@@ -37,7 +38,7 @@ class Company:
             rest.remove(order[-1])
         return order
 
-    def admit(self, species: int, points: NDArray[np.float64], keys: NDArray[np.uint64]) -> NDArray[np.bool_]:
+    def admit(self, species: int, points: Floats, keys: Keys) -> Mask:
         """Which places, (n, 2), candidates of a species may take beside what stands, and beside each other, (n,)."""
         fine = np.ones(len(points), bool)
         for number, rule in self.rules:
@@ -62,13 +63,11 @@ class Company:
                 fine[asks] = founds[asks] | Neighbours(others, rule.distance).near(points[asks])
         return fine
 
-    def add(self, species: int, points: NDArray[np.float64]) -> None:
+    def add(self, species: int, points: Floats) -> None:
         """Plants of a species stand now at places (n, 2)."""
         self.place.setdefault(species, []).append(points)
 
-    def lonely(
-        self, points: NDArray[np.float64], species: NDArray[np.int32], keys: NDArray[np.uint64], older: Company
-    ) -> NDArray[np.bool_]:
+    def lonely(self, points: Floats, species: NDArray[np.int32], keys: Keys, older: Company) -> Mask:
         """Plants that have not what they seek near, (n,), when those that these need in turn are gone as well."""
         gone = np.zeros(len(points), bool)
         seeking = [(n, r) for n, r in self.rules if r.strength > 0.0]
@@ -86,7 +85,7 @@ class Company:
                 changed |= bool(alone.any())
         return gone
 
-    def _standing(self, species: int) -> NDArray[np.float64]:
+    def _standing(self, species: int) -> Floats:
         return np.concatenate(self.place[species])
 
     def _seeks(self, species: int, other: int) -> bool:
@@ -100,5 +99,5 @@ class Company:
         return any(self._reaches(s, goal, seen) for s in sorted(ahead))
 
 
-def _follows(keys: NDArray[np.uint64], number: int, rule: Companion) -> NDArray[np.bool_]:
+def _follows(keys: Keys, number: int, rule: Companion) -> Mask:
     return uniform(keys, SiteDraw.COMPANION + number) < abs(rule.strength)

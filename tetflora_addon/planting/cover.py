@@ -9,16 +9,15 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import smoothstep
+from ..arrays import Floats, smoothstep
 from ..growth.hashing import child_key, key_of_seed
 from ..jobs import mapped
 from .canopy import Canopy, Sheet, fallen_on, light_on
 from .plane import clumps
 
 #: How suitable places on the map (n, 2) are, (n,) from 0 to 1.
-Suits = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Suits = Callable[[Floats], Floats]
 
 _PATCHES = 2**34  # keys of patches, away from those of plants and clumps
 #: Fallen leaves that cover ground as far as it is covered at all, m² on a square meter; wood lies where they do, but is
@@ -64,8 +63,8 @@ class Floor:
     """
 
     sheet: Sheet
-    light: NDArray[np.float64]
-    fallen: NDArray[np.float64]
+    light: Floats
+    fallen: Floats
 
     def suits(self, habitat: Habitat, species: int | None, seed: int) -> Suits:
         """How suitable places are for a habitat.
@@ -82,13 +81,13 @@ class Floor:
         key = child_key(key_of_seed(seed), _PATCHES + list(Habitat).index(habitat))
         values = self.map_of(habitat, species)
 
-        def suitable(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        def suitable(points: Floats) -> Floats:
             found = self.sheet.at(values, points)
             return found * clumps(points, size, keeps, key) if keeps else found
 
         return suitable
 
-    def map_of(self, habitat: Habitat, species: int | None) -> NDArray[np.float64]:
+    def map_of(self, habitat: Habitat, species: int | None) -> Floats:
         """The same for each cell, (cells,), without patches."""
         light = self.light
         if habitat is Habitat.LIGHT:
@@ -109,7 +108,7 @@ class Floor:
             return covered * own / np.maximum(whole, 1e-12)
         return np.ones(len(light))
 
-    def _smothered(self) -> NDArray[np.float64]:
+    def _smothered(self) -> Floats:
         """What fallen leaves leave of low plants, (cells,)."""
         return 1.0 - _SMOTHERED * (1.0 - np.exp(-self.fallen.sum(axis=0) / _LEAVES))
 
@@ -137,18 +136,18 @@ class Stratum:
         Linear RGB.
     """
 
-    suits: NDArray[np.float64]
+    suits: Floats
     number: float
     area: float
-    colour: NDArray[np.float64]
+    colour: Floats
 
 
-def covered(strata: Sequence[Stratum], cells: int) -> NDArray[np.float64]:
+def covered(strata: Sequence[Stratum], cells: int) -> Floats:
     """Fraction (cells,) of the ground that plants hide from above, as if they were strewn by chance."""
     return 1.0 - np.exp(-sum((one.number * one.area * one.suits for one in strata), np.zeros(cells)))
 
 
-def tinted(strata: Sequence[Stratum], soil: NDArray[np.float64], cells: int) -> NDArray[np.float64]:
+def tinted(strata: Sequence[Stratum], soil: Floats, cells: int) -> Floats:
     """Mean linear RGB (cells, 3) of bare soil (3,) and what lies on it."""
     areas = [one.number * one.area * one.suits for one in strata]
     whole = sum(areas, np.full(cells, 1e-12))

@@ -7,9 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Floats, Integers, Mask, spread
 from ..errors import SceneError
 
 #: Most cells of a grid, whatever its use.
@@ -36,9 +35,9 @@ class HeightGrid:
     west: float
     south: float
     cell: float
-    height: NDArray[np.float64]
+    height: Floats
 
-    def at(self, values: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, values: Floats, points: Floats) -> Floats:
         """Values (h, w) of cells at places on the map (n, 2 or more), linear between middles, (n,).
 
         Cells of NaN do not count; NaN comes back where all four around a place are.
@@ -59,7 +58,7 @@ class HeightGrid:
         return np.where(weights > 0.0, total / np.where(weights > 0.0, weights, 1.0), np.nan)
 
 
-def cell_for(triangles: NDArray[np.float64], finest: float, most: int) -> float:
+def cell_for(triangles: Floats, finest: float, most: int) -> float:
     """Side of cells, meters: the finest, doubled until the ground (t, 3, 3) has no more than ``most`` of them."""
     span = np.ptp(triangles[..., :2].reshape(-1, 2), axis=0)
     cell = finest
@@ -68,7 +67,7 @@ def cell_for(triangles: NDArray[np.float64], finest: float, most: int) -> float:
     return cell
 
 
-def height_grid(triangles: NDArray[np.float64], cell: float) -> HeightGrid:
+def height_grid(triangles: Floats, cell: float) -> HeightGrid:
     """Heights of the highest of all triangles.
 
     Parameters
@@ -116,7 +115,7 @@ def height_grid(triangles: NDArray[np.float64], cell: float) -> HeightGrid:
 _HAIR = 1e-9  # of a cell: middles on a border belong to both sides
 
 
-def _planes(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _planes(corners: Floats) -> tuple[Floats, Mask]:
     """Rise of triangles along x and y, (t, 2), and which have an area on the map."""
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
@@ -129,12 +128,12 @@ def _planes(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
 
 
 def _draw(
-    corners: NDArray[np.float64],
-    slope: NDArray[np.float64],
-    own: NDArray[np.int64],
-    row: NDArray[np.int64],
+    corners: Floats,
+    slope: Floats,
+    own: Integers,
+    row: Integers,
     columns: int,
-    top: NDArray[np.float64],
+    top: Floats,
 ) -> None:
     """Raise the cells of rows (k,) of the triangles ``own`` (k,) to these, in ``top`` (cells,)."""
     left, right = np.full(len(own), np.inf), np.full(len(own), -np.inf)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, Floats, Integers, Keys
 from ..errors import SceneError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .companions import Company
@@ -60,14 +60,14 @@ class Placement(Arrays):
         How many were left out by `without`.
     """
 
-    position: NDArray[np.float64]
-    azimuth: NDArray[np.float64]
-    scale: NDArray[np.float64]
+    position: Floats
+    azimuth: Floats
+    scale: Floats
     species: NDArray[np.int32]
     seed: NDArray[np.int32]
     wanted: int
     reason: str = ""
-    up: NDArray[np.float64] | None = None
+    up: Floats | None = None
     erased: int = 0
 
     def __post_init__(self) -> None:
@@ -76,7 +76,7 @@ class Placement(Arrays):
             object.__setattr__(self, "up", np.tile([0.0, 0.0, 1.0], (len(self.seed), 1)))
 
     @property
-    def rotation(self) -> NDArray[np.float64]:
+    def rotation(self) -> Floats:
         """Unit quaternions (n, 4), w first: the turn about the vertical, then the shortest one to ``up``."""
         cos, sin = np.cos(0.5 * self.azimuth), np.sin(0.5 * self.azimuth)
         x, y, z = self.up.T
@@ -89,7 +89,7 @@ class Placement(Arrays):
 def place(
     ground: Terrain,
     rules: Rules,
-    older: NDArray[np.float64] | None = None,
+    older: Floats | None = None,
     older_species: NDArray[np.int32] | None = None,
     suits: Mapping[int, Suits] | None = None,
     zones: Sequence[Zone] = (),
@@ -168,7 +168,7 @@ def without(placement: Placement, bare: Sequence[Path]) -> Placement:
     return replace(placement.take(stay), erased=placement.erased + int((~stay).sum()))
 
 
-def new_seeds(seeds: NDArray[np.int64], roll: int = 0) -> NDArray[np.int32]:
+def new_seeds(seeds: Integers, roll: int = 0) -> NDArray[np.int32]:
     """Other seeds for plants with the given ones, (n,), zero or positive; another ``roll`` gives yet others."""
     return _positive(child_key(key_of_seed(seeds), roll & 0xFFFFFFFF))
 
@@ -186,7 +186,7 @@ class _Sowing:
         self.refused = {"companions": 0, "distance": 0}
         self._parts: list[tuple[NDArray, ...]] = []
 
-    def sow(self, key: NDArray[np.uint64], species: int | None, part: float) -> None:
+    def sow(self, key: Keys, species: int | None, part: float) -> None:
         """Place plants of one species, or of all by their weights, and ``part`` of the number asked for."""
         suits = self.suits.get(species)
         if self.rules.by_density:
@@ -245,7 +245,7 @@ class _Sowing:
             self.company.add(species, position[chosen, :2])
         return len(keys), len(chosen)
 
-    def result(self) -> tuple[NDArray, NDArray, NDArray[np.uint64], NDArray[np.int32]]:
+    def result(self) -> tuple[NDArray, NDArray, Keys, NDArray[np.int32]]:
         """Places, normals, keys and species of all plants."""
         none = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.uint64), np.zeros(0, np.int32)
         return tuple(np.concatenate(column) for column in zip(none, *self._parts, strict=True))
@@ -289,7 +289,7 @@ class _Sowing:
         return REMEDIES[worst]
 
 
-def _part(weights: NDArray[np.float64], species: int, rules: Rules) -> float:
+def _part(weights: Floats, species: int, rules: Rules) -> float:
     """Fraction of a species by density; by count its number of plants, the rest going to the largest remainders."""
     fractions = weights / weights.sum()
     if rules.by_density:
@@ -301,7 +301,7 @@ def _part(weights: NDArray[np.float64], species: int, rules: Rules) -> float:
     return float(whole[species])
 
 
-def _scales(z: NDArray[np.float64], keys: NDArray[np.uint64], site: Site, rules: Rules) -> NDArray[np.float64]:
+def _scales(z: Floats, keys: Keys, site: Site, rules: Rules) -> Floats:
     low, high = sorted((rules.scale_min, rules.scale_max))
     scale = low + (high - low) * uniform(keys, SiteDraw.SCALE)
     if rules.scale_at_top != 1.0 and site.highest > site.lowest:
@@ -310,7 +310,7 @@ def _scales(z: NDArray[np.float64], keys: NDArray[np.uint64], site: Site, rules:
     return scale
 
 
-def _tilted(normal: NDArray[np.float64], tilt: float) -> NDArray[np.float64] | None:
+def _tilted(normal: Floats, tilt: float) -> Floats | None:
     if not tilt:
         return None
     up = tilt * normal
@@ -318,7 +318,7 @@ def _tilted(normal: NDArray[np.float64], tilt: float) -> NDArray[np.float64] | N
     return up / np.linalg.norm(up, axis=1, keepdims=True)
 
 
-def _positive(keys: NDArray[np.uint64]) -> NDArray[np.int32]:
+def _positive(keys: Keys) -> NDArray[np.int32]:
     return (uniform(keys, SiteDraw.SEED) * 2**31).astype(np.int32)
 
 

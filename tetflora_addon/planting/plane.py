@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Floats, Integers, Keys, Mask, spread
 from ..growth.hashing import child_key, uniform
 
 _SLABS = 4096  # at most, into which a polygon is cut
@@ -21,7 +20,7 @@ _CELLS = 4_000_000  # at most, of the grid of a set of lines
 _ENTRIES = 3_000_000  # about as many pieces of lines are noted in the cells
 
 
-def inside_any(points: NDArray[np.float64], polygons: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+def inside_any(points: Floats, polygons: Sequence[Floats]) -> Mask:
     """Which points (n, 2) lie in at least one polygon, (n,).
 
     Polygons (k, 2) are closed: the last corner is followed by the first. Where one crosses itself, what is wound twice
@@ -36,14 +35,14 @@ def inside_any(points: NDArray[np.float64], polygons: Sequence[NDArray[np.float6
     return inside
 
 
-def _inside(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _inside(points: Floats, polygon: Floats) -> Mask:
     """Whether a line to the east crosses the border an odd number of times; only edges of the own slab are asked."""
     start, end = polygon, np.roll(polygon, -1, axis=0)
     low, high = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
     slabs, base = min(len(polygon), _SLABS), low.min()
     height = max((high.max() - base) / slabs, np.finfo(np.float64).tiny)
 
-    def slab(y: NDArray[np.float64]) -> NDArray[np.int64]:
+    def slab(y: Floats) -> Integers:
         return np.clip((y - base) / height, 0, slabs - 1).astype(np.int64)
 
     first = slab(low)
@@ -71,7 +70,7 @@ class Lines:
     short one.
     """
 
-    def __init__(self, start: NDArray[np.float64], end: NDArray[np.float64], reach: NDArray[np.float64]) -> None:
+    def __init__(self, start: Floats, end: Floats, reach: Floats) -> None:
         """Pieces from ``start`` to ``end``, (e, 2) each, and how far from them it matters, (e,) above 0; metres."""
         low = (np.minimum(start, end) - reach[:, None]).min(axis=0)
         span = (np.maximum(start, end) + reach[:, None]).max(axis=0) - low
@@ -99,7 +98,7 @@ class Lines:
         self.piece = piece[useful][order]
         self.begins = np.searchsorted(number[useful][order], np.arange(self.columns * self.rows + 1))
 
-    def nearness(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def nearness(self, points: Floats) -> Floats:
         """Least ratio of distance to reach over all pieces, (n,) between 0 and 1; 1 where nothing is within reach."""
         ratio = np.ones(len(points))
         place = np.floor((points - self.low) / self.cell)
@@ -114,11 +113,11 @@ class Lines:
             at = at + 1
         return ratio
 
-    def _column_row(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _column_row(self, points: Floats) -> Integers:
         place = np.floor((points - self.low) / self.cell).astype(np.int64)
         return np.clip(place, 0, (self.columns - 1, self.rows - 1))
 
-    def _gap(self, points: NDArray[np.float64], piece: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _gap(self, points: Floats, piece: Integers) -> Floats:
         """Distance of each point from its piece, metres."""
         start, along = self.start[piece], self.along[piece]
         length = np.maximum((along * along).sum(axis=1), np.finfo(np.float64).tiny)
@@ -127,7 +126,7 @@ class Lines:
         return np.hypot(rest[:, 0], rest[:, 1])
 
 
-def lines_along(lines: Sequence[NDArray[np.float64]], reach: Sequence[float]) -> Lines | None:
+def lines_along(lines: Sequence[Floats], reach: Sequence[float]) -> Lines | None:
     """Lines through points (k, 2) each, and how far from them it matters, metres; None without any.
 
     A line of one point is a place of its own.
@@ -139,9 +138,7 @@ def lines_along(lines: Sequence[NDArray[np.float64]], reach: Sequence[float]) ->
     return Lines(np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]), far)
 
 
-def _cut(
-    start: NDArray[np.float64], end: NDArray[np.float64], reach: NDArray[np.float64], longest: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _cut(start: Floats, end: Floats, reach: Floats, longest: float) -> tuple[Floats, Floats, Floats]:
     """Pieces of at most the given length in the place of long ones."""
     parts = np.ceil(np.linalg.norm(end - start, axis=1) / longest).astype(np.int64).clip(min=1)
     piece, offset = spread(parts)
@@ -161,7 +158,7 @@ _NEAR = sorted(
 class Neighbours:
     """Points on the map, (m, 2), that others are asked to keep near or far."""
 
-    def __init__(self, points: NDArray[np.float64], distance: float) -> None:
+    def __init__(self, points: Floats, distance: float) -> None:
         """Sort the points by cell; the distance is at least `NO_DISTANCE`, metres."""
         self.distance = distance
         self.cell = distance / np.sqrt(2.0)
@@ -171,7 +168,7 @@ class Neighbours:
         first = np.flatnonzero(np.diff(cells, prepend=cells[:1] - 1))
         self.cells, self.first = cells[first], np.append(first, len(points))
 
-    def near(self, points: NDArray[np.float64], least: int = 1) -> NDArray[np.bool_]:
+    def near(self, points: Floats, least: int = 1) -> Mask:
         """Which points, (n, 2), are closer than the distance to at least so many of the others, (n,)."""
         if not len(self.points) or not len(points):
             return np.zeros(len(points), bool)
@@ -206,7 +203,7 @@ class Spacing:
         Those that stand; they may crowd cells.
     """
 
-    def __init__(self, distance: float, occupied: NDArray[np.float64]) -> None:
+    def __init__(self, distance: float, occupied: Floats) -> None:
         self.distance = distance
         self.cell = distance / np.sqrt(2.0)
         self.points = occupied
@@ -216,7 +213,7 @@ class Spacing:
         """Whether there is no distance to keep."""
         return self.distance < NO_DISTANCE
 
-    def admit(self, candidates: NDArray[np.float64], most: int) -> NDArray[np.int64]:
+    def admit(self, candidates: Floats, most: int) -> Integers:
         """Indices of candidates, (k,) and at most ``most``, that keep their distance; earlier ones go first."""
         if self.free:
             return np.arange(min(most, len(candidates)))
@@ -233,7 +230,7 @@ class Spacing:
         self.points = np.concatenate([self.points, candidates[kept]])
         return kept
 
-    def _outranked(self, speakers: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _outranked(self, speakers: Floats) -> Mask:
         """Which speakers, one a cell and in order of rank, have an earlier one too close."""
         outranked = np.zeros(len(speakers), bool)
         own = cells_of(speakers, self.cell)
@@ -249,12 +246,12 @@ class Spacing:
         return outranked
 
 
-def cells_of(points: NDArray[np.float64], cell: float, step: tuple[int, int] = (0, 0)) -> NDArray[np.int64]:
+def cells_of(points: Floats, cell: float, step: tuple[int, int] = (0, 0)) -> Integers:
     """`packed` cells (n,) of a side that points (n, 2) are in, or those so many cells beside."""
     return packed(np.floor(points / cell).astype(np.int64) + np.array(step))
 
 
-def packed(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+def packed(cells: Integers) -> Integers:
     """One number (n,) for each cell (n, 2)."""
     return cells[:, 0] * np.int64(2**32) + cells[:, 1]
 
@@ -265,7 +262,7 @@ _OCTAVES = ((1.0, 1.0), (2.17, 0.35))  # frequency and weight; not a multiple, o
 _BARE, _FULL = -0.1, 0.25  # values of the noise below which nothing grows, and above which all does
 
 
-def gradient_noise(points: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.float64]:
+def gradient_noise(points: Floats, key: Keys) -> Floats:
     """Smooth noise with mean 0 between -1 and 1 (K. Perlin, "Improving noise", SIGGRAPH 2002, in two dimensions).
 
     Parameters
@@ -292,7 +289,7 @@ def gradient_noise(points: NDArray[np.float64], key: NDArray[np.uint64]) -> NDAr
     return np.sqrt(2.0) * (along[0] + fade[:, 0] * (along[1] - along[0]))
 
 
-def clumps(points: NDArray[np.float64], size: float, clumping: float, key: NDArray[np.uint64]) -> NDArray[np.float64]:
+def clumps(points: Floats, size: float, clumping: float, key: Keys) -> Floats:
     """How suitable places are, 0 to 1, for plants that grow in clumps, (n,).
 
     Parameters

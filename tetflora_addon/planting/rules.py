@@ -14,6 +14,7 @@ from math import degrees, floor, inf, isfinite, log10, pi, radians, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import SceneError
 from ..setting import LENGTH, setting
 
@@ -191,7 +192,7 @@ class Rules(GroundLimits):
     companions: tuple[Companion, ...] = ()
 
 
-def species_by_weight(weights: tuple[float, ...], draws: NDArray[np.float64]) -> NDArray[np.int32]:
+def species_by_weight(weights: tuple[float, ...], draws: Floats) -> NDArray[np.int32]:
     """Species as indices into the weights, which are their relative frequencies, by draws from [0, 1), (n,) each."""
     weights = np.maximum(np.asarray(weights, dtype=np.float64), 0.0)
     limits = np.cumsum(weights) / weights.sum()

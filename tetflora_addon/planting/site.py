@@ -11,6 +11,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Keys, Mask
 from ..errors import SceneError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .cover import Suits
@@ -73,9 +74,9 @@ class Sample:
         How many of them each of `REMEDIES` refused.
     """
 
-    position: NDArray[np.float64]
-    up: NDArray[np.float64]
-    key: NDArray[np.uint64]
+    position: Floats
+    up: Floats
+    key: Keys
     drawn: int
     lost: dict[str, int]
 
@@ -144,7 +145,7 @@ class Site:
 
     def draw(
         self,
-        key: NDArray[np.uint64],
+        key: Keys,
         first: int,
         count: int,
         enough: int | None = None,
@@ -165,9 +166,7 @@ class Site:
         position, up, keys = (np.concatenate(column) for column in zip(*parts, strict=True))
         return Sample(position, up, keys, drawn, lost)
 
-    def _suitable(
-        self, keys: NDArray[np.uint64], lost: dict[str, int], suits: Suits | None
-    ) -> tuple[NDArray, NDArray, NDArray[np.uint64]]:
+    def _suitable(self, keys: Keys, lost: dict[str, int], suits: Suits | None) -> tuple[NDArray, NDArray, Keys]:
         index = np.searchsorted(self.cumulative, uniform(keys, SiteDraw.TRIANGLE) * self.cumulative[-1], side="right")
         index = np.minimum(index, len(self.cumulative) - 1)
         # One row of nine numbers at a time: places are in no order, and each row is a wait for memory.
@@ -187,7 +186,7 @@ class Site:
         return points[left], self.normal[index[left]], keys[left]
 
     def _factors(
-        self, index: NDArray[np.int64], barycentric: NDArray, points: NDArray, suits: Suits | None
+        self, index: Integers, barycentric: NDArray, points: NDArray, suits: Suits | None
     ) -> Iterator[tuple[str, object]]:
         """Rules by name, each a function from indices of places to how suitable they are; cheap ones first."""
         rules, ground = self.rules, self.ground
@@ -213,13 +212,13 @@ class Site:
         if suits is not None:
             yield "habitat", lambda i: suits(points[i, :2])
 
-    def _zone_share(self, index: NDArray[np.int64], barycentric: NDArray, points: NDArray) -> NDArray[np.float64]:
+    def _zone_share(self, index: Integers, barycentric: NDArray, points: NDArray) -> Floats:
         if self.within is not None:
             barycentric = np.einsum("ij,ijk->ik", barycentric, self.within[index])
         spots = Spots(self.chosen[index], barycentric, points, self.normal[index])
         return np.prod([zone.share(spots, self.wet) for zone in self.zones], axis=0)
 
-    def _image_value(self, index: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _image_value(self, index: Integers, barycentric: Floats) -> Floats:
         uv = _mean(np.take(self.uv.reshape(-1, 6), index, axis=0), barycentric)
         return np.clip(np.nan_to_num(sampled(self.ground.image, uv)), 0.0, 1.0)
 
@@ -230,13 +229,13 @@ def lines_of_paths(paths: Sequence[Path]) -> Lines | None:
     return lines_along([p.points for p in kept_free], [p.half_width for p in kept_free])
 
 
-def _mean(corners: NDArray[np.float64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+def _mean(corners: Floats, barycentric: Floats) -> Floats:
     """Values between three corners, (n, 3 k) one after the other, at barycentric coordinates (n, 3): (n, k)."""
     a, b, c = np.split(corners, 3, axis=1)
     return barycentric[:, :1] * a + barycentric[:, 1:2] * b + barycentric[:, 2:] * c
 
 
-def _between(z: NDArray[np.float64], low: float, high: float, falloff: float) -> NDArray[np.float64]:
+def _between(z: Floats, low: float, high: float, falloff: float) -> Floats:
     """1 well between the limits, 0 beyond them, linear over the falloff inside of each."""
     inside = ((z >= low) & (z <= high)).astype(np.float64)
     if falloff > NO_DISTANCE:
@@ -244,7 +243,7 @@ def _between(z: NDArray[np.float64], low: float, high: float, falloff: float) ->
     return inside
 
 
-def _by_inclination(triangles: NDArray[np.float64], rules: Rules) -> tuple[NDArray, NDArray, NDArray[np.int64]]:
+def _by_inclination(triangles: Floats, rules: Rules) -> tuple[NDArray, NDArray, Integers]:
     """Triangles of the right slope and aspect, their normals (upwards, twice as long as they are large), and which."""
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normal *= np.where(normal[:, 2:] < 0.0, -1.0, 1.0)
@@ -275,24 +274,24 @@ def _by_inclination(triangles: NDArray[np.float64], rules: Rules) -> tuple[NDArr
     return triangles[chosen], normal[chosen], chosen
 
 
-def _kept(mask: NDArray[np.bool_], *arrays: NDArray | None) -> tuple:
+def _kept(mask: Mask, *arrays: NDArray | None) -> tuple:
     if mask.all():
         return arrays
     return tuple(None if array is None else array[mask] for array in arrays)
 
 
-def _map_cross(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+def _map_cross(triangles: Floats) -> Floats:
     first, second = triangles[:, 1, :2] - triangles[:, 0, :2], triangles[:, 2, :2] - triangles[:, 0, :2]
     return (first[:, :1] * second[:, 1:]) - (first[:, 1:] * second[:, :1])
 
 
 def _near_areas(
-    areas: tuple[NDArray[np.float64], ...],
-    triangles: NDArray[np.float64],
-    weight: NDArray[np.float64] | None,
-    uv: NDArray[np.float64] | None,
+    areas: tuple[Floats, ...],
+    triangles: Floats,
+    weight: Floats | None,
+    uv: Floats | None,
     located: bool,
-) -> tuple[NDArray[np.int64], NDArray, NDArray | None, NDArray | None, NDArray | None]:
+) -> tuple[Integers, NDArray, NDArray | None, NDArray | None, NDArray | None]:
     """Parts (n,) of triangles near areas: large ones are divided, so that few places are drawn in vain.
 
     Triangle (n,) of each part; triangles, weights and texture of the parts; and where their corners are in their

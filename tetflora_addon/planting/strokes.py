@@ -18,6 +18,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Keys, Mask
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..setting import LENGTH, setting
 from .plane import NO_DISTANCE, Spacing, cells_of, packed
@@ -86,12 +87,12 @@ class Brush:
     weights: tuple[float, ...] = (1.0,)
 
 
-def stroke_key(seed: int, stroke: int) -> NDArray[np.uint64]:
+def stroke_key(seed: int, stroke: int) -> Keys:
     """Key of the n-th stroke with a seed, () uint64."""
     return child_key(key_of_seed(seed), stroke)
 
 
-def within(places: NDArray[np.float64], centre: Sequence[float], radius: float) -> NDArray[np.bool_]:
+def within(places: Floats, centre: Sequence[float], radius: float) -> Mask:
     """Which places, (n, 2) or more columns, lie in a circle on the map."""
     gap = places[:, :2] - np.asarray(centre, float)[:2]
     return np.einsum("ij,ij->i", gap, gap) <= radius * radius
@@ -112,9 +113,7 @@ def reach_of(brush: Brush) -> float:
     return brush.radius + max(brush.min_distance, cell_size(brush.density) * sqrt(2.0))
 
 
-def paint(
-    brush: Brush, centre: Sequence[float], standing: NDArray[np.float64], key: NDArray[np.uint64], dab: int
-) -> tuple[NDArray[np.float64], NDArray[np.uint64]]:
+def paint(brush: Brush, centre: Sequence[float], standing: Floats, key: Keys, dab: int) -> tuple[Floats, Keys]:
     """Where one dab sets new plants.
 
     Parameters
@@ -174,17 +173,13 @@ def paint(
     return np.concatenate(found), np.concatenate(keys)
 
 
-def erase(
-    brush: Brush, centre: Sequence[float], standing: NDArray[np.float64], key: NDArray[np.uint64], dab: int
-) -> NDArray[np.int64]:
+def erase(brush: Brush, centre: Sequence[float], standing: Floats, key: Keys, dab: int) -> Integers:
     """Which plants, as numbers of places (m, 2) or (m, 3), one dab removes: a fraction of all in the circle."""
     inside = np.flatnonzero(within(standing, centre, brush.radius))
     return inside[_drawn(brush, inside, key, dab)]
 
 
-def thin(
-    brush: Brush, centre: Sequence[float], standing: NDArray[np.float64], key: NDArray[np.uint64], dab: int
-) -> NDArray[np.int64]:
+def thin(brush: Brush, centre: Sequence[float], standing: Floats, key: Keys, dab: int) -> Integers:
     """Which plants one dab removes where they are denser than the brush, as numbers of places (m, 2) or (m, 3).
 
     Of each cell one plant stays, and of two that are closer than the minimum distance one. Which one depends on a hash
@@ -200,13 +195,13 @@ def thin(
     return gone[_drawn(brush, gone, key, dab)]
 
 
-def _ranks(places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _ranks(places: Floats) -> Floats:
     """Numbers in [0, 1) that places (n, 2) have by themselves, in the precision in which Blender stores them."""
     bits = np.ascontiguousarray(places, np.float32).view(np.uint32)
     return uniform(child_key(key_of_seed(bits[:, 0]), bits[:, 1]), _Draw.RANK)
 
 
-def individuals(brush: Brush, keys: NDArray[np.uint64]) -> dict[str, NDArray]:
+def individuals(brush: Brush, keys: Keys) -> dict[str, NDArray]:
     """Azimuth (radians), scale, species (index of a weight) and seed (0 or more) of plants with keys, (n,) each."""
     low, high = sorted((brush.scale_min, brush.scale_max))
     return {
@@ -217,7 +212,7 @@ def individuals(brush: Brush, keys: NDArray[np.uint64]) -> dict[str, NDArray]:
     }
 
 
-def dabs_along(last: Sequence[float], to: Sequence[float], spacing: float) -> NDArray[np.float64]:
+def dabs_along(last: Sequence[float], to: Sequence[float], spacing: float) -> Floats:
     """Places of dabs from one to another place of the mouse, the first left out and the last kept, (n, 3).
 
     They are about ``spacing`` metres apart, or farther where there would be more than `_MOST_DABS`.
@@ -227,7 +222,7 @@ def dabs_along(last: Sequence[float], to: Sequence[float], spacing: float) -> ND
     return a + (b - a) * (np.arange(1, number + 1) / number)[:, None]
 
 
-def admitted(places: NDArray[np.float64], standing: NDArray[np.float64], distance: float) -> NDArray[np.int64]:
+def admitted(places: Floats, standing: Floats, distance: float) -> Integers:
     """Numbers of places, (n, 2), that keep a distance to those that stand, (m, 2), and among each other.
 
     The earlier of two places goes first, as if they were set one after the other.
@@ -235,7 +230,7 @@ def admitted(places: NDArray[np.float64], standing: NDArray[np.float64], distanc
     return Spacing(distance, standing).admit(places, len(places))
 
 
-def _drawn(brush: Brush, numbers: NDArray[np.int64], key: NDArray[np.uint64], dab: int) -> NDArray[np.bool_]:
+def _drawn(brush: Brush, numbers: Integers, key: Keys, dab: int) -> Mask:
     """Which of some plants a dab of this strength reaches."""
     if brush.strength >= 1.0:
         return np.ones(len(numbers), bool)

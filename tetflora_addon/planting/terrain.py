@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import bilinear
+from ..arrays import Floats, bilinear
 from ..errors import SceneError
 
 
@@ -25,7 +25,7 @@ class Path:
         Metres to either side in which nothing grows; 0 keeps nothing free.
     """
 
-    points: NDArray[np.float64]
+    points: Floats
     half_width: float
 
 
@@ -50,13 +50,13 @@ class Terrain:
         Edges where the ground ends; found from the triangles if they are asked for and not given.
     """
 
-    triangles: NDArray[np.float64]
-    weight: NDArray[np.float64] | None = None
-    uv: NDArray[np.float64] | None = None
+    triangles: Floats
+    weight: Floats | None = None
+    uv: Floats | None = None
     image: NDArray[np.float32] | None = None
-    areas: tuple[NDArray[np.float64], ...] = ()
+    areas: tuple[Floats, ...] = ()
     paths: tuple[Path, ...] = ()
-    border: NDArray[np.float64] | None = None
+    border: Floats | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be stood on.
@@ -92,7 +92,7 @@ class Terrain:
         return float(0.5 * np.abs(ux * vy - uy * vx).sum())
 
 
-def border_of(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+def border_of(triangles: Floats) -> Floats:
     """Edges of only one triangle, (e, 2, 3); corners at exactly the same place are one."""
     # Adding 0 makes -0.0 and 0.0 the same bytes.
     rows = np.ascontiguousarray(triangles.reshape(-1, 3) + 0.0).view(np.dtype((np.void, 24)))[:, 0]
@@ -105,7 +105,7 @@ def border_of(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     return places[first[(count == 1)]]
 
 
-def sampled(image: NDArray[np.float32], uv: NDArray[np.float64]) -> NDArray[np.float64]:
+def sampled(image: NDArray[np.float32], uv: Floats) -> Floats:
     """Values of an image (h, w) at places (n, 2), linear between the middles of texels, (n,).
 
     It repeats, but opposite borders do not mix: a mask that is black on one side would let plants stray to the other.

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from hashlib import blake2b
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from .height_grid import HeightGrid, cell_for, height_grid
 
 #: The topographic index, a in meters, that counts as dry and as wet: a ridge, and the floor of a valley with a brook.
@@ -30,7 +30,7 @@ _SPREAD = 1.1  # exponent of the fall (Freeman 1991): flow down a cone is even a
 _AROUND = tuple((i, j, float(np.hypot(i, j))) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
 
 
-def filled(height: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
+def filled(height: Floats, cell: float) -> Floats:
     """Ground (h, w) without hollows, meters: each cell falls toward the border or toward NaN, from where water leaves.
 
     Notes
@@ -59,7 +59,7 @@ def filled(height: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
     return np.where(np.isnan(height), np.nan, water[1:-1, 1:-1])
 
 
-def _sweep(water: NDArray[np.float64], ground: NDArray[np.float64], lines: range, before: int, cell: float) -> None:
+def _sweep(water: Floats, ground: Floats, lines: range, before: int, cell: float) -> None:
     """Let water of each line sink to the ground, or to a hair above that of the line before."""
     straight, oblique = _DRAIN * cell, _DRAIN * cell * np.sqrt(2.0)
     for line in lines:
@@ -68,7 +68,7 @@ def _sweep(water: NDArray[np.float64], ground: NDArray[np.float64], lines: range
         np.minimum(own, np.maximum(lowest, ground[line, 1:-1]), out=own)
 
 
-def catchment(surface: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
+def catchment(surface: Floats, cell: float) -> Floats:
     """Area that is uphill of each cell of a surface (h, w), with its own, (h, w) in m²; NaN where there is no ground.
 
     Cells without a lower neighbour are outlets. All of the area arrives at these.
@@ -110,7 +110,7 @@ def catchment(surface: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
     return np.where(np.isnan(surface), np.nan, area.reshape(level.shape)[inner])
 
 
-def steepness(surface: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
+def steepness(surface: Floats, cell: float) -> Floats:
     """Tan β of each cell of a surface (h, w), from its neighbours to both sides where it has them; NaN stays."""
     around = np.pad(surface, 1, constant_values=np.nan)
     rises = []
@@ -121,7 +121,7 @@ def steepness(surface: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
     return np.where(np.isnan(surface), np.nan, np.hypot(rises[0], rises[1].T))
 
 
-def topographic_index(height: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
+def topographic_index(height: Floats, cell: float) -> Floats:
     """ln(a / tan β) of each cell, (h, w), a the area uphill for each meter of width; NaN where there is no ground.
 
     The larger of two: hollows keep what runs into them, and hollows are full and flow over.
@@ -133,7 +133,7 @@ def topographic_index(height: NDArray[np.float64], cell: float) -> NDArray[np.fl
     return np.log(np.maximum(*index))
 
 
-def wetness(height: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
+def wetness(height: Floats, cell: float) -> Floats:
     """How wet each cell of a grid of heights (h, w) is, 0 for a ridge to 1 for the floor of a valley; NaN stays.
 
     Limits are fixed (`DRY`, `WET`): what is far away, and not uphill, changes nothing.
@@ -153,9 +153,9 @@ class WetGround:
     """
 
     grid: HeightGrid
-    wetness: NDArray[np.float64]
+    wetness: Floats
 
-    def at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, points: Floats) -> Floats:
         """Wetness at places on the map (n, 2 or more), (n,); beyond all cells it is that of level ground."""
         return np.nan_to_num(self.grid.at(self.wetness, points), nan=0.5)
 
@@ -163,7 +163,7 @@ class WetGround:
 _kept: dict[bytes, WetGround] = {}  # the last one, by content: layers of plants ask for the same ground
 
 
-def wet_ground(triangles: NDArray[np.float64]) -> WetGround:
+def wet_ground(triangles: Floats) -> WetGround:
     """How wet a ground (t, 3, 3) is; that of the last one is kept."""
     key = blake2b(np.ascontiguousarray(triangles).data, digest_size=16).digest()
     made = _kept.get(key)  # other threads may forget it meanwhile

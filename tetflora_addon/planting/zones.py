@@ -14,6 +14,7 @@ from math import inf, pi, radians
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..setting import LENGTH, setting
 from .plane import Lines, lines_along
 from .rules import GroundLimits
@@ -73,10 +74,10 @@ class Spots:
         Of the ground, upwards.
     """
 
-    triangle: NDArray[np.int64]
-    barycentric: NDArray[np.float64]
-    position: NDArray[np.float64]
-    normal: NDArray[np.float64]
+    triangle: Integers
+    barycentric: Floats
+    position: Floats
+    normal: Floats
 
 
 @dataclass(frozen=True)
@@ -98,8 +99,8 @@ class Zone:
     """
 
     limits: Limits
-    weight: NDArray[np.float64] | None = None
-    uv: NDArray[np.float64] | None = None
+    weight: Floats | None = None
+    uv: Floats | None = None
     image: NDArray[np.float32] | None = None
     lines: Lines | None = None
     inverse: bool = False
@@ -109,7 +110,7 @@ class Zone:
         """Whether the wetness of the ground matters."""
         return self.limits.wetness_min > 0.0 or self.limits.wetness_max < 1.0
 
-    def share(self, spots: Spots, wet: WetGround | None) -> NDArray[np.float64]:
+    def share(self, spots: Spots, wet: WetGround | None) -> Floats:
         """How much of each place is the zone's, (n,) from 0 to 1."""
         one = self.limits
         slope = np.arccos(np.clip(spots.normal[:, 2], 0.0, 1.0))
@@ -130,7 +131,7 @@ class Zone:
         return 1.0 - share if self.inverse else share
 
 
-def distance_lines(lines: tuple[NDArray[np.float64], ...], limits: Limits) -> Lines | None:
+def distance_lines(lines: tuple[Floats, ...], limits: Limits) -> Lines | None:
     """Lines on the map, (k, 2) each, to measure the distances that limits ask for; None without any."""
     return lines_along(lines, [_reach(limits)] * len(lines)) if np.isfinite(_reach(limits)) else None
 
@@ -140,14 +141,12 @@ def _reach(limits: Limits) -> float:
     return limits.path_max + 0.5 * limits.path_softness + 1e-3
 
 
-def by_wetness(wet: NDArray[np.float64], limits: GroundLimits) -> NDArray[np.float64]:
+def by_wetness(wet: Floats, limits: GroundLimits) -> Floats:
     """How well ground of a wetness (n,), 0 to 1, fits ``wetness_min``, ``wetness_max`` and ``wetness_softness``."""
     return soft_between(wet, limits.wetness_min, limits.wetness_max, limits.wetness_softness, 0.0, 1.0)
 
 
-def soft_between(
-    values: NDArray[np.float64], low: float, high: float, softness: float, least: float, most: float
-) -> NDArray[np.float64]:
+def soft_between(values: Floats, low: float, high: float, softness: float, least: float, most: float) -> Floats:
     """1 between two limits, 0 beyond them, a half at each where there is softness, (n,).
 
     Limits at the ``least`` and the ``most`` that a value can be have no edge. What ends at a limit and what begins

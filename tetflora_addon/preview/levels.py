@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, srgb_of
+from ..arrays import Arrays, Floats, Integers, srgb_of
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..refinement.contents import Contents
@@ -116,7 +116,7 @@ class Levels:
         """Corners (t, 4, 3) float32 of a level's tetrahedra, or of some, metres from the camera's `origin`."""
         return self.tree.vertices(level.nodes[chosen]).astype(np.float32)
 
-    def back_to_front(self, level: Level, camera: Camera, chosen: NDArray | None = None) -> NDArray[np.intp]:
+    def back_to_front(self, level: Level, camera: Camera, chosen: NDArray | None = None) -> Integers:
         """Exact back-to-front order of a level's places (t,), or of those ``chosen`` (k,), for any camera there."""
         some = np.arange(len(level)) if chosen is None else chosen
         rank = self.tree.order(**camera.line_of_sight, back_to_front=True)
@@ -162,7 +162,7 @@ def _level(flora: Flora, state: Refinement) -> Level:
     )
 
 
-def mean_colours(flora: Flora, contents: Contents, nodes: NDArray[np.integer], size: int) -> NDArray[np.float64]:
+def mean_colours(flora: Flora, contents: Contents, nodes: Integers, size: int) -> Floats:
     """Mean colours (t, 3) of what nodes (t,) hold, weighted by what shows: leaves once, closed surfaces half.
 
     Unlike `proxies.summaries` without orientation and clumping, which a preview does not show.

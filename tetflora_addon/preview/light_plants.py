@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..camera.camera import origin_near
 from ..compiled.flora import Flora
 from ..compiled.placed import extents, outlines
@@ -62,7 +63,7 @@ class Shapes:
     indices: NDArray[np.int32]
     plants: int
     of: int
-    origin: NDArray[np.float64]
+    origin: Floats
 
 
 def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
@@ -128,7 +129,7 @@ def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Sha
     return Shapes(positions.reshape(-1, 3).astype(np.float32), colours, indices, len(trunk), of, origin)
 
 
-def thinned(seeds: Seeds, heights: NDArray[np.float64], most: int = MOST_PLANTS) -> Seeds:
+def thinned(seeds: Seeds, heights: Floats, most: int = MOST_PLANTS) -> Seeds:
     """At most so many plants, in proportion to how large they look: of a meadow under trees the grass is thinned.
 
     Parameters
@@ -148,14 +149,14 @@ def thinned(seeds: Seeds, heights: NDArray[np.float64], most: int = MOST_PLANTS)
     return seeds.take(np.sort(order[np.diff(places, prepend=0.0) > 0.0]))
 
 
-def _shown(flora: Flora, seeds: Seeds, most: int) -> tuple[int, NDArray[np.float64], Branches]:
+def _shown(flora: Flora, seeds: Seeds, most: int) -> tuple[int, Floats, Branches]:
     """How many plants there are, where coordinates begin (3,), and the trunks of at most so many."""
     origin = origin_near(seeds.position)
     some = thinned(seeds, flora.rows["length"][flora.first_row, 0], most).counted_from(origin)
     return len(seeds), origin, trunks(flora.rows, some)
 
 
-def _profile(flora: Flora, row: int) -> NDArray[np.float64]:
+def _profile(flora: Flora, row: int) -> Floats:
     """Lowest and highest leaves of a species, and radii of its crown's rings, for a trunk of length 1."""
     points = flora.samples.leaves if flora.leaf_count[row] > 0 else flora.samples.wood
     first = int(points.first[row, -1])  # of an upright trunk
@@ -170,7 +171,7 @@ def _profile(flora: Flora, row: int) -> NDArray[np.float64]:
     return np.array([low, high, *radii])
 
 
-def _faces() -> NDArray[np.int64]:
+def _faces() -> Integers:
     """Triangles of one plant: crown from its lowest corner over two rings to the highest, then the trunk."""
     i = np.arange(SIDES)
     j = (i + 1) % SIDES
@@ -185,7 +186,7 @@ def _faces() -> NDArray[np.int64]:
     return np.concatenate([np.stack(part, axis=1) for part in parts])
 
 
-def _repeated(indices: NDArray[np.integer], corners: int, times: int) -> NDArray[np.int32]:
+def _repeated(indices: Integers, corners: int, times: int) -> NDArray[np.int32]:
     """The same faces or edges for each of many plants of so many corners."""
     every = indices[None] + corners * np.arange(times)[:, None, None]
     return every.reshape(-1, indices.shape[1]).astype(np.int32)
@@ -198,7 +199,7 @@ _TRUNK = 0.03  # radius of the trunk over that of the crown
 
 
 def simple_crowns(
-    matrices: NDArray[np.float64],
+    matrices: Floats,
     size: tuple[float, float, float],
     colour: Sequence[float],
     boxes: bool = False,
@@ -249,7 +250,7 @@ def joined(parts: Sequence[Shapes]) -> Shapes:
     )
 
 
-def _crown(radius: float, base: float, top: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _crown(radius: float, base: float, top: float) -> tuple[Floats, Integers]:
     """Corners (v, 3) and triangles (t, 3): a crown from its lowest corner over a ring to its highest, and a trunk."""
     angle = np.arange(_SIDES) * 2.0 * np.pi / _SIDES
     ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle + base + _WIDEST * (top - base)], axis=1)
@@ -264,7 +265,7 @@ def _crown(radius: float, base: float, top: float) -> tuple[NDArray[np.float64],
     return corners, np.concatenate([lower, upper, stem])
 
 
-def _box(radius: float, base: float, top: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _box(radius: float, base: float, top: float) -> tuple[Floats, Integers]:
     """Corners (8, 3) and edges (12, 2) of the box around a crown."""
     corners = [(x * radius, y * radius, z) for z in (base, top) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     edges = [(i, (i + 1) % 4) for i in range(4)]

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Mask
 from ..camera.camera import Camera
 from ..tetrahedra.geometry import barycentric_gradients
 
@@ -63,20 +64,20 @@ class Projected:
         either way.
     """
 
-    corners: NDArray[np.float64]
-    opacity: NDArray[np.float64]
-    thickness: NDArray[np.float64]
+    corners: Floats
+    opacity: Floats
+    thickness: Floats
     triangles: NDArray[np.int32]
 
 
-def drawable(vertices: NDArray[np.floating], camera: Camera) -> NDArray[np.bool_]:
+def drawable(vertices: NDArray[np.floating], camera: Camera) -> Mask:
     """Tetrahedra (n, 4, 3) that lie whole in front of the near plane of a flat camera; others have no projection."""
     back = camera.frame[:, 2]
     depth = (np.asarray(camera.position) @ back) - vertices @ back.astype(vertices.dtype)
     return depth.min(axis=1) > camera.near
 
 
-def project(vertices: NDArray[np.float64], extinction: NDArray[np.float64], camera: Camera) -> Projected:
+def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
     """Triangles of tetrahedra as a camera sees them.
 
     Parameters

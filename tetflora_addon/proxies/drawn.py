@@ -18,7 +18,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, Floats
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets
@@ -165,14 +165,14 @@ def facet_mesh(facets: Facets) -> MeshBuffers:
     return triangle_mesh(triangles_of(facets))
 
 
-def cover_of(facets: Facets, camera: Camera | None) -> NDArray[np.float64]:
+def cover_of(facets: Facets, camera: Camera | None) -> Floats:
     """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over all directions."""
     if camera is None:
         return np.full(len(facets), MEAN_COVER)
     return np.maximum(facing(facets, camera), LEAST_COVER)
 
 
-def facing(facets: Facets, camera: Camera) -> NDArray[np.float64]:
+def facing(facets: Facets, camera: Camera) -> Floats:
     """Fraction (n,) of its area that each facet shows to the camera, 0 to 1."""
     if camera.kind == "ORTHO":
         return np.abs(facets.normal @ camera.frame[:, 2])

@@ -32,7 +32,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_TURN, spiral, spread
+from ..arrays import GOLDEN_TURN, Floats, Integers, Mask, Table, spiral, spread
 from ..compiled.clumping import fingerprint
 from ..compiled.flora import Flora, compile_species
 from ..compiled.rays import Things, basis, covered, things_of
@@ -84,19 +84,15 @@ class FacetWeights:
         reach beyond its surface by a part of their side, so what is missing falls as the root of their number.
     """
 
-    whole: NDArray[np.float64]
-    own: NDArray[np.float64]
-    solid: NDArray[np.bool_] | None = None
+    whole: Floats
+    own: Floats
+    solid: Mask | None = None
 
-    def of_subplants(
-        self, row: NDArray[np.integer], count: NDArray[np.float64], share: NDArray[np.float64] | None = None
-    ) -> NDArray[np.float64]:
+    def of_subplants(self, row: Integers, count: Floats, share: Floats | None = None) -> Floats:
         """Weights (n,) for sub-plants of rows (n,), numbers of facets (n,), and parts of their leaves (n,)."""
         return _with_share(self.whole, row, count, share)
 
-    def of_pieces(
-        self, row: NDArray[np.integer], count: NDArray[np.float64], share: NDArray[np.float64] | None = None
-    ) -> NDArray[np.float64]:
+    def of_pieces(self, row: Integers, count: Floats, share: Floats | None = None) -> Floats:
         """Weights (n,) for pieces of branches, by rows (n,) and the numbers of facets (n,) of whole branches."""
         out = _with_share(self.own, row, count, share)
         if self.solid is None or not self.solid.any():
@@ -104,9 +100,7 @@ class FacetWeights:
         return np.where(self.solid[row], 1.0 - (1.0 - out) * np.sqrt(COUNTS[-1] / np.maximum(count, COUNTS[-1])), out)
 
 
-def _with_share(
-    tables: NDArray[np.float64], row: NDArray[np.integer], count: NDArray[np.float64], share: NDArray[np.float64] | None
-) -> NDArray[np.float64]:
+def _with_share(tables: Floats, row: Integers, count: Floats, share: Floats | None) -> Floats:
     """Weights (n,) between those of two shares, where the inverse is nearly linear in the share."""
     if share is None or len(tables) == 1:
         return by_number(tables[0], row, count)
@@ -121,9 +115,7 @@ def _with_share(
     return out
 
 
-def by_number(
-    table: NDArray[np.floating], row: NDArray[np.integer], count: NDArray[np.float64], counts: NDArray = COUNTS
-) -> NDArray[np.float64]:
+def by_number(table: NDArray[np.floating], row: Integers, count: Floats, counts: NDArray = COUNTS) -> Floats:
     """Weights (n,) of rows (n,) of a table (r, k) for ``counts`` (k,) of facets, for numbers of facets (n,) between."""
     place = np.log(np.maximum(count, 1e-12) / counts[0]) / np.log(counts[1] / counts[0])
     place = np.clip(place, 0.0, len(counts) - 1.0)
@@ -132,7 +124,7 @@ def by_number(
 
 
 #: Weights (2, r, k) of other species by digest: a scene is compiled anew for each refinement.
-_found: dict[str, NDArray[np.float64]] = {}
+_found: dict[str, Floats] = {}
 _REMEMBERED = 256
 
 
@@ -155,7 +147,7 @@ def _of_states(flora: Flora, species: tuple[tuple[int, tuple[int, ...]], ...]) -
     return FacetWeights(*weights, are_solids(flora.rows))
 
 
-def _found_of(flora: Flora, number: int) -> NDArray[np.float64]:
+def _found_of(flora: Flora, number: int) -> Floats:
     """Weights (2, r, k) of one species, measured if need be."""
     at_once(_measuring(flora, number))
     return _known(flora, number)
@@ -192,7 +184,7 @@ def _measuring(flora: Flora, number: int) -> Generator[tuple[str, float], None, 
     _keep(content, remembered(_KIND, content, found.shape, lambda: found))
 
 
-def _known(flora: Flora, number: int) -> NDArray[np.float64] | None:
+def _known(flora: Flora, number: int) -> Floats | None:
     """Weights (2, r, k) of one species, which do not depend on the others of the flora; None if nobody has measured."""
     name = digest(flora, number)
     table = shipped().get(name)
@@ -207,11 +199,11 @@ def _known(flora: Flora, number: int) -> NDArray[np.float64] | None:
     return _found[name]
 
 
-def _unknown() -> NDArray[np.float64]:
+def _unknown() -> Floats:
     raise LookupError("not measured yet")
 
 
-def _keep(name: str, found: NDArray[np.float64]) -> None:
+def _keep(name: str, found: Floats) -> None:
     if len(_found) >= _REMEMBERED:
         _found.clear()
     _found[name] = found
@@ -232,7 +224,7 @@ def shipped() -> dict[str, NDArray[np.float32]]:
     return {digest: np.array([one["whole"], one["own"]], np.float32) for digest, one in table.items()}
 
 
-def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float, None, NDArray[np.float64]]:
+def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float, None, Floats]:
     """Measure the weights (2, r, k) of one species: of sub-plants, and of what branches themselves bear.
 
     Parameters
@@ -275,9 +267,7 @@ def _families(flora: Flora, number: int) -> dict[int, list[Branches]]:
     return {row: _affordable(flora, families) for row, families in found.items()}
 
 
-def _neighbours(
-    level: Branches, own: NDArray[np.int64], plant: NDArray[np.int64], most: float
-) -> Iterator[NDArray[np.int64]]:
+def _neighbours(level: Branches, own: Integers, plant: Integers, most: float) -> Iterator[Integers]:
     """Sub-plants next to one of each plant."""
     members = int(np.clip(most, 1, _NEIGHBOURS))
     for p in np.unique(plant[own]):
@@ -295,7 +285,7 @@ def _affordable(flora: Flora, families: list[Branches]) -> list[Branches]:
     return [family for family, sum_ in zip(families, total, strict=True) if sum_ <= most] or families[:1]
 
 
-def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, NDArray[np.float64]]:
+def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, Floats]:
     """All families, so far from each other that no ray meets two of them, and the way (3,) beyond the last."""
     reach = np.hypot(flora.bound[:, 0], np.maximum(-flora.bound[:, 1], flora.bound[:, 2]))
     extent = max(float(np.ptp(f.position, axis=0).max() + 2 * (reach[f.row] * f.length).max()) for f in families)
@@ -308,8 +298,8 @@ def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, NDArray[np
 def _fitted(
     sight: Families,
     rays: float,
-    seen: dict[object, list[tuple[View, NDArray[np.int64]]]],
-) -> Generator[float, None, NDArray[np.float64]]:
+    seen: dict[object, list[tuple[View, Integers]]],
+) -> Generator[float, None, Floats]:
     """Weights (k,) for one row; yields the fraction that is done.
 
     What rays meet is looked up in ``seen``, and noted there.
@@ -350,7 +340,7 @@ def _stride(blocked: float, rays: float, pairs: float) -> int:
     return int(np.clip(most, 1.0, max(1.0, np.sqrt(4.0 * blocked / rays))))
 
 
-def _weight(least: NDArray[np.float64], met: int) -> float:
+def _weight(least: Floats, met: int) -> float:
     """Weight with which ``met`` rays are blocked, from the least weight (n,) with which each ray is."""
     return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else LARGEST
 
@@ -367,11 +357,11 @@ LARGEST = 1.6
 class View:
     """Parallel rays through the points of a lattice on the plane of two axes."""
 
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
+    u: Floats
+    v: Floats
     spacing: float
 
-    def flat(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    def flat(self, vectors: Floats) -> Floats:
         """Vectors (n, 3) on the plane (n, 2), in units of the lattice."""
         return vectors @ np.stack([self.u, self.v], axis=1) / self.spacing
 
@@ -402,18 +392,18 @@ class Families:
 
     flora: Flora
     some: Branches
-    beyond: NDArray[np.float64]
-    area: NDArray[np.float64]
-    leaf: NDArray[np.float64]
+    beyond: Floats
+    area: Floats
+    leaf: Floats
     pieces: Pieces | None
 
     @classmethod
-    def of_subplants(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> Families:
+    def of_subplants(cls, flora: Flora, some: Branches, beyond: Floats) -> Families:
         """Whole sub-plants."""
         return cls(flora, some, beyond, subplant_totals(flora, some).optical_area, flora.one_leaf_area(some), None)
 
     @classmethod
-    def of_branches(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> Families:
+    def of_branches(cls, flora: Flora, some: Branches, beyond: Floats) -> Families:
         """Branches with their own leaves only."""
         pieces, owner = open_subplants(flora, some)[2:]
         area = np.bincount(owner, piece_totals(flora, pieces).optical_area, len(some))
@@ -449,7 +439,7 @@ class Families:
         return replace(branches, key=key, position=branches.position + number * self.beyond)
 
 
-def look(things: Things, beyond: NDArray[np.float64]) -> Iterator[tuple[View, NDArray[np.int64]]]:
+def look(things: Things, beyond: Floats) -> Iterator[tuple[View, Integers]]:
     """Views of families, and the numbers (m,) of the rays of each that meet anything.
 
     Directions are spread over the half sphere; the lattice is as fine for all of them.
@@ -464,7 +454,7 @@ def look(things: Things, beyond: NDArray[np.float64]) -> Iterator[tuple[View, ND
         yield view, _met(view, things)
 
 
-def _met(view: View, things: Things) -> NDArray[np.int64]:
+def _met(view: View, things: Things) -> Integers:
     place = view.flat(things.middle.T)
     near = (np.abs(place - np.rint(place)) <= (things.radius / view.spacing)[:, None]).all(axis=1)
     begin, rays = 0, []
@@ -476,7 +466,7 @@ def _met(view: View, things: Things) -> NDArray[np.int64]:
     return np.unique(np.concatenate(rays))
 
 
-def least_weights(view: View, facets: Facets) -> NDArray[np.float64]:
+def least_weights(view: View, facets: Facets) -> Floats:
     """For each ray that any of the facets can block, the least weight with which one does."""
     reach, largest = CIRCUMRADIUS * facets.side[:, None], np.sqrt(LARGEST)
     centre, a, b = (view.flat(v).T for v in (facets.centre, facets.across * reach, facets.along * reach))
@@ -511,7 +501,7 @@ def least_weights(view: View, facets: Facets) -> NDArray[np.float64]:
     return np.minimum.reduceat(scale[order], begin) ** 2 if len(begin) else np.zeros(0)
 
 
-def _ray_numbers(column: NDArray[np.int64], row: NDArray[np.int64]) -> NDArray[np.int64]:
+def _ray_numbers(column: Integers, row: Integers) -> Integers:
     return (column << 32) + row
 
 
@@ -523,7 +513,7 @@ _YOUNG, _OLD, _DEAD = (0.04, 0.1, 0.25, 0.5), (0.9, 0.995), (1.0, 8.0, 30.0)
 _LOWEST_WEIGHT, _HIGHEST_WEIGHT = 0.02, 1.8
 
 #: Weights (2, r, k) of a species (index) of a flora.
-Known = Callable[[Flora, int], NDArray[np.float64]]
+Known = Callable[[Flora, int], Floats]
 
 
 def states_of(flora: Flora, number: int) -> tuple[int, ...]:
@@ -575,7 +565,7 @@ def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
     return out
 
 
-def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> NDArray[np.float64]:
+def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
     """Weights (2, s, r, k) of a species of a flora in summer, in some states; 1 in the others.
 
     Parameters
@@ -599,7 +589,7 @@ def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known)
     described, years = own.aged
     rows = flora.rows[flora.rows["species"] == number]
 
-    def inverse(some: Flora) -> NDArray[np.float64]:
+    def inverse(some: Flora) -> Floats:
         return 1.0 / np.clip(known(some, 0)[:, _alike(rows, some.rows)], _LOWEST_WEIGHT, _HIGHEST_WEIGHT)
 
     around, place = _around(described, years)
@@ -635,7 +625,7 @@ def _around(described: Species, years: float) -> tuple[list[float], float]:
     return [ages[high - 1], ages[high]], float(np.clip(place, 0.0, 1.0))
 
 
-def _alike(rows: NDArray[np.void], other: NDArray[np.void]) -> NDArray[np.int64]:
+def _alike(rows: Table, other: Table) -> Integers:
     """For each row (r,) of a species, that of a variant which is its order and the nearest part of it."""
     out = np.zeros(len(rows), np.int64)
     for order in np.unique(rows["order"]):

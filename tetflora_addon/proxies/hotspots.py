@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..camera.camera import Camera, to_eye
 from ..compiled.flora import Flora
 from ..compiled.placed import extents
@@ -36,14 +36,14 @@ _POWER = 1.5
 _KNOWN, _POINTS = np.geomspace(1e-3, 1e4, 141), 48
 
 
-def _overlaps() -> NDArray[np.float64]:
+def _overlaps() -> Floats:
     x, weight = np.polynomial.laguerre.laggauss(_POINTS)
     a = _KNOWN[:, None]
     # ∫ 2 exp(−2x + a (1 − e^{−x / a})) dx, of which the quadrature's weights contain e^{−x}.
     return (2.0 * weight * np.exp(np.minimum(-a * np.expm1(-x / a), x) - x)).sum(axis=1)
 
 
-def overlap(size: NDArray[np.float64]) -> NDArray[np.float64]:
+def overlap(size: Floats) -> Floats:
     """How much more (n,) of a deep medium is lit and seen than if light and eye had gaps of their own: 1 to 2.
 
     ``size`` (n,) is the extinction times the chord of a leaf over 2 sin(ψ / 2), with the angle ψ between light and eye.
@@ -53,12 +53,12 @@ def overlap(size: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.interp(np.log(np.maximum(size, _KNOWN[0])), np.log(_KNOWN), _OVERLAPS)
 
 
-def mean_overlap(size: NDArray[np.float64]) -> NDArray[np.float64]:
+def mean_overlap(size: Floats) -> Floats:
     """Mean (n,) of `overlap` over all light through a surface that faces the lamp, by extinction times chord (n,)."""
     return np.interp(np.log(np.maximum(size, _KNOWN[0])), np.log(_KNOWN), _MEANS)
 
 
-def _means() -> NDArray[np.float64]:
+def _means() -> Floats:
     place, weight = np.polynomial.legendre.leggauss(_POINTS)
     chord = (place + 1.0) / np.sqrt(2.0)  # from 0 to √2; directions are as dense as that
     dense = weight * chord * (1.0 - chord**2 / 2.0) * np.sqrt(2.0)
@@ -69,9 +69,7 @@ _OVERLAPS = _overlaps()
 _MEANS = _means()
 
 
-def balance(
-    chord: NDArray[np.float64], extinction: NDArray[np.float64], leaf: NDArray[np.float64], facet: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def balance(chord: Floats, extinction: Floats, leaf: Floats, facet: Floats) -> Floats:
     """Light (n,) that leaves send to the eye once over what facets do, which send as much in all directions.
 
     Parameters
@@ -89,7 +87,7 @@ def balance(
     return ratio * mean_overlap(large) / mean_overlap(small)
 
 
-def balanced_colours(colour: NDArray[np.float64], once: NDArray[np.float64]) -> NDArray[np.float64]:
+def balanced_colours(colour: Floats, once: Floats) -> Floats:
     """Colours (n, 3) with which light that is scattered once changes by factors (n,).
 
     Of all light that a crown of albedo ω sends back, 1 − pω was scattered once.
@@ -98,9 +96,7 @@ def balanced_colours(colour: NDArray[np.float64], once: NDArray[np.float64]) -> 
     return np.clip(colour * once[:, None] ** single**_POWER, 0.0, 1.0)
 
 
-def light_ratios(
-    flora: Flora, subplants: Branches, facet: NDArray[np.float64], camera: Camera, lights: Sequence[Light]
-) -> NDArray[np.float64]:
+def light_ratios(flora: Flora, subplants: Branches, facet: Floats, camera: Camera, lights: Sequence[Light]) -> Floats:
     """`balance` (n,) of sub-plants with facets of sides (n,), metres: the mean over lamps by their strength there.
 
     The sky has no hotspot. Where there are lamps, it is taken for little.

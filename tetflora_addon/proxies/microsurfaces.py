@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_ANGLE, Arrays, gathered, perpendicular, products, spread
+from ..arrays import GOLDEN_ANGLE, Arrays, Floats, Integers, Keys, Mask, gathered, perpendicular, products, spread
 from ..compiled.flora import Flora
 from ..compiled.placed import placed_samples
 from ..compiled.samples import Points
@@ -73,18 +73,18 @@ class Facets(Arrays):
         Length along ``along`` over that of an equilateral triangle of the same area; None for 1.
     """
 
-    centre: NDArray[np.float64]
-    across: NDArray[np.float64]
-    along: NDArray[np.float64]
-    side: NDArray[np.float64]
-    colour: NDArray[np.float64]
-    transmission: NDArray[np.float64]
-    velocity: NDArray[np.float64] | None = None
-    roughness: NDArray[np.float64] | None = None
-    stretch: NDArray[np.float64] | None = None
+    centre: Floats
+    across: Floats
+    along: Floats
+    side: Floats
+    colour: Floats
+    transmission: Floats
+    velocity: Floats | None = None
+    roughness: Floats | None = None
+    stretch: Floats | None = None
 
     @property
-    def normal(self) -> NDArray[np.float64]:
+    def normal(self) -> Floats:
         """Unit vectors (n, 3) that facets are perpendicular to."""
         return np.cross(self.across, self.along)
 
@@ -92,11 +92,11 @@ class Facets(Arrays):
 def subplant_facets(
     flora: Flora,
     subplants: Branches,
-    leaf_side: NDArray[np.float64],
-    wood_side: NDArray[np.float64] | None = None,
-    weight: NDArray[np.float64] | None = None,
-    real: NDArray[np.float64] | None = None,
-    once: NDArray[np.float64] | None = None,
+    leaf_side: Floats,
+    wood_side: Floats | None = None,
+    weight: Floats | None = None,
+    real: Floats | None = None,
+    once: Floats | None = None,
 ) -> Facets:
     """Facets of sub-plants.
 
@@ -125,12 +125,12 @@ def subplant_facets(
 def piece_facets(
     flora: Flora,
     pieces: Pieces,
-    leaf_side: NDArray[np.float64],
-    wood_side: NDArray[np.float64] | None = None,
-    weight: NDArray[np.float64] | None = None,
-    real: NDArray[np.float64] | None = None,
-    real_wood: NDArray[np.bool_] | None = None,
-    once: NDArray[np.float64] | None = None,
+    leaf_side: Floats,
+    wood_side: Floats | None = None,
+    weight: Floats | None = None,
+    real: Floats | None = None,
+    real_wood: Mask | None = None,
+    once: Floats | None = None,
 ) -> Facets:
     """Facets of pieces of branches; parameters as for `subplant_facets`.
 
@@ -193,7 +193,7 @@ def facet_numbers(
     return owner[kept], index[kept], own[kept], one[owner[kept]]
 
 
-def _in_a_face(flora: Flora, row: NDArray, key: NDArray[np.uint64], frame: NDArray) -> tuple[NDArray, NDArray]:
+def _in_a_face(flora: Flora, row: NDArray, key: Keys, frame: NDArray) -> tuple[NDArray, NDArray]:
     """Two axes (n, 3), (n, 3) in a face of leaves with axes (n, 3, 3) that branches of the rows (n,) bear."""
     planes = leaf_planes(flora)
     number = row * planes.shape[1] + (uniform(key, _FACE) * planes.shape[1]).astype(np.int64)
@@ -208,7 +208,7 @@ def _in_a_face(flora: Flora, row: NDArray, key: NDArray[np.uint64], frame: NDArr
 
 def _picked(
     flora: Flora, points: Points, subplants: Branches, owner: NDArray, index: NDArray, key: NDArray, area: NDArray
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Integers, Floats, Floats, Floats]:
     """Samples (m,) for facets, their places (m, 3), rotations (m, 3, 3) from their axes to the world, and areas (m,).
 
     Runs of samples are spread over a sub-plant, and each starts its run elsewhere. Where there are more facets than
@@ -233,7 +233,7 @@ def _picked(
     return pick, place, base, area if share is None else area * share
 
 
-def _turned(base: NDArray[np.float64], again: NDArray[np.int64], some: NDArray[np.intp]) -> None:
+def _turned(base: Floats, again: Integers, some: Integers) -> None:
     """Turn some of rotations (m, 3, 3) about their third axes, in place, by as many golden angles as numbers (m,)."""
     angle = again[some] * GOLDEN_ANGLE
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
@@ -279,7 +279,7 @@ def _leaves_of_subplants(
     return made if of_day is None else made.take(np.flatnonzero(of_day > 0))
 
 
-def _of_kinds(flora: Flora, subplants: Branches, owner: NDArray, kind: NDArray) -> NDArray[np.float64] | None:
+def _of_kinds(flora: Flora, subplants: Branches, owner: NDArray, kind: NDArray) -> Floats | None:
     """Factors (m,) on areas of facets, whose samples are those of summer, by kind of leaf; None where there is one."""
     if len(flora.day.kinds) < 2:
         return None
@@ -360,16 +360,14 @@ def _wood_of_pieces(flora: Flora, pieces: Pieces, totals: Totals, side: NDArray,
 
 
 def _strips(
-    centre: NDArray, axis: NDArray, key: NDArray[np.uint64], side: NDArray, colour: NDArray, velocity: NDArray | None
+    centre: NDArray, axis: NDArray, key: Keys, side: NDArray, colour: NDArray, velocity: NDArray | None
 ) -> Facets:
     """Facets of wood: long and thin, as branches are, along axes (n, 3)."""
     stretch, none = np.full(len(side), STRETCH), np.zeros(len(side))
     return Facets(centre, _across(axis, key), axis, side, colour, none, velocity, stretch=stretch)
 
 
-def _carried(
-    flora: Flora, subplants: Branches, owner: NDArray[np.int64], centre: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
+def _carried(flora: Flora, subplants: Branches, owner: Integers, centre: Floats) -> Floats | None:
     """Velocities (m, 3) of points (m, 3) of sub-plants that move with their bases; None for plants at rest."""
     if subplants.later is None:
         return None
@@ -382,12 +380,12 @@ def _carried(
 def _along(
     flora: Flora,
     pieces: Pieces,
-    area: NDArray[np.float64],
-    facet: NDArray[np.float64],
-    start: NDArray[np.float64],
+    area: Floats,
+    facet: Floats,
+    start: Floats,
     path: int,
     draw: int,
-    real: NDArray[np.float64] | None = None,
+    real: Floats | None = None,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
     """Owner, index, key, area and place along the branch of the facets of pieces, see `facet_numbers`.
 
@@ -408,19 +406,19 @@ def _along(
     return owner[on], index[on], key[on], one[on], t[on]
 
 
-def _across(axis: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.float64]:
+def _across(axis: Floats, key: Keys) -> Floats:
     """Unit vectors perpendicular to axes, turned about them at random, since closed tubes face all ways around."""
     a = perpendicular(axis)
     turn = 2 * np.pi * uniform(key, _TURN)[:, None]
     return np.cos(turn) * a + np.sin(turn) * np.cross(axis, a)
 
 
-OnDay = tuple[Branches, NDArray[np.integer]] | None
+OnDay = tuple[Branches, Integers] | None
 
 
 def leaf_colours_of_facets(
     flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray, on_day: OnDay
-) -> NDArray[np.float64]:
+) -> Floats:
     """Colours of facets that stand for several leaves (n,) each: a mean varies less than the colour of one leaf.
 
     ``on_day`` are branches, and those (n,) whose leaves they are, where these may not be as in summer.
@@ -438,13 +436,13 @@ def leaf_colours_of_facets(
     return np.clip(mean + gathered(flora.rows["leaf_colour"][:, 1], row) * deviation[:, None], 0, 1)
 
 
-def dimmed(colour: NDArray, owner: NDArray, weight: NDArray, once: NDArray | None) -> NDArray[np.float64]:
+def dimmed(colour: NDArray, owner: NDArray, weight: NDArray, once: NDArray | None) -> Floats:
     """Colours (m, 3) of facets of owners (m,), by the weights of these (n,) and what light and eye share of them."""
     colour = trapped(colour, weight[owner])
     return colour if once is None else balanced_colours(colour, once[owner])
 
 
-def trapped(colour: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:
+def trapped(colour: Floats, weight: Floats) -> Floats:
     """Colour (n, 3) of clusters of surfaces that are seen by a fraction ``weight`` (n,) of their area.
 
     What one surface scatters meets another of its cluster with the probability p = 1 − weight, and is dimmed again:
@@ -460,7 +458,7 @@ _PLANES = 32
 
 
 @lru_cache(maxsize=8)
-def leaf_planes(flora: Flora) -> NDArray[np.float64]:
+def leaf_planes(flora: Flora) -> Floats:
     """Rotations (r, `_PLANES`, 3, 3) from axes of a face to those of the leaf that each row's own branch bears.
 
     The third axis is the normal of the face, the second as near as may be to the leaf's midrib. Each stands for the
@@ -472,7 +470,7 @@ def leaf_planes(flora: Flora) -> NDArray[np.float64]:
     return np.array([_planes_of(flora, s, k) for s, k in kinds.tolist()])[kind.ravel()]
 
 
-def _planes_of(flora: Flora, species: int, kind: int) -> NDArray[np.float64]:
+def _planes_of(flora: Flora, species: int, kind: int) -> Floats:
     """Rotations (`_PLANES`, 3, 3) of a kind of leaves of a species."""
     vectors = np.concatenate([np.zeros((0, 3)), *(model.face_vectors for model in flora.forms[species][kind])])
     areas = np.linalg.norm(vectors, axis=1)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import unit
+from ..arrays import Floats, Integers, unit
 from ..compiled.clumping import factors
 from ..compiled.flora import Flora
 from ..compiled.orientation import leaf_moments, own_leaf_moments, wood_moments
@@ -42,13 +42,13 @@ class Summaries:
         and for what polygons contribute.
     """
 
-    optical_area: NDArray[np.float64]
-    colour: NDArray[np.float64]
-    transmission: NDArray[np.float64]
-    moment: NDArray[np.float64]
-    clumping: NDArray[np.float64] | None = None
+    optical_area: Floats
+    colour: Floats
+    transmission: Floats
+    moment: Floats
+    clumping: Floats | None = None
 
-    def effective_area(self, volumes: NDArray[np.float64]) -> NDArray[np.float64]:
+    def effective_area(self, volumes: Floats) -> Floats:
         """Area (n,) of an even fog, as dark as the tetrahedra, in given volumes (n,); m²."""
         if self.clumping is None:
             return self.optical_area
@@ -58,7 +58,7 @@ class Summaries:
 def summarise(
     flora: Flora,
     contents: Contents,
-    index: NDArray[np.integer],
+    index: Integers,
     count: int,
     assets: tuple[PlacedAssets, Held[AssetParts]] | None = None,
 ) -> Summaries:
@@ -112,12 +112,12 @@ def summarise(
     return Summaries(area, mean[:, 1:4], mean[:, 4], _moments(mean[:, 5:14].reshape(-1, 3, 3)), mean[:, 14:])
 
 
-def _add(sums: NDArray[np.float64], to: NDArray[np.integer], values: NDArray[np.float64]) -> None:
+def _add(sums: Floats, to: Integers, values: Floats) -> None:
     for k in range(values.shape[1]):
         sums[:, k] += np.bincount(to, values[:, k], len(sums))
 
 
-def _add_polygons(sums: NDArray[np.float64], contents: Contents, index: NDArray[np.integer]) -> None:
+def _add_polygons(sums: Floats, contents: Contents, index: Integers) -> None:
     """Polygons are summed up triangle by triangle, which is exact under any sequence of cuts."""
     chosen = np.flatnonzero(index[contents.polygons.cell] >= 0)
     meshes = contents.polygons.items.meshes
@@ -139,9 +139,7 @@ def _add_polygons(sums: NDArray[np.float64], contents: Contents, index: NDArray[
         _add(sums, index[contents.polygons.cell[some]][owner], optical * seen)
 
 
-def _add_assets(
-    sums: NDArray[np.float64], placed: PlacedAssets, held: Held[AssetParts], index: NDArray[np.integer]
-) -> None:
+def _add_assets(sums: Floats, placed: PlacedAssets, held: Held[AssetParts], index: Integers) -> None:
     held = held.take(np.flatnonzero(index[held.cell] >= 0))
     clusters, cluster, area = placed.assets.clusters, held.items.cluster, held.totals.optical_area[:, None]
     local, full = clusters.moment[cluster], np.empty((len(cluster), 3, 3))
@@ -156,7 +154,7 @@ def _add_assets(
     _add(sums, index[held.cell], area * seen)
 
 
-def _moments(sums: NDArray[np.float64]) -> NDArray[np.float64]:
+def _moments(sums: Floats) -> Floats:
     """Moments of trace 1 (n, 3, 3) of sums of polynomials, whose least eigenvalue may lie a little below 0."""
     values, vectors = np.linalg.eigh((sums + sums.transpose(0, 2, 1)) / 2)
     values = np.maximum(values, 0)
@@ -164,7 +162,7 @@ def _moments(sums: NDArray[np.float64]) -> NDArray[np.float64]:
     return (vectors * (values / np.where(trace > 0, trace, 1))[:, None]) @ vectors.transpose(0, 2, 1)
 
 
-def extinction_matrices(summaries: Summaries, volumes: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
+def extinction_matrices(summaries: Summaries, volumes: Floats) -> tuple[NDArray, NDArray, NDArray]:
     """Extinction by direction, as it is between clusters of leaves, and the plane that the surfaces resemble.
 
     Returns

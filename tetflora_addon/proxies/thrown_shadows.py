@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..camera.camera import Camera
 from ..refinement.lights import Light
 
@@ -43,9 +43,7 @@ class ThrownShadows:
     lights: Sequence[Light] = ()
     floor: float = -np.inf
 
-    def distance(
-        self, points: NDArray[np.float64], clearance: NDArray[np.float64], reach: NDArray[np.float64] | float = 0.0
-    ) -> NDArray[np.float64]:
+    def distance(self, points: Floats, clearance: Floats, reach: Floats | float = 0.0) -> Floats:
         """Metres (n,) that shadows of points (n, 3) fall before they are in view; infinite where they never are.
 
         ``clearance`` (n,) is that of the points from the view, metres; a shadow falls at least so far, and within the
@@ -62,7 +60,7 @@ class ThrownShadows:
                 found[beside] = np.minimum(found[beside], self._of(light, points[beside], reach[beside]))
         return np.maximum(found, np.maximum(clearance, 0.0))
 
-    def _of(self, light: Light, points: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _of(self, light: Light, points: Floats, reach: Floats) -> Floats:
         if light.kind == "SUN":
             ray = np.broadcast_to(light.direction, points.shape)
         else:

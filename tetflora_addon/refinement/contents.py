@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, nested
+from ..arrays import Arrays, Floats, Integers, Mask, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds, extents
@@ -58,18 +58,18 @@ class Totals(Arrays):
         tetrahedron that holds nothing else.
     """
 
-    leaf_area: NDArray[np.float64]
-    wood_area: NDArray[np.float64]
-    polygons: NDArray[np.float64]
-    width: NDArray[np.float64]
+    leaf_area: Floats
+    wood_area: Floats
+    polygons: Floats
+    width: Floats
 
     @property
-    def area(self) -> NDArray[np.float64]:
+    def area(self) -> Floats:
         """Leaves and wood together (n,), m²."""
         return self.leaf_area + self.wood_area
 
     @property
-    def optical_area(self) -> NDArray[np.float64]:
+    def optical_area(self) -> Floats:
         """Area (n,) that can block light, m²: leaves, and half of the wood, since closed branches show no more."""
         return self.leaf_area + self.wood_area / 2
 
@@ -84,7 +84,7 @@ def subplant_totals(flora: Flora, subplants: Branches) -> Totals:
     )
 
 
-def feature_width(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
+def feature_width(flora: Flora, subplants: Branches) -> Floats:
     """Width (n,) of the features of sub-plants, metres: that of their leaves, or of their branch without any."""
     row = subplants.row
     width = np.where(flora.leaf_count[row] > 0, flora.leaf_width[row] * subplants.scale, 2.0 * subplants.radius)
@@ -112,7 +112,7 @@ def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
     return Totals(area, wood_areas(flora, pieces), leaves * leaf.polygons[row] + flora.rows["sides"][row], width)
 
 
-def polygon_totals(polygons: Polygons, width: NDArray[np.float64] | None = None) -> Totals:
+def polygon_totals(polygons: Polygons, width: Floats | None = None) -> Totals:
     """Totals of explicit polygons, without what is transparent; ``width`` (n,) replaces that of the surfaces."""
     meshes, face = polygons.meshes, polygons.face
     area = polygons.areas() * meshes.coverage[meshes.slot[face]]
@@ -122,7 +122,7 @@ def polygon_totals(polygons: Polygons, width: NDArray[np.float64] | None = None)
     return Totals(np.where(solid, 0.0, area), np.where(solid, area, 0.0), np.ones(len(face)), width)
 
 
-def sums(totals: Totals, cells: NDArray[np.integer], number: int) -> Totals:
+def sums(totals: Totals, cells: Integers, number: int) -> Totals:
     """Totals of each of a number of cells, from those (n,) of the things in ``cells`` (n,); the width is a mean."""
     area, fine = totals.area, np.isfinite(totals.width)
     small = np.where(fine, area, 0.0)
@@ -152,9 +152,9 @@ class PlantParts(Arrays):
     """
 
     branches: Branches = field(metadata=nested(Branches))
-    alone: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    alone: Mask = field(metadata=column(dtype=bool))
     totals: Totals = field(metadata=nested(Totals))
-    extent: NDArray[np.float64]
+    extent: Floats
 
     @classmethod
     def of_subplants(cls, flora: Flora, branches: Branches) -> PlantParts:
@@ -171,7 +171,7 @@ class PlantParts(Arrays):
         extent = branches.length * np.maximum(1.0, 2.0 * reaches(flora.rows)[branches.row])
         return cls(branches, np.ones(len(branches), bool), piece_totals(flora, as_pieces(branches)), extent)
 
-    def can_open(self, flora: Flora) -> NDArray[np.bool_]:
+    def can_open(self, flora: Flora) -> Mask:
         """Parts (n,) on which something else grows."""
         row = self.branches.row
         return ~self.alone & ((flora.rows["next"][row] >= 0).any(axis=1) | flora.rows["phantom"][row])
@@ -218,7 +218,7 @@ class Contents:
     polygons: Held[Polygons] = field(default_factory=lambda: Held.none(Polygons))
 
 
-def in_the_root(polygons: Polygons, large: NDArray[np.bool_] | None = None) -> Held[Polygons]:
+def in_the_root(polygons: Polygons, large: Mask | None = None) -> Held[Polygons]:
     """Polygons (n,), all in the root; ``large`` ones (n,) stay polygons whatever is decided about their cells."""
     totals = polygon_totals(polygons)
     if large is not None:
@@ -246,7 +246,7 @@ class Holdings:
         """Bytes of all arrays, including what was taken out but is not yet dropped."""
         return sum(part.nbytes for part in self._parts)
 
-    def totals(self, chosen: NDArray[np.bool_]) -> list[tuple[Totals, NDArray[np.int32]]]:
+    def totals(self, chosen: Mask) -> list[tuple[Totals, NDArray[np.int32]]]:
         """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each part."""
         some = [part.take(_within(part, chosen)) for part in self._parts]
         return [(part.totals, part.cell) for part in some]
@@ -255,7 +255,7 @@ class Holdings:
         """Add polygons."""
         self._parts.append(polygons)
 
-    def take_out(self, chosen: NDArray[np.bool_]) -> Held[Polygons]:
+    def take_out(self, chosen: Mask) -> Held[Polygons]:
         """Remove and return what lies in chosen nodes; ``chosen`` is (nodes,) bool."""
         out, kept = [], []
         for part in self._parts:
@@ -271,7 +271,7 @@ class Holdings:
         return _joined(out)
 
 
-def _within(part: Held[Polygons], chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _within(part: Held[Polygons], chosen: Mask) -> Mask:
     return chosen[np.maximum(part.cell, 0)] & (part.cell >= 0)
 
 
@@ -286,14 +286,14 @@ def _joined(parts: list[Held[Polygons]]) -> Held[Polygons]:
     return Held.concatenate(parts)
 
 
-def large_polygons(polygons: Polygons, camera: Camera) -> NDArray[np.bool_]:
+def large_polygons(polygons: Polygons, camera: Camera) -> Mask:
     """Polygons (n,) too large for a facet; leaves never are, since one facet may stand for several."""
     meshes, face = polygons.meshes, polygons.face
     optical = polygons.areas() * np.where(meshes.solid[face], 0.5, 1.0)
     return ~meshes.leaf[face] & (optical >= (LARGE * camera.extent_around(polygons.centre)) ** 2)
 
 
-def bounding_bodies(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
+def bounding_bodies(flora: Flora, subplants: Branches) -> Floats:
     """Bodies that hold all vertices of sub-plants, from the compiled bounds alone.
 
     Returns
@@ -326,7 +326,7 @@ def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDAr
     return bodies[:3].T, bodies[6] + bodies[8], bodies[7] + bodies[8]
 
 
-def bounding_box(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
+def bounding_box(flora: Flora, subplants: Branches) -> Floats:
     """Axis-aligned box (2, 3) of all sub-plants' bounds, metres."""
     bodies = bounding_bodies(flora, subplants)
     axis = np.abs(bodies[3:6])
@@ -335,15 +335,13 @@ def bounding_box(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
 
 
 #: Metres (n,) at points (n, 3) that make no difference in the image.
-Slack = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Slack = Callable[[Floats], Floats]
 
 #: Triangles of polygons that are lowered at a time; bounds what that takes to some hundred megabytes.
 LOWERED_AT_ONCE = 200_000
 
 
-def cut(
-    polygons: Polygons, planes: NDArray[np.float64], slack: NDArray[np.float64] | float = 0.0
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Polygons]:
+def cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tuple[Integers, Integers, Polygons]:
     """Clip polygons (n,) by a plane (n, 4) each.
 
     Triangles that reach beyond their plane by no more than ``slack`` (n,), in metres, stay whole.
@@ -409,7 +407,7 @@ def push_down(tree: TetrahedralTree, held: Held[Polygons], slack: Slack | None =
 
 def _lowered(
     tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack | None
-) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.int32], Mask]:
     """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""
     cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
     centre, reach, touching = polygons.centre, polygons.reach, polygons.touching()

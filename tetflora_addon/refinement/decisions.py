@@ -10,7 +10,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, smoothstep
+from ..arrays import Arrays, Floats, Integers, Mask, smoothstep
 from ..camera.camera import Camera
 from ..tetrahedra.geometry import squared_edges, volume
 from ..tetrahedra.tree import TetrahedralTree
@@ -33,7 +33,7 @@ FACET_BLOCK = 1.0
 BAND = 2.5
 
 
-def real_fraction(pixels: NDArray[np.float64], limit: float) -> NDArray[np.float64]:
+def real_fraction(pixels: Floats, limit: float) -> Floats:
     """Fraction (n,) of leaves that are real by their width (n,) in pixels: a smooth step in its logarithm.
 
     It is 0 up to a limit in pixels and 1 from `BAND` times that on (beyond the paper, which switches at once).
@@ -72,18 +72,18 @@ class Terminals(Arrays):
         Whether all of each is in view. What crosses the border has the pixels of its visible part only.
     """
 
-    nodes: NDArray[np.intp]
+    nodes: Integers
     totals: Totals
-    pixels: NDArray[np.float64]
-    opacity: NDArray[np.float64]
-    feature: NDArray[np.float64]
-    least_feature: NDArray[np.float64]
-    span: NDArray[np.float64]
-    whole: NDArray[np.bool_]
+    pixels: Floats
+    opacity: Floats
+    feature: Floats
+    least_feature: Floats
+    span: Floats
+    whole: Mask
 
     @classmethod
     def seen(
-        cls, tree: TetrahedralTree, nodes: NDArray[np.intp], totals: Totals, camera: Camera, buffer: AlphaBuffer
+        cls, tree: TetrahedralTree, nodes: Integers, totals: Totals, camera: Camera, buffer: AlphaBuffer
     ) -> Terminals:
         """Draw tetrahedra ``nodes`` (n,) of the tree into the alpha buffer and keep what it finds for each."""
         vertices = tree.vertices(nodes)
@@ -93,7 +93,7 @@ class Terminals(Arrays):
         return cls(nodes, totals, outline.pixels, outline.opacity, *features, span, outline.whole)
 
 
-def mean_extinction(totals: Totals, volumes: NDArray[np.float64]) -> NDArray[np.float64]:
+def mean_extinction(totals: Totals, volumes: Floats) -> Floats:
     """Extinction κ (n,) of tetrahedra in 1/m, as if surfaces faced all ways.
 
     Notes
@@ -103,15 +103,13 @@ def mean_extinction(totals: Totals, volumes: NDArray[np.float64]) -> NDArray[np.
     return (totals.leaf_area / 2 + totals.wood_area / 4) / volumes
 
 
-def feature_pixels(
-    vertices: NDArray[np.float64], width: NDArray[np.float64], camera: Camera
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def feature_pixels(vertices: Floats, width: Floats, camera: Camera) -> tuple[Floats, Floats]:
     """Widths (n,) in metres as pixels, where tetrahedra (n, 4, 3) are nearest to the eye and where farthest."""
     extent = camera.pixel_extent(vertices)
     return width / extent.min(axis=1), width / extent.max(axis=1)
 
 
-def decide(cells: Terminals, transmittance: NDArray[np.float64], settings: RefinementSettings) -> NDArray[np.int8]:
+def decide(cells: Terminals, transmittance: Floats, settings: RefinementSettings) -> NDArray[np.int8]:
     """Values (n,) of `Decision` for terminal tetrahedra (n,).
 
     ``transmittance`` (n,) is the fraction of each one's light that nothing in front blocks; 0 out of view.
@@ -149,14 +147,12 @@ def decide(cells: Terminals, transmittance: NDArray[np.float64], settings: Refin
     return out
 
 
-def contributions(cells: Terminals, transmittance: NDArray[np.float64]) -> NDArray[np.float64]:
+def contributions(cells: Terminals, transmittance: Floats) -> Floats:
     """Pixels (n,) that the contents of tetrahedra change."""
     return cells.pixels * transmittance * cells.opacity
 
 
-def gains_nothing(
-    splitting: NDArray[np.bool_], cells: Terminals, transmittance: NDArray[np.float64], camera: Camera
-) -> bool:
+def gains_nothing(splitting: Mask, cells: Terminals, transmittance: Floats, camera: Camera) -> bool:
     """Whether dividing the last few cells, a mask (n,), would change almost no pixels, and they hold few polygons.
 
     ``transmittance`` (n,) is the fraction of each that nothing in front blocks.
@@ -168,7 +164,7 @@ def gains_nothing(
 
 
 def without_splits(
-    decision: NDArray[np.int8], cells: Terminals, transmittance: NDArray[np.float64], settings: RefinementSettings
+    decision: NDArray[np.int8], cells: Terminals, transmittance: Floats, settings: RefinementSettings
 ) -> NDArray[np.int8]:
     """Decisions (n,) without divisions, where a limit forbids them: leaves of a pixel stay leaves.
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..camera.camera import Camera
 from .settings import RefinementSettings
 
@@ -54,11 +54,11 @@ class Stand:
     """
 
     number: int
-    foot: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    height: NDArray[np.float64]
-    polygons: NDArray[np.float64]
-    leaf: NDArray[np.float64]
+    foot: Floats
+    radius: Floats
+    height: Floats
+    polygons: Floats
+    leaf: Floats
 
     @property
     def weight(self) -> float:
@@ -136,7 +136,7 @@ def _primitives(stand: Stand, camera: Camera, settings: RefinementSettings) -> f
     return float((1.0 + UNSEEN) * stand.weight * np.minimum(stand.polygons, full * dense * each).sum())
 
 
-def seen(stand: Stand, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def seen(stand: Stand, camera: Camera) -> tuple[Floats, Floats, Floats]:
     """Fraction (k,) of each known plant in the picture, metres (k,) that a pixel spans there, pixels (k,) it covers."""
     middle = stand.foot + stand.height[:, None] * np.array([0.0, 0.0, 0.5])
     across = np.sqrt(stand.radius * np.maximum(stand.height / 2.0, stand.radius))  # of the disc of equal area

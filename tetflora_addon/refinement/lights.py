@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..camera.camera import Camera
 from ..tetrahedra.geometry import volume
 from ..tetrahedra.tree import TetrahedralTree
@@ -70,24 +71,22 @@ class Light:
     """
 
     kind: Literal["SUN", "SPOT", "POINT", "AREA"]
-    position: NDArray[np.float64]
-    direction: NDArray[np.float64]
+    position: Floats
+    direction: Floats
     width: float = 0.0
     angle: float = np.pi
-    colour: NDArray[np.float64] = field(default_factory=lambda: np.ones(3))
+    colour: Floats = field(default_factory=lambda: np.ones(3))
     blend: float = 0.0
-    span: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
+    span: Floats = field(default_factory=lambda: np.zeros((2, 3)))
     ellipse: bool = False
     shadow: bool = True
 
-    def counted_from(self, origin: NDArray[np.float64]) -> Light:
+    def counted_from(self, origin: Floats) -> Light:
         """The same in coordinates that begin at a place (3,) of the present ones."""
         return replace(self, position=self.position - origin)
 
 
-def light_views(
-    light: Light, vertices: NDArray[np.float64], points: NDArray[np.float64], resolution: int
-) -> list[Camera]:
+def light_views(light: Light, vertices: Floats, points: Floats, resolution: int) -> list[Camera]:
     """Flat cameras through which a light sees what receives it.
 
     Parameters
@@ -126,7 +125,7 @@ def light_views(
     return _all_around(light.position, frame, far, resolution)
 
 
-def _all_around(position: NDArray[np.float64], frame: NDArray[np.float64], far: float, resolution: int) -> list[Camera]:
+def _all_around(position: Floats, frame: Floats, far: float, resolution: int) -> list[Camera]:
     panorama = Camera("PANO", position, frame, (-np.pi, np.pi, -np.pi / 2, np.pi / 2), _NEAR, far, 4, 2)
     return face_cameras(panorama, resolution)
 
@@ -137,7 +136,7 @@ def image_size(width: float, height: float) -> tuple[int, int]:
     return max(round(width * scale), 1), max(round(height * scale), 1)
 
 
-def frame_towards(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+def frame_towards(direction: Floats) -> Floats:
     """Frame (3, 3) of a camera that looks in a direction (3,) of any length."""
     back = -np.asarray(direction, np.float64) / np.linalg.norm(direction)
     aside = np.eye(3)[np.argmin(np.abs(back))]
@@ -146,7 +145,7 @@ def frame_towards(direction: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([right, np.cross(back, right), back], axis=1)
 
 
-def lamp_views(position: NDArray[np.float64], points: NDArray[np.float64], resolution: int) -> list[Camera]:
+def lamp_views(position: Floats, points: Floats, resolution: int) -> list[Camera]:
     """Views of points (m, 3) from a lamp: one that fits them closely, or six all around where they surround it."""
     away = points - position
     distance = np.linalg.norm(away, axis=1)
@@ -176,8 +175,8 @@ class Shadows:
         Width in pixels of the shadows of what they hold, 0 where it is lost in the light's penumbra.
     """
 
-    pixels: NDArray[np.float64]
-    feature: NDArray[np.float64]
+    pixels: Floats
+    feature: Floats
 
 
 def decide_by_shadows(
@@ -200,7 +199,7 @@ def shadows_of(
     decision: NDArray[np.int8],
     lights: Sequence[Light],
     camera: Camera,
-    ground: NDArray[np.float64],
+    ground: Floats,
     settings: RefinementSettings,
 ) -> Shadows:
     """Shadows (n,) of hidden tetrahedra on what the camera sees.
@@ -250,7 +249,7 @@ def shadows_of(
     return Shadows(pixels, feature)
 
 
-def seen_ground(camera: Camera, occluders: NDArray[np.float64] | None, height: float) -> NDArray[np.float64]:
+def seen_ground(camera: Camera, occluders: Floats | None, height: float) -> Floats:
     """Points (m, 3) where rays through the image meet occluders, triangles (t, 3, 3), or else level ground at a height.
 
     All in metres, world space.
@@ -271,7 +270,7 @@ def seen_ground(camera: Camera, occluders: NDArray[np.float64] | None, height: f
     return np.concatenate(found)
 
 
-def _fields(pixel: NDArray[np.integer], size: tuple[int, int]) -> tuple[NDArray[np.int64], int]:
+def _fields(pixel: Integers, size: tuple[int, int]) -> tuple[Integers, int]:
     """Field (n,) of each pixel, and how many fields there are."""
     across, up = -(-size[0] // FIELD), -(-size[1] // FIELD)
     row, column = np.divmod(pixel.astype(np.int64), size[0])
@@ -281,10 +280,10 @@ def _fields(pixel: NDArray[np.integer], size: tuple[int, int]) -> tuple[NDArray[
 def _receive(
     view: Camera,
     size: tuple[int, int],
-    points: NDArray[np.float64],
-    extent: NDArray[np.float64],
-    far: NDArray[np.float64],
-    fine: NDArray[np.float64],
+    points: Floats,
+    extent: Floats,
+    far: Floats,
+    fine: Floats,
 ) -> None:
     """Put points that receive light into the fields: how far away they are, and how fine the image is there."""
     local = view.to_camera_space(points)

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, spread
+from ..arrays import Arrays, Floats, Integers, Mask, spread
 from ..subplants.pieces import chunks
 
 #: Triangles that are measured at a time; bounds what that takes to some hundred megabytes.
@@ -68,17 +68,17 @@ class Surface:
     """
 
     name: str
-    positions: NDArray[np.float64]
+    positions: Floats
     corner_verts: NDArray[np.int32]
     face_offsets: NDArray[np.int32]
     triangles: NDArray[np.int32]
     material: NDArray[np.int32]
-    colours: NDArray[np.float64]
-    transmission: NDArray[np.float64]
-    coverage: NDArray[np.float64]
-    solid: NDArray[np.bool_]
-    leaf: NDArray[np.bool_]
-    width: NDArray[np.float64]
+    colours: Floats
+    transmission: Floats
+    coverage: Floats
+    solid: Mask
+    leaf: Mask
+    width: Floats
     attributes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     normals: NDArray[np.float32] | None = None
     look: str = ""
@@ -101,7 +101,7 @@ class Meshes:
         A position or matrix holds what is no number, or one beyond all measure; the message names the surface.
     """
 
-    def __init__(self, surfaces: Sequence[Surface], surface: NDArray[np.integer], matrices: NDArray) -> None:
+    def __init__(self, surfaces: Sequence[Surface], surface: Integers, matrices: NDArray) -> None:
         self.surfaces = tuple(surfaces)
         self.surface = np.asarray(surface, np.int32)
         matrices = np.asarray(matrices, np.float64).reshape(-1, 4, 4)
@@ -124,7 +124,7 @@ class Meshes:
         self.largest = np.linalg.norm(rows, ord=2, axis=(1, 2)) if len(rows) else np.zeros(0)
         self.mean_scale = np.linalg.norm(rows, axis=2).mean(axis=1)
 
-        def starts(sizes: list[int]) -> NDArray[np.int64]:
+        def starts(sizes: list[int]) -> Integers:
             return np.cumsum([0, *sizes])
 
         def joined(arrays: list[NDArray], empty: NDArray) -> NDArray:
@@ -151,7 +151,7 @@ class Meshes:
             joined([getattr(s, k) for s in surfaces], np.zeros(0, bool)) for k in ("solid", "leaf")
         )
 
-    def counted_from(self, origin: NDArray[np.float64]) -> Meshes:
+    def counted_from(self, origin: Floats) -> Meshes:
         """The same in coordinates that begin at a place (3,) of the present ones."""
         moved = copy(self)
         moved.origin = self.origin - origin
@@ -160,13 +160,13 @@ class Meshes:
     # What follows is measured on demand: frames of an animation that reuse the result of another never need it.
 
     @cached_property
-    def area_vectors(self) -> NDArray[np.float64]:
+    def area_vectors(self) -> Floats:
         """Area vectors (t, 3) of triangles in their mesh's own space."""
         a, b, c = (self.positions[self.corner_verts[self.triangles[:, k]]] for k in range(3))
         return 0.5 * np.cross(b - a, c - a)
 
     @cached_property
-    def centres(self) -> NDArray[np.float64]:
+    def centres(self) -> Floats:
         """Centres (f, 3) of the boxes around faces."""
         if not len(self.face_start):
             return np.zeros((0, 3))
@@ -175,7 +175,7 @@ class Meshes:
         return (low + np.maximum.reduceat(points, self.face_start, axis=0)) / 2
 
     @cached_property
-    def radii(self) -> NDArray[np.float64]:
+    def radii(self) -> Floats:
         """Radii (f,) of the spheres about these centres that hold the faces."""
         if not len(self.face_start):
             return np.zeros(0)
@@ -184,7 +184,7 @@ class Meshes:
         return np.maximum.reduceat(away, self.face_start)
 
     @cached_property
-    def degenerate(self) -> NDArray[np.bool_]:
+    def degenerate(self) -> Mask:
         """Faces (f,) with a vertex twice, which a valid mesh does not have."""
         face = np.repeat(np.arange(len(self.face_start)), self.face_size)
         order = np.lexsort([self.corner_verts, face])
@@ -196,19 +196,19 @@ class Meshes:
         """Faces of all instances together."""
         return int(np.diff(self.first_face)[self.surface].sum())
 
-    def to_world(self, points: NDArray[np.float64], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+    def to_world(self, points: Floats, instance: Integers) -> Floats:
         """Points (n, k, 3) of instances (n,) in world space, metres."""
         return points @ self.linear[instance] + self.origin[instance, None]
 
-    def corners(self, triangle: NDArray[np.integer], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+    def corners(self, triangle: Integers, instance: Integers) -> Floats:
         """Corners (n, 3, 3) of triangles of instances in world space, metres."""
         return self.to_world(self.positions[self.corner_verts[self.triangles[triangle]]], instance)
 
-    def vectors(self, triangle: NDArray[np.integer], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+    def vectors(self, triangle: Integers, instance: Integers) -> Floats:
         """Area vectors (n, 3) of triangles of instances in world space, m²."""
         return np.einsum("ni,nij->nj", self.area_vectors[triangle], self.cofactors[instance])
 
-    def face_areas(self, face: NDArray[np.integer], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+    def face_areas(self, face: Integers, instance: Integers) -> Floats:
         """Areas (n,) of faces of instances, m²."""
         many = np.flatnonzero(self.face_size[face] > _FEW_CORNERS)
         key = instance[many].astype(np.int64) * len(self.face_size) + face[many]
@@ -251,9 +251,9 @@ class Polygons(Arrays):
     instance: NDArray[np.int32]
     part: NDArray[np.int32]
     triangle: NDArray[np.int32]
-    weights: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    reach: NDArray[np.float64]
+    weights: Floats
+    centre: Floats
+    reach: Floats
 
     @classmethod
     def everything(cls, meshes: Meshes) -> Polygons:
@@ -312,11 +312,11 @@ class Polygons(Arrays):
         return replace(parts[0], part=np.concatenate(shifted).astype(np.int32), **own)
 
     @property
-    def triangle_counts(self) -> NDArray[np.int64]:
+    def triangle_counts(self) -> Integers:
         """Triangles (n,) that each consists of: 1 for a fragment."""
         return np.where(self.part >= 0, 1, self.meshes.face_size[self.face] - 2)
 
-    def triangles(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    def triangles(self) -> tuple[Integers, Integers, Floats]:
         """Triangles of whole faces, and fragments, in the order of the polygons.
 
         Returns
@@ -335,7 +335,7 @@ class Polygons(Arrays):
         triangle[own], fraction[own] = self.triangle[rows], area_fractions(self.weights)[rows]
         return owner, triangle, fraction
 
-    def as_fragments(self) -> tuple[NDArray[np.int64], Polygons]:
+    def as_fragments(self) -> tuple[Integers, Polygons]:
         """The polygon (k,) that each fragment comes from, and fragments; whole faces become their triangles."""
         owner, triangle, _ = self.triangles()
         weights = np.broadcast_to(np.eye(3), (len(owner), 3, 3)).copy()
@@ -343,7 +343,7 @@ class Polygons(Arrays):
         weights[own] = self.weights[self.part[owner[own]]]
         return owner, Polygons.fragments(self.meshes, self.face[owner], self.instance[owner], triangle, weights)
 
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """Areas (n,), m²."""
         areas = np.zeros(len(self))
         for run in chunks(self.triangle_counts, MEASURED_AT_ONCE):
@@ -353,11 +353,11 @@ class Polygons(Arrays):
             areas[run] = np.bincount(owner, fraction * own, len(some))
         return areas
 
-    def bounding_box(self) -> NDArray[np.float64]:
+    def bounding_box(self) -> Floats:
         """Axis-aligned box (2, 3) around all of them, at least one, metres."""
         return np.stack([(self.centre.T - self.reach).min(axis=1), (self.centre.T + self.reach).max(axis=1)])
 
-    def distances(self, planes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def distances(self, planes: Floats) -> tuple[Floats, Floats]:
         """Least and greatest signed distances (n,) of the corners from planes (n, 4), metres."""
         low, high = np.zeros((2, len(self)))
         whole, cut = np.flatnonzero(self.part < 0), np.flatnonzero(self.part >= 0)
@@ -375,17 +375,17 @@ class Polygons(Arrays):
             low[cut], high[cut] = distance.min(axis=1), distance.max(axis=1)
         return low, high
 
-    def corner_distances(self, planes: NDArray[np.float64]) -> NDArray[np.float64]:
+    def corner_distances(self, planes: Floats) -> Floats:
         """Signed distances (n, 3) of the corners of fragments from planes (n, 4), metres."""
         corners = self.weights[self.part] @ self.meshes.corners(self.triangle[self.part], self.instance)
         return np.einsum("nki,ni->nk", corners, planes[:, :3]) + planes[:, 3:]
 
-    def touching(self) -> NDArray[np.float64]:
+    def touching(self) -> Floats:
         """Metres (n,) within which rounding errors may carry a corner across a plane."""
         return _TOUCHING * self.reach
 
 
-def area_fractions(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+def area_fractions(weights: Floats) -> Floats:
     """Fraction (n,) of its triangle's area that a fragment with weights (n, 3, 3) takes."""
     a, b = weights[:, 1, 1:] - weights[:, 0, 1:], weights[:, 2, 1:] - weights[:, 0, 1:]
     return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, spread
+from ..arrays import Arrays, Floats, Integers, column, spread
 from ..camera.camera import Camera
 from ..camera.silhouette import silhouette_area, window_bounds
 from ..parallel import blocks
@@ -57,9 +57,9 @@ class Fragments(Arrays):
 
     cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     pixel: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    entry: NDArray[np.float64]
-    thickness: NDArray[np.float64]
-    coverage: NDArray[np.float64]
+    entry: Floats
+    thickness: Floats
+    coverage: Floats
 
 
 def buffer_size(camera: Camera, resolution: int) -> tuple[int, int]:
@@ -68,7 +68,7 @@ def buffer_size(camera: Camera, resolution: int) -> tuple[int, int]:
     return max(1, round(camera.width * scale)), max(1, round(camera.height * scale))
 
 
-def pixel_rays(camera: Camera, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def pixel_rays(camera: Camera, width: int, height: int) -> tuple[Floats, Floats]:
     """Origins and unit directions (height · width, 3) of the rays through the pixels' centres, world space."""
     x, y = _centres(camera, width, height)
     grid = np.stack([np.tile(x, height), np.repeat(y, width), np.zeros(width * height)], axis=1)
@@ -79,7 +79,7 @@ def pixel_rays(camera: Camera, width: int, height: int) -> tuple[NDArray[np.floa
     return np.tile(camera.position, (width * height, 1)), towards / np.linalg.norm(towards, axis=1, keepdims=True)
 
 
-def tetrahedron_fragments(vertices: NDArray[np.float64], camera: Camera, width: int, height: int) -> Fragments:
+def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: int) -> Fragments:
     """What the rays through the pixels' centres meet of each tetrahedron.
 
     Parameters
@@ -110,7 +110,7 @@ def tetrahedron_fragments(vertices: NDArray[np.float64], camera: Camera, width: 
     return Fragments.concatenate([drawn(block) for block in blocks(len(vertices), TETRAHEDRA_AT_ONCE)])
 
 
-def occluder_depth(triangles: NDArray[np.float64], camera: Camera, width: int, height: int) -> NDArray[np.float64]:
+def occluder_depth(triangles: Floats, camera: Camera, width: int, height: int) -> Floats:
     """Where each pixel's ray first meets an opaque triangle (height · width,), metres along it; infinite for none.
 
     The triangles (t, 3, 3) are two-sided, in metres, world space. They may cross the eye's plane; those without area
@@ -123,7 +123,7 @@ def occluder_depth(triangles: NDArray[np.float64], camera: Camera, width: int, h
     return nearest
 
 
-def _fragments(vertices: NDArray[np.float64], camera: Camera, width: int, height: int) -> Fragments:
+def _fragments(vertices: Floats, camera: Camera, width: int, height: int) -> Fragments:
     """Fragments of as many tetrahedra as fit into memory.
 
     A face bounds the depth of a parallel ray by a linear function of where the ray crosses the window, and that of a
@@ -163,25 +163,25 @@ def _fragments(vertices: NDArray[np.float64], camera: Camera, width: int, height
 class _Rows:
     """Rows of boxes (r,): whose they are, which rows of the image, their first pixels and how many they have."""
 
-    cell: NDArray[np.int64]
-    number: NDArray[np.int64]
-    first: NDArray[np.int64]
-    wide: NDArray[np.int64]
+    cell: Integers
+    number: Integers
+    first: Integers
+    wide: Integers
 
     @property
-    def columns(self) -> NDArray[np.int64]:
+    def columns(self) -> Integers:
         """Columns (h,) of all their pixels."""
         return np.arange(int(self.wide.sum())) + np.repeat(self.first - np.cumsum(self.wide) + self.wide, self.wide)
 
 
 def _within(
-    planes: Sequence[NDArray[np.float64]],
+    planes: Sequence[Floats],
     count: int,
     ends: tuple[float, float],
     rows: _Rows,
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    x: Floats,
+    y: Floats,
+) -> tuple[Integers, Integers, tuple[Floats, Floats]]:
     """Rows and columns (h,) of pixels whose rays pass through tetrahedra, and bounds (h,) of depths or reciprocals.
 
     The first ``count`` of four planes (n, 4), each a constant and slopes along x and y, are lower bounds.
@@ -203,7 +203,7 @@ def _within(
     return row, column[hit], (least[hit], most[hit])
 
 
-def _rows(box: NDArray[np.int64], which: NDArray[np.intp]) -> Iterator[_Rows]:
+def _rows(box: Integers, which: Integers) -> Iterator[_Rows]:
     """Rows of some of the boxes, about `PAIRS_AT_ONCE` pixels at a time."""
     wide, high = (np.maximum(box[which, i + 1] - box[which, i] + 1, 0) for i in (0, 2))
     kept = np.flatnonzero(wide * high)
@@ -216,11 +216,11 @@ def _rows(box: NDArray[np.int64], which: NDArray[np.intp]) -> Iterator[_Rows]:
 
 
 def _with_small_ones(
-    vertices: NDArray[np.float64],
-    local: NDArray[np.float64],
+    vertices: Floats,
+    local: Floats,
     camera: Camera,
     size: tuple[int, int],
-    bounds: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    bounds: tuple[Floats, Floats, Floats],
     found: Fragments,
 ) -> Fragments:
     """Add fragments for tetrahedra between the pixels' centres, and set the coverage of all."""
@@ -262,9 +262,7 @@ def _with_small_ones(
     return Fragments(cell, pixel, entry, thickness, coverage)
 
 
-def _draw_triangles(
-    triangles: NDArray[np.float64], camera: Camera, width: int, height: int, nearest: NDArray[np.float64]
-) -> None:
+def _draw_triangles(triangles: Floats, camera: Camera, width: int, height: int, nearest: Floats) -> None:
     """Lower ``nearest``, metres along each pixel's ray, to where finite triangles are."""
     local = camera.to_camera_space(triangles)
     low, high, _ = window_bounds(local, camera)
@@ -300,26 +298,24 @@ def _draw_triangles(
         np.minimum.at(nearest, row[hit] * width + col[hit], depth[seen] * _ray_metres(camera, px[seen], py[seen]))
 
 
-def _grid(camera: Camera, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _grid(camera: Camera, width: int, height: int) -> tuple[Floats, Floats]:
     """Lower left corner of the window (2,), and the size of a pixel on it (2,)."""
     left, right, bottom, top = camera.window
     return np.array([left, bottom]), np.array([(right - left) / width, (top - bottom) / height])
 
 
-def _centres(camera: Camera, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _centres(camera: Camera, width: int, height: int) -> tuple[Floats, Floats]:
     """Window coordinates of the pixels' centres: x by column, y by row."""
     corner, step = _grid(camera, width, height)
     return tuple(corner[i] + (np.arange((width, height)[i]) + 0.5 + SHIFT[i]) * step[i] for i in (0, 1))
 
 
-def _ray_metres(camera: Camera, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64] | float:
+def _ray_metres(camera: Camera, x: Floats, y: Floats) -> Floats | float:
     """Metres along the ray through (x, y) of the window for each metre of depth."""
     return 1.0 if camera.kind == "ORTHO" else np.sqrt(1.0 + x * x + y * y)
 
 
-def _pixel_box(
-    low: NDArray[np.float64], high: NDArray[np.float64], camera: Camera, width: int, height: int
-) -> NDArray[np.int64]:
+def _pixel_box(low: Floats, high: Floats, camera: Camera, width: int, height: int) -> Integers:
     """First and last column, first and last row ``(n, 4)`` of the pixels whose centres lie in boxes on the window."""
     (corner, step), size = _grid(camera, width, height), np.array([width, height])
     # A hair wider than the box: a centre on a side must not be lost to rounding. Clipped before the conversion,

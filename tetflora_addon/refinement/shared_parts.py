@@ -17,7 +17,7 @@ from typing import Any, Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Chunks, Growing, column, renumber, rows_within
+from ..arrays import Arrays, Chunks, Floats, Growing, Integers, Mask, column, renumber, rows_within
 from ..camera.camera import Camera
 from ..parallel import blocks, each_on_all_cores
 from ..tetrahedra.tree import TetrahedralTree
@@ -60,7 +60,7 @@ class SharePoints(Arrays):
         return self.leaf + self.wood / 2
 
 
-def lowered(tree: TetrahedralTree, points: SharePoints, some: NDArray[np.intp] | None = None) -> NDArray[np.int32]:
+def lowered(tree: TetrahedralTree, points: SharePoints, some: Integers | None = None) -> NDArray[np.int32]:
     """Terminal nodes (m,) that points are in, below those that they are known to be in.
 
     some: indices (k,) of points, by default all, of which alone they are wanted (k,).
@@ -90,10 +90,10 @@ def lowered(tree: TetrahedralTree, points: SharePoints, some: NDArray[np.intp] |
 class _Figures(Arrays):
     """What a pass asks of all parts (n): the extent of those that can be opened (metres, else 0), their totals."""
 
-    reach: NDArray[np.float64]
-    area: NDArray[np.float64]
-    polygons: NDArray[np.float64]
-    width: NDArray[np.float64]
+    reach: Floats
+    area: Floats
+    polygons: Floats
+    width: Floats
 
 
 class SharedParts(Generic[Parts]):
@@ -113,11 +113,11 @@ class SharedParts(Generic[Parts]):
     def __init__(self, camera: Camera) -> None:
         self.camera = camera
 
-    def can_open(self, parts: Parts) -> NDArray[np.bool_]:
+    def can_open(self, parts: Parts) -> Mask:
         """Parts (n,) that consist of others."""
         raise NotImplementedError
 
-    def opened(self, parts: Parts) -> Iterator[tuple[Parts, NDArray[np.int64], Any]]:
+    def opened(self, parts: Parts) -> Iterator[tuple[Parts, Integers, Any]]:
         """New parts, some at a time, with those (m,) that they come from, and what `points_on` wants to know."""
         raise NotImplementedError
 
@@ -125,7 +125,7 @@ class SharedParts(Generic[Parts]):
         """Points on parts (n,), all in the root; ``known`` is of `opened`, None at first."""
         raise NotImplementedError
 
-    def alone(self, parts: Parts) -> NDArray[np.bool_]:
+    def alone(self, parts: Parts) -> Mask:
         """Parts (n,) that count apart from others, as branches without what grows on them."""
         raise NotImplementedError
 
@@ -165,7 +165,7 @@ class SharedParts(Generic[Parts]):
         made.hold(parts, points)
         return made
 
-    def update(self, tree: TetrahedralTree, dividing: NDArray[np.bool_], edge: NDArray[np.float64]) -> NDArray:
+    def update(self, tree: TetrahedralTree, dividing: Mask, edge: Floats) -> NDArray:
         """Hand points in divided nodes on, and open what is large there.
 
         Parameters
@@ -195,7 +195,7 @@ class SharedParts(Generic[Parts]):
             changed[self.open(opening, tree)] = True
         return changed
 
-    def open(self, opening: NDArray[np.bool_], tree: TetrahedralTree | None) -> NDArray[np.int32]:
+    def open(self, opening: Mask, tree: TetrahedralTree | None) -> NDArray[np.int32]:
         """Open parts (n,); returns nodes (k,) of points that leave or come. Without a tree these stay in the root."""
         gone = rows_within(opening, self._points.rows.part)
         count, parts, points = len(self._parts), [], []
@@ -224,7 +224,7 @@ class SharedParts(Generic[Parts]):
             self._figures = Growing(self._figures.rows.take(there))
         return self._parts.joined()
 
-    def totals(self, chosen: NDArray[np.bool_]) -> tuple[Totals, NDArray[np.int32]]:
+    def totals(self, chosen: Mask) -> tuple[Totals, NDArray[np.int32]]:
         """Totals (k,) of points in chosen nodes, a mask (nodes,), and their nodes (k,)."""
         points, figures = self._points.rows, self._figures.rows
         cell, part, leaf, wood = points.cell, points.part, points.leaf, points.wood

@@ -15,9 +15,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Floats, Integers, Mask, spread
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import placed_samples
@@ -53,11 +52,11 @@ _START = 221
 def share_points(
     flora: Flora,
     parts: PlantParts,
-    pixels: NDArray[np.float64],
+    pixels: Floats,
     lines: Axes | None = None,
     most: int = MOST,
     times: int = 1,
-    along: NDArray[np.int64] | int = 0,
+    along: Integers | int = 0,
 ) -> SharePoints:
     """Points on parts of plants, all in the root.
 
@@ -112,13 +111,8 @@ def share_points(
 
 
 def _along_leaves(
-    flora: Flora,
-    branches: Branches,
-    lines: Axes,
-    owner: NDArray[np.int64],
-    index: NDArray[np.int64],
-    part: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    flora: Flora, branches: Branches, lines: Axes, owner: Integers, index: Integers, part: Floats
+) -> Floats:
     """Places (m, 3) of leaves on branches, after parts (m,) of them; ``index`` (m,) numbers those of a branch."""
     start = leaf_start(flora.rows, branches)[owner]
     t, key = start + (1.0 - start) * part, leaf_keys(branches, owner, index)
@@ -126,8 +120,8 @@ def _along_leaves(
 
 
 def _sampled(
-    flora: Flora, points: Points, branches: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    flora: Flora, points: Points, branches: Branches, owner: Integers, index: Integers
+) -> tuple[Floats, Floats | None]:
     """Places (m, 3) of samples of sub-plants, and what they stand for; runs of samples are spread over them."""
     first, number = points.runs(branches)
     start = (uniform(branches.key, _START) * number).astype(np.int64)
@@ -142,7 +136,7 @@ def _sampled(
     return out, share
 
 
-def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, NDArray[np.int64], Axes | None]]:
+def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, Integers, Axes | None]]:
     """Open sub-plants into branches alone and the sub-plants of the next order.
 
     Yields
@@ -180,15 +174,15 @@ class SharedPlants(SharedParts[PlantParts]):
         while (near := self.thick(self.parts) & self.parts.can_open(flora)).any():
             self.open(near, None)
 
-    def can_open(self, parts: PlantParts) -> NDArray[np.bool_]:
+    def can_open(self, parts: PlantParts) -> Mask:
         """As `SharedParts.can_open`."""
         return parts.can_open(self.flora)
 
-    def alone(self, parts: PlantParts) -> NDArray[np.bool_]:
+    def alone(self, parts: PlantParts) -> Mask:
         """Branches without what grows on them."""
         return parts.alone
 
-    def opened(self, parts: PlantParts) -> Iterator[tuple[PlantParts, NDArray[np.int64], Axes | None]]:
+    def opened(self, parts: PlantParts) -> Iterator[tuple[PlantParts, Integers, Axes | None]]:
         """As `opened` of this module."""
         return opened(self.flora, parts)
 
@@ -196,11 +190,11 @@ class SharedPlants(SharedParts[PlantParts]):
         """The same with no plants, for what asks only how large other parts are."""
         return self.with_parts(PlantParts.empty(), SharePoints.empty())
 
-    def pixels(self, parts: PlantParts) -> NDArray[np.float64]:
+    def pixels(self, parts: PlantParts) -> Floats:
         """Extent (n,) of parts in the image."""
         return parts.extent / self.camera.extent_around(parts.branches.position)
 
-    def thick(self, parts: PlantParts) -> NDArray[np.bool_]:
+    def thick(self, parts: PlantParts) -> Mask:
         """Parts (n,) whose own branch is wide in the view somewhere, as if it were straight."""
         branches, camera = parts.branches, self.camera
         axis = branches.length[:, None] * branches.frame[:, :, 2]

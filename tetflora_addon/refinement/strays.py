@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Mask
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.growth import trunks
@@ -42,10 +42,10 @@ class Strays:
         How far they are from the camera, metres.
     """
 
-    plants: NDArray[np.int64] = field(default_factory=lambda: _NONE)
-    assets: NDArray[np.int64] = field(default_factory=lambda: _NONE)
-    instances: NDArray[np.int64] = field(default_factory=lambda: _NONE)
-    away: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    plants: Integers = field(default_factory=lambda: _NONE)
+    assets: Integers = field(default_factory=lambda: _NONE)
+    instances: Integers = field(default_factory=lambda: _NONE)
+    away: Floats = field(default_factory=lambda: np.zeros(0))
 
     def others(
         self, seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets
@@ -65,11 +65,7 @@ class Strays:
 
 
 def strays_of(
-    flora: Flora,
-    seeds: Seeds,
-    camera: Camera,
-    polygons: Polygons | None = None,
-    placed: PlacedAssets | None = None,
+    flora: Flora, seeds: Seeds, camera: Camera, polygons: Polygons | None = None, placed: PlacedAssets | None = None
 ) -> Strays:
     """Strays among plants, assets and instances of other meshes; nothing depends on their order."""
     centre, reach = seeds.position, np.zeros(len(seeds))
@@ -92,7 +88,7 @@ def strays_of(
     return Strays(some[own], some[~own & ~last] - plants_end, some[last] - assets_end, away[some])
 
 
-def far_off(away: NDArray[np.float64]) -> NDArray[np.int64]:
+def far_off(away: Floats) -> Integers:
     """The few (k,) of things by their distances (n,) that are far beyond all others, metres."""
     most = min(max(MOST, int(FRACTION * len(away))), len(away) // 2)
     if most == 0:
@@ -105,9 +101,7 @@ def far_off(away: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.sort(last[gaps[0] + 1 :]) if len(gaps) else _NONE
 
 
-def _unseen(
-    camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.float64], away: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _unseen(camera: Camera, centre: Floats, reach: Floats, away: Floats) -> Mask:
     """Things (n,) that are specks, or out of the view and too far for their shadows to fall into it."""
     specks = 2.0 * reach < UNSEEN * camera.extent_around(centre)
     depth = away if camera.kind == "PANO" else camera.to_camera_space(centre)[:, 2]
@@ -115,7 +109,7 @@ def _unseen(
     return specks | (out & (GAP * reach < away))
 
 
-def _around_instances(polygons: Polygons) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _around_instances(polygons: Polygons) -> tuple[Floats, Floats]:
     """Middles (i, 3) of all instances of meshes, and how far they reach from there (i,), metres."""
     number = len(polygons.meshes.surface)
     low, high = np.full((number, 3), np.inf), np.full((number, 3), -np.inf)

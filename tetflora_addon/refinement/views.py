@@ -11,8 +11,9 @@ with one over the cosine of the latitude.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Integers, Mask
 from ..camera.camera import LEAST_COSINE, Camera, blur_margins
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
@@ -51,7 +52,7 @@ def face_cameras(camera: Camera, side: int) -> list[Camera]:
     ]
 
 
-def pixels_per_solid_angle(camera: Camera, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+def pixels_per_solid_angle(camera: Camera, directions: Floats) -> Floats:
     """Pixels (n,) of a panorama for each steradian around directions (n, 3) in world space; 0 beside the image."""
     local = (directions @ camera.frame) * np.array([1.0, 1.0, -1.0])
     longitude, latitude = camera.longitude_latitude(local)
@@ -73,7 +74,7 @@ class PanoramaBuffer:
         Opaque triangles, metres.
     """
 
-    def __init__(self, camera: Camera, side: int, occluders: NDArray[np.float64] | None = None) -> None:
+    def __init__(self, camera: Camera, side: int, occluders: Floats | None = None) -> None:
         self.camera = camera
         self.width = self.height = side
         self.faces: list[AlphaBuffer] = []
@@ -88,7 +89,7 @@ class PanoramaBuffer:
                 self.faces.append(AlphaBuffer(face, side, end, worth))
         self._weight = np.zeros((len(self.faces), 0))
 
-    def add(self, cells: NDArray[np.integer], vertices: NDArray[np.float64], extinction: ArrayLike) -> Outline:
+    def add(self, cells: Integers, vertices: Floats, extinction: ArrayLike) -> Outline:
         """Draw tetrahedra (n, 4, 3); parameters and result as for `AlphaBuffer.add`."""
         count, extinction = len(vertices), np.asarray(extinction, np.float64)
         pixels, opacity = np.zeros((2, count))
@@ -104,12 +105,12 @@ class PanoramaBuffer:
         whole = (beside <= 0.0).all(axis=1)
         return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), whole)
 
-    def remove(self, chosen: NDArray[np.bool_]) -> None:
+    def remove(self, chosen: Mask) -> None:
         """Remove tetrahedra; ``chosen`` is a mask (m,) by their numbers."""
         for face in self.faces:
             face.remove(chosen)
 
-    def transmittance(self, rank: NDArray[np.integer]) -> NDArray[np.float64]:
+    def transmittance(self, rank: Integers) -> Floats:
         """Fraction (m,) of each tetrahedron's light that nothing in front blocks, as `AlphaBuffer.transmittance`."""
         self._grow(len(rank))
         weight = self._weight[:, : len(rank)]
@@ -127,7 +128,7 @@ class PanoramaBuffer:
 class PanoramaBuffers:
     """Panorama buffers as fine as what is drawn into them; parameters and use as for `visibility.Buffers`."""
 
-    def __init__(self, camera: Camera, resolution: int, occluders: NDArray[np.float64] | None = None) -> None:
+    def __init__(self, camera: Camera, resolution: int, occluders: Floats | None = None) -> None:
         self.camera, self.occluders = camera, occluders
         self.side = face_side(resolution)
 
@@ -144,7 +145,7 @@ def face_side(resolution: int) -> int:
     return max(1, round(FACE_FRACTION * resolution))
 
 
-def _may_be_in(vertices: NDArray[np.float64], camera: Camera) -> NDArray[np.bool_]:
+def _may_be_in(vertices: Floats, camera: Camera) -> Mask:
     """Tetrahedra (n,) that are not wholly beside one of the walls of a face's pyramid."""
     x, y, depth = np.moveaxis(camera.to_camera_space(vertices), -1, 0)
     walls = (depth - x, depth + x, depth - y, depth + y)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats, Integers, Mask
 from ..camera.camera import Camera
 from ..camera.silhouette import silhouette_pixels
 from .rasterise import buffer_size, occluder_depth, tetrahedron_fragments
@@ -28,7 +29,7 @@ COARSEST = 32
 _ACROSS = 8.0
 
 
-def depth_in_front(pixel: NDArray[np.integer], depth: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray]:
+def depth_in_front(pixel: Integers, depth: Floats) -> tuple[Integers, NDArray]:
     """First fragment of its pixel, and optical depth before it, for each of fragments (n,).
 
     Fragments are sorted by ``pixel`` and front to back. What all earlier pixels hold is subtracted again from one
@@ -54,9 +55,9 @@ class Outline:
         Whether all of it is in view.
     """
 
-    pixels: NDArray[np.float64]
-    opacity: NDArray[np.float64]
-    whole: NDArray[np.bool_]
+    pixels: Floats
+    opacity: Floats
+    whole: Mask
 
 
 class AlphaBuffer:
@@ -85,11 +86,7 @@ class AlphaBuffer:
     """
 
     def __init__(
-        self,
-        camera: Camera,
-        resolution: int,
-        occluders_depth: NDArray[np.float64] | None = None,
-        worth: NDArray[np.float64] | None = None,
+        self, camera: Camera, resolution: int, occluders_depth: Floats | None = None, worth: Floats | None = None
     ) -> None:
         self.camera, self.worth = camera, worth
         self.width, self.height = buffer_size(camera, resolution)
@@ -102,7 +99,7 @@ class AlphaBuffer:
         self._depth, self._fraction, self._before = np.zeros((3, 0))
         self._changed = np.zeros(self.width * self.height, bool)
 
-    def add(self, cells: NDArray[np.integer], vertices: NDArray[np.float64], extinction: ArrayLike) -> Outline:
+    def add(self, cells: Integers, vertices: Floats, extinction: ArrayLike) -> Outline:
         """Draw tetrahedra.
 
         Parameters
@@ -148,7 +145,7 @@ class AlphaBuffer:
         pixels = np.where(exact, pixels, weight * final) * self.camera.pixel_gain(np.asarray(vertices).mean(axis=1))
         return Outline(pixels, opacity, whole)
 
-    def remove(self, chosen: NDArray[np.bool_]) -> None:
+    def remove(self, chosen: Mask) -> None:
         """Remove tetrahedra; ``chosen`` is a mask (m,) by their numbers."""
         go = chosen[self._cell]
         if go.any():
@@ -157,7 +154,7 @@ class AlphaBuffer:
             for name in ("_cell", "_pixel", "_depth", "_fraction", "_before"):
                 setattr(self, name, np.take(getattr(self, name), stay))
 
-    def transmittance(self, rank: NDArray[np.integer]) -> NDArray[np.float64]:
+    def transmittance(self, rank: Integers) -> Floats:
         """Fraction (numbers,) of each tetrahedron's light, 0 to 1, that nothing in front blocks; 0 out of view.
 
         ``rank`` (numbers,) is the front-to-back rank by number, as `TetrahedralTree.order` gives it; smaller is nearer,
@@ -169,7 +166,7 @@ class AlphaBuffer:
         self._before[some] = np.exp(-self._depth_before(some, rank))
         return np.bincount(self._cell, self._fraction * self._before, len(rank))
 
-    def _depth_before(self, some: NDArray[np.intp], rank: NDArray[np.integer]) -> NDArray[np.float64]:
+    def _depth_before(self, some: Integers, rank: Integers) -> Floats:
         """Optical depth in front of some fragments (n,), which are all of their pixels."""
         pixel, depth = np.take(self._pixel, some), np.take(self._depth, some)
         # One number to sort by is several times as fast as two.
@@ -205,7 +202,7 @@ class Buffers:
         Triangles of explicit polygons that hide what is behind them, metres.
     """
 
-    def __init__(self, camera: Camera, resolution: int, occluders: NDArray[np.float64] | None = None) -> None:
+    def __init__(self, camera: Camera, resolution: int, occluders: Floats | None = None) -> None:
         self.camera, self.resolution = camera, resolution
         self.size = buffer_size(camera, resolution)
         some = occluders is not None and len(occluders)
@@ -218,7 +215,7 @@ class Buffers:
             return buffer
         return AlphaBuffer(self.camera, wanted, None if self.depth is None else self._reduced(wanted))
 
-    def _reduced(self, resolution: int) -> NDArray[np.float64]:
+    def _reduced(self, resolution: int) -> Floats:
         """Occluders' depth in a coarser buffer: that of the pixel of the finest one in the middle."""
         (width, height), (columns, rows) = self.size, buffer_size(self.camera, resolution)
         row = ((np.arange(rows) + 0.5) * height / rows).astype(np.int64)

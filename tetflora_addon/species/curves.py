@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import connected
+from ..arrays import Floats, Integers, Mask, connected
 
 _JOINED_WITHIN = 0.01  # of the size: a start that is drawn by eye, not snapped
 
@@ -34,9 +34,9 @@ class Chains:
         Whether the last point leads back to the first.
     """
 
-    points: NDArray[np.float64]
-    first: NDArray[np.int64]
-    cyclic: NDArray[np.bool_]
+    points: Floats
+    first: Integers
+    cyclic: Mask
 
     @classmethod
     def concatenate(cls, parts: list[Chains]) -> Chains:
@@ -45,7 +45,7 @@ class Chains:
         points = np.concatenate([np.zeros((0, 4)), *(p.points for p in parts)])
         return cls(points, np.cumsum(counts), np.concatenate([np.zeros(0, bool), *(p.cyclic for p in parts)]))
 
-    def without(self, splines: NDArray[np.int64]) -> Chains:
+    def without(self, splines: Integers) -> Chains:
         """The chains without some splines, given by number (k,)."""
         counts = np.diff(self.first)
         stays = np.ones(len(counts), dtype=bool)
@@ -53,7 +53,7 @@ class Chains:
         first = np.concatenate([[0], np.cumsum(counts[stays])])
         return Chains(self.points[np.repeat(stays, counts)], first, self.cyclic[stays])
 
-    def edges(self) -> NDArray[np.int64]:
+    def edges(self) -> Integers:
         """Ends (e, 2) int64 of the edges along all splines."""
         index = np.arange(len(self.points) - 1)
         index = np.delete(index, self.first[1:-1] - 1)
@@ -62,9 +62,7 @@ class Chains:
         return np.concatenate([np.stack([index, index + 1], axis=1), closing])
 
 
-def bezier_chains(
-    control: Chains, left: NDArray[np.float64], right: NDArray[np.float64], steps: NDArray[np.int64]
-) -> Chains:
+def bezier_chains(control: Chains, left: Floats, right: Floats, steps: Integers) -> Chains:
     """Cubic Bezier splines; radii run evenly from one control point to the next.
 
     Parameters
@@ -94,7 +92,7 @@ def bezier_chains(
     return Chains(points, first, control.cyclic)
 
 
-def smooth_handles(control: Chains) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def smooth_handles(control: Chains) -> tuple[Floats, Floats]:
     """Handles (p, 3) before and (p, 3) after each control point that make Catmull-Rom splines of Bezier splines."""
     counts = np.diff(control.first)
     owner = np.repeat(np.arange(len(counts)), counts)
@@ -108,8 +106,8 @@ def smooth_handles(control: Chains) -> tuple[NDArray[np.float64], NDArray[np.flo
 
 
 def nurbs_chain(
-    control: NDArray[np.float64],
-    weights: NDArray[np.float64],
+    control: Floats,
+    weights: Floats,
     order: int,
     steps: int,
     *,
@@ -172,7 +170,7 @@ def nurbs_chain(
     return Chains(points, np.array([0, len(points)]), np.array([cyclic]))
 
 
-def joined_edges(chains: Chains) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
     """One graph of chains; those that begin on another are moved onto its line and joined to it there.
 
     A chain begins on another where its first point, or else its last, is nearer to the other's line than its radius
@@ -195,7 +193,7 @@ def joined_edges(chains: Chains) -> tuple[NDArray[np.float64], NDArray[np.int64]
     low = points[edges, :3].min(axis=1) - margin
     high = points[edges, :3].max(axis=1) + margin
     found: list[tuple[int, float]] = []  # edge, fraction along it
-    joints: list[NDArray[np.float64]] = []
+    joints: list[Floats] = []
     for chain in np.flatnonzero(~chains.cyclic):
         for end in (chains.first[chain], chains.first[chain + 1] - 1):
             here = points[end, :3]
@@ -227,7 +225,7 @@ def joined_edges(chains: Chains) -> tuple[NDArray[np.float64], NDArray[np.int64]
     return points, np.concatenate([np.delete(edges, bearer, axis=0), *split]), np.concatenate(lines)
 
 
-def breadth_first(pairs: NDArray[np.int64], roots: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def breadth_first(pairs: Integers, roots: Integers) -> tuple[Integers, Integers]:
     """Points (p,) in the order in which they are reached from the roots, and the place (p,) of each one's parent."""
     ends = np.concatenate([pairs, pairs[:, ::-1]])
     ends = ends[np.lexsort((ends[:, 1], ends[:, 0]))]
@@ -251,7 +249,7 @@ def breadth_first(pairs: NDArray[np.int64], roots: NDArray[np.int64]) -> tuple[N
     return np.concatenate(reached), np.concatenate(parents)
 
 
-def summed_from_root(parent: NDArray[np.int64], values: NDArray) -> NDArray[np.int64]:
+def summed_from_root(parent: Integers, values: NDArray) -> Integers:
     """Sums (n,) of integers along the way from the root to each point, it included; the steps double each time."""
     total, up = values.astype(np.int64), parent.copy()
     while (go := np.flatnonzero(up >= 0)).size:
@@ -259,7 +257,7 @@ def summed_from_root(parent: NDArray[np.int64], values: NDArray) -> NDArray[np.i
     return total
 
 
-def levels(parent: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def levels(parent: Integers) -> list[Integers]:
     """Points that have a parent, grouped by steps from the root, farthest first; ``parent`` is (n,), -1 at roots."""
     depth = summed_from_root(parent, parent >= 0)
     order = np.argsort(depth, kind="stable")
@@ -267,7 +265,7 @@ def levels(parent: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [order[a:b] for a, b in pairwise(cuts)][::-1]
 
 
-def longest_way(parent: NDArray[np.int64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+def longest_way(parent: Integers, step: Floats) -> Floats:
     """Longest way (n,) from each point to a tip, where ``step`` (n,) is the way to its parent."""
     longest = np.zeros(len(parent))
     for now in levels(parent):
@@ -275,7 +273,7 @@ def longest_way(parent: NDArray[np.int64], step: NDArray[np.float64]) -> NDArray
     return longest
 
 
-def coinciding(points: NDArray[np.float64], within: float) -> NDArray[np.int64]:
+def coinciding(points: Floats, within: float) -> Integers:
     """(n,) the first of the points that lie together, directly or by way of others, of each point.
 
     Two points closer than ``within`` share a cell of twice that side in one of eight grids, shifted by half a cell.

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Mask
 from ..parameters import described, limited
 
 _SHARP = 4.0
@@ -81,14 +82,14 @@ class NodeLaw(NamedTuple):
     whole: ArrayLike
     below: ArrayLike
 
-    def number_at(self, place: ArrayLike) -> NDArray[np.float64]:
+    def number_at(self, place: ArrayLike) -> Floats:
         """Number (...) of nodes up to places (...), fractions of the full-grown length."""
         place, begin = np.asarray(place, np.float64), np.asarray(self.begin, np.float64)
         above = self.whole * (place - begin) / np.maximum(self.end - begin, 1e-9)
         part = np.clip(place / np.maximum(begin, 1e-9), 0, 1)
         return np.where(place >= begin, above, self.below * (part**self.power - 1))
 
-    def place_of(self, node: ArrayLike) -> NDArray[np.float64]:
+    def place_of(self, node: ArrayLike) -> Floats:
         """Place (...) of nodes (...), the inverse of `number_at`."""
         node = np.asarray(node, np.float64)
         above = self.begin + (self.end - self.begin) * node / np.maximum(self.whole, 1e-9)
@@ -164,7 +165,7 @@ _FADING = 0.9
 EVEN = (np.arange(256) + 0.5) / 256
 
 
-def some_nodes(ends: ArrayLike, extra: float) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+def some_nodes(ends: ArrayLike, extra: float) -> tuple[Floats, Floats, Mask]:
     """Places of children in nodes, as many as stand for all.
 
     Parameters
@@ -189,15 +190,13 @@ def some_nodes(ends: ArrayLike, extra: float) -> tuple[NDArray[np.float64], NDAr
     return node, weight, np.repeat([False, True], len(EVEN))
 
 
-def faded(fraction: NDArray[np.float64], first: ArrayLike, extra: NDArray[np.bool_]) -> NDArray[np.float64]:
+def faded(fraction: Floats, first: ArrayLike, extra: Mask) -> Floats:
     """Factor (n,) on the lengths of laterals at fractions (n,) of them: those that live for a while begin at one."""
     part = np.clip((fraction - first) / np.maximum(_FADING * (1 - np.asarray(first)), 1e-9), 0, 1)
     return np.where(extra, part, 1.0)
 
 
-def shortened(
-    fraction: NDArray[np.float64], conical: ArrayLike, low: ArrayLike, high: ArrayLike
-) -> NDArray[np.float64]:
+def shortened(fraction: Floats, conical: ArrayLike, low: ArrayLike, high: ArrayLike) -> Floats:
     """Factor (...) on lengths of laterals at fractions (...) of them, by ``conical`` and ``ramps`` of `PartGrown`."""
     new = np.clip((1 - fraction) / np.maximum(high, 1e-9), 0, 1)
     return (1 - conical * fraction) * np.clip(fraction / np.maximum(low, 1e-9), 0, 1) * new

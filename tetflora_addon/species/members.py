@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..leaves.models import LeafModel
 from .growing import EVEN, faded, shortened, some_nodes
 from .species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts, whole_cuts
@@ -78,7 +78,7 @@ def expected_leaf_area(species: Species) -> float:
     return sum(n * order.leaf_size.mean**2 for n, order in zip(leaves, species.orders, strict=True))
 
 
-def _laterals(order: Order) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | float]:
+def _laterals(order: Order) -> tuple[Floats, Floats, Floats | float]:
     """Places (n,) of laterals on a branch of an order, length ratios (n,), and how many each stands for (n,)."""
     start, fraction, shorter, weight = order.branch_start.mean, EVEN, 1.0, 1.0
     at = start + (1 - start) * fraction
@@ -95,7 +95,7 @@ def _laterals(order: Order) -> tuple[NDArray[np.float64], NDArray[np.float64], N
     return at, shorter * _ratios(order, fraction), weight
 
 
-def _ratios(order: Order, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+def _ratios(order: Order, fraction: Floats) -> Floats:
     return crown_ratio(np.full(fraction.shape, CROWN_SHAPES.index(order.crown)), 1 - fraction)
 
 
@@ -155,7 +155,7 @@ def _dead_on(dead: Dead, order: Order, i: int, cuts: list[float], fold: np.ndarr
     return wanted * np.array([stems.mean(), dead.orders[0].branches.mean * (full * stems).mean()])
 
 
-def dead_vigour(fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+def dead_vigour(fraction: Floats) -> Floats:
     """Length ratio (n,) of dead branches from the lowest, of which half is left, to the highest."""
     return crown_ratio(np.full(fraction.shape, CROWN_SHAPES.index("tapered")), fraction)
 

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import connected, top
+from ..arrays import Floats, Integers, connected, top
 from ..errors import SpeciesError
 from .curves import breadth_first, coinciding, levels, longest_way, summed_from_root
 
@@ -50,8 +50,8 @@ class Skeleton:
         Arrays that do not fit each other, or a parent that does not stand before its child.
     """
 
-    points: NDArray[np.float64]
-    radius: NDArray[np.float64]
+    points: Floats
+    radius: Floats
     parent: NDArray[np.int32]
     line: NDArray[np.int32] | None = None
 
@@ -105,25 +105,25 @@ class DrawnBranches:
         leaves it; 0 for trunks and limbs.
     """
 
-    first: NDArray[np.int64]
-    knots: NDArray[np.float64]
-    radius: NDArray[np.float64]
+    first: Integers
+    knots: Floats
+    radius: Floats
     order: NDArray[np.int32]
     parent: NDArray[np.int32]
-    at: NDArray[np.float64]
-    length: NDArray[np.float64]
-    outward: NDArray[np.float64]
+    at: Floats
+    length: Floats
+    outward: Floats
 
     def __len__(self) -> int:
         return len(self.order)
 
     @cached_property
-    def owner(self) -> NDArray[np.int64]:
+    def owner(self) -> Integers:
         """(k,) int64: branch of each knot."""
         return np.repeat(np.arange(len(self)), np.diff(self.first))
 
     @cached_property
-    def arc(self) -> NDArray[np.float64]:
+    def arc(self) -> Floats:
         """(k,) float64: way along the branch from its base to each knot, metres."""
         return _arc(self.knots, self.first)
 
@@ -255,7 +255,7 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     return DrawnBranches(first, knots, along, order, grown_on.astype(np.int32), at, length, outward)
 
 
-def _roots(points: NDArray[np.float64], pairs: NDArray[np.int64], size: float) -> NDArray[np.int64]:
+def _roots(points: Floats, pairs: Integers, size: float) -> Integers:
     """One point of each connected part, see `skeleton_from_edges`."""
     n = len(points)
     degree = np.bincount(pairs.reshape(-1), minlength=n)
@@ -267,7 +267,7 @@ def _roots(points: NDArray[np.float64], pairs: NDArray[np.int64], size: float) -
     return order[np.unique(part[order], return_index=True)[1]]
 
 
-def _pipe_radii(points: NDArray[np.float64], parent: NDArray[np.int64]) -> NDArray[np.float64]:
+def _pipe_radii(points: Floats, parent: Integers) -> Floats:
     """Radii (p,) by the pipe rule, see `skeleton_from_edges`."""
     before = np.where(parent < 0, np.arange(len(parent)), parent)
     step = np.linalg.norm(points - points[before], axis=1)
@@ -279,9 +279,7 @@ def _pipe_radii(points: NDArray[np.float64], parent: NDArray[np.int64]) -> NDArr
     return _ROOT_RADIUS * longest * np.sqrt(wood / wood.max())
 
 
-def _base_radius(
-    knots: NDArray[np.float64], radius: NDArray[np.float64], base: NDArray[np.int64], count: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _base_radius(knots: Floats, radius: Floats, base: Integers, count: Integers) -> Floats:
     """Radii (s,) at the first knots ``base`` (s,) of side branches of ``count`` knots (s,); those given are the forks'.
 
     The taper between its own first two points, continued to the fork; half of the fork's radius for a branch that has
@@ -295,7 +293,7 @@ def _base_radius(
     return np.minimum(start, np.maximum(fork, here))
 
 
-def _arc(knots: NDArray[np.float64], first: NDArray[np.int64]) -> NDArray[np.float64]:
+def _arc(knots: Floats, first: Integers) -> Floats:
     """Way (k,) along each branch to its knots."""
     step = np.zeros(len(knots))
     step[1:] = np.linalg.norm(np.diff(knots, axis=0), axis=1)
@@ -304,7 +302,7 @@ def _arc(knots: NDArray[np.float64], first: NDArray[np.int64]) -> NDArray[np.flo
     return total - np.repeat(total[first[:-1]], np.diff(first))
 
 
-def _outward(level: NDArray[np.int64], parent: NDArray[np.int64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+def _outward(level: Integers, parent: Integers, at: Floats) -> Floats:
     """See `DrawnBranches`, from the number of forks (b,) below each branch."""
     outward = np.where(level == 2, at, 0.0)
     for g in range(3, int(level.max(initial=0)) + 1):

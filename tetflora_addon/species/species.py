@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..leaves.models import LeafModel
 from ..parameters import Colour, Range, Rgb, described, limited, named
 from .ecology import Ecology
@@ -261,7 +261,7 @@ def whole_cuts(order: Order) -> list[float]:
     return cuts[: reached + 1]
 
 
-def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[np.float64]:
+def crown_ratio(shape: Integers, r: Floats) -> Floats:
     """Length ratio of a child, 0 to 1.
 
     Parameters

@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Mask
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, uniform
 from .guilds import Guilds
@@ -118,13 +119,13 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
     )  # fmt: skip
 
 
-def _offset(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _offset(a: Floats, b: Floats) -> Floats:
     """Offset (n,) towards the light on one side, where there is such light on two."""
     more = _LEANS * (a - b) / (a + b + 0.2)
     return _MOST_OFFSET * more / (1.0 + np.abs(more))
 
 
-def _thickening(one: Plants, wood: NDArray, lit: NDArray, guilds: Guilds) -> NDArray[np.float64]:
+def _thickening(one: Plants, wood: NDArray, lit: NDArray, guilds: Guilds) -> Floats:
     """By how much plants (n,) become thicker that make so much wood, kg, and have so much of the light of free ones."""
     step = 0.002
     rise = np.maximum(guilds.heights(one.guild, one.girth + step) - guilds.heights(one.guild, one.girth), 0.0) / step
@@ -136,7 +137,7 @@ def _thickening(one: Plants, wood: NDArray, lit: NDArray, guilds: Guilds) -> NDA
     return np.minimum(wood / np.maximum(more, 1e-9), most)
 
 
-def dying(plants: Plants, guilds: Guilds, year: int, block: slice) -> NDArray[np.bool_]:
+def dying(plants: Plants, guilds: Guilds, year: int, block: slice) -> Mask:
     """Which of some plants die in a year."""
     one = plants.take(block)
     guild = one.guild
@@ -179,7 +180,7 @@ _SEED_CELL, _HALF = 4.0, 20.0
 _OUTSIDE = 0.1
 
 
-def planted(site: StandSite, guilds: Guilds, suits: NDArray[np.float64], density: float, seed: int) -> Plants:
+def planted(site: StandSite, guilds: Guilds, suits: Floats, density: float, seed: int) -> Plants:
     """Plants evenly spread, each somewhere in a square of its own.
 
     Parameters
@@ -224,9 +225,7 @@ class SeedRain:
         Metres of the grid on which seeds are spread.
     """
 
-    def __init__(
-        self, site: StandSite, guilds: Guilds, suits: NDArray[np.float64], most: float, outside: float
-    ) -> None:
+    def __init__(self, site: StandSite, guilds: Guilds, suits: Floats, most: float, outside: float) -> None:
         """Of a site, for guilds that grow so well on its cells.
 
         Parameters
@@ -241,7 +240,7 @@ class SeedRain:
         self.columns, self.rows = max(round(width / _SEED_CELL), 1), max(round(depth / _SEED_CELL), 1)
         self.outside = outside * _OUTSIDE * guilds.rain * guilds.seeds
 
-    def fallen(self, plants: Plants) -> NDArray[np.float64]:
+    def fallen(self, plants: Plants) -> Floats:
         """Seeds (g, cells) on a square metre and year."""
         width, depth = self.site.size
         column = np.minimum((plants.x * (self.columns / width)).astype(np.int64), self.columns - 1)
@@ -298,7 +297,7 @@ class SeedRain:
         return newcomers(key[kept], first, guild, x[kept], y[kept], girth, quality, _SOWN_AGE, self.guilds)
 
 
-def _smoothed(values: NDArray[np.float64], reach: int, axis: int) -> NDArray[np.float64]:
+def _smoothed(values: Floats, reach: int, axis: int) -> Floats:
     """Means of the cells within a reach along an axis; what leaves on one side enters on the other."""
     size = values.shape[axis]
     reach = min(reach, (size - 1) // 2)

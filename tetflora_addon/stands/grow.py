@@ -12,8 +12,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Mask
 from ..errors import TetFloraError
 from ..jobs import Progress
 from ..parallel import blocks, on_all_cores
@@ -171,7 +171,7 @@ class GrowingStand:
         for index, own in zip(strips, on_all_cores(self.light.taken, range(len(strips))), strict=True):
             taken[index] = own
 
-        def changed(block: slice) -> tuple[Plants, NDArray[np.bool_]]:
+        def changed(block: slice) -> tuple[Plants, Mask]:
             after = grown(plants, crowns, taken, self.light, self.guilds, block)
             return after, dying(after, self.guilds, year, slice(None))
 

@@ -16,6 +16,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import TetFloraError
 from ..species.ages import ages_of
 from ..species.ecology import Ecology
@@ -146,7 +147,7 @@ class Guilds:
         # Dry mass is this × girth² × height.
         self.solid = np.round(self.form * self.wood * np.pi / 4, _DIGITS)
 
-    def heights(self, guild: NDArray, girth: NDArray) -> NDArray[np.float64]:
+    def heights(self, guild: NDArray, girth: NDArray) -> Floats:
         """Heights (n,) in a closed stand, metres."""
         first = np.take(self.first, guild)
         place = np.minimum(girth / np.take(self._step, guild), _HEIGHTS - 0.001)
@@ -156,12 +157,12 @@ class Guilds:
         tall = low + (np.take(flat, start + 1) - low) * (place - index)
         return np.where(girth < first, np.take(self.breast, guild) * girth / first, tall)
 
-    def radii(self, guild: NDArray, girth: NDArray) -> NDArray[np.float64]:
+    def radii(self, guild: NDArray, girth: NDArray) -> Floats:
         """Radii (n,) of crowns that stand free, metres."""
         first = np.take(self.first, guild)
         at_first, slope = np.take(self.crown[:, 0], guild), np.take(self.crown[:, 1], guild)
         return 0.5 * np.where(girth < first, at_first * girth / first, at_first + slope * (girth - first))
 
-    def masses(self, guild: NDArray, girth: NDArray, height: NDArray) -> NDArray[np.float64]:
+    def masses(self, guild: NDArray, girth: NDArray, height: NDArray) -> Floats:
         """Dry mass (n,) of the wood above ground, kg."""
         return np.take(self.solid, guild) * girth**2 * height

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Floats, Integers, spread
 from ..errors import TetFloraError
 from ..parallel import blocks, each_on_all_cores, on_all_cores
 
@@ -50,12 +50,12 @@ class Discs(NamedTuple):
         Square of the distance from the middle over the radius, mean of what is covered.
     """
 
-    first: NDArray[np.int64]
-    number: NDArray[np.int64]
-    row: NDArray[np.int64]
-    column: NDArray[np.int64]
-    part: NDArray[np.float64]
-    far: NDArray[np.float64]
+    first: Integers
+    number: Integers
+    row: Integers
+    column: Integers
+    part: Floats
+    far: Floats
 
 
 @cache
@@ -99,14 +99,14 @@ class CrownCells(NamedTuple):
         As of `Discs`.
     """
 
-    crown: NDArray[np.int64]
-    row: NDArray[np.int64]
-    column: NDArray[np.int64]
-    part: NDArray[np.float64]
-    far: NDArray[np.float64]
+    crown: Integers
+    row: Integers
+    column: Integers
+    part: Floats
+    far: Floats
 
 
-def covered(x: NDArray[np.float64], y: NDArray[np.float64], radius: NDArray[np.float64]) -> CrownCells:
+def covered(x: Floats, y: Floats, radius: Floats) -> CrownCells:
     """Cells that discs (n,) cover; places and radii in cells from the grid's corner.
 
     What is narrower than a cell is in one alone.
@@ -145,12 +145,12 @@ _STEEP = 6.0
 _THIN = 0.15
 
 
-def layer_edge(number: NDArray | int) -> NDArray[np.float64]:
+def layer_edge(number: NDArray | int) -> Floats:
     """Height at which layers begin, metres."""
     return _LAYERS[0] * number + _LAYERS[1] * np.square(number)
 
 
-def layer_of(height: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def layer_of(height: Floats) -> tuple[Integers, Floats]:
     """Layer (n,) of heights (n,), and which part of it is below them."""
     a, b = _LAYERS
     height = np.maximum(height, 0.0)
@@ -174,13 +174,13 @@ class Crowns:
         0 a dome, 1 a cone.
     """
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    base: NDArray[np.float64]
-    height: NDArray[np.float64]
-    leaves: NDArray[np.float64]
-    top: NDArray[np.float64]
+    x: Floats
+    y: Floats
+    radius: Floats
+    base: Floats
+    height: Floats
+    leaves: Floats
+    top: Floats
 
 
 class _Columns(NamedTuple):
@@ -216,7 +216,7 @@ class LightGrid:
     columns: int
     cell: float
     margin: float = 0.0
-    ground: NDArray[np.float64] | None = None
+    ground: Floats | None = None
     light: NDArray[np.float32] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -227,7 +227,7 @@ class LightGrid:
         """Rows that are looked at together."""
         return blocks(self.rows, self.strip)
 
-    def fill(self, crowns: Crowns) -> list[NDArray[np.intp]]:
+    def fill(self, crowns: Crowns) -> list[Integers]:
         """Put the leaves of crowns (n,) on the grid and let light through; returns the crowns of each strip."""
         tallest = float(crowns.height.max(initial=0.5)) + (0.0 if self.ground is None else _STEEP)
         layers = int(layer_of(np.array([tallest + 0.01]))[0][0]) + 1
@@ -318,9 +318,7 @@ class LightGrid:
             each_on_all_cores(part, bands)
             now, after = after, now
 
-    def at(
-        self, x: NDArray, y: NDArray, height: NDArray, of: tuple[NDArray, NDArray] | None = None
-    ) -> NDArray[np.float64]:
+    def at(self, x: NDArray, y: NDArray, height: NDArray, of: tuple[NDArray, NDArray] | None = None) -> Floats:
         """Light (n,) at places (n,), mean of the layer there, over that in the open.
 
         Heights are above the ground there, or above that of other places, x and y (n,).
@@ -337,12 +335,12 @@ class LightGrid:
         thick = _LAYERS[0] + _LAYERS[1] * (2 * layer + 1)
         return (np.take(flat, place) - np.take(flat, place + self.rows * self.columns)) / thick
 
-    def _ground(self, x: NDArray, y: NDArray) -> NDArray[np.float64]:
+    def _ground(self, x: NDArray, y: NDArray) -> Floats:
         """Altitude (n,) of the columns at places (n,)."""
         row, column = (np.floor((values + self.margin) / self.cell).astype(np.int64) for values in (y, x))
         return np.take(self.ground, self._cell(row, column))
 
-    def taken(self, strip: int) -> NDArray[np.float64]:
+    def taken(self, strip: int) -> Floats:
         """Light that the crowns (k,) of a strip take, m² of full light; all together no more than there is."""
         own = self._columns[strip]
         light = self._summed(own.foot, own.under)
@@ -350,7 +348,7 @@ class LightGrid:
         light *= own.density
         return np.bincount(own.crown, light, own.number) * (_UNIT * self.cell**2)
 
-    def _cell(self, row: NDArray, column: NDArray) -> NDArray[np.int64]:
+    def _cell(self, row: NDArray, column: NDArray) -> Integers:
         return (row % self.rows) * self.columns + column % self.columns
 
     def _summed(self, place: NDArray[np.int32], part: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -13,7 +13,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, nested
+from ..arrays import Arrays, Floats, Integers, Keys, Mask, column, nested
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .guilds import FULL, Guilds
 from .light import Crowns
@@ -64,7 +64,7 @@ class Records(Arrays):
     dead: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
 
     @property
-    def lying(self) -> NDArray[np.bool_]:
+    def lying(self) -> Mask:
         """Which lie (n,)."""
         return (self.lean * self.lean).sum(axis=1) >= (LYING * 0.999) ** 2
 
@@ -149,22 +149,22 @@ class Plants(Arrays):
         Whether it has a record.
     """
 
-    number: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
-    key: NDArray[np.uint64] = field(metadata=column(dtype=np.uint64))
-    guild: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    girth: NDArray[np.float64]
-    height: NDArray[np.float64]
-    base: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    east: NDArray[np.float64]
-    north: NDArray[np.float64]
-    vigour: NDArray[np.float64]
-    quality: NDArray[np.float64]
-    strength: NDArray[np.float64]
-    age: NDArray[np.float64]
-    known: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    number: Integers = field(metadata=column(dtype=np.int64))
+    key: Keys = field(metadata=column(dtype=np.uint64))
+    guild: Integers = field(metadata=column(dtype=np.int64))
+    x: Floats
+    y: Floats
+    girth: Floats
+    height: Floats
+    base: Floats
+    radius: Floats
+    east: Floats
+    north: Floats
+    vigour: Floats
+    quality: Floats
+    strength: Floats
+    age: Floats
+    known: Mask = field(metadata=column(dtype=bool))
 
     def crowns(self, guilds: Guilds) -> Crowns:
         """What takes light."""
@@ -175,7 +175,7 @@ class Plants(Arrays):
         y = self.y + _BESIDE * self.radius * self.north
         return Crowns(x, y, self.radius, self.base, self.height, leaves, np.take(guilds.top, self.guild))
 
-    def leaf_area(self, guilds: Guilds) -> NDArray[np.float64]:
+    def leaf_area(self, guilds: Guilds) -> Floats:
         """Leaf area (n,), m²."""
         return self.crowns(guilds).leaves / np.take(guilds.extinction, self.guild)
 
@@ -213,9 +213,9 @@ class DeadPlants(Arrays):
     """
 
     last: Records = field(metadata=nested(Records))
-    died: NDArray[np.float64]
-    falls: NDArray[np.float64]
-    gone: NDArray[np.float64]
+    died: Floats
+    falls: Floats
+    gone: Floats
     lean: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))
 
     def records(self, year: float) -> Records:
@@ -234,7 +234,7 @@ def _positions(x: NDArray, y: NDArray, site: StandSite) -> NDArray[np.float32]:
 
 
 def newcomers(
-    key: NDArray[np.uint64], first: int, guild: NDArray, x: NDArray, y: NDArray, girth: NDArray, quality: NDArray,
+    key: Keys, first: int, guild: NDArray, x: NDArray, y: NDArray, girth: NDArray, quality: NDArray,
     age: float, guilds: Guilds,
 ) -> Plants:  # fmt: skip
     """Young plants (n,) at places (n,) in metres from the corner; those of a girth stand as free ones do."""
@@ -249,6 +249,6 @@ def newcomers(
     )  # fmt: skip
 
 
-def keys_of(seed: int, what: int) -> NDArray[np.uint64]:
+def keys_of(seed: int, what: int) -> Keys:
     """Key of random numbers of a sort in a stand."""
     return child_key(key_of_seed(seed), 2**33 + what)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import bilinear
+from ..arrays import Floats, Integers, bilinear
 from ..errors import TetFloraError
 from ..species.ecology import Ecology
 
@@ -100,18 +100,18 @@ class StandSite:
         here = self.height.size if self.plantable is None else float(self.plantable.sum())
         return here * self.cell**2
 
-    def cells(self, x: NDArray, y: NDArray) -> NDArray[np.intp]:
+    def cells(self, x: NDArray, y: NDArray) -> Integers:
         """Index (n,) of the cell, row by row, at places (n,) in metres from the corner; the nearest of those beyond."""
         rows, columns = self.height.shape
         column = np.clip((np.asarray(x) / self.cell).astype(np.intp), 0, columns - 1)
         row = np.clip((np.asarray(y) / self.cell).astype(np.intp), 0, rows - 1)
         return row * columns + column
 
-    def ground(self, x: NDArray, y: NDArray) -> NDArray[np.float64]:
+    def ground(self, x: NDArray, y: NDArray) -> Floats:
         """Altitude (n,) at places (n,) in metres from the corner, bilinear between the middles of cells."""
         return bilinear(self.height, np.stack([x, y], axis=1) / self.cell - 0.5)
 
-    def suits(self, ecology: Ecology) -> NDArray[np.float64]:
+    def suits(self, ecology: Ecology) -> Floats:
         """How well a species grows in each cell, over how it does where nothing is wanting: (h w,), 0 to 1."""
         colder = _LAPSE * (self.height.ravel() - self.altitude)
         warm = self.warmth - _DAYS * colder - ecology.warmth
@@ -125,7 +125,7 @@ class StandSite:
         fed = _ramp(0.3 + 0.7 * (1.0 - np.maximum(ecology.fertility - food, 0.0) / max(ecology.fertility, 1e-9)))
         return np.round(warmth * water * fed, _DIGITS)
 
-    def slope(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def slope(self) -> tuple[Floats, Floats]:
         """Rise of the ground to the east and to the north in each cell: (h w,) each, tangents."""
         north, east = (
             np.gradient(self.height, self.cell, axis=axis) if self.height.shape[axis] > 1 else 0.0 * self.height
@@ -134,11 +134,11 @@ class StandSite:
         return east.ravel(), north.ravel()
 
 
-def _of(values: NDArray | None, default: float, like: NDArray) -> NDArray[np.float64]:
+def _of(values: NDArray | None, default: float, like: NDArray) -> Floats:
     return np.full(like.shape, default) if values is None else values.ravel()
 
 
-def _ramp(value: ArrayLike) -> NDArray[np.float64]:
+def _ramp(value: ArrayLike) -> Floats:
     return np.clip(value, 0.0, 1.0)
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, cross, dot, spread, unit
+from ..arrays import Arrays, Integers, Keys, cross, dot, spread, unit
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_keys, leaf_places, place_leaves
@@ -35,7 +35,7 @@ _AT_END, _VARIED = 1.3, 0.25
 _LEAN, _SUNK = 0.62, 0.75
 
 
-def bud_numbers(flora: Flora, whole: WholeBranches) -> NDArray[np.int64]:
+def bud_numbers(flora: Flora, whole: WholeBranches) -> Integers:
     """Rings (n,) of the buds of near branches."""
     owner = _places(flora, whole)[0]
     return BUD_RINGS * np.bincount(owner, minlength=len(whole))
@@ -46,7 +46,7 @@ def bud_sides(sides: int) -> int:
     return int(np.clip(2 * sides, 6, 24))
 
 
-def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings, NDArray[np.int64]] | None:
+def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings, Integers] | None:
     """Rings of the buds of near branches (n), and the branch of each bud; None without any."""
     owner, index, key = _places(flora, whole)
     if not len(owner):
@@ -92,7 +92,7 @@ def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings
     return rings, owner
 
 
-def _places(flora: Flora, whole: WholeBranches) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.uint64]]:
+def _places(flora: Flora, whole: WholeBranches) -> tuple[Integers, Integers, Keys]:
     """Branch (m,), leaf in whose axil it is, or -1 for the one at the end, and key of each bud of branches (n)."""
     rows, branches = flora.rows, whole.branches
     lateral = np.array([-1.0 if one.bud is None else one.bud.lateral for one in flora.species])

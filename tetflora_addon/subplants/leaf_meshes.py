@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Floats, Integers, Keys, spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
@@ -69,12 +69,12 @@ class LeafCopies:
 
     def add(
         self,
-        key: NDArray[np.uint64],
-        position: NDArray[np.float64],
+        key: Keys,
+        position: Floats,
         frame: NDArray[np.float32],
-        size: NDArray[np.float64],
-        colour: NDArray[np.float64],
-        motion: tuple[NDArray[np.float64], NDArray[np.float32]] | None = None,
+        size: Floats,
+        colour: Floats,
+        motion: tuple[Floats, NDArray[np.float32]] | None = None,
     ) -> None:
         """Place the next n copies.
 
@@ -101,7 +101,7 @@ class LeafCopies:
             self.velocity[new] = _placed(shape, *motion, size)
         self.colour[new] = colour[:, None]
 
-    def _shapes(self, key: NDArray[np.uint64], new: slice) -> NDArray[np.float32]:
+    def _shapes(self, key: Keys, new: slice) -> NDArray[np.float32]:
         """Vertices (v, 3, n or 1) of copies with keys (n,) before they are placed."""
         return self.model.positions.astype(np.float32)[:, :, None]
 
@@ -155,7 +155,7 @@ class KiteCopies(LeafCopies):
         self.kites = kites
         self.plane = np.zeros(number, np.int8)
 
-    def _shapes(self, key: NDArray[np.uint64], new: slice) -> NDArray[np.float32]:
+    def _shapes(self, key: Keys, new: slice) -> NDArray[np.float32]:
         self.plane[new] = self.kites.chosen(uniform(key, Draw.LEAF_PLANE))
         return self.kites.positions.astype(np.float32).transpose(1, 2, 0)[:, :, self.plane[new]]
 
@@ -181,7 +181,7 @@ class LevelCopies(LeafCopies):
         super().__init__(level.model, number, transmission, moving)
         self.shapes, self.tint = level.shapes.transpose(1, 2, 0), level.tint
 
-    def _shapes(self, key: NDArray[np.uint64], new: slice) -> NDArray[np.float32]:
+    def _shapes(self, key: Keys, new: slice) -> NDArray[np.float32]:
         variants = self.shapes.shape[2]
         return self.shapes[:, :, (uniform(key, Draw.LEAF_VARIANT) * variants).astype(np.int64)]
 
@@ -192,7 +192,7 @@ class LevelCopies(LeafCopies):
 
 
 def _placed(
-    shape: NDArray[np.float32], position: NDArray[np.float64], frame: NDArray[np.float32], size: NDArray[np.float64]
+    shape: NDArray[np.float32], position: Floats, frame: NDArray[np.float32], size: Floats
 ) -> NDArray[np.float32]:
     """Vertices (n, 3 v) of copies of shapes (v, 3, n or 1); linear in position and frame, and so serves velocities."""
     scaled = frame.transpose(1, 2, 0) * size.astype(np.float32)  # (3, 3, n)
@@ -252,8 +252,8 @@ def leaf_meshes(
     flora: Flora,
     species: int,
     whole: Sequence[WholeBranches],
-    fractions_of: Callable[[Branches], tuple[NDArray[np.float64], NDArray[np.float64]]] | None = None,
-    lengths_of: Callable[[WholeBranches], NDArray[np.float64]] | None = None,
+    fractions_of: Callable[[Branches], tuple[Floats, Floats]] | None = None,
+    lengths_of: Callable[[WholeBranches], Floats] | None = None,
 ) -> Iterator[LeafMesh]:
     """Copies of the leaf models for the leaves on branches of one species, form by form.
 
@@ -303,7 +303,7 @@ def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_Bearers]:
         yield _Bearers(flora, row, whole.take(order[own]))
 
 
-def _by_row(rows: NDArray[np.integer]) -> Iterator[tuple[int, slice]]:
+def _by_row(rows: Integers) -> Iterator[tuple[int, slice]]:
     """Runs of equal numbers in a sorted array."""
     cuts = [0, *(np.flatnonzero(np.diff(rows)) + 1), len(rows)]
     for start, stop in pairwise(cuts):
@@ -325,9 +325,9 @@ class _Bearers:
         row: int,
         whole: WholeBranches,
         step: int = 0,
-        fraction: NDArray[np.float64] | None = None,
-        kites: NDArray[np.float64] | None = None,
-        lengths: NDArray[np.float64] | None = None,
+        fraction: Floats | None = None,
+        kites: Floats | None = None,
+        lengths: Floats | None = None,
     ) -> None:
         self.flora, self.whole, self.counts = flora, whole, leaf_counts(flora.rows, whole.branches)
         self.step, self.fraction, self.kites, self.lengths = step, fraction, kites, lengths
@@ -335,7 +335,7 @@ class _Bearers:
         self.kind = int(flora.rows["leaf_kind"][row])
         self.forms = flora.forms[int(flora.rows["species"][row])][self.kind]
 
-    def parts(self, fraction: NDArray[np.float64], kites: NDArray[np.float64]) -> Iterator[_Bearers]:
+    def parts(self, fraction: Floats, kites: Floats) -> Iterator[_Bearers]:
         """The branches some of whose leaves are wanted as they are, and those with leaves as kites."""
         for step, share in ((0, 1.0 - kites), (_KITE, kites)):
             own = np.flatnonzero((fraction > 0.0) & (share > 0.0))
@@ -343,7 +343,7 @@ class _Bearers:
                 given = fraction[own], kites[own]
                 yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given)
 
-    def levels(self, lengths: NDArray[np.float64]) -> Iterator[_Bearers]:
+    def levels(self, lengths: Floats) -> Iterator[_Bearers]:
         """The branches by the levels that some of their leaves have; kites stay what they are."""
         if self.step == _KITE:
             yield self
@@ -357,7 +357,7 @@ class _Bearers:
                 mixed = lengths[own] if (low[own] < high[own]).any() else None
                 yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given, mixed)
 
-    def numbers(self) -> NDArray[np.int64]:
+    def numbers(self) -> Integers:
         """How many leaves there are of each form."""
         if len(self.forms) == 1 and self.fraction is None and self.lengths is None and not is_seasonal(self.flora.rows):
             return np.array([self.counts.sum()])
@@ -410,7 +410,7 @@ class _Bearers:
             if self.counts[run].any():
                 yield run
 
-    def _leaves(self, part: slice) -> tuple[NDArray[np.int64], ...]:
+    def _leaves(self, part: slice) -> tuple[Integers, ...]:
         """Branch within the run, number on it, key and form of each wanted leaf."""
         owner, index = spread(self.counts[part])
         key = leaf_keys(self.whole.branches.take(part), owner, index)

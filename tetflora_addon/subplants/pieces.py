@@ -11,9 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, gathered, nested
+from ..arrays import Arrays, Floats, Integers, Table, column, gathered, nested
 from ..compiled.averages import own_leaf_integrals, tube_perimeter
 from ..compiled.flora import Flora
 from ..growth.axes import axes, profile_integral
@@ -38,13 +37,13 @@ class Pieces(Arrays):
     """
 
     branches: Branches = field(metadata=nested(Branches))
-    t0: NDArray[np.float64]
-    t1: NDArray[np.float64]
-    start: NDArray[np.float64] = field(metadata=column(3))
-    end: NDArray[np.float64] = field(metadata=column(3))
+    t0: Floats
+    t1: Floats
+    start: Floats = field(metadata=column(3))
+    end: Floats = field(metadata=column(3))
 
 
-def whole_pieces(rows: NDArray[np.void], whole: WholeBranches) -> tuple[Pieces, NDArray[np.int64]]:
+def whole_pieces(rows: Table, whole: WholeBranches) -> tuple[Pieces, Integers]:
     """All segments (m,) of whole branches as pieces, and the branch (m,) of each."""
     owner, t, position = whole.knots(rows)
     low = np.flatnonzero(owner[1:] == owner[:-1])
@@ -53,13 +52,13 @@ def whole_pieces(rows: NDArray[np.void], whole: WholeBranches) -> tuple[Pieces, 
     return Pieces(whole.branches.take(owner), t[low], t[low + 1], *ends), owner
 
 
-def leaf_fraction(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+def leaf_fraction(flora: Flora, pieces: Pieces) -> Floats:
     """Expected fraction (n,) of a branch's own leaves that sit on each piece."""
     start = leaf_start(flora.rows, pieces.branches)
     return np.clip(np.maximum(pieces.t1, start) - np.maximum(pieces.t0, start), 0, None) / (1 - start)
 
 
-def outward_ends(flora: Flora, pieces: Pieces) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def outward_ends(flora: Flora, pieces: Pieces) -> tuple[Floats, Floats]:
     """Places between inside and outside of the crown of the first and the last leaf that each piece (n,) may bear."""
     rows, branches = flora.rows, pieces.branches
     start = leaf_start(rows, branches)
@@ -67,9 +66,7 @@ def outward_ends(flora: Flora, pieces: Pieces) -> tuple[NDArray[np.float64], NDA
     return tuple(outwardness(rows, branches, every, np.maximum(t, start)) for t in (pieces.t0, pieces.t1))
 
 
-def piece_leaf_integrals(
-    flora: Flora, pieces: Pieces
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def piece_leaf_integrals(flora: Flora, pieces: Pieces) -> tuple[Floats, Floats, Floats]:
     """`own_leaf_integrals` (n,) of the leaves that branches themselves bear on pieces."""
     rows, row = flora.rows, pieces.branches.row
     along = None
@@ -80,14 +77,14 @@ def piece_leaf_integrals(
     return own_leaf_integrals(*sizes, outward_ends(flora, pieces), along)
 
 
-def piece_leaf_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+def piece_leaf_colours(flora: Flora, pieces: Pieces) -> Floats:
     """Mean linear RGB (n, 3) of the leaves that branches themselves bear on pieces, weighted by area."""
     row, rows = pieces.branches.row, flora.rows
     colour = _summer_colours(flora, pieces)
     return colour if flora.day is None else flora.day.own_colours(pieces.branches, rows["leaf_kind"][row], colour)
 
 
-def _summer_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+def _summer_colours(flora: Flora, pieces: Pieces) -> Floats:
     row, rows = pieces.branches.row, flora.rows
     inside = rows["leaf_colour"][row, 0]
     if not rows["gradient"].any():
@@ -97,14 +94,14 @@ def _summer_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
     return older + (rows["leaf_colour_young"][row] - inside) * (area_young / area)[:, None]
 
 
-def wood_areas(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+def wood_areas(flora: Flora, pieces: Pieces) -> Floats:
     """Surface (n,) of the wood of each piece, m²: perimeter × length at the mean radius."""
     branches = pieces.branches
     low, high = (profile_integral(flora.rows, branches.row, branches.key, t) for t in (pieces.t0, pieces.t1))
     return tube_perimeter(flora.rows["sides"][branches.row]) * branches.radius * branches.length * (high - low)
 
 
-def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray[np.int64], Pieces, NDArray[np.int64]]:
+def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, Integers, Pieces, Integers]:
     """Open sub-plants into the sub-plants of the next order and the pieces of their own branch.
 
     Returns
@@ -129,9 +126,7 @@ def expand(flora: Flora, subplants: Branches) -> Iterator[WholeBranches]:
         yield whole
 
 
-def open_branches(
-    flora: Flora, subplants: Branches
-) -> tuple[WholeBranches, NDArray[np.int64], Branches, NDArray[np.int64]]:
+def open_branches(flora: Flora, subplants: Branches) -> tuple[WholeBranches, Integers, Branches, Integers]:
     """Branches of sub-plants with the index of the sub-plant of each, and their children with that of their parent."""
     rows = flora.rows
     phantom = rows["phantom"][subplants.row]
@@ -145,7 +140,7 @@ def open_branches(
     return WholeBranches(bodies, lines), body, *children(rows, bodies, lines)
 
 
-def chunks(polygons: NDArray[np.float64], limit: float) -> Iterator[slice]:
+def chunks(polygons: Floats, limit: float) -> Iterator[slice]:
     """Runs of things whose expected polygons (n,) sum up to about a limit each."""
     block = (np.cumsum(polygons) / limit).astype(np.int64)
     edges = np.flatnonzero(np.diff(block)) + 1

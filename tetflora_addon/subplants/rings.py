@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread, unit
+from ..arrays import Floats, Integers, Keys, Mask, Table, spread, unit
 from ..compiled.averages import tube_perimeter
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds
@@ -54,14 +54,14 @@ class Rings:
     """
 
     branches: Branches
-    branch: NDArray[np.int64]
-    t: NDArray[np.float64]
-    centre: NDArray[np.float64]
+    branch: Integers
+    t: Floats
+    centre: Floats
     reach: NDArray[np.float32]
-    goes_on: NDArray[np.bool_]
+    goes_on: Mask
     later: tuple[NDArray, NDArray] | None = None
     swelling: NDArray[np.float32] | None = None
-    colour: NDArray[np.float64] | None = None
+    colour: Floats | None = None
 
 
 def rings_of(flora: Flora, whole: WholeBranches) -> Rings:
@@ -77,16 +77,14 @@ def rings_of(flora: Flora, whole: WholeBranches) -> Rings:
     return Rings(branches, owner, t, centre, reach, _goes_on(owner), later)
 
 
-def fine_numbers(
-    flora: Flora, whole: WholeBranches, counts: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def fine_numbers(flora: Flora, whole: WholeBranches, counts: Integers) -> tuple[Integers, Integers]:
     """Rings of each branch (n,), and of its roots, of which each has `PLACES`."""
     footed = has_foot(flora.rows, whole.branches)
     rings = counts.sum(axis=1) + 1 + below_base(flora.rows, whole.branches) + beyond_tip(flora.rows, whole.branches)
     return rings, np.where(footed, PLACES * root_number(whole.branches.key), 0)
 
 
-def fine_counts(flora: Flora, whole: WholeBranches, fine: Fineness, pixels: Pixels) -> NDArray[np.int64]:
+def fine_counts(flora: Flora, whole: WholeBranches, fine: Fineness, pixels: Pixels) -> Integers:
     """Parts (n, S) of the segments of branches; a branch has a ring more than parts."""
     rows, branches, lines = flora.rows, whole.branches, whole.lines
     n, most = len(branches), lines.frames.shape[1]
@@ -102,7 +100,7 @@ def fine_counts(flora: Flora, whole: WholeBranches, fine: Fineness, pixels: Pixe
     return np.where(there, out, 0)
 
 
-def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: NDArray[np.int64]) -> Rings:
+def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integers) -> Rings:
     """Rings along the curves of branches of one number of sides, so many (n, S) to each segment."""
     rows, branches, segments = flora.rows, whole.branches, whole.lines.segments
     n, most = counts.shape
@@ -160,7 +158,7 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: NDArr
     return Rings(branches, owner, t, centre, reach, _goes_on(owner), later, swollen)
 
 
-def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings, NDArray[np.int64]] | None:
+def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings, Integers] | None:
     """Rings of the roots of trunks, and the branch of each root; None without any."""
     rows, branches = flora.rows, whole.branches
     own = np.flatnonzero(has_foot(rows, branches) & (fine.weight > 0))
@@ -184,7 +182,7 @@ def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Ring
     return Rings(wood, owner, t, centre, reach, _goes_on(owner), still), own[which]
 
 
-def _curve(flora: Flora, whole: WholeBranches, weight: NDArray[np.float64]) -> Curve:
+def _curve(flora: Flora, whole: WholeBranches, weight: Floats) -> Curve:
     """The curves of branches, which stay within their own thickness."""
     n, joints = whole.lines.knots.shape[:2]
     t = np.minimum(np.arange(joints) / whole.lines.segments[:, None], 1.0)
@@ -193,7 +191,7 @@ def _curve(flora: Flora, whole: WholeBranches, weight: NDArray[np.float64]) -> C
     return curve(whole.lines, radius, weight)
 
 
-def _falls(rows: NDArray[np.void], branches: Branches, segments: NDArray[np.int64]) -> NDArray[np.float64]:
+def _falls(rows: Table, branches: Branches, segments: Integers) -> Floats:
     """Over how many of its own lengths the base of a branch falls to its usual thickness in the first segment (n,)."""
     step = branches.length / segments
     more, length = collars(rows, branches)
@@ -201,19 +199,19 @@ def _falls(rows: NDArray[np.void], branches: Branches, segments: NDArray[np.int6
     return np.where(flared, 8 * np.log(100.0) / segments, np.where(more > 0, 2.0 * step / length, 0.0))
 
 
-def _stretched(x: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
+def _stretched(x: Floats, fall: Floats) -> Floats:
     """Fractions (n,) moved so that straight lines between them are equally far off e^(-fall x)."""
     fall = np.clip(fall, 1e-6, 40.0)
     return -2.0 * np.log1p(-x * -np.expm1(-fall / 2.0)) / fall
 
 
-def _goes_on(owner: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _goes_on(owner: Integers) -> Mask:
     out = np.zeros(len(owner), bool)
     out[:-1] = owner[1:] == owner[:-1]
     return out
 
 
-def without_places(branches: Branches, index: NDArray[np.int64]) -> Branches:
+def without_places(branches: Branches, index: Integers) -> Branches:
     """Selection of all that numbers and radii depend on; places and frames, which are most of the memory, are zero."""
     n = len(index)
     names = ("row", "plant", "key", "length", "radius", "scale", "vigour", "outward")
@@ -221,7 +219,7 @@ def without_places(branches: Branches, index: NDArray[np.int64]) -> Branches:
     return Branches(position=np.broadcast_to(0.0, (n, 3)), frame=np.broadcast_to(0.0, (n, 3, 3)), **rest)
 
 
-def _ring_axes(lines: Axes, branch: NDArray[np.int64], t: NDArray[np.float64]) -> NDArray[np.float64]:
+def _ring_axes(lines: Axes, branch: Integers, t: Floats) -> Floats:
     """Both axes (2, 3, n) across a branch at rings; at a joint, half way between those of the two segments."""
     frames = lines.frames[:, :, :, :2].astype(np.float32)
     number = np.take(lines.segments, branch)
@@ -262,7 +260,7 @@ _BALL, _ROUND = 4, np.radians(72.0)
 _CAP, _SPLINTERS = 3, 1.6
 
 
-def collars(rows: NDArray[np.void], branches: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def collars(rows: Table, branches: Branches) -> tuple[Floats, Floats]:
     """How much thicker branches (n,) are at their base, over their radius, and over which length that falls, metres.
 
     The base lies on the axis of the parent: what is seen begins a radius of the parent further out.
@@ -275,13 +273,13 @@ def collars(rows: NDArray[np.void], branches: Branches) -> tuple[NDArray[np.floa
     return np.where(grown & ~rows["drawn"][row], _COLLAR, 0.0), np.maximum(length, 1e-9)
 
 
-def has_foot(rows: NDArray[np.void], branches: Branches) -> NDArray[np.bool_]:
+def has_foot(rows: Table, branches: Branches) -> Mask:
     """Branches (n,) with buttresses and roots: flared trunks."""
     row = branches.row
     return (rows["order"][row] == 0) & (rows["flare"][row] > 0) & ~rows["continues"][row] & ~rows["phantom"][row]
 
 
-def below_base(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
+def below_base(rows: Table, branches: Branches) -> Integers:
     """Rings (n,) below the base of near branches: of trunks in the ground, of stems beyond a fork within their parent.
 
     The end of what forks and the base of such a stem are circles around one place, as wide as each other. At an angle
@@ -292,14 +290,12 @@ def below_base(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
     return np.where(has_foot(rows, branches), 1, np.where(ball, _BALL, 0))
 
 
-def beyond_tip(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
+def beyond_tip(rows: Table, branches: Branches) -> Integers:
     """Rings (n,) beyond the end of near branches: the half of a ball where they fork, a cap where they end."""
     return np.where(rows["next"][branches.row, FORK] >= 0, _BALL, _CAP)
 
 
-def beyond(
-    rows: NDArray[np.void], branches: Branches, branch: NDArray[np.int64], number: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def beyond(rows: Table, branches: Branches, branch: Integers, number: Integers) -> tuple[Floats, Floats, Floats]:
     """How far rings (m,) of branches, numbered from 1, lie beyond the end, how wide and how oblique they are.
 
     All in radii there. Ends are round; dead ones are broken off, with a hollow in the oblique break.
@@ -315,7 +311,7 @@ def beyond(
     return deep, np.where(dead, np.array([0.96, 0.6, 0.0])[at], narrow), slant
 
 
-def depths(footed: NDArray[np.bool_], number: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def depths(footed: Mask, number: Integers) -> tuple[Floats, Floats]:
     """How far rings (n,), numbered from 1, lie beyond an end, and how wide they are, in radii there.
 
     Those of the ``footed`` are in the ground, others on a ball.
@@ -324,7 +320,7 @@ def depths(footed: NDArray[np.bool_], number: NDArray[np.int64]) -> tuple[NDArra
     return np.where(footed, SUNK, np.sin(angle)), np.where(footed, 1.0, np.cos(angle))
 
 
-def below_forks(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
+def below_forks(rows: Table, branches: Branches) -> Floats:
     """How much wider branches (n,) are where they fork, over their radius there: as wide as the stems beyond begin.
 
     Stems share the cross-section of what forks, and flare at their base by what the expected number of them takes.
@@ -336,18 +332,18 @@ def below_forks(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float6
     return np.where(beyond >= 0, wider, 1.0)
 
 
-def widening(wider: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]:
+def widening(wider: Floats, t: Floats) -> Floats:
     """Factor (n,) of the radius at fractions t (n,) of branches that are so much wider (n,) at their end."""
     x = np.clip((t - _WIDENS) / (1.0 - _WIDENS), 0.0, 1.0)
     return 1.0 + (wider - 1.0) * x * x * (3.0 - 2.0 * x)
 
 
-def root_number(key: NDArray[np.uint64]) -> NDArray[np.int64]:
+def root_number(key: Keys) -> Integers:
     """Number (n,) of the buttresses of trunks, each with a root."""
     return LEAST + np.floor((MOST - LEAST + 1) * uniform(child_key(key, _ROOTS), 0)).astype(np.int64)
 
 
-def buttresses(key: NDArray[np.uint64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def buttresses(key: Keys) -> tuple[Floats, Floats]:
     """Angles and sizes (n, MOST) of the buttresses of trunks; those that a trunk has not are 0 large."""
     number = root_number(key)[:, None]
     each = np.arange(MOST)
@@ -361,7 +357,7 @@ def root_sides(sides: int) -> int:
     return max(sides // 4, 6)
 
 
-def keep_inside(flora: Flora, branches: Branches, owner: NDArray[np.int64], points: NDArray[np.float32]) -> None:
+def keep_inside(flora: Flora, branches: Branches, owner: Integers, points: NDArray[np.float32]) -> None:
     """Move points (m, 3), in place, that lie outside the bounds of their branches (n,) to the border of these.
 
     Hardly any: bounds are those of whole sub-plants, and wider than what a foot or a collar adds to wood.
@@ -384,12 +380,12 @@ def keep_inside(flora: Flora, branches: Branches, owner: NDArray[np.int64], poin
 
 
 def swelling(
-    rows: NDArray[np.void],
+    rows: Table,
     branches: Branches,
-    weight: NDArray[np.float64],
-    owner: NDArray[np.int64],
-    t: NDArray[np.float64],
-    radius: NDArray[np.float64],
+    weight: Floats,
+    owner: Integers,
+    t: Floats,
+    radius: Floats,
     sides: int,
 ) -> NDArray[np.float32] | None:
     """Factors (sides, r) of the radius (r,) of rings at fractions t (r,) of branches (n,); None where all are 1."""
@@ -405,9 +401,7 @@ def swelling(
     return np.maximum(1.0 + size * shape[:, owner], _LEAST_RADIUS).astype(np.float32)
 
 
-def roots(
-    rows: NDArray[np.void], trunks: Branches, weight: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Floats, Integers]:
     """Surface roots of trunks (n,): they leave the buttresses, wind along the ground and lead into it.
 
     Returns

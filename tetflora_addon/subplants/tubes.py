@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
@@ -84,11 +85,11 @@ class _Sort:
 
     whole: WholeBranches
     sides: int
-    rings: NDArray[np.int64]
-    beside: NDArray[np.int64] | None = None
+    rings: Integers
+    beside: Integers | None = None
     fine: Fineness | None = None
-    counts: NDArray[np.int64] | None = None
-    buds: NDArray[np.int64] | None = None
+    counts: Integers | None = None
+    buds: Integers | None = None
 
     def numbers(self) -> tuple[int, int]:
         """Vertices and faces."""
@@ -260,7 +261,7 @@ def wood_attributes(
     return {"UVMap": ("CORNER", uv), **{name: ("FACE", values) for name, values in faces.items()}, **motion}
 
 
-def base_girth(branches: Branches) -> NDArray[np.float64]:
+def base_girth(branches: Branches) -> Floats:
     """Length (n,) around branches at their base, without flare, metres: what v counts."""
     return 2 * np.pi * branches.radius
 

@@ -9,9 +9,8 @@ from any direction is that of the tubes, whose far side is never seen.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import spread, unit
+from ..arrays import Floats, Integers, spread, unit
 from ..buffers import MeshBuffers, concatenate_buffers
 from ..compiled.flora import Flora
 from ..growth.axes import Axes
@@ -25,10 +24,7 @@ from .tubes import base_girth, wood_attributes
 
 
 def twig_buffers(
-    flora: Flora,
-    whole: WholeBranches,
-    wider: NDArray[np.float64] | None = None,
-    parts: NDArray[np.int64] | None = None,
+    flora: Flora, whole: WholeBranches, wider: Floats | None = None, parts: Integers | None = None
 ) -> MeshBuffers | None:
     """Triangles and ribbons in the place of tubes.
 
@@ -56,7 +52,7 @@ def twig_buffers(
     return concatenate_buffers(made)
 
 
-def _triangles(flora: Flora, whole: WholeBranches, times: NDArray[np.float64]) -> MeshBuffers:
+def _triangles(flora: Flora, whole: WholeBranches, times: Floats) -> MeshBuffers:
     """A triangle from base to tip of each of branches (n,), so many times (n,) as wide."""
     branches, number = whole.branches, len(whole)
     base, tip = _ends(whole.lines)
@@ -84,7 +80,7 @@ def _triangles(flora: Flora, whole: WholeBranches, times: NDArray[np.float64]) -
     return _buffers(flora, branches, np.arange(number), corners, velocity, uv, topology)
 
 
-def _ribbons(flora: Flora, whole: WholeBranches, times: NDArray[np.float64], parts: NDArray[np.int64]) -> MeshBuffers:
+def _ribbons(flora: Flora, whole: WholeBranches, times: Floats, parts: Integers) -> MeshBuffers:
     """A chain of quadrilaterals (n,) along each of branches (n,), so many times (n,) as wide, as girths taper."""
     branches, lines = whole.branches, whole.lines
     ring, number = spread(parts + 1)
@@ -116,11 +112,11 @@ def _ribbons(flora: Flora, whole: WholeBranches, times: NDArray[np.float64], par
 def _buffers(
     flora: Flora,
     branches: Branches,
-    owner: NDArray[np.integer],
-    corners: NDArray[np.float64],
-    velocity: NDArray[np.float64] | None,
-    uv: NDArray[np.float64],
-    topology: tuple[NDArray[np.integer], ...],
+    owner: Integers,
+    corners: Floats,
+    velocity: Floats | None,
+    uv: Floats,
+    topology: tuple[Integers, ...],
 ) -> MeshBuffers:
     """Buffers of faces (f,) of branches (f,), with vertices (v, 3) that move at velocities (v, 3).
 
@@ -132,18 +128,18 @@ def _buffers(
     return MeshBuffers(corners.astype(np.float32), *whole, wood_attributes(*light), smooth=True)
 
 
-def _turned(branches: Branches, frame: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turned(branches: Branches, frame: Floats) -> Floats:
     """Unit vectors (n, 3) across lines with frames (n, 3, 3), turned about these at random."""
     turn = 2.0 * np.pi * uniform(branches.key, Draw.TWIG_TURN)[:, None]
     return np.cos(turn) * frame[:, :, 0] + np.sin(turn) * frame[:, :, 1]
 
 
-def _height(branches: Branches) -> NDArray[np.float64]:
+def _height(branches: Branches) -> Floats:
     """Length (n,) of the texture along branches, in girths."""
     return branches.length / np.maximum(base_girth(branches), 1e-9)
 
 
-def _ends(lines: Axes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _ends(lines: Axes) -> tuple[Floats, Floats]:
     """First and last knots (n, 3) of lines."""
     every = np.arange(len(lines.segments))
     return lines.knot(every, np.zeros(len(every), np.int64)), lines.knot(every, lines.segments)

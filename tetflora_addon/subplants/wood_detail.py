@@ -13,9 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, cross, dot, smoothstep, spread, unit
+from ..arrays import Arrays, Floats, Integers, Mask, cross, dot, smoothstep, spread, unit
 from ..compiled.flora import Flora
 from ..growth.axes import Axes
 from ..growth.branches import Branches
@@ -51,7 +50,7 @@ class Pixels:
         By how much that falls at most with each metre that one comes nearer.
     """
 
-    extent: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    extent: Callable[[Floats], Floats]
     slope: float = 0.0
 
 
@@ -68,17 +67,17 @@ class Fineness(Arrays):
         Radius in the image where that is largest.
     """
 
-    sides: NDArray[np.int64]
-    weight: NDArray[np.float64]
-    pixels: NDArray[np.float64]
+    sides: Integers
+    weight: Floats
+    pixels: Floats
 
 
-def round_up_to(sides: NDArray[np.int64]) -> NDArray[np.float64]:
+def round_up_to(sides: Integers) -> Floats:
     """Radius in pixels (n,) up to which polygons of so many sides (n,) pass for circles, and joints for curves."""
     return np.minimum(DEVIATION / (1.0 - np.cos(np.pi / sides)), _BENT)
 
 
-def fine_sides(sides: NDArray[np.int64], pixels: NDArray[np.float64]) -> NDArray[np.int64]:
+def fine_sides(sides: Integers, pixels: Floats) -> Integers:
     """Sides (n,) of branches of a radius in pixels (n,) whose species has so many (n,): twice that, four times, ..."""
     enough = np.pi / np.arccos(np.clip(1.0 - DEVIATION / np.maximum(pixels, DEVIATION), -1.0, 1.0 - 1e-9))
     power = np.ceil(np.log2(np.maximum(enough / sides, 1.0)) - 1e-9)
@@ -101,7 +100,7 @@ def fineness(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Fineness:
     return Fineness(fine_sides(sides, size), weight, size)
 
 
-def _largest(flora: Flora, whole: WholeBranches, pixels: Pixels) -> NDArray[np.float64]:
+def _largest(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Floats:
     """Largest radius in pixels (n,) of branches at knots and between them."""
     owner, index = spread(whole.lines.segments * (len(_PLACES) + 1) + 1)
     segment, place = index // (len(_PLACES) + 1), np.concatenate([[0.0], _PLACES])[index % (len(_PLACES) + 1)]
@@ -111,7 +110,7 @@ def _largest(flora: Flora, whole: WholeBranches, pixels: Pixels) -> NDArray[np.f
     return np.maximum.reduceat(size, np.searchsorted(owner, np.arange(len(whole))))
 
 
-def finer(flora: Flora, branches: Branches, alone: NDArray[np.bool_], pixels: Pixels) -> NDArray[np.float64]:
+def finer(flora: Flora, branches: Branches, alone: Mask, pixels: Pixels) -> Floats:
     """Expected faces (n,) over those of coarse tubes: of sub-plants, or of their own branch ``alone`` (n,)."""
     row = branches.row
     sides = flora.rows["sides"][row]
@@ -137,18 +136,16 @@ class Curve:
     """
 
     lines: Axes
-    chord: NDArray[np.float64]
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
-    across: NDArray[np.float64]
+    chord: Floats
+    start: Floats
+    end: Floats
+    across: Floats
 
-    def deviation(self) -> NDArray[np.float64]:
+    def deviation(self) -> Floats:
         """How far the curve may be off each segment (n, S), metres."""
         return _HERMITE * (_norm(self.start) + _norm(self.end))
 
-    def at(
-        self, branch: NDArray[np.int64], segment: NDArray[np.int64], x: NDArray[np.float64], most: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def at(self, branch: Integers, segment: Integers, x: Floats, most: Floats) -> tuple[Floats, Floats]:
         """Places (m, 3) at fractions x (m,) of segments, at most so far (m,) off these, and axes (2, 3, m) across."""
         x = x[:, None]
         chord, start, end = (some[branch, segment] for some in (self.chord, self.start, self.end))
@@ -162,7 +159,7 @@ class Curve:
         return centre, np.stack([first.T, cross(along, first).T])
 
 
-def curve(lines: Axes, radius: NDArray[np.float64], weight: NDArray[np.float64]) -> Curve:
+def curve(lines: Axes, radius: Floats, weight: Floats) -> Curve:
     """The curves of branches.
 
     Parameters
@@ -194,16 +191,16 @@ def curve(lines: Axes, radius: NDArray[np.float64], weight: NDArray[np.float64])
     return Curve(lines, chord, np.where(there[..., None], start, 0.0), np.where(there[..., None], end, 0.0), across)
 
 
-def parts(deviation: NDArray[np.float64], pixel: NDArray[np.float64]) -> NDArray[np.int64]:
+def parts(deviation: Floats, pixel: Floats) -> Integers:
     """Straight parts (...) of segments whose curve is so far off them, where a pixel spans so much."""
     number = np.ceil(np.sqrt(deviation / (DEVIATION * np.maximum(pixel, 1e-300))))
     return np.clip(number, 1, MOST_RINGS).astype(np.int64)
 
 
-def unit_of(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def unit_of(vectors: Floats) -> Floats:
     """Vectors (..., 3) scaled to length 1."""
     return vectors / np.maximum(_norm(vectors), 1e-300)[..., None]
 
 
-def _norm(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _norm(vectors: Floats) -> Floats:
     return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
