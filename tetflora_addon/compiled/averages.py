@@ -107,10 +107,7 @@ def row_leaves(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]], tran
 
 
 def own_leaf_integrals(
-    size_tip: Floats,
-    size_young: Floats,
-    outward: tuple[Floats, Floats],
-    along: tuple[Floats, Floats] | None,
+    size_tip: Floats, size_young: Floats, outward: tuple[Floats, Floats], along: tuple[Floats, Floats] | None
 ) -> tuple[Floats, Floats, Floats]:
     """Means over leaves that sit evenly between two places.
 

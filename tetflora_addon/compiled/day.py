@@ -100,13 +100,7 @@ class DayTotals:
             total += area[:, kind] * left[0]
         return out / np.maximum(total, 1e-300)[:, None]
 
-    def own_colours(
-        self,
-        branches: Branches,
-        kind: Integers,
-        summer: Floats,
-        owner: Integers | None = None,
-    ) -> Floats:
+    def own_colours(self, branches: Branches, kind: Integers, summer: Floats, owner: Integers | None = None) -> Floats:
         """Mean colours (n, 3) of leaves of one kind (n,), of which those in summer are known (n, 3).
 
         ``owner`` (n,) are their branches, if not one for each.

@@ -67,12 +67,7 @@ def leaf_moments(orientation: Orientation, subplants: Branches) -> Floats:
     return _evaluated(orientation.leaves, subplants.row, subplants.frame, subplants.outward)
 
 
-def own_leaf_moments(
-    orientation: Orientation,
-    row: Integers,
-    axis: Floats,
-    outward: Floats,
-) -> Floats:
+def own_leaf_moments(orientation: Orientation, row: Integers, axis: Floats, outward: Floats) -> Floats:
     """The same (n, 3, 3) over the leaves that straight pieces of branches bear.
 
     They are given by row (n,), axis (n, 3), and place (n,) between inside and outside of the crown.
@@ -85,12 +80,7 @@ def wood_moments(orientation: Orientation, subplants: Branches) -> Floats:
     return _evaluated(orientation.wood, subplants.row, subplants.frame, subplants.outward)
 
 
-def _evaluated(
-    coefficients: Floats,
-    row: Integers,
-    frame: Floats,
-    outward: Floats,
-) -> Floats:
+def _evaluated(coefficients: Floats, row: Integers, frame: Floats, outward: Floats) -> Floats:
     """Moments (n, 3, 3) in the world for branches with frames (n, 3, 3), so far outside in the crown (n,).
 
     By polynomials (r, 1, 33, 6) of rows (n,), or (r, 3, 33, 6) at `NODES`.
@@ -155,11 +145,7 @@ def _frames_along(axis: Floats) -> Floats:
 
 
 def orientation_of(
-    rows: Table,
-    forms: Sequence[Sequence[Sequence[LeafModel]]],
-    leaf: Floats,
-    wood: Floats,
-    length: Floats,
+    rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]], leaf: Floats, wood: Floats, length: Floats
 ) -> Orientation:
     """Orientation of every row.
 

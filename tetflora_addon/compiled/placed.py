@@ -32,12 +32,7 @@ def formed_subplants(rows: Table, subplants: Branches) -> Integers:
 
 
 def placed_samples(
-    flora: Flora,
-    points: Points,
-    subplants: Branches,
-    owner: Integers,
-    pick: Integers,
-    turn: Floats | None = None,
+    flora: Flora, points: Points, subplants: Branches, owner: Integers, pick: Integers, turn: Floats | None = None
 ) -> tuple[NDArray[np.floating], Floats | None]:
     """Samples of sub-plants: places in units of their lengths and in their axes, and what each stands for.
 
@@ -152,14 +147,7 @@ def _tilted(way: Floats, factor: Floats) -> Floats:
 
 
 def _shares(
-    flora: Flora,
-    own: Branches,
-    shares: Shares,
-    on: Limbs,
-    which: Integers,
-    reach: Floats,
-    sparse: Floats,
-    leafy: bool,
+    flora: Flora, own: Branches, shares: Shares, on: Limbs, which: Integers, reach: Floats, sparse: Floats, leafy: bool
 ) -> Floats:
     """What samples (m,) stand for, 1 on the mean; see `_moved`."""
     totals, crown = flora.formed_totals, own.crown.astype(np.float64)

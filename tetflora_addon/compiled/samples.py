@@ -412,13 +412,7 @@ class Shares:
 
 
 def limbs_of(
-    rows: Table,
-    first: int,
-    i: int,
-    number: Integers,
-    branches: Sequence[Branches],
-    row: Integers,
-    base: Branches,
+    rows: Table, first: int, i: int, number: Integers, branches: Sequence[Branches], row: Integers, base: Branches
 ) -> Limbs:
     """The limbs of samples of one row.
 

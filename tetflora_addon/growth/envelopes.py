@@ -68,13 +68,7 @@ def axis_places(rows: Table, branches: Branches, row: Integers, owner: NDArray, 
 
 
 def leaf_sites(
-    rows: Table,
-    branches: Branches,
-    lines: Axes,
-    row: Integers,
-    owner: Integers,
-    key: Keys,
-    t: Floats,
+    rows: Table, branches: Branches, lines: Axes, row: Integers, owner: Integers, key: Keys, t: Floats
 ) -> tuple[Floats, NDArray, Floats]:
     """Where leaves are: the middles of those in solids, the bases of others.
 

@@ -98,13 +98,7 @@ def youth(rows: Table, row: Integers, t: Floats) -> Floats:
     return (first + (last - first) * t) ** YOUTH
 
 
-def leaf_sizes(
-    rows: Table,
-    row: Integers,
-    key: Keys,
-    outward: Floats,
-    t: Floats,
-) -> Floats:
+def leaf_sizes(rows: Table, row: Integers, key: Keys, outward: Floats, t: Floats) -> Floats:
     """Metres (m,) by which models of leaves are scaled at plant scale 1; (1,) where all are alike.
 
     They are on rows (m,) or (1,), at places (m,) between inside and outside, and fractions t (m,) of branches.
@@ -140,13 +134,7 @@ def _rows_of(branches: Branches, owner: Integers) -> NDArray[np.int32]:
 
 
 def place_leaves(
-    rows: Table,
-    branches: Branches,
-    lines: Axes,
-    owner: Integers,
-    index: Integers,
-    key: Keys,
-    t: Floats,
+    rows: Table, branches: Branches, lines: Axes, owner: Integers, index: Integers, key: Keys, t: Floats
 ) -> Leaves:
     """Leaves at given fractions of their branches; call `face_light` to turn them to the sky.
 
@@ -287,13 +275,7 @@ def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArr
     return out.transpose(2, 0, 1)
 
 
-def settled(
-    rows: Table,
-    row: Integers,
-    frame: NDArray[np.floating],
-    light: Floats,
-    sky: Floats,
-) -> NDArray:
+def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
     """Leaf frames as they are in the end: turned to the light, then hanging, as far as their orders ask for.
 
     Parameters

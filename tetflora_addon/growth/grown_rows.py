@@ -149,12 +149,7 @@ def lengths(rows: Table, row: Integers, fraction: Floats) -> Floats:
     return out
 
 
-def fullness_of(
-    rows: Table,
-    row: Integers,
-    vigour: Floats,
-    own: Floats | None = None,
-) -> Floats:
+def fullness_of(rows: Table, row: Integers, vigour: Floats, own: Floats | None = None) -> Floats:
     """Factor (n,) on the numbers of branches and leaves on branches of rows (n,) and vigours (n,).
 
     ``own`` (n,) are their vigours without the crown forms of their plants.
@@ -224,13 +219,7 @@ class Grown:
         node = node + np.where(on, np.where(extra, self.first[1][owner] - stay, self.first[0][owner]), 0)
         return node * whorl + within, np.where(extra, _EXTRA, 0), extra
 
-    def places(
-        self,
-        owner: Integers,
-        node: Integers,
-        within: Floats,
-        extra: Mask,
-    ) -> tuple[Floats, Floats, Floats]:
+    def places(self, owner: Integers, node: Integers, within: Floats, extra: Mask) -> tuple[Floats, Floats, Floats]:
         """Fractions (m,) for nodes (m,) of branches (m,): of the branch, of its children, and of those as described."""
         own = node + within
         dense = np.where(extra, self.density[1][owner], np.where(own >= 0, self.density[0][owner], 1.0))

@@ -183,13 +183,7 @@ def radius_at(rows: Table, branches: Branches, t: Floats) -> Floats:
 
 
 def chosen_children(
-    rows: Table,
-    parents: Branches,
-    lines: Axes,
-    owner: Integers,
-    index: Integers,
-    counts: Integers,
-    sort: int = LATERAL,
+    rows: Table, parents: Branches, lines: Axes, owner: Integers, index: Integers, counts: Integers, sort: int = LATERAL
 ) -> Branches:
     """Some children (m,) of branches.
 

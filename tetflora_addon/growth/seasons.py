@@ -251,12 +251,7 @@ def _springtime(year: np.void | Table, day: Floats, deviation: Floats) -> tuple[
     return age >= 0.0, size, np.where(year["any_fresh"], 1.0 - smoothstep(age / (_FRESH * growth)), 0.0)
 
 
-def _autumntime(
-    year: np.void | Table,
-    day: Floats,
-    turns: Floats,
-    falls: Floats,
-) -> tuple[Mask, Floats]:
+def _autumntime(year: np.void | Table, day: Floats, turns: Floats, falls: Floats) -> tuple[Mask, Floats]:
     """Whether leaves still hang, and how far they have turned; likewise."""
     since = day - year["turn"] - year["turn_spread"] * turns
     turned = np.where(year["colours"] > 0, smoothstep(since / np.maximum(year["turning"], 1e-6) + 0.5), 0.0)
@@ -288,11 +283,7 @@ def leaf_table(leaf: LeafYear | None) -> Floats:
 
 
 def expected(
-    tables: Floats,
-    origin: Floats,
-    which: Integers,
-    day: Floats,
-    columns: Sequence[int] = range(6),
+    tables: Floats, origin: Floats, which: Integers, day: Floats, columns: Sequence[int] = range(6)
 ) -> list[Floats]:
     """What to expect of leaves, some columns (n,) each, on days (n,), from some (n,) of tables (k, 6, t).
 
@@ -340,13 +331,7 @@ def mean_autumn_colours(year: Table, hue: Floats) -> Floats:
     return np.einsum("nk,nkc->nc", share, year["autumn"])
 
 
-def in_season(
-    summer: Floats,
-    fresh: Floats,
-    stages: Stages,
-    autumn: Floats,
-    dry: Floats,
-) -> Floats:
+def in_season(summer: Floats, fresh: Floats, stages: Stages, autumn: Floats, dry: Floats) -> Floats:
     """Colours (n, 3) of leaves at their stages, from those that they have when they are at the end of each."""
     out = summer + stages.fresh[:, None] * (fresh - summer)
     out += stages.turned[:, None] * (autumn - out)

@@ -305,12 +305,7 @@ def leant(points: Floats, up: Floats, turn: Floats) -> Floats:
 
 
 def fluttered(
-    rows: Table,
-    row: Integers,
-    frame: NDArray[np.float32],
-    key: Keys,
-    gust: Floats,
-    ahead: float = 0.0,
+    rows: Table, row: Integers, frame: NDArray[np.float32], key: Keys, gust: Floats, ahead: float = 0.0
 ) -> NDArray[np.float32]:
     """Frames of leaves (n, 3, 3) turned about their bases: up and down, and about their midribs.
 

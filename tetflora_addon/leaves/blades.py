@@ -113,13 +113,7 @@ def _columns(blade: Blade, step: float) -> Floats:
 
 
 def _half(
-    blade: Blade,
-    side: int,
-    s: Floats,
-    margin: Floats,
-    ribs: Floats,
-    columns: Floats,
-    step: float,
+    blade: Blade, side: int, s: Floats, margin: Floats, ribs: Floats, columns: Floats, step: float
 ) -> tuple[Floats, Integers]:
     """Flat places (v, 2) and faces (f, 4) of one half whose margin has points (n, 2) of parameters (n,)."""
     if blade.palmate:  # rays begin at the base, and the last one is the midrib

@@ -222,14 +222,7 @@ def _areoles(body: LeafModel, part: Integers, distance: float) -> tuple[Floats, 
     return middle[chosen], body.face_vectors[chosen] / area[chosen, None]
 
 
-def _pyramids(
-    base: Floats,
-    tip: Floats,
-    x: Floats,
-    y: Floats,
-    radius: float,
-    sides: int,
-) -> Floats:
+def _pyramids(base: Floats, tip: Floats, x: Floats, y: Floats, radius: float, sides: int) -> Floats:
     """Sides (n * sides, 3, 3) of pyramids from bases to tips (n, 3), around axes perpendicular to x and y (n, 3)."""
     angle = 2.0 * np.pi * np.arange(sides + 1) / sides
     ring = base[:, None] + radius * (np.cos(angle)[:, None] * x[:, None] + np.sin(angle)[:, None] * y[:, None])

@@ -146,13 +146,7 @@ def _sheet(points: Floats, area: Floats) -> tuple[Floats, float, float]:
     return normal, fold, float((weight * ((normals - expected) ** 2).sum(axis=1)).sum())
 
 
-def _kite(
-    model: LeafModel,
-    area: float,
-    normal: Floats,
-    fan: tuple[Floats, Floats],
-    fold: float = 0.0,
-) -> Floats:
+def _kite(model: LeafModel, area: float, normal: Floats, fan: tuple[Floats, Floats], fold: float = 0.0) -> Floats:
     """Vertices (4, 3) of a kite with an area and a normal, along the model's longer axis across that; both halves rise
     by a fold.
     """

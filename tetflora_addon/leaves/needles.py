@@ -114,13 +114,7 @@ def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Le
 
 
 def _needles(
-    start: Floats,
-    direction: Floats,
-    towards: Floats,
-    length: Floats,
-    needles: Needles,
-    tolerance: float,
-    factor: float,
+    start: Floats, direction: Floats, towards: Floats, length: Floats, needles: Needles, tolerance: float, factor: float
 ) -> LeafSurface:
     """Needles from starts (k, n, 3) in directions, of lengths (k, n), bent towards vectors (k, n, 3)."""
     flat, three = tolerance > _FLAT, tolerance > _THREE

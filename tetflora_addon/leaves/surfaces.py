@@ -99,13 +99,7 @@ def _along(*factors: float | Floats) -> Floats:
     return np.stack(np.broadcast_arrays(*factors), axis=-1)[..., None, :]
 
 
-def surface(
-    positions: Floats,
-    faces: Integers,
-    uv: Floats,
-    solid: bool = False,
-    error: float = 0.0,
-) -> LeafSurface:
+def surface(positions: Floats, faces: Integers, uv: Floats, solid: bool = False, error: float = 0.0) -> LeafSurface:
     """A surface of triangles and quads.
 
     Parameters

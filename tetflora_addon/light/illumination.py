@@ -272,12 +272,7 @@ class Illumination:
         return np.clip((weight @ last) / np.where(former > 0.0, former, np.inf), 0.0, _MOST_AGAIN)
 
     def _through(
-        self,
-        buffers: list[LightBuffer],
-        points: Floats,
-        cells: Integers,
-        towards: Floats,
-        sheets: Integers | None,
+        self, buffers: list[LightBuffer], points: Floats, cells: Integers, towards: Floats, sheets: Integers | None
     ) -> Floats:
         """Transmittance (m,) through the first of several views that sees each point."""
         empty = np.append(self.sheets.replaced, True)[cells]

@@ -122,11 +122,7 @@ _PHASE_BANDS = _bands()
 
 
 def facet_direct(
-    normal: Floats,
-    fractions: Fractions,
-    towards: Floats,
-    arriving: Floats,
-    view: Floats | None = None,
+    normal: Floats, fractions: Fractions, towards: Floats, arriving: Floats, view: Floats | None = None
 ) -> tuple[Floats, Floats]:
     """Radiance of the front, where normals point, and of the back of facets (n, 3 each) by one light.
 
@@ -179,12 +175,7 @@ def _mirrored(normal: Floats, towards: Floats, view: Floats) -> Floats:
     return np.where(light * eye > 0.0, density * inwards / (2.0 * np.maximum(masking, 1e-9)), 0.0)
 
 
-def particle_direct(
-    fractions: Fractions,
-    towards: Floats,
-    arriving: Floats,
-    view: Floats,
-) -> Floats:
+def particle_direct(fractions: Fractions, towards: Floats, arriving: Floats, view: Floats) -> Floats:
     """Radiance (n, 3) of a thick cloud of sheets that face all ways, by one light; the gloss is even."""
     reflected, through, gloss = fractions
     cosine = np.sum(towards * view, axis=1)

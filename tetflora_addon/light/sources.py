@@ -141,12 +141,7 @@ def light_resolution(camera: Camera) -> int:
 
 
 def buffers_of(
-    light: Light,
-    clouds: Clouds,
-    sheets: Sheets,
-    occluders: Floats | None,
-    resolution: int,
-    near: Near | None = None,
+    light: Light, clouds: Clouds, sheets: Sheets, occluders: Floats | None, resolution: int, near: Near | None = None
 ) -> list[LightBuffer]:
     """Buffers in which a light sees tetrahedra, sheets and polygons: one, six all around, or none.
 
@@ -182,12 +177,7 @@ def _closer(view: Camera, near: Near) -> list[Camera]:
 
 
 def _buffer(
-    view: Camera,
-    light: Light,
-    clouds: Clouds,
-    sheets: Sheets,
-    occluders: Floats | None,
-    resolution: int,
+    view: Camera, light: Light, clouds: Clouds, sheets: Sheets, occluders: Floats | None, resolution: int
 ) -> LightBuffer:
     along = light.direction if light.kind == "SUN" else -to_eye(view, clouds.vertices.mean(axis=1))
     extinction = np.where(sheets.replaced, 0.0, clouds.extinction(along))

@@ -127,14 +127,7 @@ def _planes(corners: Floats) -> tuple[Floats, Mask]:
     return np.stack([east, north], axis=1), upright
 
 
-def _draw(
-    corners: Floats,
-    slope: Floats,
-    own: Integers,
-    row: Integers,
-    columns: int,
-    top: Floats,
-) -> None:
+def _draw(corners: Floats, slope: Floats, own: Integers, row: Integers, columns: int, top: Floats) -> None:
     """Raise the cells of rows (k,) of the triangles ``own`` (k,) to these, in ``top`` (cells,)."""
     left, right = np.full(len(own), np.inf), np.full(len(own), -np.inf)
     for corner in range(3):

@@ -143,14 +143,7 @@ class Site:
         """Square metres of the map on which places are drawn; each counts as much as it is suitable at most."""
         return float(self.cumulative[-1])
 
-    def draw(
-        self,
-        key: Keys,
-        first: int,
-        count: int,
-        enough: int | None = None,
-        suits: Suits | None = None,
-    ) -> Sample:
+    def draw(self, key: Keys, first: int, count: int, enough: int | None = None, suits: Suits | None = None) -> Sample:
         """Suitable ones among the places of children ``first`` to ``first + count - 1`` of a key, in their order.
 
         Stops when ``enough`` are found, with at least as many. ``suits`` is what one species asks for besides.
@@ -286,11 +279,7 @@ def _map_cross(triangles: Floats) -> Floats:
 
 
 def _near_areas(
-    areas: tuple[Floats, ...],
-    triangles: Floats,
-    weight: Floats | None,
-    uv: Floats | None,
-    located: bool,
+    areas: tuple[Floats, ...], triangles: Floats, weight: Floats | None, uv: Floats | None, located: bool
 ) -> tuple[Integers, NDArray, NDArray | None, NDArray | None, NDArray | None]:
     """Parts (n,) of triangles near areas: large ones are divided, so that few places are drawn in vain.
 

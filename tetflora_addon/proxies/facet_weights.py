@@ -296,9 +296,7 @@ def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, Floats]:
 
 
 def _fitted(
-    sight: Families,
-    rays: float,
-    seen: dict[object, list[tuple[View, Integers]]],
+    sight: Families, rays: float, seen: dict[object, list[tuple[View, Integers]]]
 ) -> Generator[float, None, Floats]:
     """Weights (k,) for one row; yields the fraction that is done.
 

@@ -277,14 +277,7 @@ def _fields(pixel: Integers, size: tuple[int, int]) -> tuple[Integers, int]:
     return (row // FIELD) * across + column // FIELD, across * up
 
 
-def _receive(
-    view: Camera,
-    size: tuple[int, int],
-    points: Floats,
-    extent: Floats,
-    far: Floats,
-    fine: Floats,
-) -> None:
+def _receive(view: Camera, size: tuple[int, int], points: Floats, extent: Floats, far: Floats, fine: Floats) -> None:
     """Put points that receive light into the fields: how far away they are, and how fine the image is there."""
     local = view.to_camera_space(points)
     left, right, bottom, top = view.window

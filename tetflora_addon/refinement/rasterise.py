@@ -175,12 +175,7 @@ class _Rows:
 
 
 def _within(
-    planes: Sequence[Floats],
-    count: int,
-    ends: tuple[float, float],
-    rows: _Rows,
-    x: Floats,
-    y: Floats,
+    planes: Sequence[Floats], count: int, ends: tuple[float, float], rows: _Rows, x: Floats, y: Floats
 ) -> tuple[Integers, Integers, tuple[Floats, Floats]]:
     """Rows and columns (h,) of pixels whose rays pass through tetrahedra, and bounds (h,) of depths or reciprocals.
 

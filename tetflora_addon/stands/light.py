@@ -362,7 +362,7 @@ class LightGrid:
 
 def _through(
     block: slice, wide: int, high: int, leaves: NDArray, density: NDArray, now: NDArray, after: NDArray,
-    above: NDArray, summed: NDArray, thick: np.float32, side: np.float32,
+    above: NDArray, summed: NDArray, thick: np.float32, side: np.float32
 ) -> None:  # fmt: skip
     """Let light through some rows of one layer; writes ``after`` and ``summed`` and brings ``density`` up to date."""
     rows = np.arange(block.start, block.stop)

@@ -235,7 +235,7 @@ def _positions(x: NDArray, y: NDArray, site: StandSite) -> NDArray[np.float32]:
 
 def newcomers(
     key: Keys, first: int, guild: NDArray, x: NDArray, y: NDArray, girth: NDArray, quality: NDArray,
-    age: float, guilds: Guilds,
+    age: float, guilds: Guilds
 ) -> Plants:  # fmt: skip
     """Young plants (n,) at places (n,) in metres from the corner; those of a girth stand as free ones do."""
     number, none = len(key), np.zeros(len(key))

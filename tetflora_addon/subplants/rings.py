@@ -380,13 +380,7 @@ def keep_inside(flora: Flora, branches: Branches, owner: Integers, points: NDArr
 
 
 def swelling(
-    rows: Table,
-    branches: Branches,
-    weight: Floats,
-    owner: Integers,
-    t: Floats,
-    radius: Floats,
-    sides: int,
+    rows: Table, branches: Branches, weight: Floats, owner: Integers, t: Floats, radius: Floats, sides: int
 ) -> NDArray[np.float32] | None:
     """Factors (sides, r) of the radius (r,) of rings at fractions t (r,) of branches (n,); None where all are 1."""
     footed = has_foot(rows, branches)
