@@ -4,6 +4,10 @@
 
 Each is a page of a species file, made from that of the living plant: the same leaf, bark and way of branching. Stems
 are a centimeter or two high, so that what grows on them sideways lies on the ground.
+
+Leaves that have just fallen are litter with a year of their own, from the fall of their tree's leaves until they rot in
+spring. What is on the ground on a day is what is no longer on the trees, leaf by leaf on average, because leaves of the
+patch appear as those of the tree fall.
 """
 
 from __future__ import annotations
@@ -11,7 +15,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from math import cos, pi, sin, sqrt
+from itertools import pairwise
+from math import cos, hypot, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +26,7 @@ from ..leaves.outlines import Blade
 from ..leaves.schema import MAX_FORMS
 from .schema import FORMAT
 from .species import LEAF_KINDS, Species
+from .year import DAYS, LeafYear
 
 #: Leaves without outline that let less light through than this are needles and scales, whose plants bear cones.
 NEEDLES = 0.2
@@ -112,16 +118,10 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
         around["leaf_light"], middle["thickness"] = [0.97, 0.03], [0.05, 0.004]
     own_forms = page["leaf"] if isinstance(page["leaf"], list) else [page["leaf"]]
     dried = [one for form, own in zip(species.leaf, own_forms, strict=True) for one in _dried(form, own)]
-    made = {
-        "format": FORMAT,
-        "name": f"{species.name} litter"[:1000],
-        "description": f"Fallen {'needles, twigs and cones' if needles else 'leaves'} of {species.name}, a patch of "
-        f"{200 * radius:.0f} cm"[:1000],
-        "bark": species.bark,
-        "leaf": _strewn(needle) if needles else dried[:MAX_FORMS],
-        "leaf_transmission": round(0.4 * species.leaf_transmission, 3),
-        "orders": [middle, around],
-    }
+    what = f"Fallen {'needles, twigs and cones' if needles else 'leaves'} of {species.name}, a patch of "
+    made = _page(species, "litter", f"{what}{200 * radius:.0f} cm", [middle, around])
+    made |= {"leaf": _strewn(needle) if needles else dried[:MAX_FORMS]}
+    made |= {"leaf_transmission": round(0.4 * species.leaf_transmission, 3)}
     if needles:
         made |= {"blossom": parts["cone"], "blossom_transmission": 0, "spur": parts["spur"]}
         around["spurs"], around["spur_start"] = _pair(_CONES / twigs, _CONES / twigs), 0.3
@@ -142,7 +142,8 @@ def branch_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     orders[-1]["branches"] = 0
     orders[0] |= _parts()["bough"] | {"length": _pair(length, 0.4 * length)}
     orders[0].pop("angle_tip", None)
-    return _wood(species, page, orders, "branch", f"A fallen branch of {species.name}, about {length:.1f} m long")
+    made = _page(species, "branch", f"A fallen branch of {species.name}, about {length:.1f} m long", orders)
+    return made | {"leaf": page["leaf"]}
 
 
 def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -163,8 +164,8 @@ def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None
     orders = [parts["stem"], log, parts["stub"]]
     for order, how in zip(orders, (0.65, 0.65, 0.7), strict=True):
         order["branch_colour"] = _weathered(colour, how)
-    made = _wood(species, page, orders, "log", f"A fallen log of {species.name}, about {length:.1f} m long")
-    return made | {"blossom": parts["cut"], "blossom_transmission": 0}
+    made = _page(species, "log", f"A fallen log of {species.name}, about {length:.1f} m long", orders)
+    return made | {"leaf": page["leaf"], "blossom": parts["cut"], "blossom_transmission": 0}
 
 
 #: Pages by the ending of the identifier that the fallen parts of a species have.
@@ -183,18 +184,10 @@ def _dried(form: LeafModel | str, own: dict[str, Any]) -> list[dict[str, Any]]:
     return [{"outline": {"kind": "blade", **blade, **bent}} for bent in _BENT]
 
 
-def _wood(
-    species: Species, page: Mapping[str, Any], orders: list[dict[str, Any]], kind: str, description: str
-) -> dict[str, Any]:
-    return {
-        "format": FORMAT,
-        "name": f"{species.name} {kind}"[:1000],
-        "description": description[:1000],
-        "bark": species.bark,
-        "leaf": page["leaf"],
-        "leaf_transmission": species.leaf_transmission,
-        "orders": orders,
-    }
+def _page(species: Species, kind: str, description: str, orders: list[dict[str, Any]]) -> dict[str, Any]:
+    name, transmission = f"{species.name} {kind}"[:1000], species.leaf_transmission
+    page = {"format": FORMAT, "name": name, "description": description[:1000], "bark": species.bark}
+    return page | {"leaf": [], "leaf_transmission": transmission, "orders": orders}
 
 
 def _bare(order: Mapping[str, Any]) -> dict[str, Any]:
@@ -231,3 +224,105 @@ def _strewn(needle: float) -> dict[str, Any]:
         vertices += [[round(x + u, 4), round(y + v, 4), round(z, 3)] for u, v in ends]
         faces.append([4 * k + i for i in range(4)])
     return {"vertices": vertices, "faces": faces}
+
+
+KIND = "leaves"
+"""Ending of the identifier that the fallen leaves of a species have."""
+#: Area of the leaves of a patch, m², and how many there are at least and at most.
+_SHED_AREA, _SHED_LEAVES = 0.32, (16, 100)
+#: Fraction of its circle that a patch covers, counted singly, arms on which its leaves lie, and its radius at most.
+_SHED_COVERED, _ARMS, _SHED_RADIUS = 0.5, 14, 0.45
+#: Days after which a leaf has lost half of its color, in which it loses all of it, and date by which it has rotted.
+_FADES, _FADING, _ROTS, _ROT_SPREAD = 20.0, 40.0, 90.0, 13.0
+#: Linear RGB of leaves on the ground after that: those of litter.
+_FALLEN_BROWN = ([0.145, 0.09, 0.045], [0.175, 0.11, 0.055])
+_SHED = 0.9  # of its leaves are shed each year by what counts as deciduous
+_THREAD = 0.002  # thickness of arms, which are there only for the leaves to lie on
+
+
+def shed_share(species: Species) -> float:
+    """Fraction of its leaf area in summer that a species lets fall in autumn; 0 of evergreen ones, and without a year.
+
+    What hangs on dry in winter is not part of it.
+    """
+    leaf = None if species.year is None else species.year.leaf
+    if leaf is None or leaf.turnover < _SHED or leaf.fall >= DAYS:
+        return 0.0
+    return leaf.turnover * (1.0 - leaf.kept)
+
+
+def leaves_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The page of a patch of leaves that fall in autumn; None of a species that sheds none.
+
+    Parameters
+    ----------
+    species : Species
+    page : mapping
+        What its species file holds.
+    """
+    made = litter_page(species, page) if shed_share(species) > 0.0 else None
+    if made is None:
+        return None
+    leaf = species.year.leaf
+    middle, around = made["orders"]
+    for key in ("blossom", "blossom_transmission", "spur"):
+        made.pop(key, None)
+    around = {key: value for key, value in around.items() if not key.startswith("spur")}
+    area = leaf_area(species)
+    number = min(max(_SHED_AREA / area, _SHED_LEAVES[0]), _SHED_LEAVES[1])
+    radius = min(max(sqrt(number * area / (_SHED_COVERED * pi)), 1.3 * around["leaf_size"][0]), _SHED_RADIUS)
+    stem = middle["length"][0]
+    colour, variation = _autumn(species, leaf)
+    around |= {
+        "length": [round(radius / stem, 4), round(0.3 * radius / stem, 4)],
+        "thickness": _THREAD,
+        "sides": 3,
+        "leaves": [round(number / _ARMS, 4), round(0.2 * number / _ARMS, 4)],
+        "leaf_start": 0.1,
+        "leaf_colour": [colour, variation],
+        "leaf_colour_tip": colour,
+    }
+    middle |= {"thickness": _THREAD, "branches": [_ARMS, 0]}
+    return made | {
+        "name": f"{species.name} fallen leaves"[:1000],
+        "description": f"Leaves that {species.name} sheds in autumn, a patch of {200 * radius:.0f} cm"[:1000],
+        "orders": [middle, around],
+        "year": _year(species, leaf),
+    }
+
+
+def _year(species: Species, leaf: LeafYear) -> dict[str, Any]:
+    """The year of leaves on the ground: they appear as those of the tree fall, each by its own chance."""
+    spread = round(hypot(leaf.turn_spread, leaf.fall_spread), 2)
+    return {
+        "latitude": species.year.latitude,
+        # These days lie around midwinter: what comes before the middle of their life goes by the autumn of the trees.
+        "spring": species.year.autumn,
+        "autumn": 3,
+        "fallen": True,
+        "leaf": {
+            "appear": leaf.fall,
+            "appear_spread": spread,
+            "growth": 0,
+            "turn": leaf.fall + _FADES,
+            "turn_spread": spread,
+            "turning": _FADING,
+            "autumn": list(_FALLEN_BROWN),
+            "fall": DAYS + _ROTS,
+            "fall_spread": _ROT_SPREAD,
+        },
+    }
+
+
+def _autumn(species: Species, leaf: LeafYear) -> tuple[list[float], list[float]]:
+    """Mean and variation of the autumn colors of a tree's leaves, from the first to the last."""
+    if not leaf.autumn:
+        bearing = next(order for order in species.orders if order.leaves.mean > 0)
+        return [list(one) for one in (bearing.leaf_colour.mean, bearing.leaf_colour.variation)]
+    number = len(leaf.autumn)
+    # Hue of the plant and tint of the leaf count alike: their mean is distributed as a triangle.
+    edges = [2 * x * x if x < 0.5 else 1 - 2 * (1 - x) ** 2 for x in (i / number for i in range(number + 1))]
+    shares = [b - a for a, b in pairwise(edges)]
+    channels = list(zip(*leaf.autumn, strict=True))
+    mean = [round(sum(s * c for s, c in zip(shares, one, strict=True)), 4) for one in channels]
+    return mean, [round(min(abs(one[0] - one[-1]) / 2, m), 4) for one, m in zip(channels, mean, strict=True)]

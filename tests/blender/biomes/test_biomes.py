@@ -25,8 +25,7 @@ from tetflora_addon.blender.species.edits import catalogue
 from tetflora_addon.blender.stands.growing import keep_year
 from tetflora_addon.blender.worker import at_once
 from tetflora_addon.errors import SceneError, TetFloraError
-from tetflora_addon.species.fallen import KIND
-from tetflora_addon.species.litter import FALLEN
+from tetflora_addon.species.litter import FALLEN, KIND
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 

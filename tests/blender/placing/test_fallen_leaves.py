@@ -21,7 +21,7 @@ from tetflora_addon.blender.species.edits import species_for
 from tetflora_addon.blender.worker import at_once
 from tetflora_addon.planting.canopy import Sheet
 from tetflora_addon.planting.cover import mapping
-from tetflora_addon.species.fallen import shed_share
+from tetflora_addon.species.litter import shed_share
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 

@@ -18,8 +18,7 @@ from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalogue import builtin_folder, load_species
-from tetflora_addon.species.fallen import leaves_page, shed_share
-from tetflora_addon.species.litter import FALLEN
+from tetflora_addon.species.litter import FALLEN, leaves_page, shed_share
 from tetflora_addon.species.members import expected_polygons
 from tetflora_addon.species.schema import species_from_dict
 

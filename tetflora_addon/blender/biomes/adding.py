@@ -19,8 +19,8 @@ import bpy
 from ...errors import SceneError, TetFloraError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress, mapped
-from ...species.fallen import KIND as FALLEN_LEAVES
 from ...species.litter import FALLEN
+from ...species.litter import KIND as FALLEN_LEAVES
 from ..placing.cover import fallen_from
 from ..placing.plant_objects import remove_fields
 from ..placing.population_data import fill_population

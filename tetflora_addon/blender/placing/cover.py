@@ -23,8 +23,7 @@ from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress, mapped
 from ...planting.canopy import Canopy
 from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
-from ...species.fallen import KIND, leaves_page
-from ...species.litter import FALLEN
+from ...species.litter import FALLEN, KIND, leaves_page
 from ..materials.soil import SHADED, lay_soil
 from ..runtime import JobData, guarded, is_there
 from ..scene.crowns import crown_for, crown_steps

@@ -16,7 +16,7 @@ from ...errors import SceneError
 from ...jobs import Progress
 from ...planting.canopy import Canopy
 from ...planting.cover import FULL
-from ...species.fallen import KIND, shed_share
+from ...species.litter import KIND, shed_share
 from ..runtime import JobData, guarded
 from ..scene.crowns import crown_for, crown_steps
 from ..species.edits import species_for
