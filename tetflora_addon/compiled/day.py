@@ -70,23 +70,21 @@ class DayTotals:
         """Sum (n,) over kinds of leaves of what they have in summer (n, k) and the day leaves."""
         return sum(each[:, kind] * self.left(subplants, kind, column)[0] for kind in self.kinds)
 
-    def leaf_areas(self, subplants: Branches, formed: Floats | None = None) -> Floats:
+    def leaf_areas(self, subplants: Branches, formed: Floats | float = 1.0) -> Floats:
         """Area (n,) of leaves at plant scale 1, without the fullness of sub-plants.
 
         ``formed`` (n, k) are factors by kind of leaf, because of crown forms.
         """
         area = np.einsum("nj,njk->nk", quadratic(subplants.outward), self.area[subplants.row])
-        area = area if formed is None else area * formed
-        return self._summed(subplants, area, seasons.AREA)
+        return self._summed(subplants, area * formed, seasons.AREA)
 
     def leaf_counts(self, subplants: Branches) -> Floats:
         """Number (n,) of leaves, likewise."""
         return self._summed(subplants, self.count[subplants.row], seasons.PRESENT)
 
-    def leaf_faces(self, subplants: Branches, formed: Floats | None = None) -> Floats:
+    def leaf_faces(self, subplants: Branches, formed: Floats | float = 1.0) -> Floats:
         """Number (n,) of faces of leaves, likewise."""
-        faces = self.faces[subplants.row]
-        return self._summed(subplants, faces if formed is None else faces * formed, seasons.PRESENT)
+        return self._summed(subplants, self.faces[subplants.row] * formed, seasons.PRESENT)
 
     def leaf_colours(self, subplants: Branches) -> Floats:
         """Mean colours (n, 3) of leaves, weighted by area; black where there are none."""

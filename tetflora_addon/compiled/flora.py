@@ -199,11 +199,9 @@ class Flora:
     def leaf_areas(self, subplants: Branches) -> Floats:
         """Expected one-sided area (n,) of the leaves of sub-plants, m²."""
         if subplants.year is None:
-            area, some = self._at_place(self.area_nodes, subplants), self._formed(subplants)
-            if len(some):
-                area[some] *= self.formed_totals.leaves(subplants.take(some))
+            area = self._at_place(self.area_nodes, subplants) * self._formed_leaves(subplants)
         else:
-            area = self.day.leaf_areas(subplants, self._formed_kinds(subplants))
+            area = self.day.leaf_areas(subplants, self._formed_leaves(subplants, kinds=True))
         return fullness(self.rows, subplants) * area * subplants.scale**2
 
     def leaf_colours(self, subplants: Branches) -> Floats:
@@ -245,12 +243,8 @@ class Flora:
     def _leaf_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the leaves of sub-plants, without their fullness."""
         if subplants.year is not None:
-            return self.day.leaf_faces(subplants, self._formed_kinds(subplants, faces=True))
-        faces = self.leaf_faces[subplants.row]
-        some = self._formed(subplants)
-        if len(some):
-            faces[some] *= self.formed_totals.leaves(subplants.take(some), faces=True)
-        return faces
+            return self.day.leaf_faces(subplants, self._formed_leaves(subplants, faces=True, kinds=True))
+        return self.leaf_faces[subplants.row] * self._formed_leaves(subplants, faces=True)
 
     @_in_summer
     def formed_totals(self) -> FormedTotals:
@@ -263,13 +257,13 @@ class Flora:
             return np.zeros(0, np.intp)
         return np.flatnonzero(self.formed_totals.formed[subplants.row])
 
-    def _formed_kinds(self, subplants: Branches, faces: bool = False) -> Floats | None:
-        """`FormedTotals.leaves` (n, k) of sub-plants, 1 where nothing is formed; None where nothing is at all."""
+    def _formed_leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats | float:
+        """`FormedTotals.leaves` (n,) or (n, k) of sub-plants, 1 where nothing is formed."""
         some = self._formed(subplants)
         if not len(some):
-            return None
-        out = np.ones((len(subplants), len(LEAF_KINDS)))
-        out[some] = self.formed_totals.leaves(subplants.take(some), faces, kinds=True)
+            return 1.0
+        out = np.ones((len(subplants), len(LEAF_KINDS)) if kinds else len(subplants))
+        out[some] = self.formed_totals.leaves(subplants.take(some), faces, kinds)
         return out
 
     def one_leaf_area(self, branches: Branches) -> Floats:

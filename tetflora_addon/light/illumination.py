@@ -116,12 +116,9 @@ class Illumination:
             result[outside] = self._from_sky(points[outside], none) + self._from_clouds(points[outside])
         return result
 
-    def irradiance(self, points: Floats, normals: Floats, cells: Integers | None = None) -> Floats:
-        """Irradiance (m, 3) of surfaces at points with unit normals, on the side of the normals, W/m².
-
-        For vertices or faces of meshes; ``cells`` as for `direct`, by default none.
-        """
-        cells = np.full(len(points), -1) if cells is None else cells
+    def irradiance(self, points: Floats, normals: Floats) -> Floats:
+        """Irradiance (m, 3) of vertices or faces of meshes, with unit normals, on the side of the normals, W/m²."""
+        cells = np.full(len(points), -1)
         result = scattering.irradiance(self.around(points, cells), normals)
         for towards, light in self.direct(points, cells):
             result += light * np.maximum(np.sum(normals * towards, axis=1), 0.0)[:, None]

@@ -203,9 +203,8 @@ def simple_crowns(
     size: tuple[float, float, float],
     colour: Sequence[float],
     boxes: bool = False,
-    most: int = MOST_PLANTS,
 ) -> Shapes:
-    """Plants of one size as crowns, stretched and turned as their places are.
+    """Plants of one size as crowns, stretched and turned as their places are; of very many every second, or third.
 
     Parameters
     ----------
@@ -217,12 +216,10 @@ def simple_crowns(
         Linear RGB.
     boxes : bool
         Edges of boxes instead of faces.
-    most : int
-        Plants that are shown; of more, every second, third and so on is.
     """
     corners, indices = _box(*size) if boxes else _crown(*size)
     of, origin = len(matrices), origin_near(matrices[:, :3, 3])
-    shown = matrices[:: max(-(-of // most), 1)]
+    shown = matrices[:: max(-(-of // MOST_PLANTS), 1)]
     positions = corners @ shown[:, :3, :3].transpose(0, 2, 1) + (shown[:, None, :3, 3] - origin)
     shade = np.interp(corners[:, 2], [0.0, size[2]], _SHADES)
     colours = as_shown(np.clip(np.asarray(colour) * shade[:, None], 0.0, 1.0))

@@ -10,9 +10,8 @@ larger than a part is the part opened, see `shares` and `asset_parts`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,12 +157,6 @@ class SharedParts(Generic[Parts]):
     def nbytes(self) -> int:
         """Bytes of all arrays, with what waits to be dropped and room to spare."""
         return self._parts.nbytes + self._figures.nbytes + self._points.nbytes
-
-    def with_parts(self, parts: Parts, points: SharePoints) -> Self:
-        """The same with other parts and the points on them."""
-        made = copy(self)
-        made.hold(parts, points)
-        return made
 
     def update(self, tree: TetrahedralTree, dividing: Mask, edge: Floats) -> NDArray:
         """Hand points in divided nodes on, and open what is large there.

@@ -54,7 +54,6 @@ def share_points(
     parts: PlantParts,
     pixels: Floats,
     lines: Axes | None = None,
-    most: int = MOST,
     times: int = 1,
     along: Integers | int = 0,
 ) -> SharePoints:
@@ -68,19 +67,17 @@ def share_points(
     pixels : (n,) float64
         Extent of the parts in the image.
     lines : Axes of n, optional
-    most : int
-        Points on the leaves of a part at most.
     times : int
-        How many times as many as that.
+        How many times as many points as usual.
     along : (n,) int64, optional
         Points on the wood of branches alone at least.
     """
-    number = times * np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, most)).astype(np.int64)
+    number = times * np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, MOST)).astype(np.int64)
     wood = np.maximum(np.ceil(WOOD * number).astype(np.int64), along)
     solid = are_solids(flora.rows)[parts.branches.row]
-    squares, most = (pixels[solid] / PIXELS_IN_SOLID) ** 2, max(MOST_IN_SOLID * most // MOST, FEWEST_IN_SOLID)
+    squares = (pixels[solid] / PIXELS_IN_SOLID) ** 2
     # Cells that are filled are smaller than what cannot be opened: too few points make holes and lumps of it.
-    number[solid] = times**2 * np.ceil(np.clip(squares, FEWEST_IN_SOLID, most)).astype(np.int64)
+    number[solid] = times**2 * np.ceil(np.clip(squares, FEWEST_IN_SOLID, MOST_IN_SOLID)).astype(np.int64)
     made = []
     for leafy in (True, False):
         area = parts.totals.leaf_area if leafy else parts.totals.wood_area
@@ -185,10 +182,6 @@ class SharedPlants(SharedParts[PlantParts]):
     def opened(self, parts: PlantParts) -> Iterator[tuple[PlantParts, Integers, Axes | None]]:
         """As `opened` of this module."""
         return opened(self.flora, parts)
-
-    def without_parts(self) -> SharedPlants:
-        """The same with no plants, for what asks only how large other parts are."""
-        return self.with_parts(PlantParts.empty(), SharePoints.empty())
 
     def pixels(self, parts: PlantParts) -> Floats:
         """Extent (n,) of parts in the image."""

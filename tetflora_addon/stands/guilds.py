@@ -163,6 +163,10 @@ class Guilds:
         at_first, slope = np.take(self.crown[:, 0], guild), np.take(self.crown[:, 1], guild)
         return 0.5 * np.where(girth < first, at_first * girth / first, at_first + slope * (girth - first))
 
+    def diameters(self, guild: NDArray, girth: NDArray) -> Floats:
+        """Diameters (n,) of trunks at breast height, metres."""
+        return np.maximum(girth - np.take(self.first, guild), 0.0)
+
     def masses(self, guild: NDArray, girth: NDArray, height: NDArray) -> Floats:
         """Dry mass (n,) of the wood above ground, kg."""
         return np.take(self.solid, guild) * girth**2 * height

@@ -189,7 +189,7 @@ class Plants(Arrays):
             (uniform(self.key, StandDraw.SEED) * 2.0**31).astype(np.int32),
             _positions(self.x, self.y, site),
             self.height.astype(np.float32),
-            np.maximum(self.girth - np.take(guilds.first, self.guild), 0.0).astype(np.float32),  # at breast height
+            guilds.diameters(self.guild, self.girth).astype(np.float32),
             (2.0 * self.radius).astype(np.float32),
             self.base.astype(np.float32),
             np.stack([self.east, self.north], axis=1).astype(np.float32),

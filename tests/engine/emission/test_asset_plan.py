@@ -178,7 +178,8 @@ def test_the_order_of_instances_does_not_matter() -> None:
     shared = result.assets
     inverse = np.argsort(order).astype(np.int32)
     parts = replace(shared.parts, instance=inverse[shared.parts.instance])
-    moved = SharedAssets(shared.placed.take(order), camera).with_parts(parts, shared.points)
+    moved = SharedAssets(shared.placed.take(order), camera)
+    moved.hold(parts, shared.points)
     found = []
     for own in (shared, moved):
         placed = own.placed

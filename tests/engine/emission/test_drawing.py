@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import cache
 
@@ -22,8 +23,10 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.emission.shade import Shade
 from tetflora_addon.proxies.drawn import triangle_corners
 from tetflora_addon.proxies.microsurfaces import Facets
+from tetflora_addon.refinement.contents import PlantParts
 from tetflora_addon.refinement.lights import Light
 from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.refinement.shared_parts import SharePoints
 
 WIDTH = 96
 
@@ -301,8 +304,9 @@ def test_quarters_are_the_facet_divided() -> None:
 
 def test_nothing_to_draw() -> None:
     flora, _, camera, result = scene()
-    empty = replace(result, plants=result.plants.without_parts())
-    blocks, facets, _ = support.drawn(flora, empty, camera)
+    plants = copy(result.plants)
+    plants.hold(PlantParts.empty(), SharePoints.empty())
+    blocks, facets, _ = support.drawn(flora, replace(result, plants=plants), camera)
     assert blocks == [] and len(facets) == 0
 
 

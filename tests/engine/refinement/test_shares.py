@@ -266,7 +266,8 @@ QUESTIONS = {
     "parts": lambda plants, tree: plants.parts,
     "points": lambda plants, tree: plants.points,
     "held": lambda plants, tree: plants.held(len(tree)),
-    "without": lambda plants, tree: plants.without_parts(),
+    "numbers": lambda plants, tree: plants.numbers,
+    "bytes": lambda plants, tree: plants.nbytes,
 }
 
 
