@@ -31,7 +31,7 @@ from ..growth.hashing import key_of_seed, mix, uniform
 from ..growth.seeds import Seeds
 from ..leaves.models import LeafModel
 from ..storage import remembered
-from .rays import WIDEST, Things, basis, cell_numbers, covered, opened, path_lengths, things_of
+from .rays import WIDEST, Things, basis, cell_numbers, opened, path_lengths, things_of
 
 #: Raise it when factors are found in another way.
 _METHOD = 1
@@ -220,14 +220,9 @@ def _looked_at(things: Things, direction: Floats, offset: float) -> tuple[Floats
     place = flat / spacing - low[:, None]
     near = (np.abs(place - np.rint(place)) <= things.radius / spacing).all(axis=0)
     met = np.zeros(shape.prod(), bool)
-    begin = 0
-    for part in things.parts:
-        end = begin + len(part)
-        corners, first, number = part.outlines(np.flatnonzero(near[begin:end]), u, v)
-        begin = end
-        _, ray = covered(corners / spacing - low, first, number)
-        inside = ((ray >= 0) & (ray < shape)).all(axis=1)
-        met[ray[inside, 0] * shape[1] + ray[inside, 1]] = True
+    ray = things.covered(near, u, v, spacing, low)
+    inside = ((ray >= 0) & (ray < shape)).all(axis=1)
+    met[ray[inside, 0] * shape[1] + ray[inside, 1]] = True
     i = np.arange(len(met))
     at = (np.stack([i // shape[1], i % shape[1]], axis=1) + low) * spacing
     return at[:, :1] * u + at[:, 1:] * v, met

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Table, spread
+from ..arrays import Floats, Integers, Mask, Table, spread
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_forms, leaf_keys, leaf_places, place_leaves, settled
@@ -238,6 +238,15 @@ class Things:
     radius: Floats
     group: Integers
     dense: Floats
+
+    def covered(self, near: Mask, u: Floats, v: Floats, spacing: float, low: Floats | float = 0.0) -> Integers:
+        """Points (m, 2) of a lattice on the plane of two axes that outlines of some things, a mask (n,), cover."""
+        found, begin = [], 0
+        for part in self.parts:
+            corners, first, number = part.outlines(np.flatnonzero(near[begin : begin + len(part)]), u, v)
+            found.append(covered(corners / spacing - low, first, number)[1])
+            begin += len(part)
+        return np.concatenate(found)
 
 
 def things_of(

@@ -17,7 +17,7 @@ from ..growth.hashing import child_key, key_of_seed, uniform
 from .cover import Suits
 from .plane import NO_DISTANCE, Lines, clumps, inside_any, lines_along
 from .rules import Rules
-from .terrain import Path, Terrain, border_of, sampled
+from .terrain import Path, Terrain, border_of, map_areas, sampled
 from .wetness import wet_ground
 from .zones import Spots, Zone, by_wetness
 
@@ -123,7 +123,7 @@ class Site:
         self.triangles, self.weight, self.uv = triangles, weight, uv
         self.normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
         self.most = np.ones(len(triangles)) if weight is None else weight.max(axis=1)
-        area = 0.5 * np.linalg.norm(_map_cross(triangles), axis=1) if ground.areas else 0.5 * np.abs(normal[:, 2])
+        area = map_areas(triangles) if ground.areas else 0.5 * np.abs(normal[:, 2])
         self.cumulative = np.cumsum(area * self.most if weight is not None else area)
         if not self.cumulative[-1] > 0.0:
             raise SceneError("The suitable ground is vertical and has no area seen from above; select another mesh")
@@ -271,11 +271,6 @@ def _kept(mask: Mask, *arrays: NDArray | None) -> tuple:
     if mask.all():
         return arrays
     return tuple(None if array is None else array[mask] for array in arrays)
-
-
-def _map_cross(triangles: Floats) -> Floats:
-    first, second = triangles[:, 1, :2] - triangles[:, 0, :2], triangles[:, 2, :2] - triangles[:, 0, :2]
-    return (first[:, :1] * second[:, 1:]) - (first[:, 1:] * second[:, :1])
 
 
 def _near_areas(

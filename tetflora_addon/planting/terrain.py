@@ -87,9 +87,14 @@ class Terrain:
     @property
     def map_area(self) -> float:
         """Area of all triangles on the map, m²; what lies above other ground counts as well."""
-        a, b, c = np.moveaxis(self.triangles[..., :2], 1, 0)
-        (ux, uy), (vx, vy) = (b - a).T, (c - a).T
-        return float(0.5 * np.abs(ux * vy - uy * vx).sum())
+        return float(map_areas(self.triangles).sum())
+
+
+def map_areas(triangles: Floats) -> Floats:
+    """Areas (t,) of triangles (t, 3, 3) on the map, m²."""
+    a, b, c = np.moveaxis(triangles[..., :2], 1, 0)
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    return 0.5 * np.abs(ux * vy - uy * vx)
 
 
 def border_of(triangles: Floats) -> Floats:

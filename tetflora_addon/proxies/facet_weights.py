@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from ..arrays import GOLDEN_TURN, Floats, Integers, Mask, Table, spiral, spread
 from ..compiled.clumping import fingerprint
 from ..compiled.flora import Flora, compile_species
-from ..compiled.rays import Things, basis, covered, things_of
+from ..compiled.rays import Things, basis, things_of
 from ..growth.branches import Branches
 from ..growth.envelopes import are_solids
 from ..growth.growth import trunks
@@ -449,19 +449,9 @@ def look(things: Things, beyond: Floats) -> Iterator[tuple[View, Integers]]:
     index = np.arange(_DIRECTIONS) + 0.5
     for direction in spiral(index / _DIRECTIONS, index, GOLDEN_TURN):
         view = View(*basis(direction), extent / _RAYS)
-        yield view, _met(view, things)
-
-
-def _met(view: View, things: Things) -> Integers:
-    place = view.flat(things.middle.T)
-    near = (np.abs(place - np.rint(place)) <= (things.radius / view.spacing)[:, None]).all(axis=1)
-    begin, rays = 0, []
-    for part in things.parts:
-        end = begin + len(part)
-        corners, first, number = part.outlines(np.flatnonzero(near[begin:end]), view.u, view.v)
-        rays.append(_ray_numbers(*covered(corners / view.spacing, first, number)[1].T))
-        begin = end
-    return np.unique(np.concatenate(rays))
+        place = view.flat(things.middle.T)
+        near = (np.abs(place - np.rint(place)) <= (things.radius / view.spacing)[:, None]).all(axis=1)
+        yield view, np.unique(_ray_numbers(*things.covered(near, view.u, view.v, view.spacing).T))
 
 
 def least_weights(view: View, facets: Facets) -> Floats:
