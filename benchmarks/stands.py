@@ -17,7 +17,7 @@ from tetflora_addon.species.ages import ages_of, with_age
 from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.stands.grow import StandSettings, begun
 from tetflora_addon.stands.guilds import Guild, Guilds
-from tetflora_addon.stands.site import even_site
+from tetflora_addon.stands.site import StandSite
 
 from .report import Targets, records_of
 from .stands_published import Figure, Trees, curves, figures, published
@@ -53,7 +53,9 @@ def stand(species: str) -> tuple[list[Figure], tuple[float, float]]:
     """Figures of a species at some years, and its slopes: biomass to density, and density to diameter."""
     guild = Guild(load_species(species))
     guilds, settings = Guilds([guild]), StandSettings(density=DENSITY, recruits=0.0, years=max(YEARS), interval=0)
-    grown, area = begun(even_site(SIDE), [guild], settings), SIDE**2 / 1e4
+    cells = round(SIDE / 5.0)
+    site = StandSite(0.0, 0.0, SIDE / cells, np.zeros((cells, cells)))
+    grown, area = begun(site, [guild], settings), SIDE**2 / 1e4
     found, thinned, stands = [], [], []
     for year in range(settings.years):
         grown.step(year)

@@ -91,12 +91,11 @@ def _crown_of(species: Species) -> Crown:
     reach = _LEAF_LEANS * float(flora.leaf_reach[row])
     radius = float(np.quantile(np.hypot(place[:, 0], place[:, 1]), _WITHIN)) + reach
     height = max(float(np.quantile(place[:, 2], _TALLEST)), radius)
-    base = float(np.quantile(place[:, 2], _LOWEST)) if flora.leaf_count[row] > 0 else 0.0
+    base = max(float(np.quantile(place[:, 2], _LOWEST)), 0.0) if flora.leaf_count[row] > 0 else 0.0
     leaves, wood = flora.leaf_areas(trunk), flora.wood_areas(trunk)
     areas = np.array([LEVEL * leaves.mean(), wood.mean() / np.pi])
     colours = np.stack([flora.leaf_colours(trunk).mean(axis=0), flora.wood_colour[row]])
     colour = tuple((areas @ colours / areas.sum()).tolist())
     polygons = expected_polygons(flora.species[0])
     leaf = float(flora.leaf_width[row]) if flora.leaf_count[row] > 0 else 2.0 * float(trunk.radius.mean())
-    base = max(base, 0.0)
     return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), colour, leaf)

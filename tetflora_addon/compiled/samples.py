@@ -206,7 +206,11 @@ class _Walk:
                 if child >= 0 and rows["count"][row, sort, 0] > 0:
                     arrived[child - first].append(_one_child_each(rows, one, lines, sort))
             for number, child in enumerate(range(*rows["drawn_rows"][row])):
-                arrived[child - first].append(_drawn_child(rows, one, number, self._number(child)))
+                places = self._number(child)
+                owner = thinned(len(one.weight), places)
+                weight = one.weight[owner] * (len(one.weight) / places)
+                drawn = chosen_drawn(rows, one.branches, owner, np.full(places, number))
+                arrived[child - first].append(_Arrived(drawn, weight, one.line[:, owner]))
         self.wood = _Points.concatenate(wood)
         self.leaves = _Points.concatenate(leaves) if leaves else None
 
@@ -328,13 +332,6 @@ def _leaf_points(rows: Table, one: _Arrived, lines: Axes) -> _Points:
     light = np.broadcast_to(leaves.light, len(leaves))  # may be one number for all
     young = youth(rows, branches.row[:1], t)
     return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, light, young, area)
-
-
-def _drawn_child(rows: Table, one: _Arrived, number: int, places: int) -> _Arrived:
-    """One of the branches drawn by hand, of some of the plants."""
-    owner = thinned(len(one.weight), places)
-    weight = one.weight[owner] * (len(one.weight) / places)
-    return _Arrived(chosen_drawn(rows, one.branches, owner, np.full(places, number)), weight, one.line[:, owner])
 
 
 def _one_child_each(rows: Table, one: _Arrived, lines: Axes, sort: int) -> _Arrived:

@@ -76,8 +76,10 @@ def leaf_kites(model: LeafModel) -> LeafKites:
             found.append((_kite(model, float(fan[1].sum()), normal, fan, fold), areas.sum(), material))
             break
         for plane in _planes(normals[own], areas[own]):
-            normal = _mean_direction(normals[own][plane], areas[own][plane])
-            found.append((_kite(model, model.shown_area, normal, fan), areas[own][plane].sum(), material))
+            turned, size = normals[own][plane], areas[own][plane]
+            normal = np.linalg.eigh(np.einsum("f,fi,fj->ij", size, turned, turned))[1][:, 2]
+            normal = normal if (size * (turned @ normal)).sum() >= 0.0 else -normal  # to the side of most of them
+            found.append((_kite(model, model.shown_area, normal, fan), size.sum(), material))
     positions = np.array([corners for corners, _, _ in found])
     share = np.cumsum([area for _, area, _ in found])
     return LeafKites(
@@ -99,12 +101,6 @@ def _planes(normals: Floats, areas: Floats) -> list[Integers]:
     done = np.cumsum(areas[order]) - areas[order] / 2
     group = np.minimum((planes * done / areas.sum()).astype(int), planes - 1)
     return [order[group == one] for one in np.unique(group)]
-
-
-def _mean_direction(normals: Floats, areas: Floats) -> Floats:
-    """Mean axis of normals, with the sign of most of them."""
-    axis = np.linalg.eigh(np.einsum("f,fi,fj->ij", areas, normals, normals))[1][:, 2]
-    return axis if (areas * (normals @ axis)).sum() >= 0.0 else -axis
 
 
 def _fan(model: LeafModel, normals: Floats) -> tuple[Floats, Floats]:

@@ -184,9 +184,8 @@ def chosen_level(model: LeafModel, pixels: Floats) -> Integers:
 def chosen_polygons(model: LeafModel, pixels: Floats) -> Floats:
     """Polygons (n,) of leaves at the levels that `chosen_level` gives them."""
     level = chosen_level(model, pixels)
-    return (
-        level_polygons(model, 1.0 / pixels.max())[level] if level.any() else np.full(len(level), model.polygons, float)
-    )
+    polygons = level_polygons(model, 1.0 / pixels.max()) if level.any() else np.array([model.polygons], float)
+    return polygons[level]
 
 
 @lru_cache(maxsize=128)

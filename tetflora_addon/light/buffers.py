@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask
 from ..camera.camera import Camera
-from ..refinement.rasterise import buffer_size, occluder_depth, tetrahedron_fragments
+from ..refinement.rasterise import buffer_size, image_places, occluder_depth, tetrahedron_fragments
 from ..refinement.visibility import OPAQUE, depth_in_front
 
 #: Distance behind polygons at which their shadows begin, in pixels of the buffer: none shadows what lies on it.
@@ -269,18 +269,12 @@ class LightBuffer:
 
     def _taps(self, points: Floats) -> tuple[_Taps, Mask]:
         """Pixels around those points (k,) that are in view, and which these are (m,)."""
-        local = self.camera.to_camera_space(points)
-        depth = local[:, 2]
-        left, right, bottom, top = self.camera.window
-        ahead = depth >= self.camera.near
-        flat = local[:, :2] if self.camera.kind == "ORTHO" else local[:, :2] / np.where(ahead, depth, 1.0)[:, None]
         size = np.array([self.width, self.height])
-        place = (flat - [left, bottom]) / [right - left, top - bottom] * size
-        inside = ahead & (place >= -1e-9).all(axis=1) & (place <= size + 1e-9).all(axis=1)
+        place, depth, metres = image_places(self.camera, points, size)
+        inside = (depth >= self.camera.near) & (place >= -1e-9).all(axis=1) & (place <= size + 1e-9).all(axis=1)
         place = place[inside] - 0.5
         low = np.floor(place)
         fraction = place - low
-        metres = depth[inside] if self.camera.kind == "ORTHO" else np.linalg.norm(local[inside], axis=1)
         pixels, weights = [], []
         for up in (0, 1):
             for aside in (0, 1):
@@ -288,7 +282,7 @@ class LightBuffer:
                 row = np.clip(low[:, 1] + up, 0, self.height - 1).astype(np.int64)
                 pixels.append(row * self.width + column)
                 weights.append(np.abs(1 - aside - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1]))
-        return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), metres), inside
+        return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), metres[inside]), inside
 
     def _last_before(self, taps: _Taps) -> tuple[Integers, Mask]:
         """The last fragment (k, 4) that begins in front of each point in each pixel, and whether there is one."""

@@ -364,7 +364,10 @@ def _strips(
 ) -> Facets:
     """Facets of wood: long and thin, as branches are, along axes (n, 3)."""
     stretch, none = np.full(len(side), STRETCH), np.zeros(len(side))
-    return Facets(centre, _across(axis, key), axis, side, colour, none, velocity, stretch=stretch)
+    # Turned about their axes at random, since closed tubes face all ways around.
+    aside, turn = perpendicular(axis), 2 * np.pi * uniform(key, _TURN)[:, None]
+    across = np.cos(turn) * aside + np.sin(turn) * np.cross(axis, aside)
+    return Facets(centre, across, axis, side, colour, none, velocity, stretch=stretch)
 
 
 def _carried(flora: Flora, subplants: Branches, owner: Integers, centre: Floats) -> Floats | None:
@@ -404,13 +407,6 @@ def _along(
     t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + index * _GOLDEN) % 1.0)
     on = np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner]))
     return owner[on], index[on], key[on], one[on], t[on]
-
-
-def _across(axis: Floats, key: Keys) -> Floats:
-    """Unit vectors perpendicular to axes, turned about them at random, since closed tubes face all ways around."""
-    a = perpendicular(axis)
-    turn = 2 * np.pi * uniform(key, _TURN)[:, None]
-    return np.cos(turn) * a + np.sin(turn) * np.cross(axis, a)
 
 
 OnDay = tuple[Branches, Integers] | None

@@ -23,7 +23,7 @@ from ..camera.camera import Camera
 from ..tetrahedra.geometry import volume
 from ..tetrahedra.tree import TetrahedralTree
 from .decisions import Decision, Terminals, mean_extinction
-from .rasterise import buffer_size, occluder_depth, pixel_rays, tetrahedron_fragments
+from .rasterise import buffer_size, image_places, occluder_depth, pixel_rays, tetrahedron_fragments
 from .settings import RefinementSettings
 from .views import face_cameras
 from .visibility import AlphaBuffer
@@ -279,15 +279,9 @@ def _fields(pixel: Integers, size: tuple[int, int]) -> tuple[Integers, int]:
 
 def _receive(view: Camera, size: tuple[int, int], points: Floats, extent: Floats, far: Floats, fine: Floats) -> None:
     """Put points that receive light into the fields: how far away they are, and how fine the image is there."""
-    local = view.to_camera_space(points)
-    left, right, bottom, top = view.window
-    depth = local[:, 2]
-    ahead = depth > view.near
-    flat = local[:, :2] if view.kind == "ORTHO" else local[:, :2] / np.where(ahead, depth, 1.0)[:, None]
-    place = (flat - [left, bottom]) / [right - left, top - bottom] * size
-    some = np.flatnonzero(ahead & (place >= 0.0).all(axis=1) & (place < size).all(axis=1))
+    place, depth, metres = image_places(view, points, size)
+    some = np.flatnonzero((depth > view.near) & (place >= 0.0).all(axis=1) & (place < size).all(axis=1))
     column, row = place[some].astype(np.int64).T
     field, _ = _fields(row * size[0] + column, size)
-    metres = depth[some] if view.kind == "ORTHO" else np.linalg.norm(local[some], axis=1)
-    np.maximum.at(far, field, metres)
+    np.maximum.at(far, field, metres[some])
     np.minimum.at(fine, field, extent[some])

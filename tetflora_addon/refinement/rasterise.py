@@ -299,6 +299,21 @@ def _grid(camera: Camera, width: int, height: int) -> tuple[Floats, Floats]:
     return np.array([left, bottom]), np.array([(right - left) / width, (top - bottom) / height])
 
 
+def image_places(camera: Camera, points: Floats, size: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
+    """Where points (n, 3) are in a flat image of so many pixels, (n, 2) from its lower left corner; depths; distances.
+
+    Distances (n,) are those along rays, metres; places of what is nearer than the near plane mean nothing.
+    """
+    local = camera.to_camera_space(points)
+    left, right, bottom, top = camera.window
+    flat, depth = local[:, :2], local[:, 2]
+    if camera.kind == "ORTHO":
+        metres = depth
+    else:
+        flat, metres = flat / np.where(depth >= camera.near, depth, 1.0)[:, None], np.linalg.norm(local, axis=1)
+    return (flat - [left, bottom]) / [right - left, top - bottom] * size, depth, metres
+
+
 def _centres(camera: Camera, width: int, height: int) -> tuple[Floats, Floats]:
     """Window coordinates of the pixels' centres: x by column, y by row."""
     corner, step = _grid(camera, width, height)

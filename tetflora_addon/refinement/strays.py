@@ -52,15 +52,11 @@ class Strays:
     ) -> tuple[Seeds, Polygons | None, PlacedAssets]:
         """What is left of plants, polygons and instances of assets; None where no polygon is."""
         if len(self.plants):
-            kept = np.ones(len(seeds), bool)
-            kept[self.plants] = False
-            seeds = seeds.take(kept)
+            seeds = seeds.take(np.delete(np.arange(len(seeds)), self.plants))
         if len(self.instances):
             polygons = polygons.take(np.flatnonzero(~np.isin(polygons.instance, self.instances)))
         if len(self.assets):
-            kept = np.ones(len(placed), bool)
-            kept[self.assets] = False
-            placed = placed.take(kept)
+            placed = placed.take(np.delete(np.arange(len(placed)), self.assets))
         return seeds, polygons if polygons is not None and len(polygons) else None, placed
 
 

@@ -96,7 +96,9 @@ class PanoramaBuffer:
         if count:
             self._grow(int(np.max(cells)) + 1)
         for number, face in enumerate(self.faces):
-            some = np.flatnonzero(_may_be_in(vertices, face.camera))
+            x, y, depth = np.moveaxis(face.camera.to_camera_space(vertices), -1, 0)
+            walls = (depth - x, depth + x, depth - y, depth + y)  # of the face's pyramid
+            some = np.flatnonzero(np.logical_and.reduce([(wall > 0.0).any(axis=1) for wall in walls]))
             outline = face.add(cells[some], vertices[some], extinction[some])
             self._weight[number, cells[some]] = outline.pixels
             pixels[some] += outline.pixels
@@ -143,13 +145,6 @@ class PanoramaBuffers:
 def face_side(resolution: int) -> int:
     """Side in pixels of the faces, given the longer side of a flat image's buffer."""
     return max(1, round(FACE_FRACTION * resolution))
-
-
-def _may_be_in(vertices: Floats, camera: Camera) -> Mask:
-    """Tetrahedra (n,) that are not wholly beside one of the walls of a face's pyramid."""
-    x, y, depth = np.moveaxis(camera.to_camera_space(vertices), -1, 0)
-    walls = (depth - x, depth + x, depth - y, depth + y)
-    return np.logical_and.reduce([(wall > 0.0).any(axis=1) for wall in walls])
 
 
 def widened_for(

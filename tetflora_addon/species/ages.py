@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -228,7 +229,10 @@ class _Aged:
             changes[name] = Range(mean, min(variation, mean, 0.99 - mean))
         if not stool:
             changes |= self._leaves(o)
-            changes["taper"] = self._taper(order, self._radius(o))
+            thick = (one.thickness.mean for one in self.one.orders[: o + 1])
+            radius = prod((self.whole[0], *thick, self.stout[o]))  # typical one at the base, metres
+            mean = max(order.taper.mean, min(0.5, _TIP / max(radius, 1e-9)))
+            changes["taper"] = Range(mean, min(order.taper.variation, mean, 1 - mean))
             changes["flare"] = order.flare * min(self.stout[o], 1.0) ** 0.5
         if o == self.stem and order.pipe > _EVEN:
             changes["pipe"] = order.pipe - self.youth * (order.pipe - _EVEN)
@@ -314,18 +318,6 @@ class _Aged:
             if before.pipe > 0:
                 factor *= max(self._sorts(o - 1)[0][0], 1e-3) ** (1 / max(before.pipe, 1.0))
         return order.thickness.scaled(min(factor, 0.95 / order.thickness.high))
-
-    def _radius(self, o: int) -> float:
-        """Typical radius at the base, metres."""
-        radius = self.whole[0]
-        for order in self.one.orders[: o + 1]:
-            radius *= order.thickness.mean
-        return radius * self.stout[o]
-
-    @staticmethod
-    def _taper(order: Order, radius: float) -> Range:
-        mean = max(order.taper.mean, min(0.5, _TIP / max(radius, 1e-9)))
-        return Range(mean, min(order.taper.variation, mean, 1 - mean))
 
     def _leaf(self, order: Order) -> Range:
         largest = order.leaf_size.high * max(order.leaf_size_tip, 1.0) * max(order.leaf_size_young, 1.0)

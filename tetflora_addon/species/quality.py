@@ -127,7 +127,9 @@ def _shapes(species: Species, detail: float) -> list[tuple[float, float]]:
         else:
             pace = _SHAPE_PACE + _TWIG_PACE * _crowd(number)
             left = max(1 - pace * (1 - detail), 0.0)
-            bent = min(max(math.ceil(_bend(order) / _TURN), 1), order.segments)
+            # By so many degrees a branch is meant to turn from base to tip, to either side.
+            bend = (abs(order.curvature.mean) + abs(order.curvature_tip)) / 2 + abs(order.attraction.mean)
+            bent = min(max(math.ceil(bend / _TURN), 1), order.segments)
             shape = 3 * (order.sides / 3) ** left, bent * (order.segments / bent) ** left
         shapes.append((min(shape[0], ORDER_KEYS["sides"].high), min(shape[1], ORDER_KEYS["segments"].high)))
     return shapes
@@ -136,11 +138,6 @@ def _shapes(species: Species, detail: float) -> list[tuple[float, float]]:
 def _crowd(number: float) -> float:
     """0 for the trunk, 1 for the twigs of a large tree."""
     return min(math.log(max(number, 1.0)) / math.log(_MANY), 1.0)
-
-
-def _bend(order: Order) -> float:
-    """Degrees by which a branch of the order is meant to turn from base to tip, to either side."""
-    return (abs(order.curvature.mean) + abs(order.curvature_tip)) / 2 + abs(order.attraction.mean)
 
 
 def _shaped(species: Species, shapes: list[tuple[float, float]]) -> Species:

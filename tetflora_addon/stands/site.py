@@ -140,9 +140,3 @@ def _of(values: NDArray | None, default: float, like: NDArray) -> Floats:
 
 def _ramp(value: ArrayLike) -> Floats:
     return np.clip(value, 0.0, 1.0)
-
-
-def even_site(size: float, cell: float = 5.0, **settings: float) -> StandSite:
-    """A level square of so many metres, for examples and measurements; ``settings`` are those of `StandSite`."""
-    number = max(round(size / cell), 1)
-    return StandSite(0.0, 0.0, size / number, np.zeros((number, number)), **settings)

@@ -14,7 +14,7 @@ from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.stands.change import SeedRain, planted
 from tetflora_addon.stands.guilds import Guild, Guilds
 from tetflora_addon.stands.plants import Plants
-from tetflora_addon.stands.site import even_site
+from tetflora_addon.stands.site import StandSite
 
 SIDE = 600.0
 RADIUS = 3.0
@@ -24,7 +24,7 @@ def fallen(dispersal: float, radius: float = RADIUS, age: float = 500.0) -> tupl
     """Seeds on a square metre (rows, columns) around one beech in the middle of the ground."""
     beech = load_species("beech")
     guilds = Guilds([Guild(beech, ecology=replace(Guild(beech).needs, dispersal=dispersal))])
-    site, suits = even_site(SIDE), np.ones((1, 120**2))
+    site, suits = StandSite(0.0, 0.0, SIDE / 120, np.zeros((120, 120))), np.ones((1, 120**2))
     plants: Plants = planted(site, guilds, suits, 1.0, 0).take(np.array([0]))
     one = replace(
         plants, x=np.array([SIDE / 2]), y=np.array([SIDE / 2]), radius=np.array([radius]), age=np.array([age])

@@ -22,11 +22,16 @@ from tetflora_addon.stands.grow import StandSettings, begun, grow
 from tetflora_addon.stands.guilds import Guild, Guilds
 from tetflora_addon.stands.light import Crowns, LightGrid
 from tetflora_addon.stands.plants import LYING, Records
-from tetflora_addon.stands.site import StandSite, even_site
+from tetflora_addon.stands.site import StandSite
 
 SIDE = 40.0
 MIXED = [Guild(load_species(name)) for name in ("beech", "birch")]
 YEARS = StandSettings(years=60, interval=10, density=6000.0, recruits=500.0, seed=3)
+
+
+def even_site(size: float, **settings: float) -> StandSite:
+    """A level square of so many metres, in cells of 5 m."""
+    return StandSite(0.0, 0.0, 5.0, np.zeros((round(size / 5.0), round(size / 5.0))), **settings)
 
 
 def half_planted(settings: StandSettings = YEARS) -> StandSite:
