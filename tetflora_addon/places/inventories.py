@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
 from .cells import NOTHING, NUMBER, RANGE, WORD, cells, place_in
-from .projection import LONGITUDE_LATITUDE, MOST_AWAY, System, between, place_about, system_of
+from .projection import LONGITUDE_LATITUDE, MOST_AWAY, System, between, chosen_system, place_about
 from .species_names import KIND, is_name, key_of, species_named
 from .tables import Table, read_csv, read_points
 from .titles import FIELDS, NAMES, NEVER, Title, meaning, read_title, said_of
@@ -399,7 +399,7 @@ class _Reading:
                 code = code or own
                 metres = not code and bool((np.abs(points[self.good]) > (360.0, 180.0)).any())
             else:
-                metres = metres and (not degrees or (code and not system_of(code).geographic))
+                metres = metres and (not degrees or (code and not chosen_system(code, System(), "").geographic))
                 columns = ("x", "y") if metres else ("longitude", "latitude")
                 pair = columns[0]
                 points = np.stack([self._coordinate(column) for column in columns], axis=1)
@@ -410,7 +410,7 @@ class _Reading:
                 metres = False
                 self.notes.append("x and y read as longitude and latitude")
             code = code or (0 if metres else LONGITUDE_LATITUDE)
-        system = system_of(code, f"{name}: ") if code else System()
+        system = chosen_system(code, System(), f"{name}: ")
         if system.geographic:
             some = np.abs(points[self.good])
             if len(some) and 90.0 < np.median(some[:, 1]) <= 180.0 and np.median(some[:, 0]) <= 90.0:
