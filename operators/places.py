@@ -25,11 +25,15 @@ from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_item
 from ..tetflora_addon.errors import TetFloraError, readable
 from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.places.inventories import IMPERIAL, METRIC
+from ..tetflora_addon.places.layers import ENDINGS
+from ..tetflora_addon.places.outlines import KINDS
+from ..tetflora_addon.places.projection import PLAIN
 from ..tetflora_addon.places.species_names import told as names_told
 from .add import mix_in, parse_weights
 from .base import ModalJob, counted, in_object_mode, select_only
 from .populations import selected_grounds
 
+_LAYERS = ";".join(f"*{ending}" for ending in ENDINGS)
 _UNLINKED = {'SKIP_SAVE'}
 
 
@@ -41,12 +45,17 @@ class _Importing(ModalJob, ImportHelper):
     code: IntProperty(
         name="Coordinate System",
         description=(
-            "EPSG code of the coordinates in the file: 4326 for longitude and latitude, 326xx and 327xx for UTM, 3857 "
-            "for Web Mercator. 0 uses what the file says"
+            "EPSG code of the coordinates in the file, such as 4326 for longitude and latitude, or 25832 for a zone of "
+            "UTM. 0 uses what the file says"
         ),
         default=0,
         min=0,
         max=999_999,
+        options=_UNLINKED,
+    )
+    plain: BoolProperty(
+        name="Plain Meters",
+        description="Take coordinates for meters of a plane, whatever the file says of its coordinate system",
         options=_UNLINKED,
     )
     new_origin: BoolProperty(
@@ -82,15 +91,22 @@ class _Importing(ModalJob, ImportHelper):
         return {'CANCELLED'}
 
     @property
+    def system(self) -> int:
+        """The chosen coordinate system."""
+        return PLAIN if self.plain else self.code
+
+    @property
     def path(self) -> Path:
         """The chosen file."""
         return Path(bpy.path.abspath(self.filepath))
 
 
 class _Raster(_Importing):
-    """Mix-in for those that read rasters."""
+    """Mix-in for those that read rasters, or several tiles of one."""
 
     filter_glob: StringProperty(default=PATTERN, options={'HIDDEN'})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
+    directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
     factor: FloatProperty(
         name="Meters per Value",
         description="Factor on the values of the file: 0.3048 for feet, 0.1 for decimeters",
@@ -111,9 +127,20 @@ class _Raster(_Importing):
         options=_UNLINKED,
     )
 
+    @property
+    def tiles(self) -> list[Path]:
+        """The other chosen files."""
+        folder = Path(bpy.path.abspath(self.directory)) if self.directory else self.path.parent
+        return [folder / file.name for file in self.files if file.name and folder / file.name != self.path]
+
+    def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
+        """Settings of another call, with files by their names."""
+        found = super().as_keywords(ignore=(*ignore, "files"))
+        return found | {"files": [{"name": file.name} for file in self.files]}
+
 
 class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
-    """Make ground from a raster of elevations: an ASCII grid, a GeoTIFF or a PNG with a world file."""
+    """Make ground from a raster of elevations, or from several tiles of one."""
 
     bl_idname = "tetflora.import_terrain"
     bl_label = "Import Terrain"
@@ -127,15 +154,34 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
         max=20_000_000,
         options=_UNLINKED,
     )
+    image: StringProperty(
+        name="Orthophoto",
+        description=(
+            "Image of the same place that becomes the color of the ground: GeoTIFF, or JPEG or PNG with a world file"
+        ),
+        subtype='FILE_PATH',
+        options=_UNLINKED,
+    )
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, ImportedGround]:
-        return terrain_steps(context.scene, self.path, self.most, self.code, self.factor, self.shift, self.new_origin)
+        return terrain_steps(
+            context.scene,
+            self.path,
+            self.most,
+            self.system,
+            self.factor,
+            self.shift,
+            self.new_origin,
+            self.tiles,
+            Path(bpy.path.abspath(self.image)) if self.image else None,
+        )
 
     def finish(self, context: bpy.types.Context, result: ImportedGround) -> set[str]:
         select_only(context, [result.object])
         faces = counted(len(result.object.data.polygons), "face")
         coarser = "; the file is finer, see Most Faces" if result.coarser else ""
-        return self.done(f'Ground "{result.object.name}" of {faces}, one every {result.step:.2f} m{coarser}')
+        parts = [f'Ground "{result.object.name}" of {faces}, one every {result.step:.2f} m{coarser}', *result.notes]
+        return self.done(readable("; ".join(parts)))
 
 
 class _Trees(_Importing):
@@ -176,7 +222,7 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
     bl_idname = "tetflora.import_inventory"
     bl_label = "Import Tree Inventory"
 
-    filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.geojson;*.json", options={'HIDDEN'})
+    filter_glob: StringProperty(default=f"*.csv;*.tsv;*.txt;{_LAYERS}", options={'HIDDEN'})
     units: EnumProperty(
         name="Units",
         description="Units of columns that do not name theirs",
@@ -262,7 +308,7 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
                 "TETFLORA_UL_inventory_columns", "", self, "table", self, "active", rows=rows, maxrows=rows
             )
         layout.use_property_split = True
-        for name in ("units", "unknown", "species", "skip", "code", "new_origin", "crop", "crop_size"):
+        for name in ("units", "unknown", "species", "skip", "code", "plain", "new_origin", "crop", "crop_size"):
             if (name != "species" or self.unknown == 'SPECIES') and (name != "crop_size" or self.crop == MIDDLE):
                 layout.prop(self, name)
 
@@ -274,7 +320,7 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
             self.path,
             selected_grounds(context),
             chosen,
-            self.code,
+            self.system,
             self.units,
             self.skip,
             self.new_origin,
@@ -313,6 +359,12 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
         unit='LENGTH',
         options=_UNLINKED,
     )
+    below: StringProperty(
+        name="Ground Below",
+        description="Raster of the elevations of the ground, to subtract from those of a surface model; empty for none",
+        subtype='FILE_PATH',
+        options=_UNLINKED,
+    )
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
         self.species = self.species or mix_in(context.scene.tetflora.populate)
@@ -323,10 +375,12 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
             selected_grounds(context),
             parse_weights(self.species),
             self.least,
-            self.code,
+            self.system,
             self.factor,
             self.shift,
             self.new_origin,
+            Path(bpy.path.abspath(self.below)) if self.below else None,
+            self.tiles,
         )
 
     def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
@@ -334,7 +388,7 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
 
 
 class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
-    """Make curves of woods, meadows, water, roads and buildings from GeoJSON, with the keys of OpenStreetMap.
+    """Make curves of woods, meadows, water, roads and buildings from GeoJSON, a shapefile or a GeoPackage.
 
     They lie on the selected meshes, or on imported terrain. Populations can be limited to them.
     """
@@ -342,7 +396,17 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
     bl_idname = "tetflora.import_outlines"
     bl_label = "Import Outlines"
 
-    filter_glob: StringProperty(default="*.geojson;*.json", options={'HIDDEN'})
+    filter_glob: StringProperty(default=_LAYERS, options={'HIDDEN'})
+    kind: EnumProperty(
+        name="Take All As",
+        description="What all areas and lines of the file are",
+        items=(
+            ('KEYS', "Told by Their Keys", "What each says that it is, by the keys of OpenStreetMap or others"),
+            *((kind.upper(), kind, f"All are {kind.lower()}") for kind in KINDS),
+        ),
+        default='KEYS',
+        options=_UNLINKED,
+    )
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Drawn]:
         return outline_steps(
@@ -350,12 +414,13 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
             context.evaluated_depsgraph_get(),
             self.path,
             selected_grounds(context),
-            self.code,
+            self.system,
             self.new_origin,
+            "" if self.kind == 'KEYS' else self.kind.title(),
         )
 
     def finish(self, _context: bpy.types.Context, result: Drawn) -> set[str]:
-        return self.done(f"Outlines imported: {told(result.number)}")
+        return self.done(readable("; ".join([f"Outlines imported: {told(result.number)}", *result.notes])))
 
 
 CLASSES = (

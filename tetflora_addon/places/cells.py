@@ -25,7 +25,10 @@ _METRES = {
     0.0: r"years?|yrs?|jahre?|ans?|a[nñ]os?|anni|jaar",
 }
 _UNIT = "|".join(_METRES.values())
-_LESS = r"<=?|≤|bis(?: zu)?|up to|less than|under|below|unter|moins de|jusqu'?[aà]|menos de|menor (?:de|que|a)|hasta|meno di|fino a|tot"
+_LESS = (
+    r"<=?|≤|bis(?: zu)?|up to|less than|under|below|unter|moins de|jusqu'?[aà]|"
+    r"menos de|menor (?:de|que|a)|hasta|meno di|fino a|tot"
+)
 _MORE = (
     r">=?|≥|more than|greater than|over|above|at least|[uü]ber|[uü]ebersteigt|ab|mehr als|mindestens|plus de|au moins|"
     r"m[aá]s de|mayor (?:de|que|a)|oltre|pi[uù] di|meer dan"

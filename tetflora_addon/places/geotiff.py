@@ -1,16 +1,18 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The few tags of a GeoTIFF that tell its size, its numbers, and where on Earth it lies.
+"""GeoTIFF: what its values are, and where on Earth they lie.
 
-Pixels are not read here. Tags are those of TIFF 6.0 (Adobe, 1992), its 64-bit kin BigTIFF, and OGC GeoTIFF 1.1 (OGC
-19-008r4, 2019); the value that stands for "nothing known" is GDAL's.
+Tags are those of TIFF 6.0 (Adobe, 1992), its 64-bit kin BigTIFF, and OGC GeoTIFF 1.1 (OGC 19-008r4, 2019); what stands
+for "nothing known", scale and offset are GDAL's.
 """
 
 from __future__ import annotations
 
 import math
+import re
 import struct
-from dataclasses import dataclass
+from collections.abc import Generator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,77 +20,78 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
-from .projection import System
-from .rasters import check_regular, checked_size
+from ..jobs import Progress
+from .methods import Ellipsoid
+from .pixels import Layout, read_pixels
+from .prj import described, system_in
+from .projection import System, known_systems
+from .rasters import Raster, check_regular, checked_size, system_beside, without_nodata, world_file
 
-#: Tags: names for messages.
 _WIDTH, _HEIGHT, _BITS, _BANDS, _FORMAT = 256, 257, 258, 277, 339
 _STRIPS, _STRIP_BYTES, _TILES, _TILE_BYTES = 273, 279, 324, 325
-_SCALE, _TIEPOINT, _MATRIX, _GEO, _NODATA = 33550, 33922, 34264, 34735, 42113
+_SCALE, _TIEPOINT, _MATRIX, _GEO, _NODATA, _METADATA = 33550, 33922, 34264, 34735, 42113, 42112
+_KIND, _COMPRESSION, _COLOURS, _FILL, _ROWS, _PLANES, _PREDICTOR = 254, 259, 262, 266, 278, 284, 317
+_ACROSS, _DOWN, _EXTRA, _DOUBLES, _TEXTS = 322, 323, 338, 34736, 34737
+#: Tags: names for messages.
 _NAMES = {
+    _KIND: "NewSubfileType",
     _WIDTH: "ImageWidth",
     _HEIGHT: "ImageLength",
     _BITS: "BitsPerSample",
-    _BANDS: "SamplesPerPixel",
-    _FORMAT: "SampleFormat",
+    _COMPRESSION: "Compression",
+    _COLOURS: "PhotometricInterpretation",
+    _FILL: "FillOrder",
     _STRIPS: "StripOffsets",
+    _BANDS: "SamplesPerPixel",
+    _ROWS: "RowsPerStrip",
     _STRIP_BYTES: "StripByteCounts",
+    _PLANES: "PlanarConfiguration",
+    _PREDICTOR: "Predictor",
+    _ACROSS: "TileWidth",
+    _DOWN: "TileLength",
     _TILES: "TileOffsets",
     _TILE_BYTES: "TileByteCounts",
+    _EXTRA: "ExtraSamples",
+    _FORMAT: "SampleFormat",
     _SCALE: "ModelPixelScale",
     _TIEPOINT: "ModelTiepoint",
     _MATRIX: "ModelTransformation",
     _GEO: "GeoKeyDirectory",
+    _DOUBLES: "GeoDoubleParams",
+    _TEXTS: "GeoAsciiParams",
+    _METADATA: "GDAL_METADATA",
     _NODATA: "GDAL_NODATA",
 }
 #: Types of values: letter for `struct`; others, such as fractions, occur in none of these tags.
 _TYPES = {1: "B", 2: "s", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 11: "f", 12: "d", 16: "Q", 17: "q"}
 _MOST_TAGS, _MOST_BYTES = 4096, 64_000_000
-#: Keys of the directory of geographic keys: kind of model, whether values belong to points, codes, unit of length.
-_MODEL, _RASTER, _GEOGRAPHIC, _PROJECTED, _UNIT = 1024, 1025, 2048, 3072, 3076
+#: Keys of the directory of geographic keys: kind of model, whether values belong to points, codes, units.
+_MODEL, _RASTER, _GEOGRAPHIC, _PROJECTED, _UNIT, _UNIT_SIZE, _VERTICAL = 1024, 1025, 2048, 3072, 3076, 3077, 4099
+_CITATIONS, _ZONE, _METHOD, _AXIS, _FLATTENING, _SHIFT = (3073, 1026, 2049), 3074, 3075, 2057, 2059, 2062
 _UNITS = {9001: 1.0, 9002: 0.3048, 9003: 1200.0 / 3937.0}
 _OWN = 32767  # "user-defined"
-#: What Blender makes 1 of: largest values of whole numbers by bits and sign.
-_LARGEST = {
-    (8, 1): 255.0,
-    (16, 1): 65535.0,
-    (32, 1): 4294967295.0,
-    (16, 2): 32767.0,
-    (32, 2): 2147483647.0,
-    (32, 3): 1.0,
-    (64, 3): 1.0,
-}
+#: Methods by their numbers, and what their keys hold.
+_METHODS = {
+    1: "transverse mercator", 3: "hotine oblique mercator", 7: "mercator", 8: "lambert conformal conic",
+    9: "lambert conformal conic", 10: "lambert azimuthal equal area", 11: "albers", 15: "polar stereographic",
+    16: "oblique stereographic",
+}  # fmt: skip
+_FIGURES = {
+    3078: "first", 3079: "second", 3080: "longitude", 3081: "latitude", 3082: "east", 3083: "north", 3084: "longitude",
+    3085: "latitude", 3086: "east", 3087: "north", 3088: "longitude", 3089: "latitude", 3090: "east", 3091: "north",
+    3092: "scale", 3093: "scale", 3094: "azimuth", 3095: "longitude", 3096: "skew",
+}  # fmt: skip
+_UTM_ZONES = 16000  # and 16100 in the south
+#: Types of values: letter for `numpy.dtype` by format.
+_LETTERS = {1: "u", 2: "i", 3: "f"}
+_SIZES = {1: (8, 16, 32, 64), 2: (8, 16, 32, 64), 3: (16, 32, 64)}
+_MOST_IMAGES = 64
+_PALETTE = 3
+_LARGEST_PIECE, _MOST_PIECE = 65_536, 50_000_000  # pixels of a side, and of a strip or tile
 
 
-@dataclass(frozen=True)
-class Head:
-    """What a GeoTIFF says about its pixels.
-
-    Attributes
-    ----------
-    width, height : int
-    factor : float
-        By what Blender divides values.
-    nothing : float or None
-        Value of pixels of which nothing is known.
-    corner, along, down : (2,) float64, or None for all
-        As of `rasters.Raster`, in metres or degrees.
-    system : System
-        Only its code: 0 where the file has none or one of its own.
-    """
-
-    width: int
-    height: int
-    factor: float
-    nothing: float | None
-    corner: NDArray[np.float64] | None
-    along: NDArray[np.float64] | None
-    down: NDArray[np.float64] | None
-    system: System
-
-
-def read_head(path: Path) -> Head:
-    """Read and check the tags of a file.
+def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
+    """Read a GeoTIFF, or a TIFF with a world file; yields progress.
 
     Raises
     ------
@@ -98,10 +101,63 @@ def read_head(path: Path) -> Head:
         It is broken, or of a kind that cannot be used; names the tag.
     """
     check_regular(path)
-    size = path.stat().st_size
     with path.open("rb") as file:
-        tags = _Tags(file, size, path.name)
-        return tags.head()
+        tags = _Tags(file, path.stat().st_size, path.name)
+        tags.check_kind()
+        place, (system, unit), notes = tags.place(), tags.system(), []
+        if place is None:
+            beside = world_file(path)
+            if beside is None:
+                raise SceneError(
+                    f"{path.name}: tag ModelPixelScale (33550) is missing, and there is no world file (.tfw)"
+                )
+            *place, other, unit = beside
+            system = system if system.code else other
+        elif not system.code and unit == 1.0:
+            system, unit = system_beside(path)
+        if not system.code:
+            place = [unit * v for v in place]
+        values, absent = yield from tags.pixels()
+        mask = yield from tags.mask(values.shape)
+        if mask is not None:
+            absent |= ~mask
+        if (nothing := tags.nothing()) is not None:
+            absent |= values == nothing
+        values = without_nodata(values.astype(np.float32), nothing if values.dtype.kind == "f" else None)
+        values[absent] = np.nan
+        scale, offset = tags.scale()
+        height = _UNITS.get(tags.keys().get(_VERTICAL, 9001), 1.0)
+        if (scale, offset, height) != (1.0, 0.0, 1.0):
+            values = without_nodata((values * scale + offset) * np.float32(height), None)
+            notes += ["scale and offset of the file used"] * ((scale, offset) != (1.0, 0.0))
+            notes += ["heights in feet read as such"] * (height != 1.0)
+        if tags.one(_COLOURS, 1) == _PALETTE:
+            notes.append("its values are numbers of colors in a palette; check that they are heights")
+        return Raster(values, *place, system, tuple(notes))
+
+
+def place_of_image(path: Path) -> Raster:
+    """Where the pixels of an image lie, as a raster of one value: a TIFF by its tags, others by world files.
+
+    Raises
+    ------
+    OSError, SceneError
+        As `read_tiff`.
+    """
+    check_regular(path)
+    place = None
+    if path.suffix.lower() in (".tif", ".tiff"):
+        with path.open("rb") as file:
+            tags = _Tags(file, path.stat().st_size, path.name)
+            place, (system, unit) = tags.place(), tags.system()
+    beside = world_file(path) if place is None else None
+    if beside is not None:
+        *place, system, unit = beside
+    if place is None:
+        raise SceneError(f"{path.name}: it has no place: neither tags of GeoTIFF nor a world file beside it")
+    if not system.code:
+        place = [unit * v for v in place]
+    return Raster(np.zeros((1, 1), np.float32), *place, system)
 
 
 class _Tags:
@@ -118,6 +174,7 @@ class _Tags:
         if self.big and len(start) < 16:
             raise SceneError(f"{name}: head: the file ends within it")
         offset = self._unpack("Q", start[8:16]) if self.big else self._unpack("I", start[4:8])
+        self.next = 0
         self.found = self._directory(offset)
 
     def _bytes(self, offset: int, number: int, what: str) -> bytes:
@@ -136,6 +193,11 @@ class _Tags:
         if not 0 < number <= _MOST_TAGS:
             raise SceneError(f"{self.name}: directory: {number:,} tags; it is damaged")
         data = self._bytes(offset + wide, number * entry, "directory")
+        after = offset + wide + number * entry
+        last = after + (8 if self.big else 4) > self.size
+        self.next = (
+            0 if last else self._unpack("Q" if self.big else "I", self._bytes(after, 8 if self.big else 4, "directory"))
+        )
         found = {}
         for at in range(0, number * entry, entry):
             tag, kind = struct.unpack(self.order + "HH", data[at : at + 4])
@@ -172,33 +234,123 @@ class _Tags:
         """The error of a tag."""
         return SceneError(f"{self.name}: tag {_NAMES[tag]} ({tag}) {text}")
 
-    def head(self) -> Head:
-        """All that is asked of a file."""
-        width, height = (self._one(tag) for tag in (_WIDTH, _HEIGHT))
-        checked_size(width, height, f"{self.name}: ")
-        bands = self._one(_BANDS, 1)
-        if bands != 1:
+    def check_kind(self) -> None:
+        """Refuse what has no values that can be heights."""
+        bands = self.one(_BANDS, 1)
+        extra = self.numbers(_EXTRA, 1) or ()
+        if bands != 1 and not (bands == 2 and extra and extra[0] in (1, 2)):
             raise self.broken(_BANDS, f"is {bands}; write one band only, for example with gdal_translate -b 1")
-        bits, form = self._one(_BITS, 1), self._one(_FORMAT, 1)
-        if (bits, form) not in _LARGEST:
+        self._layout()
+
+    def _layout(self) -> Layout:
+        """How the pixels lie in the file."""
+        width, height = self.one(_WIDTH), self.one(_HEIGHT)
+        checked_size(width, height, f"{self.name}: ")
+        bits, form = self.one(_BITS, 1), self.one(_FORMAT, 1)
+        form = 1 if form == 4 else form
+        if bits not in _SIZES.get(form, ()) and not (bits == 1 and self.one(_KIND, 0) & 4):
             raise self.broken(
                 _BITS,
                 f"is {bits}, of format {form}; write 32-bit floats, for example with gdal_translate -ot Float32",
             )
-        self._check_pixels()
-        place = self._place()
-        geo = self._keys()
-        unit = _UNITS.get(geo.get(_UNIT, 9001), 1.0)
-        code = geo.get(_GEOGRAPHIC if geo.get(_MODEL) == 2 else _PROJECTED, 0)
-        code = 0 if code == _OWN else code
-        if place is not None:
-            corner, along, down = place
-            if geo.get(_RASTER, 1) != 2:  # values belong to areas, whose corner is told
-                corner = corner + (along + down) / 2.0
-            place = (corner, along, down) if code else tuple(unit * v for v in (corner, along, down))
-        return Head(width, height, _LARGEST[bits, form], self._nothing(), *(place or (None, None, None)), System(code))
+        tiled = _TILES in self.found
+        across = self.one(_ACROSS) if tiled else width
+        down = self.one(_DOWN) if tiled else min(self.one(_ROWS, height), height)
+        if not (0 < across <= _LARGEST_PIECE and 0 < down <= _LARGEST_PIECE and across * down <= _MOST_PIECE):
+            raise self.broken(_ACROSS if tiled else _ROWS, f"gives pieces of {across:,} by {down:,} pixels")
+        samples = 1 if self.one(_PLANES, 1) == 2 else self.one(_BANDS, 1)
+        dtype = np.dtype(f"{self.order}{_LETTERS[form]}{max(bits // 8, 1)}")
+        return Layout(
+            width, height, across, down, tiled, bits, samples, dtype,
+            self.one(_COMPRESSION, 1), self.one(_PREDICTOR, 1), self.one(_FILL, 1) == 2,
+        )  # fmt: skip
 
-    def _one(self, tag: int, default: int | None = None) -> int:
+    def pixels(self) -> Generator[Progress, object, tuple[NDArray[Any], NDArray[np.bool_]]]:
+        """As `read_pixels`."""
+        where, size = (_TILES, _TILE_BYTES) if _TILES in self.found else (_STRIPS, _STRIP_BYTES)
+        offsets, sizes = self.numbers(where, 1), self.numbers(size, 1)
+        if offsets is None or sizes is None:
+            raise SceneError(f"{self.name}: tag {_NAMES[where]} ({where}) is missing")
+        if len(offsets) != len(sizes) or any(
+            a < 0 or b < 0 or a + b > self.size for a, b in zip(offsets, sizes, strict=True)
+        ):
+            raise self.broken(where, "leads beyond the end of the file; it is damaged or was not copied whole")
+        return (yield from read_pixels(self.file, self._layout(), offsets, sizes, self.name))
+
+    def mask(self, shape: tuple[int, int]) -> Generator[Progress, object, NDArray[np.bool_] | None]:
+        """Which pixels count, (h, w), by a mask that is another image of the file; None without one."""
+        own, seen = self.found, set()
+        try:
+            while self.next and self.next not in seen and len(seen) < _MOST_IMAGES:
+                seen.add(self.next)
+                self.found = self._directory(self.next)
+                if self.one(_KIND, 0) & 4 and (self.one(_HEIGHT), self.one(_WIDTH)) == shape:
+                    values, absent = yield from self.pixels()
+                    return (values != 0) & ~absent
+        finally:
+            self.found = own
+        return None
+
+    def scale(self) -> tuple[np.float32, np.float32]:
+        """Factor and summand of values, as GDAL's metadata have them."""
+        text = self.values(_METADATA)
+        text = text.decode("utf-8", "replace") if isinstance(text, bytes) else ""
+        out = []
+        for role, usual in (("scale", 1.0), ("offset", 0.0)):
+            found = re.search(rf'<Item[^>]*\brole="{role}"[^>]*>([^<]*)<', text)
+            try:
+                value = float(found[1]) if found else usual
+            except ValueError:
+                value = math.nan
+            if not abs(value) < 1e6:
+                raise self.broken(_METADATA, f"has a {role} of {shown(found[1])}")
+            out.append(np.float32(value))
+        return out[0], out[1]
+
+    def system(self) -> tuple[System, float]:
+        """The system, and metres of its unit where it is none that lies on Earth."""
+        geo = self.keys()
+        for key in _CITATIONS:
+            text = str(geo.get(key, ""))
+            if (
+                re.search(r"(PROJCS|GEOGCS)\s*\[", text)
+                and (found := system_in(text[re.search("PROJCS|GEOGCS", text).start() :]))[0].code
+            ):
+                return found
+        flat = geo.get(_GEOGRAPHIC, 0)
+        code = geo.get(_PROJECTED, 0) if geo.get(_MODEL) != 2 else flat
+        unit = float(geo.get(_UNIT_SIZE, 0.0) or _UNITS.get(geo.get(_UNIT, 9001), 1.0))
+        if code not in (0, _OWN):
+            return System(int(code)), 1.0
+        known = known_systems()
+        datum = known.get(flat, known[4326])
+        if flat not in known and 6.2e6 < geo.get(_AXIS, 0.0) < 6.5e6 and geo.get(_FLATTENING, 0.0) > 100.0:
+            shift = geo.get(_SHIFT, ())
+            shift = (
+                (*shift, *[0.0] * (7 - len(shift))) if isinstance(shift, tuple) and len(shift) in (3, 7) else (0.0,) * 7
+            )
+            datum = replace(datum, ellipsoid=Ellipsoid(geo[_AXIS], geo[_FLATTENING]), shift=shift)
+        if geo.get(_MODEL) == 2:
+            return System(-2, own=datum), 1.0
+        south, zone = divmod(int(geo.get(_ZONE, 0)) - _UTM_ZONES, 100)
+        if south in (0, 1) and 1 <= zone <= 60:
+            given = {
+                "latitude": 0.0,
+                "longitude": 6.0 * zone - 183.0,
+                "scale": 0.9996,
+                "east": 5e5,
+                "north": 1e7 * south,
+            }
+            return described("transverse mercator", given, datum)
+        given = {name: float(geo[key]) for key, name in _FIGURES.items() if isinstance(geo.get(key), int | float)}
+        given |= {name: unit * given[name] for name in ("east", "north") if name in given}
+        try:
+            return described(_METHODS.get(geo.get(_METHOD, 0), ""), given, replace(datum, unit=unit))
+        except (ValueError, ZeroDivisionError, OverflowError):
+            return System(), unit
+
+    def one(self, tag: int, default: int | None = None) -> int:
+        """The first value of a tag."""
         values = self.numbers(tag, 1)
         if values is None:
             if default is None:
@@ -208,18 +360,8 @@ class _Tags:
             raise self.broken(tag, f"is {shown(values[0])}")
         return int(values[0])
 
-    def _check_pixels(self) -> None:
-        """All pieces of the image must lie within the file."""
-        where, size = (_TILES, _TILE_BYTES) if _TILES in self.found else (_STRIPS, _STRIP_BYTES)
-        offsets, sizes = self.numbers(where, 1), self.numbers(size, 1)
-        if offsets is None or sizes is None:
-            raise SceneError(f"{self.name}: tag {_NAMES[where]} ({where}) is missing")
-        if len(offsets) != len(sizes) or any(
-            a < 0 or b < 0 or a + b > self.size for a, b in zip(offsets, sizes, strict=True)
-        ):
-            raise self.broken(where, "leads beyond the end of the file; it is damaged or was not copied whole")
-
-    def _place(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
+    def place(self) -> list[NDArray[np.float64]] | None:
+        """Middle of the first pixel, and steps along and down, in the units of the file."""
         matrix = self.numbers(_MATRIX, 16)
         if matrix is not None:
             m = np.array(matrix[:16], np.float64).reshape(4, 4)
@@ -230,23 +372,35 @@ class _Tags:
                 return None
             along, down = np.array([scale[0], 0.0]), np.array([0.0, -scale[1]])
             place = np.array(tie[3:5]) - tie[0] * along - tie[1] * down, along, down
+        place = [*place]
+        if self.keys().get(_RASTER, 1) != 2:  # values belong to areas, whose corner is told
+            place[0] = place[0] + (place[1] + place[2]) / 2.0
         if not np.abs(np.concatenate(place)).max() < 1e10 or not abs(np.linalg.det(np.stack(place[1:]))) > 0.0:
             raise self.broken(tag, "gives cells without a size or a place")
         return place
 
-    def _keys(self) -> dict[int, int]:
-        """Geographic keys whose values are in the directory itself."""
+    def keys(self) -> dict[int, Any]:
+        """Geographic keys: whole numbers, numbers, tuples of numbers, and texts."""
         values = self.numbers(_GEO, 4)
         if values is None:
             return {}
         if len(values) < 4 + 4 * int(values[3]):
             raise self.broken(_GEO, f"tells of {values[3]} keys and is too short for them")
-        keys = np.array(values[4 : 4 + 4 * int(values[3])], np.int64).reshape(-1, 4)
-        return {int(key): int(value) for key, place, _, value in keys if place == 0}
+        doubles, texts = self.numbers(_DOUBLES, 1) or (), self.values(_TEXTS)
+        out: dict[int, Any] = {}
+        for key, place, number, at in np.array(values[4 : 4 + 4 * int(values[3])], np.int64).reshape(-1, 4).tolist():
+            if place == 0:
+                out[key] = at
+            elif place == _DOUBLES and 0 <= at < len(doubles):
+                out[key] = doubles[at] if number == 1 else doubles[at : at + number]
+            elif place == _TEXTS and isinstance(texts, bytes):
+                out[key] = texts[at : at + number].decode("latin-1")
+        return out
 
-    def _nothing(self) -> float | None:
+    def nothing(self) -> float | None:
+        """Value of pixels of which nothing is known."""
         text = self.values(_NODATA)
-        if text is None:
+        if text is None or (isinstance(text, bytes) and not text.strip(b"\0 ")):
             return None
         try:
             return float(text.split(b"\0")[0])

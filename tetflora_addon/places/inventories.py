@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
 from .cells import NOTHING, NUMBER, RANGE, WORD, cells, place_in
-from .projection import LONGITUDE_LATITUDE, MOST_AWAY, System, between, chosen_system, place_about
+from .layers import ENDINGS
+from .projection import LONGITUDE_LATITUDE, MOST_AWAY, PLAIN, System, between, chosen_system, place_about
 from .species_names import KIND, is_name, key_of, species_named
 from .tables import Table, read_csv, read_points
 from .titles import FIELDS, NAMES, NEVER, Title, meaning, read_title, said_of
@@ -117,7 +118,7 @@ def read_inventory(
     SceneError
         It is broken; names line or feature, and column.
     """
-    table_ = _table(path, skip)
+    table_ = _table(path, skip, code=code)
     return _Reading(table_, units, skip, _chosen(table_, columns or {})).inventory(code)
 
 
@@ -131,7 +132,7 @@ def preview(path: Path) -> list[Column]:
     SceneError
         It is broken.
     """
-    table_ = _table(path, True, _PREVIEWED)
+    table_ = _table(path, True, _PREVIEWED, PLAIN)
     taken = taken_for(table_, {})
     return [
         Column(title, taken[title].field, tuple(list(dict.fromkeys(filter(None, texts.tolist())))[:_SHOWN]))
@@ -139,9 +140,9 @@ def preview(path: Path) -> list[Column]:
     ]
 
 
-def _table(path: Path, skip: bool, most: int | None = None) -> Table:
-    read = read_points if path.suffix.lower() in (".geojson", ".json") else read_csv
-    found = read(path, skip, most)
+def _table(path: Path, skip: bool, most: int | None = None, code: int = 0) -> Table:
+    layer = path.suffix.lower() in ENDINGS
+    found = read_points(path, skip, most, code) if layer else read_csv(path, skip, most)
     if not len(found.numbers):
         raise SceneError(found.first or f"{found.name}: it has no {'points' if found.points is not None else 'rows'}")
     return found

@@ -1,9 +1,12 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Outlines of woods, meadows, water, roads and buildings, told apart by the keys that OpenStreetMap has for them."""
+"""Outlines of woods, meadows, water, roads and buildings, told apart by the keys that OpenStreetMap has for them, by
+words of what others call kinds of things, or by the name of their layer.
+"""
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NAME, SceneError, readable, shown
-from .projection import System, system_of
-from .tables import MAX_POINTS, coordinates, read_features
+from .layers import LAYER, read_features
+from .projection import System, chosen_system
+from .tables import MAX_POINTS, coordinates, flat_tags
 
 WOOD, MEADOW, WATER, ROAD, BUILDING, OTHER = "Woods", "Meadows", "Water", "Roads", "Buildings", "Others"
 KINDS = (WOOD, MEADOW, WATER, ROAD, BUILDING, OTHER)
@@ -50,6 +54,16 @@ _WIDTHS = {
 }
 _ROAD_WIDTH, _LANE, _STOREY, _BUILDING_HEIGHT = 5.0, 3.25, 3.0, 7.0
 _MOST_WIDTH, _MOST_HEIGHT = 200.0, 1000.0
+_PATTERNS = {
+    # Brackets stand for the beginning and the end of a word.
+    key: re.compile(text.replace("<", "(?<![a-z])").replace(">", "(?![a-z])"))
+    for key, text in json.loads(Path(__file__).with_name("kinds.json").read_text(encoding="utf-8")).items()
+}
+#: Kinds by words of values, of layers and of files.
+_WORDS = {kind: _PATTERNS[kind] for kind in (BUILDING, WATER, WOOD, ROAD, MEADOW)}
+#: Values that are roads where they are lines.
+_ROADS = set(_WIDTHS) - {"river", "canal", "stream", "ditch", "drain"}
+_FEET = re.compile(r"(ft|feet)$")
 
 
 @dataclass(frozen=True)
@@ -77,13 +91,15 @@ class MapFeature:
     height: float = 0.0
 
 
-def read_outlines(path: Path, code: int = 0) -> tuple[list[MapFeature], System]:
-    """Read areas and lines of a GeoJSON file; points are left out.
+def read_outlines(path: Path, code: int = 0, kind: str = "") -> tuple[list[MapFeature], System, list[str]]:
+    """Read areas and lines of a file, and what is to be told of it; points are left out.
 
     Parameters
     ----------
     code : int
-        EPSG code of the coordinates; 0 where the file tells.
+        As of `chosen_system`.
+    kind : str
+        What all are taken for; empty to tell them by their keys.
 
     Raises
     ------
@@ -92,25 +108,37 @@ def read_outlines(path: Path, code: int = 0) -> tuple[list[MapFeature], System]:
     SceneError
         It is broken, or has no outlines; names the feature.
     """
-    features, own = read_features(path)
-    system = system_of(code or own, f"{path.name}: ")
+    features, own = read_features(path, code)
+    system = chosen_system(own, System(), f"{path.name}: ")
     found: list[MapFeature] = []
-    points = 0
+    points = slivers = 0
     for number, feature in enumerate(features, 1):
         where = f"{path.name}: feature {number:,}"
+        tags = _lower(flat_tags(feature.get("properties") or {}))
+        names = (str(feature.get(LAYER, "")), path.stem)
         for rings, closed in _rings(feature["geometry"], where):
             points += sum(map(len, rings))
             if system.geographic and any((np.abs(ring) > (360.0, 90.0)).any() for ring in rings):
                 raise SceneError(f"{where}: its coordinates are no longitude and latitude; set Coordinate System")
-            found.append(_outline(feature.get("properties") or {}, rings, closed))
+            if not len(rings) or len(rings[0]) < (3 if closed else 2):
+                slivers += 1
+                continue
+            rings = tuple(ring for ring in rings if len(ring) > 2 or not closed)
+            found.append(_outline(tags, names, rings, closed, kind))
         if len(found) > MAX_OUTLINES or points > MAX_POINTS:
             raise SceneError(
                 f"{path.name}: more than {MAX_OUTLINES:,} outlines, or {MAX_POINTS:,} points; cut it, for example with "
                 "ogr2ogr -spat"
             )
     if not found:
-        raise SceneError(f"{path.name}: it has no areas and no lines")
-    return found, system
+        raise SceneError(
+            f"{path.name}: it has no areas and no lines" + f" but {slivers:,} of too few points" * (slivers > 0)
+        )
+    notes = [f"{slivers:,} of too few points left out"] if slivers else []
+    others = sum(feature.kind == OTHER for feature in found)
+    if 2 * others > len(found):
+        notes.append(f"nothing tells what {others:,} of them are; import them again with Take All As")
+    return found, system, notes
 
 
 def _rings(geometry: dict[str, Any] | None, where: str) -> list[tuple[tuple[NDArray[np.float64], ...], bool]]:
@@ -129,8 +157,6 @@ def _rings(geometry: dict[str, Any] | None, where: str) -> list[tuple[tuple[NDAr
     many = {"LineString": lambda: [given], "MultiLineString": lambda: given}.get(kind)
     if many is not None:
         lines = [coordinates(line, where) for line in _list(many(), where)]
-        if any(len(line) < 2 for line in lines):
-            raise SceneError(f"{where}: a line of less than two points")
         return [((line,), False) for line in lines]
     if kind not in ("Polygon", "MultiPolygon"):
         raise SceneError(f"{where}: {shown(kind)} is no geometry of GeoJSON")
@@ -148,36 +174,69 @@ def _ring(values: Any, where: str) -> NDArray[np.float64]:
     ring = coordinates(values, where)
     if len(ring) > 1 and (ring[0] == ring[-1]).all():
         ring = ring[:-1]
-    if len(ring) < 3:
-        raise SceneError(f"{where}: an area of less than three points")
     return ring
 
 
-def _outline(properties: dict[str, Any], rings: tuple[NDArray[np.float64], ...], closed: bool) -> MapFeature:
-    kind, value = _kind(properties)
+def _lower(tags: dict[str, Any]) -> dict[str, Any]:
+    """Tags by their keys in small letters, as far as they have a value."""
+    return {str(key).strip().lower(): value for key, value in tags.items() if value not in (None, "")}
+
+
+def _outline(
+    tags: dict[str, Any], names: tuple[str, ...], rings: tuple[NDArray[np.float64], ...], closed: bool, chosen: str
+) -> MapFeature:
+    kind, value = _kind(tags, names, closed)
+    kind = chosen or kind
     width = height = 0.0
     if not closed:
-        lanes = _measure(properties.get("lanes"))
+        lanes = _measure(tags.get("lanes"))
         usual = _WIDTHS.get(value, _LANE * lanes if lanes else _ROAD_WIDTH if kind == ROAD else 0.0)
-        width = min(_measure(properties.get("width")) or usual, _MOST_WIDTH)
+        width = min(_measured(tags, "width", _PATTERNS["widths"]) or usual, _MOST_WIDTH)
     elif kind == BUILDING:
-        storeys = _STOREY * _measure(properties.get("building:levels"))
-        height = min(_measure(properties.get("height")) or storeys or _BUILDING_HEIGHT, _MOST_HEIGHT)
-    name = properties.get("name")
+        storeys = _STOREY * _measured(tags, "building:levels", _PATTERNS["storeys"])
+        height = min(_measured(tags, "height", _PATTERNS["heights"]) or storeys or _BUILDING_HEIGHT, _MOST_HEIGHT)
+    name = tags.get("name")
     name = name if isinstance(name, str) and name.strip() else value or kind
     return MapFeature(kind, readable(name.strip(), NAME), rings, closed, width, height)
 
 
-def _kind(properties: dict[str, Any]) -> tuple[str, str]:
+def _kind(tags: dict[str, Any], names: tuple[str, ...], closed: bool) -> tuple[str, str]:
     """Kind of a feature, and the value that tells it."""
     for key, kind in _KEYS.items():
-        value = properties.get(key)
-        if isinstance(value, str) and value not in ("", "no"):
+        value = tags.get(key)
+        if isinstance(value, str) and value.lower() not in ("no", "0", "false"):
             return kind, value
     for (key, value), kind in _VALUES.items():
-        if properties.get(key) == value:
+        if tags.get(key) == value:
             return kind, value
+    for key, value in tags.items():
+        if isinstance(value, str) and _PATTERNS["classes"].fullmatch(re.sub(r"[^a-zäöüß]", "", key)):
+            text = re.sub(r"[_\W]+", " ", value.lower()).strip()
+            if not closed and text.removesuffix(" link") in _ROADS:
+                return ROAD, text.removesuffix(" link")
+            kind = next((kind for kind, words in _WORDS.items() if words.search(text)), "")
+            if kind:
+                return kind, value if len(value) < NAME else ""
+    keys = " ".join(re.sub(r"[_\W]+", " ", key) for key in tags)
+    if closed and _WORDS[BUILDING].search(keys):
+        return BUILDING, ""
+    for name in names:
+        text = re.sub(r"[_\W\d]+", " ", name.lower()).strip()
+        kind = next((kind for kind, words in _WORDS.items() if words.search(text)), "")
+        if kind and (closed or kind in (ROAD, WATER)):
+            return kind, ""
     return OTHER, ""
+
+
+def _measured(tags: dict[str, Any], usual: str, keys: re.Pattern) -> float:
+    """The first measure under the usual key, or under any whose letters fit."""
+    if found := _measure(tags.get(usual)):
+        return found
+    for key, value in tags.items():
+        plain = re.sub(r"[^a-zäöüß]", "", key)
+        if keys.fullmatch(plain) and (found := _measure(value)):
+            return found * (0.3048 if _FEET.search(plain) else 1.0)
+    return 0.0
 
 
 def _measure(value: Any) -> float:

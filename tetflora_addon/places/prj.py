@@ -149,6 +149,9 @@ def _well_known(node: _Node) -> tuple[System, float]:
             scale = 1.0 if key == "scale" else angle if own is None else degrees(own)
             given[key] = rest[0] * (1.0 if isclose(scale, 1.0, rel_tol=1e-6) else scale)
     name = "web" if "pseudo" in _plain(node[1][0]) else method[1][0] if method else ""
+    zone = re.search(r"utmzone(\d{1,2})([ns])", _plain(node[1][0]))
+    if zone and not given:  # a name that says all
+        name, given = "transverse", _zone(int(zone[1]), zone[2] == "s")
     return described(name, given, replace(datum, unit=metres))
 
 
@@ -169,7 +172,7 @@ def _datum(base: _Node) -> Definition:
     meridian = _child(base, "PRIMEM")
     east = float(meridian[1][1]) if meridian else 0.0
     if node is None:
-        return Definition("geo", meridian=east)
+        return datum_named(_plain(base[1][0]).removeprefix("gcs")) or Definition("geo", meridian=east)
     shape, shift = _child(node, "SPHEROID", "ELLIPSOID"), _child(node, "TOWGS84")
     ellipsoid = Ellipsoid(shape[1][1], shape[1][2] or 1e9) if shape else WGS84
     if not (6.2e6 < ellipsoid.a < 6.5e6 and ellipsoid.inverse > 100.0):
@@ -247,6 +250,11 @@ def _figures(own: Definition) -> tuple:
     return own.method, *shape, round(own.meridian, 6), round(own.unit, 7), numbers
 
 
+def _zone(zone: int, south: bool) -> dict[str, float]:
+    """Parameters of a zone of UTM."""
+    return {"latitude": 0.0, "longitude": 6.0 * zone - 183.0, "scale": 0.9996, "east": 5e5, "north": 1e7 * south}
+
+
 def _old(text: str) -> tuple[System, float]:
     """Words of ArcInfo: a name and a value on each line, and parameters with comments below."""
     head, _, tail = text.partition("Parameters")
@@ -260,8 +268,7 @@ def _old(text: str) -> tuple[System, float]:
     if name == "UTM":
         zone = int(float(words["zone"]))
         south = zone < 0 or float(words.get("yshift", "0")) < 0
-        given = {"latitude": 0.0, "longitude": 6.0 * abs(zone) - 183.0, "scale": 0.9996, "east": 500_000.0}
-        return described("transverse", given | {"north": 1e7 * south}, datum)
+        return described("transverse", _zone(abs(zone), south), datum)
     keys = (
         ("scale", "longitude", "latitude") if name.startswith("TRANS") else ("first", "second", "longitude", "latitude")
     )

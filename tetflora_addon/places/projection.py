@@ -74,7 +74,7 @@ class System:
         """For messages."""
         if self.code > 0:
             return f"EPSG:{self.code}"
-        return {0: "an unknown system", -2: "the system that the file defines"}.get(
+        return {0: "plain meters", -2: "the system that the file defines"}.get(
             self.code, f"the plane about {self.latitude:.5f}, {self.longitude:.5f}"
         )
 

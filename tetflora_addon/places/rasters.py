@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ..errors import SceneError, shown
 from ..files import is_regular, read_whole
 from ..jobs import Progress
-from .projection import System, code_in
+from .prj import system_in
+from .projection import LONGITUDE_LATITUDE, System, may_be_degrees
 
 #: Most cells of a raster, and bytes of a text file of them.
 MAX_CELLS, MAX_TEXT = 40_000_000, 1_000_000_000
@@ -31,6 +32,9 @@ _LIMIT = 1e7  # metres: what is higher, or has larger coordinates than a thousan
 _SMALL = 4096  # bytes of world files and files with the name of a coordinate system
 WORLD_FILES = {
     ".png": (".pgw", ".pngw", ".wld"),
+    ".jpg": (".jgw", ".jpgw", ".wld"),
+    ".jpeg": (".jgw", ".jpegw", ".wld"),
+    ".jp2": (".j2w", ".jp2w", ".wld"),
     ".tif": (".tfw", ".tifw", ".wld"),
     ".tiff": (".tfw", ".tiffw", ".wld"),
 }
@@ -49,6 +53,8 @@ class Raster:
     along, down : (2,) float64
         Steps from a cell to the next of its row, and to the next row.
     system : System
+    notes : tuple of str
+        What was taken from the file beside its values.
     """
 
     values: NDArray[np.float32]
@@ -56,6 +62,7 @@ class Raster:
     along: NDArray[np.float64]
     down: NDArray[np.float64]
     system: System
+    notes: tuple[str, ...] = ()
 
     def places(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> NDArray[np.float64]:
         """Coordinates (n, 2) of places given in cells; 0, 0 is the middle of the first cell."""
@@ -122,6 +129,30 @@ def check_regular(path: Path) -> None:
         raise SceneError(f"{path.name}: it is not a regular file")
 
 
+def in_degrees(raster: Raster, what: str) -> Raster:
+    """A raster of which no file tells the system; its cells may be so small that they are degrees.
+
+    Raises
+    ------
+    SceneError
+        Nobody can tell; ``what`` begins the message.
+    """
+    if raster.system.code or not may_be_degrees(raster.outline.min(axis=0), raster.outline.max(axis=0)):
+        return raster
+    cell = max(np.abs(raster.along).max(), np.abs(raster.down).max())
+    if cell < _DEGREES:
+        return replace(raster, system=System(LONGITUDE_LATITUDE), notes=(*raster.notes, "coordinates read as degrees"))
+    if cell < _UNCLEAR:
+        raise SceneError(
+            f"{what}its cells are {cell:g} wide, which may be degrees or meters; set Coordinate System to 4326, or "
+            "turn on Plain Meters"
+        )
+    return raster
+
+
+_DEGREES, _UNCLEAR = 0.003, 0.1  # cells: no ground is as fine in meters, or as coarse in degrees
+
+
 def checked_size(width: int, height: int, what: str) -> None:
     """Refuse rasters that are too large, or have no cells.
 
@@ -174,7 +205,7 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
         end = content.find(b"\n", start + _PIECE)
         end = len(content) if end < 0 else end + 1
         piece = content[start:end]
-        found = _numbers(piece, name, line)
+        found = numbers_in(piece, name, line)
         if done + len(found) > len(values):
             raise SceneError(f"{name}: more than the {len(values):,} values that its head tells of")
         values[done : done + len(found)] = np.clip(found, -_BEYOND, _BEYOND)
@@ -183,8 +214,9 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
         raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values")
     nothing = header.get("nodata_value", -9999.0)
     values = without_nodata(values.reshape(height, width), nothing)
-    first = np.array([corner[0], corner[1] + (height - 1) * dy])
-    return Raster(values, first, np.array([dx, 0.0]), np.array([0.0, -dy]), System(_code_beside(path)))
+    system, unit = system_beside(path)
+    first = unit * np.array([corner[0], corner[1] + (height - 1) * dy])
+    return Raster(values, first, np.array([unit * dx, 0.0]), np.array([0.0, -unit * dy]), system)
 
 
 def _ascii_head(header: dict[str, float], name: str) -> tuple[int, int, tuple[float, float], float, float]:
@@ -208,7 +240,7 @@ def _ascii_head(header: dict[str, float], name: str) -> tuple[int, int, tuple[fl
     return int(width), int(height), corner, dx, dy
 
 
-def _numbers(piece: bytes, name: str, line: int) -> NDArray[np.float64]:
+def numbers_in(piece: bytes, name: str, line: int) -> NDArray[np.float64]:
     """All numbers of some lines; a broken one is told by its line."""
     found = _split(piece)
     if found is not None:
@@ -251,26 +283,20 @@ def without_nodata(values: NDArray[np.floating], nothing: float | None) -> NDArr
     return np.where(bad, np.float32(np.nan), values)
 
 
-def _code_beside(path: Path) -> int:
-    """EPSG code in a file ``.prj`` beside another; 0 where there is none."""
-    try:
-        text = read_whole(path.with_suffix(".prj"), 16 * _SMALL).decode("latin-1")
-    except OSError:
-        return 0
-    found = re.search(r'AUTHORITY\["EPSG","(\d+)"\]\]\s*$|ID\["EPSG",(\d+)\]\]\s*$', text)
-    if found:
-        return int(found[1] or found[2])
-    # Esri writes names only.
-    zone = re.search(r"UTM_Zone_(\d{1,2})([NS])", text)
-    if zone and re.search(r"WGS_1984|ETRS_1989", text) and 1 <= int(zone[1]) <= 60:
-        return (32600 if zone[2] == "N" else 32700) + int(zone[1])
-    if text.lstrip().startswith("GEOGCS") and re.search(r"WGS_1984|ETRS_1989", text):
-        return 4326
-    return code_in(text) or 0
+def system_beside(path: Path) -> tuple[System, float]:
+    """The system in a file ``.prj`` beside another, and metres of its unit where it is none that lies on Earth."""
+    for beside in (path.with_suffix(".prj"), path.with_suffix(".PRJ")):
+        with suppress(OSError):
+            return system_in(read_whole(beside, 16 * _SMALL).decode("latin-1"))
+    return System(), 1.0
 
 
-def world_file(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], System] | None:
-    """Middle of the first cell, steps along and down, and system, of an image's world file; None without one.
+def world_file(
+    path: Path,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], System, float] | None:
+    """Middle of the first cell, steps along and down, system and metres of its unit, of an image's world file.
+
+    None without one.
 
     Raises
     ------
@@ -279,7 +305,7 @@ def world_file(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], ND
     SceneError
         It is broken; names the line.
     """
-    for ending in WORLD_FILES[path.suffix.lower()]:
+    for ending in WORLD_FILES.get(path.suffix.lower(), ()):
         beside = next((p for p in (path.with_suffix(ending), path.with_suffix(ending.upper())) if p.exists()), None)
         if beside is None:
             continue
@@ -291,5 +317,5 @@ def world_file(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], ND
         )
         if not abs(a * e - b * d) > 0.0:
             raise SceneError(f"{beside.name}: line 1: its cells have no size")
-        return np.array([x, y]), np.array([a, d]), np.array([b, e]), System(_code_beside(path))
+        return np.array([x, y]), np.array([a, d]), np.array([b, e]), *system_beside(path)
     return None

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NAME, SceneError, readable, shown
-from ..files import json_of, read_whole
+from ..files import read_whole
 from .cells import middle_of
-from .projection import LONGITUDE_LATITUDE, code_in
+from .layers import MAX_BYTES, MAX_ROWS, read_features
 
-MAX_BYTES, MAX_ROWS, MAX_COLUMNS = 200_000_000, 2_000_000, 500
+MAX_COLUMNS = 500
 _DELIMITERS = ",;\t|"
 _MARKS = (b"\xff\xfe", b"\xfe\xff")  # of UTF-16
 #: Most points of all lines of a file of outlines.
@@ -131,58 +131,15 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
     return Table(name, "line", np.array(numbers, np.int64), columns, broken=broken, first=wrong)
 
 
-def read_features(path: Path) -> tuple[list[dict[str, Any]], int]:
-    """Features of a GeoJSON file, of which each is an object with a geometry, and their EPSG code.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the feature.
-    """
-    name = path.name
-    try:
-        data = json_of(read_whole(path, MAX_BYTES))
-    except ValueError as error:
-        raise SceneError(f"{name}: {error}") from None
-    kind = data.get("type") if isinstance(data, dict) else None
-    if kind == "Feature":
-        data = {"features": [data]}
-    elif kind != "FeatureCollection":
-        raise SceneError(f'{name}: "type" is {shown(kind)}; a GeoJSON file is a FeatureCollection')
-    features = data.get("features")
-    if not isinstance(features, list) or len(features) > MAX_ROWS:
-        raise SceneError(f'{name}: "features" must be a list of at most {MAX_ROWS:,}')
-    for number, feature in enumerate(features, 1):
-        geometry = feature.get("geometry", ...) if isinstance(feature, dict) else ...
-        properties = feature.get("properties") if isinstance(feature, dict) else None
-        if not isinstance(geometry, dict | None) or not isinstance(properties, dict | None):
-            raise SceneError(f"{name}: feature {number:,}: it has no geometry, or properties that are no object")
-        if geometry is not None and not isinstance(geometry.get("type"), str):
-            raise SceneError(f"{name}: feature {number:,}: its geometry has no type")
-    return features, _code(data.get("crs"), name)
-
-
-def _code(crs: Any, name: str) -> int:
-    """EPSG code of the member ``crs`` that GeoJSON of before 2016 has, and GDAL still writes."""
-    if crs is None:
-        return LONGITUDE_LATITUDE
-    properties = crs.get("properties") if isinstance(crs, dict) else None
-    text = properties.get("name") if isinstance(properties, dict) else None
-    code = code_in(text) if isinstance(text, str) else None
-    if code is None:
-        raise SceneError(f'{name}: "crs" is {shown(crs)}, which is no EPSG code; write it with -t_srs EPSG:4326')
-    return code
-
-
-def read_points(path: Path, _skip: bool = False, most: int | None = None) -> Table:
+def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen: int = 0) -> Table:
     """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count.
 
     Parameters
     ----------
     most : int, optional
         Features at most, for a preview.
+    chosen : int
+        As of `read_features`.
 
     Raises
     ------
@@ -191,7 +148,7 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None) -> Tab
     SceneError
         It is broken; names the feature.
     """
-    features, code = read_features(path)
+    features, code = read_features(path, chosen)
     name, without = path.name, 0
     points, numbers, rows = [np.zeros((0, 2))], [], []
     for number, feature in enumerate(features[:most], 1):
@@ -199,7 +156,7 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None) -> Tab
         without += not len(found)
         points.append(found)
         numbers += [number] * len(found)
-        rows += [_flat(feature.get("properties") or {})] * len(found)
+        rows += [flat_tags(feature.get("properties") or {})] * len(found)
     titles = dict.fromkeys(title for row in rows for title in row)
     if len(titles) > MAX_COLUMNS:
         raise SceneError(f"{name}: {len(titles):,} kinds of properties; {MAX_COLUMNS} is the limit")
@@ -226,7 +183,7 @@ def _points_of(geometry: dict[str, Any] | None, where: str) -> NDArray[np.float6
     return np.array([middle_of(coordinates(values, where, texts=True))])
 
 
-def _flat(properties: dict[str, Any]) -> dict[str, Any]:
+def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
     """Properties with those that lie within others, as OpenStreetMap's tags do."""
     out = dict(properties)
     for title, value in properties.items():
@@ -234,7 +191,7 @@ def _flat(properties: dict[str, Any]) -> dict[str, Any]:
             value = dict(re.findall(r'"((?:[^"\\]|\\.)*)"=>"((?:[^"\\]|\\.)*)"', value))
         if isinstance(value, dict):
             out.pop(title)
-            out = _flat(value) | out if len(value) < MAX_COLUMNS else out
+            out = flat_tags(value) | out if len(value) < MAX_COLUMNS else out
     return out
 
 

@@ -39,6 +39,8 @@ _LOOKS = {
     BUILDING: ("Map building", (0.55, 0.5, 0.44), 0.8),
     "": ("Map road", (0.14, 0.13, 0.12), 0.9),
 }
+#: On objects that are imported buildings.
+BUILDING_MARK = "tetflora_building"
 #: On materials of maps.
 _MARK = "tetflora_map"
 
@@ -52,10 +54,12 @@ class Drawn:
     collections : list of bpy.types.Collection
     number : Counter
         Outlines of each kind.
+    notes : list of str
     """
 
     collections: list[bpy.types.Collection]
     number: Counter
+    notes: list[str]
 
 
 @importing
@@ -66,6 +70,7 @@ def outline_steps(
     grounds: list[bpy.types.Object],
     code: int,
     new: bool,
+    kind: str = "",
 ) -> Generator[Progress, Any, Drawn]:
     """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
 
@@ -77,6 +82,8 @@ def outline_steps(
         EPSG code of the coordinates; 0 where the file tells.
     new : bool
         Let its middle be the scene's origin, whatever was imported before.
+    kind : str
+        What all are taken for; empty to tell them by their keys.
 
     Raises
     ------
@@ -86,7 +93,7 @@ def outline_steps(
     progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
     yield progress
     try:
-        outlines, system = yield from call_in_thread(progress, read_outlines, path, code)
+        outlines, system, notes = yield from call_in_thread(progress, read_outlines, path, code, kind)
     except OSError as error:
         raise SceneError(f"{what}cannot read the file: {error.strerror or error}") from None
     sizes = [len(ring) for outline in outlines for ring in outline.rings]
@@ -113,7 +120,20 @@ def outline_steps(
     bpy.data.batch_remove([collection for collection in made if not collection.objects])
     scene.collection.children.link(top)
     remember(scene, place)
-    return Drawn(found, Counter(outline.kind for outline in outlines))
+    return Drawn(found, Counter(outline.kind for outline in outlines), [*notes, f"coordinates: {system.name}"])
+
+
+def building_areas(scene: bpy.types.Scene) -> list[NDArray[np.float64]]:
+    """Borders (k, 2) of the buildings that were imported into a scene, in world space."""
+    found = []
+    for obj in scene.objects:
+        if obj.type == 'CURVE' and obj.get(BUILDING_MARK):
+            for spline in obj.data.splines[:1]:
+                points = np.zeros(4 * len(spline.points), np.float32)
+                spline.points.foreach_get("co", points)
+                world = np.array(obj.matrix_world)
+                found.append((points.reshape(-1, 4).astype(np.float64)[:, :3] @ world[:3, :3].T + world[:3, 3])[:, :2])
+    return found
 
 
 def _remove(collections: list[bpy.types.Collection], materials: list[bpy.types.Material]) -> None:
@@ -161,6 +181,8 @@ def _curve(
     obj.location = foot
     if ribbon:
         obj[HALF_WIDTH] = outline.width / 2.0
+    if filled and outline.kind == BUILDING:
+        obj[BUILDING_MARK] = True
     return obj
 
 

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import dataclass
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,13 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...jobs import Progress
+from ...places.geotiff import place_of_image
+from ...places.projection import System, between, chosen_system
 from ...places.rasters import Raster
 from ...planting.height_grid import HeightGrid, cell_for, height_grid
 from ..attributes import write
+from ..compat import shader_tree
+from ..materials.nodes import Graph
 from ..materials.soil import soil_material
 from ..placing.terrain import read_ground
 from ..runtime import JobData, guarded
@@ -43,15 +47,25 @@ class ImportedGround:
         Distance of its vertices, metres.
     coarser : bool
         Whether that is more than in the file.
+    notes : list of str
     """
 
     object: bpy.types.Object
     step: float
     coarser: bool
+    notes: list[str]
 
 
 def terrain_steps(
-    scene: bpy.types.Scene, path: Path, most: int, code: int, factor: float, shift: float, new: bool
+    scene: bpy.types.Scene,
+    path: Path,
+    most: int,
+    code: int,
+    factor: float,
+    shift: float,
+    new: bool,
+    tiles: Sequence[Path] = (),
+    image: Path | None = None,
 ) -> Generator[Progress, Any, ImportedGround]:
     """Make ground; yields progress. Closing the steps leaves all as it was.
 
@@ -63,20 +77,33 @@ def terrain_steps(
         As of `read_raster`.
     new : bool
         Let its middle be the scene's origin, whatever was imported before.
+    tiles : sequence of Path
+        Other files of the same grid.
+    image : Path, optional
+        An orthophoto, which becomes its color.
 
     Raises
     ------
     SceneError
         The file is broken, or cannot lie in this scene.
     """
-    return guarded(JobData("Importing", scene), _steps(scene, path, most, code, factor, shift, new))
+    return guarded(JobData("Importing", scene), _steps(scene, [path, *tiles], most, code, factor, shift, new, image))
 
 
 def _steps(
-    scene: bpy.types.Scene, path: Path, most: int, code: int, factor: float, shift: float, new: bool
+    scene: bpy.types.Scene,
+    paths: list[Path],
+    most: int,
+    code: int,
+    factor: float,
+    shift: float,
+    new: bool,
+    image: Path | None,
 ) -> Generator[Progress, Any, ImportedGround]:
-    raster = yield from read_raster(path, code, factor, shift)
+    raster = yield from read_raster(paths, code, factor, shift)
+    path = paths[0]
     what = f"{path.name}: "
+    photo = None if image is None else _photo_place(image, raster.system)
     place = origin_for(scene, raster.system, raster.outline, new, what)
     coarse = yield from call_in_thread(Progress(0.7, "Making the ground"), raster.coarser, most)
     h, w = coarse.values.shape
@@ -91,11 +118,17 @@ def _steps(
     number = np.zeros(h * w, np.int64)
     number[used] = np.arange(len(used))
     uv = np.column_stack([column / (w - 1), 1.0 - row / (h - 1)])[used]
-    made = _mesh(path.stem, points[used], number[faces], uv)
+    material, notes = None, [*raster.notes, f"coordinates: {raster.system.name}"]
+    if photo is not None:
+        cells = between(coarse.places(column, row)[used], coarse.system, photo.system) - photo.corner
+        cells = np.linalg.solve(np.stack([photo.along, photo.down]).T, cells.T).T + 0.5
+        material, uv, beside = _photo_material(image, cells)
+        notes += [f"{beside:,} of {len(uv):,} vertices lie beside the image"] * (beside > 0)
+    made = _mesh(path.stem, points[used], number[faces], uv, material)
     scene.collection.objects.link(made)
     remember(scene, place)
     step = float(np.linalg.norm(points[faces[:, 0], :2] - points[faces[:, 1], :2], axis=1).mean())
-    return ImportedGround(made, step, coarse is not raster)
+    return ImportedGround(made, step, coarse is not raster, notes)
 
 
 def _faces(raster: Raster) -> NDArray[np.int64]:
@@ -109,7 +142,47 @@ def _faces(raster: Raster) -> NDArray[np.int64]:
     return quads if down_then_along > 0.0 else quads[:, ::-1]
 
 
-def _mesh(name: str, points: NDArray, faces: NDArray, uv: NDArray) -> bpy.types.Object:
+def _photo_place(path: Path, ground: System) -> Raster:
+    """Where an orthophoto lies; in the system of the ground if it has none of its own."""
+    try:
+        place = place_of_image(path)
+    except OSError as error:
+        raise SceneError(f"{path.name}: cannot read the file: {error.strerror or error}") from None
+    place = replace(place, system=chosen_system(0, place.system, f"{path.name}: ")) if place.system.code else place
+    if place.system.code and not ground.code:
+        raise SceneError(
+            f"{path.name}: the image lies on Earth, and nothing tells where the terrain does; set Coordinate System"
+        )
+    return place if place.system.code else replace(place, system=ground)
+
+
+def _photo_material(path: Path, cells: NDArray[np.float64]) -> tuple[bpy.types.Material, NDArray[np.float64], int]:
+    """A material of an image, UV (n, 2) of places in its pixels (n, 2), and how many of these lie beside it."""
+    unreadable = SceneError(f"{path.name}: Blender cannot read this image; write it as JPEG, PNG or 8-bit TIFF")
+    try:
+        image = bpy.data.images.load(str(path), check_existing=False)
+    except RuntimeError:
+        raise unreadable from None
+    size = np.array(image.size, np.float64)
+    inside = ((cells >= 0.0) & (cells <= size)).all(axis=1)
+    if not size.all() or not inside.any():
+        bpy.data.images.remove(image)
+        raise (
+            SceneError(f"{path.name}: the image lies elsewhere; choose one of this place") if size.all() else unreadable
+        )
+    material = bpy.data.materials.new(path.stem)
+    graph = Graph(shader_tree(material))
+    texture = graph.node("ShaderNodeTexImage", extension='EXTEND')
+    texture.image = image
+    surface = graph.node("ShaderNodeBsdfPrincipled", {"Base Color": texture.outputs["Color"], "Roughness": 0.95})
+    graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
+    graph.arrange()
+    return material, np.stack([cells[:, 0], size[1] - cells[:, 1]], axis=1) / size, int((~inside).sum())
+
+
+def _mesh(
+    name: str, points: NDArray, faces: NDArray, uv: NDArray, material: bpy.types.Material | None
+) -> bpy.types.Object:
     middle = np.round((points.min(axis=0) + points.max(axis=0)) / 2.0)
     middle[2] = 0.0
     mesh = bpy.data.meshes.new(name)
@@ -123,10 +196,12 @@ def _mesh(name: str, points: NDArray, faces: NDArray, uv: NDArray) -> bpy.types.
     mesh.shade_smooth()
     layer = mesh.uv_layers.new(name="UVMap")
     write(mesh, layer.name, uv[faces.ravel()])
-    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    shape = (2, 2)
-    colours, green = np.broadcast_to(_SOIL, (*shape, 3)), np.full(shape, _COVERED)
-    mesh.materials.append(soil_material(f"{name} soil", colours, green, np.array(_GREEN), low, high - low))
+    if material is None:
+        low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        shape = (2, 2)
+        colours, green = np.broadcast_to(_SOIL, (*shape, 3)), np.full(shape, _COVERED)
+        material = soil_material(f"{name} soil", colours, green, np.array(_GREEN), low, high - low)
+    mesh.materials.append(material)
     made = bpy.data.objects.new(name, mesh)
     made.location = middle
     made[TERRAIN] = True

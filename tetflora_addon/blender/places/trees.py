@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import tau
 from pathlib import Path
@@ -19,7 +19,7 @@ from ...errors import SceneError, SpeciesError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...growth.seeds import Seeds
 from ...jobs import Progress
-from ...places.canopy import find_trees
+from ...places.canopy import checked_canopy, find_trees, heights_above, without_areas
 from ...places.inventories import Inventory, read_inventory
 from ...places.projection import MapOrigin
 from ...places.species_names import GENUS, KIN, KIND, best_of, words_of
@@ -35,6 +35,7 @@ from ..worker import call_in_thread, steps_in_thread
 from .completion import complete
 from .jobs import importing
 from .origin import WHOLE, cropped, in_scene, origin_for, remember
+from .outlines import building_areas
 from .rasters import read_raster
 from .terrain import grounds_in, heights_steps
 
@@ -135,7 +136,8 @@ def inventory_steps(
         )
     place = origin_for(scene, inventory.system, inventory.points, new, what)
     flat = in_scene(place, inventory.points, inventory.system, what)
-    made = Planted(notes=list(inventory.notes), inventory=inventory)
+    notes = [*inventory.notes, f"coordinates: {inventory.system.name}"]
+    made = Planted(notes=notes, inventory=inventory)
     identifiers, kinds = _species(inventory, unknown, made)
     kept = np.flatnonzero(kinds >= 0)
     if not len(kept):
@@ -184,6 +186,8 @@ def canopy_steps(
     factor: float,
     shift: float,
     new: bool,
+    below: Path | None = None,
+    tiles: Sequence[Path] = (),
     seed: int = 0,
 ) -> Generator[Progress, Any, Planted]:
     """Make a field of the trees that a raster of canopy height shows; yields progress. Closing the steps leaves all
@@ -197,14 +201,26 @@ def canopy_steps(
         Height of the smallest tree, metres.
     code, factor, shift
         As of `read_raster`.
+    below : Path, optional
+        Elevations of the ground, which are subtracted.
+    tiles : sequence of Path
+        Other files of the same grid.
 
     Raises
     ------
     SceneError
         The file is broken, has no trees, or cannot lie in this scene.
     """
-    raster = yield from read_raster(path, code, factor, shift)
+    raster = yield from read_raster([path, *tiles], code, factor, shift)
     what = f"{path.name}: "
+    made = Planted(notes=[*raster.notes, f"coordinates: {raster.system.name}"])
+    if below is not None:
+        ground = yield from read_raster(below, code, factor, shift)
+        progress = Progress(0.05, "Subtracting the ground")
+        raster = yield from call_in_thread(progress, heights_above, raster, ground, what)
+    values, notes = checked_canopy(raster.values, what)
+    raster = replace(raster, values=values)
+    made.notes += notes
     place = origin_for(scene, raster.system, raster.outline, new, what)
     h, w = raster.values.shape
     # Steps from a cell in the middle to the next ones, in metres of the scene.
@@ -213,6 +229,13 @@ def canopy_steps(
     )
     along, down = along - middle, down - middle
     cell = float(np.sqrt(abs(along[0] * down[1] - along[1] * down[0])))
+    if roofs := building_areas(scene):
+        flat_cells = replace(raster, corner=middle - along * (w // 2) - down * (h // 2), along=along, down=down)
+        flat_cells, number = yield from call_in_thread(
+            Progress(0.1, "Leaving out roofs"), without_areas, flat_cells, roofs
+        )
+        raster = replace(raster, values=flat_cells.values)
+        made.notes += [f"{number:,} cells on buildings left out"] * (number > 0)
     if cell > _COARSEST:
         raise SceneError(f"{what}its cells are {cell:.1f} m wide; trees can be told apart up to {_COARSEST:g} m")
     found = yield from steps_in_thread(find_trees(raster.values, cell, least), Progress(0.1, "Looking for treetops"))
@@ -229,7 +252,6 @@ def canopy_steps(
         "crown_width": found.width.astype(np.float32),
         "offset": np.column_stack([found.offset @ unit, np.zeros(number)]).astype(np.float32),
     }
-    made = Planted()
     yield from _plant(scene, depsgraph, path.stem, grounds, place, flat, kinds, identifiers, sizes, seed, made)
     return made
 

@@ -1,0 +1,363 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Features of maps, as GeoJSON has them: from GeoJSON of all kinds, shapefiles and GeoPackages.
+
+Formats are those of RFC 7946 and 8142, the ESRI Shapefile Technical Description (1998), dBASE III, and OGC GeoPackage
+1.3 (OGC 12-128r17) with the well-known binary of OGC 06-103r4.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import struct
+from contextlib import closing
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError, shown
+from ..files import is_regular, json_of, read_whole
+from .prj import system_in
+from .projection import LONGITUDE_LATITUDE, System, code_in, known_systems, may_be_degrees, to_degrees
+
+MAX_BYTES, MAX_ROWS = 200_000_000, 2_000_000
+#: Endings of files that `read_features` reads.
+ENDINGS = (".geojson", ".json", ".geojsonl", ".geojsons", ".ndjson", ".shp", ".gpkg")
+#: On features: the layer that they come from.
+LAYER = "layer"
+_GEOMETRIES = {
+    "Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon", "GeometryCollection",
+}  # fmt: skip
+_DEEPEST = 32  # collections within each other
+_Feature = dict[str, Any]
+
+
+def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], int]:
+    """Features of a file, of which each is an object with a geometry, and their EPSG code; 0 for plain metres.
+
+    Parameters
+    ----------
+    chosen : int
+        EPSG code that counts in place of the file's own; 0 for none.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the feature.
+    """
+    name = path.name
+    if path.suffix.lower() in (".shp", ".gpkg"):
+        try:
+            features, own = _shapes(path) if path.suffix.lower() == ".shp" else _package(path)
+        except (struct.error, ValueError, IndexError, KeyError, TypeError, OverflowError, RecursionError, MemoryError):
+            raise SceneError(f"{name}: it is damaged or was not copied whole") from None
+        system, unit = own
+        if chosen:
+            return features, chosen
+        if system.code == -2 or unit != 1.0:  # its own figures, or lengths in feet of which nobody knows where they are
+            for feature in features:
+                _convert(feature["geometry"], system, unit)
+            system = System(LONGITUDE_LATITUDE) if system.code else System()
+        elif not system.code and may_be_degrees(*_corners(features)):
+            raise SceneError(
+                f"{name}: no file tells its coordinate system (.prj); set Coordinate System to 4326 for longitude and "
+                "latitude, or turn on Plain Meters"
+            )
+        return features, system.code
+    try:
+        data = _json(read_whole(path, MAX_BYTES))
+    except ValueError as error:
+        raise SceneError(f"{name}: {error}") from None
+    kind = data.get("type") if isinstance(data, dict) else None
+    if isinstance(kind, str) and kind in _GEOMETRIES:
+        data = {"features": [{"geometry": data, "properties": {}}], "crs": data.get("crs")}
+    elif kind == "Feature":
+        data = {"features": [data]}
+    elif kind != "FeatureCollection":
+        raise SceneError(f'{name}: "type" is {shown(kind)}; a GeoJSON file is a FeatureCollection')
+    features = data.get("features")
+    if not isinstance(features, list) or len(features) > MAX_ROWS:
+        raise SceneError(f'{name}: "features" must be a list of at most {MAX_ROWS:,}')
+    for number, feature in enumerate(features, 1):
+        geometry = feature.get("geometry", ...) if isinstance(feature, dict) else ...
+        properties = feature.get("properties") if isinstance(feature, dict) else None
+        if not isinstance(geometry, dict | None) or not isinstance(properties, dict | None):
+            raise SceneError(f"{name}: feature {number:,}: it has no geometry, or properties that are no object")
+        if geometry is not None and not isinstance(geometry.get("type"), str):
+            raise SceneError(f"{name}: feature {number:,}: its geometry has no type")
+    return features, chosen or _code(data.get("crs"), name)
+
+
+def _json(content: bytes) -> Any:
+    """One JSON text, or a feature on each line, which may begin with a record separator."""
+    try:
+        return json_of(content)
+    except ValueError:
+        lines = [line.strip(b"\x1e \t\r") for line in content.split(b"\n")]
+        lines = [line for line in lines if line]
+        if len(lines) < 2 or not (lines[0].startswith(b"{") and lines[0].endswith(b"}")):
+            raise
+    features = []
+    for number, line in enumerate(lines, 1):
+        try:
+            part = json_of(line)
+        except ValueError as error:
+            raise ValueError(f"feature {number:,} {error}") from None
+        bare = isinstance(part, dict) and str(part.get("type")) in _GEOMETRIES
+        features.append({"geometry": part, "properties": {}} if bare else part)
+    return {"type": "FeatureCollection", "features": features}
+
+
+def _code(crs: Any, name: str) -> int:
+    """EPSG code of the member ``crs`` that GeoJSON of before 2016 has, and GDAL still writes."""
+    if crs is None:
+        return LONGITUDE_LATITUDE
+    properties = crs.get("properties") if isinstance(crs, dict) else None
+    properties = properties if isinstance(properties, dict) else {}
+    text = next((v for v in map(properties.get, ("name", "href")) if isinstance(v, str)), None)
+    text = text or f"EPSG:{properties.get('code')}"
+    if (code := code_in(text)) is not None:
+        return code
+    raise SceneError(
+        f'{name}: "crs" is {shown(text)}, which is no EPSG code; set Coordinate System to the code, or write the file '
+        "with -t_srs EPSG:4326"
+    )
+
+
+def _convert(geometry: _Feature | None, system: System, unit: float) -> None:
+    """Put degrees, or metres of another unit, in place of coordinates."""
+
+    def moved(values: Any) -> Any:
+        if values and isinstance(values[0], list | tuple) and values[0] and isinstance(values[0][0], list | tuple):
+            return [moved(part) for part in values]
+        if not values:
+            return values
+        alone = not isinstance(values[0], list | tuple)
+        points = np.array([values] if alone else [v[:2] for v in values], np.float64)[:, :2]
+        points = (to_degrees(system, points) if system.code else unit * points).tolist()
+        return points[0] if alone else points
+
+    for part in (geometry or {}).get("geometries", ()):
+        _convert(part, system, unit)
+    if geometry and "coordinates" in geometry:
+        geometry["coordinates"] = moved(geometry["coordinates"])
+
+
+def _corners(features: list[_Feature]) -> NDArray[np.float64]:
+    """The corners (2, 2) of all coordinates."""
+    found: list[Any] = []
+
+    def gather(values: Any) -> None:
+        if values and isinstance(values[0], int | float):
+            found.append(values[:2])
+        else:
+            for part in values:
+                gather(part)
+
+    for feature in features:
+        gather((feature["geometry"] or {}).get("coordinates", ()))
+    points = np.array(found, np.float64).reshape(-1, 2)
+    return np.stack([points.min(axis=0), points.max(axis=0)]) if len(points) else np.full((2, 2), np.inf)
+
+
+def _shapes(path: Path) -> tuple[list[_Feature], tuple[System, float]]:
+    """Features of a shapefile, with the table and the system beside it."""
+    content = read_whole(path, MAX_BYTES)
+    if content[:4] != b"\0\0\x27\x0a":
+        raise SceneError(f"{path.name}: this is no shapefile")
+    rows = _dbase(path)
+    features, at = [], 100
+    while at + 12 <= len(content):
+        size = 2 * int.from_bytes(content[at + 4 : at + 8])
+        record = content[at + 8 : at + 8 + size]
+        if len(record) < size or size < 4:
+            raise ValueError
+        number = len(features)
+        properties = rows[number] if rows is not None and number < len(rows) else {}
+        deleted = properties is None
+        features.append(
+            {"geometry": None if deleted else _shape(record), "properties": properties or {}, LAYER: path.stem}
+        )
+        at += 8 + size
+        if len(features) > MAX_ROWS:
+            raise SceneError(f"{path.name}: more than {MAX_ROWS:,} features; cut it")
+    prj = next((p for p in (path.with_suffix(".prj"), path.with_suffix(".PRJ")) if p.exists()), None)
+    return features, system_in(read_whole(prj, 65_536).decode("latin-1")) if prj else (System(), 1.0)
+
+
+def _shape(record: bytes) -> _Feature | None:
+    """Geometry of a record; heights and measures do not count."""
+    kind = int.from_bytes(record[:4], "little") % 10
+    if kind == 1:
+        return {"type": "Point", "coordinates": list(struct.unpack_from("<2d", record, 4))}
+    if kind == 8:
+        (number,) = struct.unpack_from("<i", record, 36)
+        return {"type": "MultiPoint", "coordinates": _points(record, 40, number).tolist()}
+    if kind not in (3, 5):
+        return None
+    parts, number = struct.unpack_from("<2i", record, 36)
+    if not 0 <= parts <= number <= len(record) // 16:
+        raise ValueError
+    starts = [*struct.unpack_from(f"<{parts}i", record, 44), number]
+    points = _points(record, 44 + 4 * parts, number)
+    rings = [points[a:b] for a, b in pairwise(starts)]
+    if kind == 3:
+        return {"type": "MultiLineString", "coordinates": [ring.tolist() for ring in rings]}
+    areas: list[list[NDArray[np.float64]]] = [[ring] for ring in rings if _turn(ring) <= 0.0]
+    for hole in (ring for ring in rings if _turn(ring) > 0.0):
+        outer = next((area for area in areas if _inside(hole[0], area[0])), None)
+        if outer is None:
+            areas.append([hole])
+        else:
+            outer.append(hole)
+    return {"type": "MultiPolygon", "coordinates": [[ring.tolist() for ring in area] for area in areas]}
+
+
+def _points(data: bytes, at: int, number: int) -> NDArray[np.float64]:
+    return np.frombuffer(data, "<f8", 2 * number, at).reshape(-1, 2)
+
+
+def _turn(ring: NDArray[np.float64]) -> float:
+    """Twice the area of a ring, positive counter-clockwise."""
+    x, y = (ring - ring[:1]).T
+    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+
+
+def _inside(point: NDArray[np.float64], ring: NDArray[np.float64]) -> bool:
+    (x, y), (x1, y1), (x2, y2) = point, ring.T, np.roll(ring, -1, axis=0).T
+    crossed = (y1 > y) != (y2 > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return bool((crossed & (x < x1 + (y - y1) * (x2 - x1) / (y2 - y1))).sum() % 2)
+
+
+def _dbase(path: Path) -> list[dict[str, Any] | None] | None:
+    """Rows of the table beside a shapefile, those that are deleted as None; None without a table."""
+    table = next((p for p in (path.with_suffix(".dbf"), path.with_suffix(".DBF")) if p.exists()), None)
+    if table is None:
+        return None
+    content = read_whole(table, MAX_BYTES)
+    number, start, size = struct.unpack_from("<IHH", content, 4)
+    pages = next((p for p in (path.with_suffix(".cpg"), path.with_suffix(".CPG")) if p.exists()), None)
+    told = read_whole(pages, 4096).decode("latin-1").strip().lower() if pages else ""
+    fields, at, left = [], 32, 1
+    while at + 32 <= start and content[at] != 0x0D:
+        title = content[at : at + 11].split(b"\0")[0]
+        fields.append((title, chr(content[at + 11]), left, left + content[at + 16]))
+        left += content[at + 16]
+        at += 32
+    if number > MAX_ROWS or not size or start + number * size > len(content) + 1:
+        raise ValueError
+    encodings = ("utf-8", "cp1252") if told in ("", "utf-8", "utf8", "65001") else ("cp1252",)
+
+    def text(value: bytes) -> str:
+        for encoding in encodings[:-1]:
+            try:
+                return value.decode(encoding)
+            except UnicodeDecodeError:
+                pass
+        return value.decode("cp1252", "replace")
+
+    titles = [text(title) for title, *_ in fields]
+    rows: list[dict[str, Any] | None] = []
+    for row in range(number):
+        record = content[start + row * size : start + (row + 1) * size]
+        values = [text(record[a:b].strip(b"\0 ")) for _, _, a, b in fields]
+        rows.append(None if record[:1] == b"*" else dict(zip(titles, values, strict=True)))
+    return rows
+
+
+def _package(path: Path) -> tuple[list[_Feature], tuple[System, float]]:
+    """Features of all layers of a GeoPackage, in the system of the first."""
+    if not is_regular(path):
+        read_whole(path, MAX_BYTES)  # which says what it is
+    features: list[_Feature] = []
+    first: tuple[System, float] | None = None
+    try:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as base:
+            base.text_factory = lambda data: data.decode("utf-8", "replace")
+            layers = base.execute(
+                "SELECT g.table_name, g.column_name, s.organization, s.organization_coordsys_id, s.definition "
+                "FROM gpkg_geometry_columns g LEFT JOIN gpkg_spatial_ref_sys s ON g.srs_id = s.srs_id"
+            ).fetchall()
+            for table, column, by, code, text in layers:
+                known = str(by).upper() == "EPSG" and code in known_systems()
+                own = (System(int(code)), 1.0) if known else system_in(str(text))
+                first = first or own
+                if own != first:
+                    raise SceneError(
+                        f"{path.name}: its layers have several coordinate systems; write one of them, for example with "
+                        f"ogr2ogr {table}.gpkg {path.name} {table}"
+                    )
+                rows = base.execute(f'SELECT * FROM "{str(table).replace(chr(34), 2 * chr(34))}"')
+                titles = [title for title, *_ in rows.description]
+                for row in rows:
+                    properties = dict(zip(titles, row, strict=True))
+                    geometry = _geometry(properties.pop(column))
+                    properties = {k: v for k, v in properties.items() if isinstance(v, str | int | float)}
+                    features.append({"geometry": geometry, "properties": properties, LAYER: str(table)})
+                    if len(features) > MAX_ROWS:
+                        raise SceneError(f"{path.name}: more than {MAX_ROWS:,} features; cut it")
+    except sqlite3.Error as error:
+        raise SceneError(f"{path.name}: this is no GeoPackage, or damaged: {error}") from None
+    return features, first or (System(), 1.0)
+
+
+def _geometry(blob: Any) -> _Feature | None:
+    """Geometry of a GeoPackage: a head, then well-known binary."""
+    if blob is None:
+        return None
+    if not isinstance(blob, bytes) or blob[:2] != b"GP":
+        raise ValueError
+    envelope = {0: 0, 1: 32, 2: 48, 3: 48, 4: 64}[blob[3] >> 1 & 7]
+    return None if blob[3] & 16 else _binary(blob, 8 + envelope)[0]
+
+
+def _binary(data: bytes, at: int, depth: int = 0) -> tuple[_Feature | None, int]:
+    """A geometry of well-known binary from some byte, and where it ends."""
+    order = "<" if data[at] else ">"
+    (code,) = struct.unpack_from(f"{order}I", data, at + 1)
+    at += 5
+    code, more = code & 0xFFFFFFF, (code >> 31 & 1) + (code >> 30 & 1)
+    more, kind = more + {0: 0, 1: 1, 2: 1, 3: 2}[code // 1000], code % 1000
+    size = 8 * (2 + more)
+
+    def points(start: int, number: int) -> tuple[list[list[float]], int]:
+        flat = np.frombuffer(data, f"{order}f8", (2 + more) * number, start).reshape(number, -1)[:, :2]
+        return flat.tolist(), start + number * size
+
+    def count(start: int) -> tuple[int, int]:
+        (number,) = struct.unpack_from(f"{order}I", data, start)
+        if number > len(data):
+            raise ValueError
+        return number, start + 4
+
+    if kind == 1:
+        found, at = points(at, 1)
+        return {"type": "Point", "coordinates": found[0]} if np.isfinite(found[0]).all() else None, at
+    number, at = count(at)
+    if kind == 2:
+        found, at = points(at, number)
+        return {"type": "LineString", "coordinates": found}, at
+    if kind == 3:
+        rings = []
+        for _ in range(number):
+            many, at = count(at)
+            ring, at = points(at, many)
+            rings.append(ring)
+        return {"type": "Polygon", "coordinates": rings}, at
+    if kind not in (4, 5, 6, 7) or depth > _DEEPEST:
+        raise ValueError
+    parts = []
+    for _ in range(number):
+        part, at = _binary(data, at, depth + 1)
+        parts.append(part)
+    parts = [part for part in parts if part]
+    if kind == 7:
+        return {"type": "GeometryCollection", "geometries": parts}, at
+    names = {4: "MultiPoint", 5: "MultiLineString", 6: "MultiPolygon"}
+    return {"type": names[kind], "coordinates": [part["coordinates"] for part in parts]}, at
