@@ -34,34 +34,13 @@ _KIND, _COMPRESSION, _COLOURS, _FILL, _ROWS, _PLANES, _PREDICTOR = 254, 259, 262
 _ACROSS, _DOWN, _EXTRA, _DOUBLES, _TEXTS = 322, 323, 338, 34736, 34737
 #: Tags: names for messages.
 _NAMES = {
-    _KIND: "NewSubfileType",
-    _WIDTH: "ImageWidth",
-    _HEIGHT: "ImageLength",
-    _BITS: "BitsPerSample",
-    _COMPRESSION: "Compression",
-    _COLOURS: "PhotometricInterpretation",
-    _FILL: "FillOrder",
-    _STRIPS: "StripOffsets",
-    _BANDS: "SamplesPerPixel",
-    _ROWS: "RowsPerStrip",
-    _STRIP_BYTES: "StripByteCounts",
-    _PLANES: "PlanarConfiguration",
-    _PREDICTOR: "Predictor",
-    _ACROSS: "TileWidth",
-    _DOWN: "TileLength",
-    _TILES: "TileOffsets",
-    _TILE_BYTES: "TileByteCounts",
-    _EXTRA: "ExtraSamples",
-    _FORMAT: "SampleFormat",
-    _SCALE: "ModelPixelScale",
-    _TIEPOINT: "ModelTiepoint",
-    _MATRIX: "ModelTransformation",
-    _GEO: "GeoKeyDirectory",
-    _DOUBLES: "GeoDoubleParams",
-    _TEXTS: "GeoAsciiParams",
-    _METADATA: "GDAL_METADATA",
-    _NODATA: "GDAL_NODATA",
-}
+    254: "NewSubfileType", 256: "ImageWidth", 257: "ImageLength", 258: "BitsPerSample", 259: "Compression",
+    262: "PhotometricInterpretation", 266: "FillOrder", 273: "StripOffsets", 277: "SamplesPerPixel",
+    278: "RowsPerStrip", 279: "StripByteCounts", 284: "PlanarConfiguration", 317: "Predictor", 322: "TileWidth",
+    323: "TileLength", 324: "TileOffsets", 325: "TileByteCounts", 338: "ExtraSamples", 339: "SampleFormat",
+    33550: "ModelPixelScale", 33922: "ModelTiepoint", 34264: "ModelTransformation", 34735: "GeoKeyDirectory",
+    34736: "GeoDoubleParams", 34737: "GeoAsciiParams", 42112: "GDAL_METADATA", 42113: "GDAL_NODATA",
+}  # fmt: skip
 #: Types of values: letter for `struct`; others, such as fractions, occur in none of these tags.
 _TYPES = {1: "B", 2: "s", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 11: "f", 12: "d", 16: "Q", 17: "q"}
 _MOST_TAGS, _MOST_BYTES = 4096, 64_000_000

@@ -24,40 +24,19 @@ WOOD, MEADOW, WATER, ROAD, BUILDING, OTHER = "Woods", "Meadows", "Water", "Roads
 KINDS = (WOOD, MEADOW, WATER, ROAD, BUILDING, OTHER)
 #: Most outlines of a file: each becomes an object.
 MAX_OUTLINES = 20_000
-_VALUES = {
-    ("landuse", "forest"): WOOD,
-    ("natural", "wood"): WOOD,
-    ("natural", "scrub"): WOOD,
-    ("landuse", "orchard"): WOOD,
-    ("landcover", "trees"): WOOD,
-    **dict.fromkeys((("landuse", v) for v in ("meadow", "grass", "farmland", "village_green", "allotments")), MEADOW),
-    **dict.fromkeys((("natural", v) for v in ("grassland", "heath", "fell", "wetland")), MEADOW),
-    **dict.fromkeys((("leisure", v) for v in ("park", "garden", "common", "golf_course")), MEADOW),
-    **dict.fromkeys((("natural", v) for v in ("water", "bay", "strait")), WATER),
-    **dict.fromkeys((("landuse", v) for v in ("reservoir", "basin")), WATER),
-}
+_TABLES: dict[str, Any] = json.loads(Path(__file__).with_name("kinds.json").read_text(encoding="utf-8"))
+#: Kinds by keys and values of OpenStreetMap.
+_VALUES = {(key, value): kind for key, values in _TABLES["values"].items() for value, kind in values.items()}
 #: Keys that tell by themselves, whatever their value; the first that a feature has counts.
 _KEYS = {"building": BUILDING, "highway": ROAD, "waterway": WATER, "railway": ROAD, "water": WATER}
 #: Widths of lines in metres, by the value of their key.
-_WIDTHS = {
-    **dict.fromkeys(("motorway", "trunk"), 11.0),
-    **dict.fromkeys(("primary",), 8.0),
-    **dict.fromkeys(("secondary",), 7.0),
-    **dict.fromkeys(("tertiary",), 6.0),
-    **dict.fromkeys(("residential", "unclassified", "living_street", "pedestrian", "road"), 5.5),
-    **dict.fromkeys(("service", "rail", "light_rail", "tram"), 4.0),
-    **dict.fromkeys(("track",), 3.0),
-    **dict.fromkeys(("path", "footway", "cycleway", "bridleway", "steps", "ditch", "drain"), 1.5),
-    **dict.fromkeys(("river",), 12.0),
-    **dict.fromkeys(("canal",), 10.0),
-    **dict.fromkeys(("stream",), 2.0),
-}
+_WIDTHS: dict[str, float] = _TABLES["widths"]
 _ROAD_WIDTH, _LANE, _STOREY, _BUILDING_HEIGHT = 5.0, 3.25, 3.0, 7.0
 _MOST_WIDTH, _MOST_HEIGHT = 200.0, 1000.0
+# Brackets stand for the beginning and the end of a word.
 _PATTERNS = {
-    # Brackets stand for the beginning and the end of a word.
     key: re.compile(text.replace("<", "(?<![a-z])").replace(">", "(?![a-z])"))
-    for key, text in json.loads(Path(__file__).with_name("kinds.json").read_text(encoding="utf-8")).items()
+    for key, text in _TABLES["patterns"].items()
 }
 #: Kinds by words of values, of layers and of files.
 _WORDS = {kind: _PATTERNS[kind] for kind in (BUILDING, WATER, WOOD, ROAD, MEADOW)}

@@ -18,29 +18,11 @@ from typing import Any
 import numpy as np
 
 from .methods import METHODS, WGS84, Definition, Ellipsoid
-from .projection import LONGITUDE_LATITUDE, System, code_in, known_systems
+from .projection import LONGITUDE_LATITUDE, System, code_in, known_systems, read_figures
 
-#: Geographic systems by a part of what datums are called, letters and digits only.
-_DATUMS = {
-    "northamerican1983": 4269, "nad83": 4269, "northamerican1927": 4267, "northamericandatum1927": 4267, "nad27": 4267,
-    "northamericandatum1983": 4269, "etrs1989": 4258, "etrs89": 4258, "europeanterrestrialreference": 4258,
-    "european1950": 4230, "ed50": 4230, "wgs1984": 4326, "wgs84": 4326, "deutscheshauptdreiecksnetz": 4314,
-    "dhdn": 4314, "osgb": 4277, "ordnancesurveyofgreatbritain": 4277, "ch1903": 4150, "amersfoort": 4289,
-    "belge1972": 4313, "reseaunationalbelge1972": 4313, "mgi": 4312, "militargeographische": 4312, "ntf": 4275,
-    "tokyo": 4301, "jgd2000": 4612, "japanesegeodeticdatum2000": 4612, "jgd2011": 6668, "gda2020": 7844,
-    "gda1994": 4283, "geocentricdatumofaustralia1994": 4283, "nzgd2000": 4167, "newzealandgeodeticdatum2000": 4167,
-}  # fmt: skip
-#: Methods by what their names begin with, letters only; the longest beginning counts.
-_METHODS = {
-    "transversemercator": "tm", "gausskruger": "tm", "lambertconformalconic": "lcc", "lambertconicconformal": "lcc",
-    "lambert": "lcc", "albers": "aea", "doublestereographic": "sterea", "obliquestereographic": "sterea",
-    "polarstereographic": "stere", "stereographicnorth": "stere", "stereographicsouth": "stere", "polar": "stere",
-    "mercator": "merc", "mercatorauxiliarysphere": "web", "popularvisualisation": "web", "web": "web",
-    "lambertazimuthalequalarea": "laea", "hotineobliquemercator": "omercA", "hotineobliquemercatorvarianta": "omercA",
-    "hotineobliquemercatorvariantb": "omercB", "hotineobliquemercatorazimuthcenter": "omercB",
-    "obliquemercator": "omercB", "rectifiedskeworthomorphiccenter": "omercB",
-    "rectifiedskeworthomorphicnaturalorigin": "omercA", "swissoblique": "omercB", "transverse": "tm",
-}  # fmt: skip
+#: Geographic systems by what names of datums begin with, and methods by what theirs do; letters and digits only.
+_DATUMS: dict[str, int] = read_figures()["datums"]
+_METHODS: dict[str, str] = read_figures()["methods"]
 #: What parameters mean by a part of their names; the first that fits counts.
 _PARAMETERS = (
     ("2nd|parallel2", "second"), ("1st|parallel", "first"), ("easting", "east"), ("northing", "north"),

@@ -85,9 +85,15 @@ def _about(longitude: float, latitude: float) -> Definition:
 
 
 @cache
+def read_figures() -> dict[str, Any]:
+    """Figures and names of systems."""
+    return json.loads(Path(__file__).with_name("systems.json").read_text(encoding="utf-8"))
+
+
+@cache
 def known_systems() -> dict[int, Definition]:
     """All systems that have an EPSG code here."""
-    data: dict[str, Any] = json.loads(Path(__file__).with_name("systems.json").read_text(encoding="utf-8"))
+    data = read_figures()
     ellipsoids, shifts = [Ellipsoid(*e) for e in data["ellipsoids"]], [tuple(s) for s in data["shifts"]]
     found = {}
     for method, ellipsoid, shift, meridian, unit, parameters, codes in data["systems"]:
