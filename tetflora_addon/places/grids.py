@@ -84,10 +84,10 @@ def _xyz(path: Path) -> Generator[Progress, object, Raster]:
         content, line = content[len(head) :], 2
         head = content[: content.find(b"\n") + 1 or len(content)]
     if head.count(b";") >= 2:
-        content = content.replace(b",", b".")
+        content, head = content.replace(b",", b"."), head.replace(b",", b".")
     yield Progress(0.1, f"Reading {name}")
     found = numbers_in(content.translate(bytes.maketrans(b",;\t", b"   ")), name, line)
-    columns = len(head.replace(b",", b" ").replace(b";", b" ").split())
+    columns = len(head.translate(bytes.maketrans(b",;", b"  ")).split())
     if columns < 3 or len(found) % columns or len(found) < 4 * columns:
         raise SceneError(f"{name}: line {line}: each line must have x, y and height")
     yield Progress(0.5, f"Reading {name}")

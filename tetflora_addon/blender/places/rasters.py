@@ -30,6 +30,8 @@ from ..worker import call_in_thread, steps_in_thread
 PATTERN = ";".join(f"*{ending}" for ending in (*ENDINGS, ".png"))
 _PNG_HEAD = struct.Struct(">8s4x4sIIBB")  # signature, length and name of the first chunk, size, bits, colours
 _MOST_FILE = 4_000_000_000
+_VOIDS = (-32768.0, -32767.0, -99999.0)  # what stands for nothing where no file says so
+_MOST = 30_000.0  # metres above the sea or below it
 
 
 def read_raster(
@@ -65,7 +67,8 @@ def read_raster(
         what = f"{path.name}: "
         raster = replace(raster, system=chosen_system(code, raster.system, what))
         raster = raster if code else in_degrees(raster, what)
-        if len(paths) == 1 and not np.isfinite(raster.values).any():
+        raster.values[np.isin(raster.values, _VOIDS)] = np.nan
+        if not np.isfinite(raster.values).any():
             raise SceneError(f"{what}none of its cells has a value")
         tiles.append(raster)
         if sum(tile.values.size for tile in tiles) > 2 * MAX_CELLS:
@@ -75,6 +78,12 @@ def read_raster(
     raster = yield from call_in_thread(Progress(0.5, "Joining tiles"), mosaic, tiles, [path.name for path in paths])
     if (factor, shift) != (1.0, 0.0):
         raster = replace(raster, values=raster.values * np.float32(factor) + np.float32(shift))
+    low, high = (float(f(raster.values[np.isfinite(raster.values)])) for f in (np.min, np.max))
+    if not -_MOST < low <= high < _MOST:
+        raise SceneError(
+            f"{paths[0].name}: its values are from {low:,.0f} to {high:,.0f} m, which nothing on Earth is; it is "
+            "damaged, or in another unit: set Meters per Value"
+        )
     return raster
 
 
