@@ -31,7 +31,7 @@ PATTERN = ";".join(f"*{ending}" for ending in (*ENDINGS, ".png"))
 _PNG_HEAD = struct.Struct(">8s4x4sIIBB")  # signature, length and name of the first chunk, size, bits, colours
 _MOST_FILE = 4_000_000_000
 _VOIDS = (-32768.0, -32767.0, -99999.0)  # what stands for nothing where no file says so
-_MOST = 30_000.0  # metres above the sea or below it
+_MOST = 100_000.0  # metres above the sea or below it
 
 
 def read_raster(
