@@ -86,4 +86,4 @@ def _outlines(path: Path) -> dict[str, Any]:
 def figures() -> dict[str, float]:
     """The figures of the benchmark."""
     right = sum(not problems(name) for name in cases())
-    return {"maps": float(len(cases())), "maps_right": float(right)}
+    return {"cases": float(len(cases())), "cases_right": float(right), "cases_wrong": float(len(cases()) - right)}

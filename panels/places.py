@@ -57,10 +57,10 @@ def draw_in_import_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> No
     """Entries in Blender's File > Import."""
     menu.layout.separator()
     for kind, ending, icon in (
-        (TETFLORA_OT_import_terrain, "Terrain (.asc, .tif, .png)", 'RNDCURVE'),
-        (TETFLORA_OT_import_canopy, "Canopy Height (.asc, .tif, .png)", 'OUTLINER_OB_POINTCLOUD'),
+        (TETFLORA_OT_import_terrain, "Terrain (.tif, .asc, .hgt)", 'RNDCURVE'),
+        (TETFLORA_OT_import_canopy, "Canopy Height (.tif, .asc, .xyz)", 'OUTLINER_OB_POINTCLOUD'),
         (TETFLORA_OT_import_inventory, "Tree Inventory (.csv, .geojson)", 'SPREADSHEET'),
-        (TETFLORA_OT_import_outlines, "Map Outlines (.geojson)", 'OUTLINER_OB_CURVE'),
+        (TETFLORA_OT_import_outlines, "Map Outlines (.geojson, .shp, .gpkg)", 'OUTLINER_OB_CURVE'),
     ):
         Button(kind, icon, ending).draw(menu.layout)
 
