@@ -40,6 +40,7 @@ NAMES = (
     "assets",
     "closed_form",
     "edited_species",
+    "exact",
     "fidelity",
     "rami",
     "above",
@@ -54,6 +55,7 @@ NAMES = (
     "biomes",
     "dolly",
     "endurance",
+    "limits",
     "farm",
     "attack",
 )

@@ -97,6 +97,9 @@ class Calls:
         timers.register = add
         timers.unregister = lambda function: unregister(known.get(function, function))
         timers.is_registered = lambda function: is_registered(known.get(function, function))
+        make = sys.modules[f"{session.PACKAGE}.tetflora_addon.blender.main_thread"].make_changes
+        unregister(make)  # there since the extension was enabled
+        add(make, persistent=True)
 
     def _timed(self, function, label):
         def call(*given, **named):

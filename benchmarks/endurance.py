@@ -1,10 +1,14 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Endurance: two hundred frames of an animation, refined for each, in memory that does not grow.
+"""Endurance: two hundred frames of an animation, and two hundred rounds of an artist, in memory that does not grow.
 
 The camera goes to and fro before a row of plants, so that both halves see the same; images are tiny, so that what is
 measured is refinement, emission, and what Blender does with meshes that come and go. Frames share no results: each is
 refined anew.
+
+In a round an artist refines on another day of the year, undoes that and does it again, renames the scene and a plant,
+and disables and enables the extension. Refinement is work enough for other processes. When the extension is disabled,
+none of them and none of its threads may be there.
 """
 
 from __future__ import annotations
@@ -12,6 +16,9 @@ from __future__ import annotations
 import gc
 import os
 import tempfile
+import threading
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +30,10 @@ LEG, WAY = 10, 4.0
 FRAMES, QUICK_FRAMES = 20 * LEG, 8 * LEG
 #: Frames before memory counts: the first ones fill caches, compile species and load the renderer's kernels.
 WARM_UP = 2 * LEG
+#: Rounds of an artist, those before memory counts, and undo steps that Blender keeps, so that they are full by then.
+ROUNDS, QUICK_ROUNDS, FIRST_ROUNDS, UNDO_STEPS = 200, 26, 10, 6
+#: Days of the year, which come round.
+DAYS = 8
 
 TARGETS: Targets = {
     "growth": {"max": 0.03},
@@ -30,8 +41,15 @@ TARGETS: Targets = {
     "different_frames": {"min": LEG},
     "frames": {"min": 200},
     "errors": {"max": 0},
+    "rounds": {"min": ROUNDS},
+    "leak_percent": {"max": 5.0},
+    "processes_left": {"max": 0},
+    "threads_left": {"max": 0},
+    "handles_left": {"max": 0},
+    "processes_used": {"min": 2},
+    "seasons": {"min": 6},
 }
-QUICK_TARGETS: Targets = {**TARGETS, "frames": {"min": QUICK_FRAMES}}
+QUICK_TARGETS: Targets = {**TARGETS, "frames": {"min": QUICK_FRAMES}, "rounds": {"min": QUICK_ROUNDS}}
 
 
 def resident_mb() -> float:
@@ -41,7 +59,87 @@ def resident_mb() -> float:
 
 
 def run(quick: bool) -> dict[str, float]:
-    """Render the animation; see ``docs/results.md`` for what the figures mean."""
+    """Render the animation, and go the rounds; see ``docs/results.md`` for what the figures mean."""
+    from devtools import session
+
+    found = _frames(QUICK_FRAMES if quick else FRAMES)
+    session.clean_file()
+    return {**found, **_rounds(QUICK_ROUNDS if quick else ROUNDS)}
+
+
+def _rounds(number: int) -> dict[str, float]:
+    """An artist's rounds; memory is that in use when the extension is enabled again and nothing is under way."""
+    import addon_utils
+    import bpy
+
+    from devtools import session
+    from examples import row80
+    from tetflora_addon import memory, parallel
+    from tetflora_addon.processes import pool
+
+    scene = bpy.context.scene
+    row80.build(scene, count=6, species="birch")
+    scene.render.resolution_x, scene.render.resolution_y = 480, 270
+    scene.tetflora.year.enabled = True
+    bpy.context.preferences.edit.undo_steps = UNDO_STEPS
+    parallel.use(2)
+    threads, used, polygons = threading.active_count(), 0, set()
+    left, handles, resident = {"processes": 0, "threads": 0}, [], []
+    for round in range(number):
+        scene = bpy.context.scene
+        scene.tetflora.year.day = 90 + 30 * (round % DAYS)
+        scene.tetflora.cutoff = 2.0  # so that other processes are worth it
+        bpy.ops.ed.undo_push(message="Before")
+        if bpy.ops.tetflora.refine() != {'FINISHED'}:
+            raise RuntimeError("Refine did not finish")
+        bpy.ops.ed.undo_push(message="Refine")
+        bpy.ops.ed.undo()
+        bpy.ops.ed.redo()
+        used = max(used, len(children()))
+        polygons.add(sum(len(mesh.polygons) for mesh in bpy.data.meshes))
+        scene = bpy.context.scene
+        scene.name = f"round {round % 3}"
+        next(obj for obj in scene.objects if obj.tetflora.is_plant).name = f"renamed {round % 5}"
+        addon_utils.disable(session.PACKAGE)
+        left["processes"] = max(left["processes"], len(children()))
+        end = time.monotonic() + 5.0
+        while threading.active_count() > threads and time.monotonic() < end:
+            time.sleep(0.01)  # those of `parallel` end when they have seen that they may
+        left["threads"] = max(left["threads"], threading.active_count() - threads)
+        addon_utils.enable(session.PACKAGE)
+        gc.collect()
+        memory.give_back()
+        resident.append(resident_mb())
+        handles.append(len(os.listdir("/proc/self/fd")))
+    pool.stop()
+    counted = np.array(resident[FIRST_ROUNDS:])
+    some = DAYS * max(len(counted) // (10 * DAYS), 1)  # whole years, as each day has memory of its own
+    first, last = counted[:some].mean(), counted[-some:].mean()
+    return {
+        "rounds": number,
+        "leak_percent": float(100.0 * (last / first - 1.0)),
+        "first_rounds_mb": float(first),
+        "last_rounds_mb": float(last),
+        "processes_used": used,
+        "seasons": len(polygons),
+        "processes_left": left["processes"],
+        "threads_left": left["threads"],
+        "handles_left": handles[-1] - handles[FIRST_ROUNDS],
+    }
+
+
+def children() -> list[int]:
+    """Processes that this one has started and that still run, or wait for it to learn of their end."""
+    own, found = os.getpid(), []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # ended meanwhile
+            if int(path.read_text("ascii", "replace").rpartition(")")[2].split()[1]) == own:
+                found.append(int(path.parent.name))
+    return found
+
+
+def _frames(frames: int) -> dict[str, float]:
+    """The animation."""
     import bpy
 
     from examples import row80
@@ -53,7 +151,6 @@ def run(quick: bool) -> dict[str, float]:
     scene.render.resolution_x, scene.render.resolution_y = 64, 36
     scene.cycles.samples = 1
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-    frames = QUICK_FRAMES if quick else FRAMES
     scene.frame_start, scene.frame_end = 1, WARM_UP + frames
     scene.tetflora.share_frames = False
     camera, begin = scene.camera, scene.camera.location.x

@@ -39,8 +39,8 @@ def watching(look: Callable[[Refinement, Detail], Detail | None]) -> Iterator[No
     """While it lasts, jobs show what the loop left and the detail they can afford, and take what it returns."""
     afford = refine.afford
 
-    def watched(flora: object, refinement: Refinement, *rest: object) -> Detail:
-        detail = afford(flora, refinement, *rest)
+    def watched(refinement: Refinement, *rest: object) -> Detail:
+        detail = afford(refinement, *rest)
         return look(refinement, detail) or detail
 
     refine.afford = watched

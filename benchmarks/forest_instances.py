@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import bpy
 import numpy as np
 
-from tetflora_addon.blender.job.contents import compile_for, read_scene
+from tetflora_addon.blender.job.contents import compile_for, in_year, read_scene
 from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, single_seed
 from tetflora_addon.growth.seeds import Seeds
 
@@ -27,10 +27,11 @@ _NAMED = (
 )
 
 
-def build(scene: bpy.types.Scene, of_each: int = 0) -> dict[str, float]:
+def build(scene: bpy.types.Scene, of_each: int = 0, own: bool = False) -> dict[str, float]:
     """Put variants at the places of all plants of a scene; seconds, and polygons of the variants.
 
-    So many of each species, or `VARIANTS` in all.
+    So many of each species, or `VARIANTS` in all, each at random; ``own``: that of the plant's own seed, which must be
+    below their number.
     """
     start = time.perf_counter()
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -38,14 +39,14 @@ def build(scene: bpy.types.Scene, of_each: int = 0) -> dict[str, float]:
     variants = bpy.data.collections.new(_NAME)  # of no scene: only the instances are rendered
     polygons, each = 0, of_each or -(-VARIANTS // len(seeds.identifiers))
     for number, kind in enumerate(seeds.identifiers):
-        flora = compile_for((kind,), scene, depsgraph)
+        flora = in_year(scene, compile_for((kind,), scene, depsgraph))
         for one in range(each):
             # Geometry nodes sort the members of a collection by their names.
             name = f"{_NAME} {number:03d} {one:03d}"
             mesh = plant_mesh(scene, name, flora.species[0], plant_parts(flora, single_seed(kind, one)))
             variants.objects.link(bpy.data.objects.new(name, mesh))
             polygons += len(mesh.polygons)
-    wood = bpy.data.objects.new("Wood", _points(seeds, each))
+    wood = bpy.data.objects.new("Wood", _points(seeds, each, own))
     scene.collection.objects.link(wood)
     wood.modifiers.new("Instances", 'NODES').node_group = _nodes(variants)
     bpy.context.view_layer.update()
@@ -53,8 +54,10 @@ def build(scene: bpy.types.Scene, of_each: int = 0) -> dict[str, float]:
     return {"instances": len(seeds), "build_s": seconds, "variant_polygons": polygons, "peak_mb": peak_mb()}
 
 
-def _points(seeds: Seeds, each: int) -> bpy.types.Mesh:
+def _points(seeds: Seeds, each: int, own: bool) -> bpy.types.Mesh:
     """A vertex for each plant, with its rotation, scale and variant, out of so many of its species."""
+    if own and len(seeds) and not 0 <= seeds.seed.min() <= seeds.seed.max() < each:
+        raise ValueError(f"Seeds from {seeds.seed.min()} to {seeds.seed.max()} are none of {each} variants")
     mesh = bpy.data.meshes.new("Wood")
     mesh.vertices.add(len(seeds))
     frame = seeds.frame
@@ -66,7 +69,8 @@ def _points(seeds: Seeds, each: int) -> bpy.types.Mesh:
         ],
         axis=1,
     )
-    variant = seeds.species * each + np.random.default_rng(1).integers(0, each, len(seeds))
+    chosen = seeds.seed if own else np.random.default_rng(1).integers(0, each, len(seeds))
+    variant = seeds.species * each + chosen
     mesh.attributes["position"].data.foreach_set("vector", seeds.position.astype(np.float32).ravel())
     for name, kind, key, values in (
         ("turned", 'FLOAT_VECTOR', "vector", angles.astype(np.float32)),

@@ -38,7 +38,7 @@ def sums(records: Mapping[tuple[str, str], dict]) -> dict[str, float]:
     """
     woods = {case: one for (case, what), one in records.items() if what == "refine" and case != "million"}
     species = [one for case, one in woods.items() if case not in ("mix", "eye")]
-    ratios = {case: _ratios(one, records[case, "instances"]) for case, one in woods.items()}
+    over = {case: ratios(one, records[case, "instances"]) for case, one in woods.items()}
     parts = {case: one for (case, what), one in records.items() if what == "part"}
     limits = {int(what.removeprefix("limit_")): one for (_, what), one in records.items() if what.startswith("limit_")}
     figures = {
@@ -47,7 +47,7 @@ def sums(records: Mapping[tuple[str, str], dict]) -> dict[str, float]:
         "polygons_max": max(one["polygons"] for one in woods.values()),
         **{f"{case}_s": woods[case]["refine_emit_s"] for case in ("mix", "eye") if case in woods},
         "longest_step_s": max(one["longest_step_s"] for one in woods.values()),
-        **{f"{key}_max": max(one[key] for one in ratios.values()) for key in next(iter(ratios.values()))},
+        **{f"{key}_max": max(one[key] for one in over.values()) for key in next(iter(over.values()))},
         "hidden_open_ratio_max": max(one["hidden_open"] for one in woods.values()),
         "flip_mean": float(np.mean([one["flip"] for one in parts.values()])),
         "flip_max": max(one["flip"] for one in parts.values()),
@@ -63,12 +63,12 @@ def sums(records: Mapping[tuple[str, str], dict]) -> dict[str, float]:
     for case, one in woods.items():
         figures |= {f"{key}_{case}": one[key] for key in _OURS if key in one}
         figures |= {f"instances_{key}_{case}": records[case, "instances"][key] for key in _THEIRS}
-        figures |= {f"{key}_{case}": value for key, value in ratios[case].items()}
+        figures |= {f"{key}_{case}": value for key, value in over[case].items()}
         figures |= {f"{key}_{case}": parts[case][key] for key in _PART if key in parts[case]}
     return figures
 
 
-def _ratios(ours: dict, theirs: dict) -> dict[str, float]:
+def ratios(ours: dict, theirs: dict) -> dict[str, float]:
     """Ours over instances: render, everything until an image with `SAMPLES` samples, and memory."""
     whole, processor = f"render_{SAMPLES}_s", f"render_{SAMPLES}_cpu_s"
     return {

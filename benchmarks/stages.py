@@ -21,9 +21,12 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.job.contents import compile_for
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.blender.scene.plants import read_plants
-from tetflora_addon.emission.forms import Refined, facet_blocks
-from tetflora_addon.emission.plants import explicit_blocks
+from tetflora_addon.emission.drawing import drawing
+from tetflora_addon.emission.forms import Refined, as_triangles, facet_blocks
+from tetflora_addon.emission.plants import Transition
 from tetflora_addon.proxies.facet_sizes import FacetPixels
+from tetflora_addon.proxies.facet_weights import facet_weights
+from tetflora_addon.refinement.settings import RefinementSettings
 
 from .report import Targets
 
@@ -86,11 +89,15 @@ def run(quick: bool) -> dict[str, float]:
     for stage, wall_s in result.seconds.items():  # wall clock, scaled to processor time
         seconds[stage], left[stage] = wall_s / wall * taken, sizes[stage]
     begun = time.process_time()
-    for block in explicit_blocks(flora, result, camera):
+    settings = RefinementSettings()
+    transition, weights = Transition(flora, camera, settings.leaf_limit), facet_weights(flora)
+    given = drawing(flora, result, camera, transition, settings.facet, weights, form=as_triangles)
+    refined = Refined(flora, result, camera, FacetPixels(settings.facet), given)
+    for block in refined.mesh_blocks():
         lap("polygons", block.buffers.nbytes)
         meshes.write_mesh("block", block.buffers)
         lap("write", block.buffers.nbytes)
-    for facets in facet_blocks(Refined(flora, result, camera, FacetPixels(0.33))):
+    for facets in facet_blocks(refined):
         lap("facets", facets.nbytes)
         meshes.write_mesh("facets", facets)
         lap("write", facets.nbytes)

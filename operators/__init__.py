@@ -19,6 +19,7 @@ from . import (
     populations,
     preview,
     refine,
+    report,
     species,
     stands,
     year,

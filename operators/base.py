@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from ..tetflora_addon.blender.placing.plant_objects import plants_of
+from ..tetflora_addon.blender.runtime import remember
 from ..tetflora_addon.blender.worker import at_once
 from ..tetflora_addon.errors import TetFloraError, readable
 from ..tetflora_addon.jobs import Progress
@@ -53,6 +54,7 @@ class Tool:
 
     def failed(self, error: TetFloraError | str) -> set[str]:
         """Report an error; the operator's result, for which Blender pushes no undo step."""
+        remember(str(error))
         self.report({'ERROR'}, readable(str(error)))
         return {'CANCELLED'}
 
@@ -67,6 +69,9 @@ class Reporting(Tool):
             return self.run(context)
         except TetFloraError as error:
             return self.failed(error)
+        except Exception as error:  # Blender shows it
+            remember(repr(error), error)
+            raise
 
     def run(self, context: bpy.types.Context) -> set[str]:
         """Do it; the result of ``execute``."""
@@ -188,7 +193,8 @@ class ModalJob(Reporting):
         except TetFloraError as error:
             self.cancel(context)
             return self.failed(error)
-        except BaseException:
+        except BaseException as error:
+            remember(repr(error), error)
             self.cancel(context)
             raise
         self._show(context, progress)

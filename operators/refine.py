@@ -76,6 +76,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         for warning in (
             *_few_of(asset_warnings),
             statistics.left_out,
+            statistics.coarser,
             outside,
             few_bounces(context.scene),
             _unread_world(context.scene),

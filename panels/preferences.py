@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import bpy
 
 from ..operators.refine import TETFLORA_OT_clear_cache, TETFLORA_OT_refine
+from ..operators.report import TETFLORA_OT_write_report
 from ..tetflora_addon import storage
 from ..tetflora_addon.blender.preferences import CACHE_VARIABLE, TetFloraPreferences, species_folders
 from ..tetflora_addon.blender.species.edits import skipped_files
@@ -85,6 +86,7 @@ def _draw(self: TetFloraPreferences, context: bpy.types.Context) -> None:
     layout.prop(self, "new_quality")
     layout.prop(self, "new_memory")
     _draw_cache(layout.column(), self)
+    layout.operator(TETFLORA_OT_write_report.bl_idname, icon='TEXT')
     _draw_keys(layout.column(), context)
 
 

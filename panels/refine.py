@@ -67,7 +67,8 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
             draw_message(context, layout, "The scene has no camera; add one, and make it active with Ctrl Numpad 0")
         elif text := hint(context.scene) or made_of(settings.statistics):
             draw_message(context, layout, text, 'INFO')
-        for number, text in enumerate(forecast_text(context.scene, context.view_layer).splitlines()):
+        expected = forecast_text(context.scene, context.view_layer)
+        for number, text in enumerate(expected.splitlines()):
             draw_message(context, layout, text, 'BLANK1' if number else 'TIME')
         layout = split_layout(self)
         column = layout.column()
@@ -81,6 +82,9 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         if active is not None and (may_scatter(active) or is_scatter(active)):
             _draw_scatter(layout, active)
         draw_properties(layout, settings, "refine_at_render", "auto_refine")
+        if expected and settings.refine_at_render and not context.scene.render.use_lock_interface:
+            draw_message(context, layout, "Lock Interface is off: the window stands still while frames are refined")
+            layout.prop(context.scene.render, "use_lock_interface")
         row = layout.row()
         row.active = settings.auto_refine
         row.prop(settings, "follow_viewport")

@@ -114,6 +114,27 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
     )
 
 
+def kept_faces(mesh: MeshBuffers, kept: NDArray[np.bool_]) -> MeshBuffers:
+    """Some faces of a mesh, a mask (f,), with the vertices and edges that they need."""
+    size = np.diff(mesh.face_offsets)
+    corner = np.flatnonzero(np.repeat(kept, size))
+    verts, edges = np.zeros(len(mesh.positions), bool), np.zeros(len(mesh.edge_verts), bool)
+    verts[mesh.corner_verts[corner]] = True
+    edges[mesh.corner_edges[corner]] = True
+    vert, edge = (np.cumsum(some, dtype=np.int32) - np.int32(1) for some in (verts, edges))
+    some = {"POINT": np.flatnonzero(verts), "FACE": np.flatnonzero(kept), "CORNER": corner}
+    return MeshBuffers(
+        positions=mesh.positions[some["POINT"]],
+        edge_verts=vert[mesh.edge_verts[edges]],
+        corner_verts=vert[mesh.corner_verts[corner]],
+        corner_edges=edge[mesh.corner_edges[corner]],
+        face_offsets=np.concatenate([[0], np.cumsum(size[kept])]).astype(np.int32),
+        attributes={name: (domain, values[some[domain]]) for name, (domain, values) in mesh.attributes.items()},
+        smooth=mesh.smooth,
+        species=mesh.species,
+    )
+
+
 def _values(mesh: MeshBuffers, name: str, domain: str, like: NDArray) -> NDArray:
     """Values of an attribute of a mesh; zeros if it has none of that name."""
     if name in mesh.attributes:

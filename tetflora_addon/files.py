@@ -13,6 +13,7 @@ import json
 import os
 import re
 import stat
+import time
 import uuid
 from collections.abc import Callable
 from contextlib import suppress
@@ -32,6 +33,8 @@ IDENTIFIER_RULE = 'letters from a to z, digits, "_" and "-", at most 64, and no 
 _NO_LINKS = getattr(os, "O_NOFOLLOW", 0)  # Windows has none
 # A pipe would let whoever opens it wait for its other end.
 _READING = os.O_RDONLY | _NO_LINKS | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
+#: Windows' errors of a file that another program has open, and seconds between tries to replace it.
+_HELD, _WAITS = (5, 32), (0.01, 0.03, 0.1, 0.3, 0.6)
 _DIGITS = 300  # of integers that every float can hold
 
 
@@ -110,11 +113,29 @@ def write_whole(path: Path, content: bytes | str) -> None:
             file.write(content.encode() if isinstance(content, str) else content)
             file.flush()
             os.fsync(file.fileno())  # drives in the network only say here that they are full
-        part.replace(path)
+        replace(part, path)
     except BaseException:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise
+
+
+def replace(part: Path, path: Path) -> None:
+    """Put a file in the place of another one; on Windows wait a moment for whoever has that open, as virus scanners do.
+
+    Raises
+    ------
+    OSError
+        It cannot be put there.
+    """
+    for wait in (*_WAITS, None):
+        try:
+            part.replace(path)
+            return
+        except PermissionError as error:
+            if wait is None or getattr(error, "winerror", None) not in _HELD:
+                raise
+            time.sleep(wait)
 
 
 def json_of(content: bytes | str, constant: Callable[[str], float] = float) -> Any:

@@ -28,6 +28,8 @@ VARIABLE = "TETFLORA_THREADS"
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 _wanted = 0  # threads, see `use`
+_pools: dict[int, ThreadPoolExecutor] = {}  # by their numbers of threads
+_lock = threading.Lock()
 _here = threading.local()  # "at_work" in threads of the pool, which must not wait for each other
 
 
@@ -87,16 +89,20 @@ def within() -> bool:
     return getattr(_here, "at_work", False)
 
 
-def in_each_thread(function: Callable[[], object]) -> None:
-    """Call a function in as many threads as work at the same time, and do not wait for it."""
-    for _ in range(threads()):
-        _pool().submit(function)
+def begin(function: Callable[[], object]) -> None:
+    """Call a function in one of the threads that work at the same time, and do not wait for it."""
+    _pool().submit(function)
+
+
+def stop() -> None:
+    """Let all threads end when they have done what they are at; new ones begin when they are needed."""
+    while _pools:
+        _pools.popitem()[1].shutdown(wait=False, cancel_futures=True)
 
 
 def _pool() -> ThreadPoolExecutor:
-    return _pool_of(threads())
-
-
-@cache
-def _pool_of(number: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(number, "tetflora", lambda: setattr(_here, "at_work", True))
+    number = threads()
+    with _lock:
+        if number not in _pools:
+            _pools[number] = ThreadPoolExecutor(number, "tetflora", lambda: setattr(_here, "at_work", True))
+        return _pools[number]

@@ -7,16 +7,36 @@ from __future__ import annotations
 import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
+from types import SimpleNamespace
 
+import bpy
 import pytest
 
-from tetflora_addon.blender import main_thread
+from tetflora_addon.blender import main_thread, runtime
 
 
-@pytest.fixture(autouse=True)
-def no_timer():
-    yield
-    main_thread.unregister()
+@pytest.fixture
+def window(monkeypatch):
+    """A window with *Lock Interface* off, and what is asked of Blender's timers from which thread."""
+    asked = []
+
+    def register(function, **options) -> None:
+        asked.append((threading.current_thread(), function, options))
+
+    manager = SimpleNamespace(is_interface_locked=False)
+    timers = SimpleNamespace(register=register, is_registered=lambda _: False)
+    app = SimpleNamespace(background=False, timers=timers)
+    data = SimpleNamespace(window_managers=[manager], scenes=())
+    monkeypatch.setattr(main_thread, "bpy", SimpleNamespace(app=app, data=data))
+    monkeypatch.setattr(bpy.app.timers, "register", register)
+    yield SimpleNamespace(manager=manager, timers=asked)
+    main_thread._asked.clear()
+
+
+def elsewhere(function, *given) -> object:
+    """Call a function in another thread."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(function, *given).result(5.0)
 
 
 def asked(function) -> Future:
@@ -57,9 +77,35 @@ def test_where_the_main_thread_waits_itself_the_asker_makes_the_change_once(monk
     assert calls[0] is not threading.main_thread()
 
 
-def test_the_timer_ends_when_nothing_is_asked_for_a_while() -> None:
-    looks = 0
-    while main_thread.make_changes() is not None:
-        looks += 1
-        assert looks < 1000
-    assert looks > 100
+def test_one_timer_looks_for_ever_often_after_a_change_and_seldom_else(window) -> None:
+    main_thread.register()
+    assert window.timers == [(threading.main_thread(), main_thread.make_changes, {"persistent": True})]
+    asked(int)
+    waits = [main_thread.make_changes() for _ in range(1000)]
+    assert waits[0] < 0.01 and 0.02 < waits[-1] < 0.2 and waits == sorted(waits)
+
+
+def test_no_other_thread_touches_blenders_timers(window) -> None:
+    elsewhere(asked, int)
+    elsewhere(runtime.call_soon, main_thread.make_changes, 0.5)
+    elsewhere(runtime.complain, "something is wrong")
+    elsewhere(runtime.open_menu, "TETFLORA_MT_nothing_refined")
+    assert not window.timers
+    main_thread._asked.popleft().make()  # in the main thread, the request for a timer reaches it
+    assert window.timers == [(threading.main_thread(), main_thread.make_changes, {"first_interval": 0.5})]
+
+
+def test_an_error_that_nobody_waits_for_is_printed_and_ends_nothing(window, capsys) -> None:
+    later: list[int] = []
+    main_thread.later(lambda: {}["missing"])
+    main_thread.later(lambda: later.append(1))
+    main_thread.make_changes()
+    assert later == [1]
+    assert "KeyError: 'missing'" in capsys.readouterr().err
+
+
+def test_the_window_draws_only_while_another_thread_works_and_nothing_locks_it(window) -> None:
+    assert not main_thread.window_draws()
+    assert elsewhere(main_thread.window_draws)
+    window.manager.is_interface_locked = True
+    assert not elsewhere(main_thread.window_draws)

@@ -8,6 +8,7 @@ Nothing here measures time: whoever must wait waits for an event, and gives up a
 from __future__ import annotations
 
 import gc
+import operator
 import subprocess
 import sys
 import threading
@@ -19,8 +20,10 @@ from pathlib import Path
 import bpy
 import pytest
 
+from tetflora_addon import parallel
 from tetflora_addon.blender import worker
 from tetflora_addon.jobs import Progress
+from tetflora_addon.processes import pool
 
 PATIENCE = 30.0
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,6 +39,7 @@ def no_thread_is_left():
     for thread in threads():
         thread.join(PATIENCE)
     assert not threads()
+    pool.resume()
 
 
 def threads() -> list[threading.Thread]:
@@ -285,6 +289,7 @@ def test_python_ends_although_a_thread_is_at_work():
     """As when Blender is closed in the middle of a pass."""
     script = """
 import time
+from tetflora_addon import parallel
 from tetflora_addon.blender import worker
 worker.register()
 def work():
@@ -302,3 +307,22 @@ print("left")
     done = subprocess.run([*command, script], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
     assert "left" in done.stdout.splitlines(), done.stderr
     assert done.returncode == 0
+
+
+def test_when_the_extension_is_disabled_all_ends_and_begins_again_when_it_is_enabled(monkeypatch):
+    monkeypatch.setattr(parallel, "threads", lambda: 2)
+    assert list(pool.in_processes(operator.add, 1, range(4))) == [1, 2, 3, 4]
+    started = [own._process for own in pool._pool.children]
+    assert started
+    worker.unregister()
+    try:
+        assert all(process.poll() is not None for process in started)
+        pool.start()
+        assert list(pool.in_processes(operator.add, 1, range(4))) == [1, 2, 3, 4]
+        assert not pool._pool.children
+    finally:
+        worker.register()
+    assert list(pool.in_processes(operator.add, 1, range(4))) == [1, 2, 3, 4]
+    assert pool._pool.children
+    pool.stop()
+    pool.resume()

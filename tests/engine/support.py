@@ -13,17 +13,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tetflora_addon.arrays import spread
-from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
+from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
-from tetflora_addon.emission.forms import Refined, facet_blocks
-from tetflora_addon.emission.plants import Transition
+from tetflora_addon.emission.drawing import drawing
+from tetflora_addon.emission.forms import Refined
+from tetflora_addon.emission.plants import Block, Transition
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts, trunks
 from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.proxies.drawn import joined
 from tetflora_addon.proxies.facet_sizes import FacetPixels
+from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights, facet_weights
+from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.species.catalogue import builtin_folder, load_species
 from tetflora_addon.species.members import expected_polygons
@@ -258,16 +262,35 @@ def moment(*meshes: MeshBuffers) -> NDArray[np.float64]:
     return scaled.T @ scaled / areas.sum()
 
 
-def facet_buffers(
+def refined(
     flora: Flora,
     result: Refinement,
     camera: Camera,
-    pixels: FacetPixels | float = 0.33,
-    transition: Transition | None = None,
-) -> MeshBuffers | None:
-    """All facets in one mesh, of given sides in pixels; without a transition, those of all plants; None if none."""
-    sides = pixels if isinstance(pixels, FacetPixels) else FacetPixels(pixels)
-    return concatenate_buffers(list(facet_blocks(Refined(flora, result, camera, sides, transition))))
+    facet: float = 1.0,
+    limit: float = 1e9,
+    weighted: bool = True,
+    **options: Any,
+) -> Refined:
+    """A scene to be drawn with facets of so many pixels, and leaves as facets up to a width of so many.
+
+    weighted: facets have the area that leaves of a cluster show; else all of the area that they stand for.
+    """
+    ones = np.ones((1, len(flora.rows), len(COUNTS)))
+    there = np.unique(flora.species_of(result.plants.parts.branches.row)).tolist()
+    weights = facet_weights(flora, there) if weighted else FacetWeights(ones, ones)
+    given = drawing(flora, result, camera, Transition(flora, camera, limit, np.inf), facet, weights, **options)
+    return Refined(flora, result, camera, FacetPixels(facet / 3.0), given)
+
+
+def drawn(
+    flora: Flora, result: Refinement, camera: Camera, facet: float = 1.0, limit: float = 1e9, **options: Any
+) -> tuple[list[Block], Facets, NDArray[np.bool_]]:
+    """Meshes, facets (n,), and which of these (n,) are seen; options as of `refined`."""
+    scene = refined(flora, result, camera, facet, limit, **options)
+    blocks = list(scene.mesh_blocks())
+    parts = [part for parts in scene.facet_parts() for part in parts]
+    facets = joined([some for some, _ in parts]) if parts else Facets.empty()
+    return blocks, facets, np.concatenate([np.zeros(0, bool), *(np.full(len(some), seen) for some, seen in parts)])
 
 
 def face_planes(vertices: NDArray[np.float64]) -> NDArray[np.float64]:

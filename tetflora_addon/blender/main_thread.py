@@ -7,11 +7,18 @@ views and properties from drawing meanwhile, but not the Outliner (source of 5.2
 up every object of every collection in the view layer, and Blender crashes if the other thread is just linking or
 removing one, or is at the view layer's list of objects, which it makes anew after each change when somebody needs it.
 So such changes are handed to the main thread, which makes them between two redraws, and the lists at once.
+
+Without *Lock Interface* nothing keeps the window from drawing what the other thread changes. Then all that a handler
+does is handed over, and the window stands still meanwhile: `window_draws` tells.
+
+Blender's timers are a list without a lock, so only the main thread may touch them: one timer, which is there as long
+as the extension is, looks at a queue.
 """
 
 from __future__ import annotations
 
 import threading
+import traceback
 from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
@@ -21,18 +28,17 @@ import bpy
 #: Seconds after which the caller makes the change itself: the main thread then waits for the render, to quit or to
 #: open a file, and draws nothing.
 _PATIENCE = 3.0
-#: Seconds between two looks, and looks without a change after which the timer ends. It goes on for a while because
-#: adding timers from another thread is better done rarely.
-_LOOK, _LOOKS = 0.005, 400
+#: Seconds between two looks, and between those of a while without any change; how many looks such a while has.
+_LOOK, _IDLE, _LOOKS = 0.005, 0.05, 400
 
 _Result = TypeVar("_Result")
 
 
 class _Change(Generic[_Result]):
-    """A function that is called once, by whoever comes first."""
+    """A function that is called once, by whoever comes first; whether anybody waits for its result."""
 
-    def __init__(self, function: Callable[[], _Result]) -> None:
-        self._function = function
+    def __init__(self, function: Callable[[], _Result], waits: bool = True) -> None:
+        self._function, self._waits = function, waits
         self._mine = threading.Lock()
         self.done = threading.Event()
         self.error: BaseException | None = None
@@ -47,12 +53,14 @@ class _Change(Generic[_Result]):
             sync_view_layers()
         except BaseException as error:  # raised again where it was asked for
             self.error = error
+            if not self._waits:
+                traceback.print_exc()
         finally:
             self.done.set()
 
 
 _asked: deque[_Change] = deque()
-_idle = 0
+_idle = _LOOKS
 
 
 def sync_view_layers() -> None:
@@ -72,16 +80,33 @@ def in_main_thread(function: Callable[[], _Result] = sync_view_layers) -> _Resul
     function : callable
         By default `sync_view_layers`: what the main thread was doing is done then.
     """
-    if bpy.app.background or threading.current_thread() is threading.main_thread():
+    if bpy.app.background or on_main_thread():
         return function()
     return _handed_over(function)
+
+
+def window_draws() -> bool:
+    """Whether the window may draw while this thread changes data: in a render's thread without *Lock Interface*.
+
+    That of the scene decides which is rendered; of a sequencer, not those of the scenes that it shows.
+    """
+    return not (bpy.app.background or on_main_thread() or bpy.data.window_managers[0].is_interface_locked)
+
+
+def on_main_thread() -> bool:
+    """Whether this is Blender's main thread."""
+    return threading.current_thread() is threading.main_thread()
+
+
+def later(function: Callable[[], object]) -> None:
+    """Call a function in the main thread soon, from any thread; not without a window, where nothing would call it."""
+    if not bpy.app.background:
+        _asked.append(_Change(function, False))
 
 
 def _handed_over(function: Callable[[], _Result]) -> _Result:
     change = _Change(function)
     _asked.append(change)
-    if not bpy.app.timers.is_registered(make_changes):
-        bpy.app.timers.register(make_changes)
     if not change.done.wait(_PATIENCE):
         change.make()
         change.done.wait()
@@ -93,20 +118,19 @@ def _handed_over(function: Callable[[], _Result]) -> _Result:
     return change.result
 
 
-def make_changes() -> float | None:
-    """Make what other threads have asked for; seconds until the next look, None after many in vain."""
+def make_changes() -> float:
+    """Make what other threads have asked for; seconds until the next look."""
     global _idle
-    _idle = 0 if _asked else _idle + 1
+    _idle = 0 if _asked else min(_idle + 1, _LOOKS)
     while _asked:
         _asked.popleft().make()
-    if _idle <= _LOOKS:
-        return _LOOK
-    _idle = 0
-    return None
+    return _LOOK if _idle < _LOOKS else _IDLE
 
 
 def register() -> None:
-    """Nothing yet: the timer runs when something is asked for."""
+    """Begin to look, if there is a window; opening another file changes nothing about it."""
+    if not bpy.app.background:
+        bpy.app.timers.register(make_changes, persistent=True)
 
 
 def unregister() -> None:

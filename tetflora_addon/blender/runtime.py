@@ -13,14 +13,20 @@ import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
+from textwrap import wrap
+from traceback import FrameSummary, extract_tb
 from typing import Any, TypeVar
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import SceneError, readable
-from .main_thread import in_main_thread
+from ..processes import pool
+from .main_thread import in_main_thread, later, on_main_thread
 
+#: Letters of a line in a popup.
+_LINE = 100
 #: Errors of the last render: a text for each frame that was rendered without its plants.
 failed_frames: list[str] = []
 
@@ -63,8 +69,10 @@ class Listeners(list):
 
 
 def call_soon(function: Callable[[], float | None], seconds: float) -> None:
-    """Call a function of a module by a timer, once for all requests until then."""
-    if not bpy.app.timers.is_registered(function):
+    """Call a function of a module by a timer, once for all requests until then; from any thread, as of a render."""
+    if not on_main_thread():
+        later(partial(call_soon, function, seconds))
+    elif not bpy.app.timers.is_registered(function):
         bpy.app.timers.register(function, first_interval=seconds)
 
 
@@ -156,6 +164,7 @@ class JobData:
             raise GoneError(f"{self.job} was stopped because {self._reason}; start it again") from error
 
 
+_last: tuple[str, list[str]] = ("", [])
 _running: list[tuple[JobData, Generator]] = []
 
 
@@ -199,7 +208,29 @@ _STOPPING = Handlers(
     load_pre=lambda *_: stop_jobs("another file was opened"),
     render_init=lambda *_: in_main_thread(partial(stop_jobs, "a render began")),
 )
-register, unregister = _STOPPING.register, _STOPPING.unregister
+unregister = _STOPPING.unregister
+
+
+def register() -> None:
+    """Register the handlers, and let the artist know when other processes cannot be used."""
+    _STOPPING.register()
+    pool.tell = complain
+
+
+def remember(text: str, error: BaseException | None = None) -> None:
+    """Keep the last error of the session for a report, and where it was; the error itself would keep all its data."""
+    global _last
+    _last = text, [f"  {_place(frame)}" for frame in extract_tb(error.__traceback__)] if error is not None else []
+
+
+def _place(frame: FrameSummary) -> str:
+    """File, line and function of a call, without the folders of a user."""
+    return f"{'/'.join(Path(frame.filename).parts[-3:])}:{frame.lineno} in {frame.name}"
+
+
+def last_error() -> tuple[str, list[str]]:
+    """What was told last, and the calls that led there if it was none that TetFlora expects; empty at first."""
+    return _last
 
 
 def redraw() -> None:
@@ -213,12 +244,14 @@ def redraw() -> None:
 def complain(text: str) -> None:
     """Report an error where no operator can: in the terminal, and in the window if there is one."""
     text = readable(text)
+    remember(text)
     print(f"TetFlora: error: {text}", file=sys.stderr, flush=True)
-    _in_window(
-        lambda: bpy.context.window_manager.popup_menu(
-            lambda menu, _context: menu.layout.label(text=text), title="TetFlora", icon='ERROR'
-        )
-    )
+
+    def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+        for line in wrap(text, _LINE):
+            menu.layout.label(text=line)
+
+    _in_window(lambda: bpy.context.window_manager.popup_menu(draw, title="TetFlora", icon='ERROR'))
 
 
 def open_menu(identifier: str) -> None:
@@ -235,5 +268,4 @@ def _in_window(function: Callable[[], object]) -> None:
             with bpy.context.temp_override(window=windows[0]):
                 function()
 
-    if not bpy.app.background:
-        bpy.app.timers.register(call)
+    later(call)

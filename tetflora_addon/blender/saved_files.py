@@ -22,7 +22,7 @@ from pathlib import Path
 import bpy
 
 from ..errors import SceneError, shown
-from ..files import IDENTIFIER_RULE, PART, is_identifier
+from ..files import IDENTIFIER_RULE, PART, is_identifier, replace
 from .runtime import Handlers, complain
 
 #: Version of the layout of properties; a later one adds steps from earlier ones to `migrate`.
@@ -61,7 +61,7 @@ def write_blend(path: Path, write: Callable[[str], object]) -> None:
         write(str(part))
         if cut_off(part):
             raise SceneError(f"Cannot write {path}: the disk is full")
-        part.replace(path)
+        replace(part, path)
     except (OSError, RuntimeError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         # What Blender says of a full disk.

@@ -19,6 +19,7 @@ from contextlib import closing
 from typing import Any, TypeVar
 from weakref import WeakSet
 
+from .. import parallel
 from ..jobs import Progress
 from ..jobs import at_once as run
 from ..processes import pool
@@ -227,18 +228,20 @@ _workers: WeakSet[_Worker] = WeakSet()
 
 
 def stop_all() -> None:
-    """Stop all work, and wait a moment for it; end other processes."""
+    """Stop all work, end other processes and threads, and wait a moment for those that are at something."""
     end = time.monotonic() + _PARTING
     running = list(_workers)
     for worker in running:
         worker.stop()
+    pool.stop()
     for worker in running:
         worker.rests(max(0.0, end - time.monotonic()))
-    pool.stop()
+    parallel.stop()
 
 
 def register() -> None:
     """Stop when Python ends: a thread must not go on while its modules disappear."""
+    pool.resume()
     atexit.register(stop_all)
 
 

@@ -22,10 +22,10 @@ from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes
 from ..proxies.microsurfaces import Facets, kept_out_of_view
 from ..refinement.asset_parts import AssetParts
 from ..refinement.decisions import real_fraction
+from ..subplants.pieces import chunks
 from .asset_sight import AssetPortions, AssetSight
 from .leaf_detail import FADING
-from .plants import KITES
-from .portions import MIXED, in_chunks
+from .plants import KITES, MIXED
 
 #: How many times as far plain instances are kept where the renderer shows a mesh in many places for the cost of one.
 FARTHER = 20.0
@@ -156,7 +156,7 @@ def planned_facets(
 ) -> Iterator[tuple[Any, bool]]:
     """Facets of a plan, or what a form makes of them, and whether they are seen, some at a time."""
     expected = sizes_of(sight, plan.facets).counts(pixels) + 1.0
-    for run in in_chunks(expected, AT_ONCE) if len(expected) else ():
+    for run in chunks(expected, AT_ONCE):
         for facets, seen in _facets_of(sight, plan.facets.take(run), pixels):
             if len(facets):
                 yield facets if form is None else form(facets, seen), seen

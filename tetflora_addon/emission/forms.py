@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,17 +28,23 @@ from ..proxies.drawn import (
 from ..proxies.facet_sizes import FacetPixels
 from ..proxies.microsurfaces import Facets
 from ..refinement.loop import Refinement
-from .asset_plan import AssetPlan
+from .asset_plan import AssetPlan, planned_facets
 from .asset_sight import AssetSight
 from .budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE
-from .facets import Form, Parts, facet_parts
+from .drawing import Drawing, Form, Parts, drawn_blocks
 from .leaf_detail import TOLERANCE
 from .light import BakedLight, baked_attributes
-from .plants import Transition
-from .portions import Sight
+from .plants import Block, explicit_blocks
+from .polygons import hidden_polygon_facets
 from .shells import proxy_shells
 
 Buffers = MeshBuffers | PointBuffers
+
+
+#: Stands for a species where facets are of assets.
+ASSETS = -1
+#: Approximate number of facets of your own meshes that are made at a time.
+FACETS_AT_ONCE = 200_000
 
 
 @dataclass(frozen=True)
@@ -52,38 +57,65 @@ class Refined:
     refinement : Refinement
     camera : Camera
     pixels : FacetPixels or None
-        Sides of facets and spheres; None in forms that have none.
-    transition : Transition or None
-        As for `plants.explicit_blocks`; None in forms without facets.
-    disc : float
-        Area that the renderer draws of a sphere of radius 1.
+        Sides of facets and spheres of instances and meshes; None in forms that have none.
+    drawing : Drawing or None
+        What plants are drawn with; None in forms without facets.
     tolerance : float
-        Pixels by which the margins of near leaves may be off.
-    sight : Sight or None
-        What is seen of plants, where that is known already; None in forms without facets.
+        Pixels by which the margins of near leaves may be off, in forms without facets.
     assets : AssetSight, AssetPlan or None
         What instances of assets are drawn as; None where there are none.
+    disc : float
+        Area that the renderer draws of a sphere of radius 1.
     """
 
     flora: Flora
     refinement: Refinement
     camera: Camera
     pixels: FacetPixels | None = None
-    transition: Transition | None = None
-    disc: float = np.pi
+    drawing: Drawing | None = None
     tolerance: float = TOLERANCE
-    sight: Sight | None = None
     assets: tuple[AssetSight, AssetPlan] | None = None
+    disc: float = np.pi
+    _waiting: list[Parts] = field(default_factory=list, compare=False)
 
     @property
     def facet_pixels(self) -> float | None:
         """Side in pixels of facets that are seen; None in forms that have none."""
-        return None if self.pixels is None else self.pixels.seen
+        return None if self.drawing is None else self.drawing.facet
 
-    def facet_parts(self, form: Form | None = None) -> Iterator[Parts]:
-        """Facets of the proxies, or what a form makes of them, block by block."""
-        given = self.flora, self.refinement, self.camera, self.pixels, self.transition, form
-        return facet_parts(*given, sight=self.sight, assets=self.assets)
+    def mesh_blocks(self) -> Iterator[Block]:
+        """Meshes of plants. Facets are made with them, and wait until `facet_parts` is asked for them."""
+        if self.drawing is None:
+            yield from explicit_blocks(self.flora, self.refinement, self.camera, self.tolerance)
+            return
+        self._waiting.clear()
+        for made in drawn_blocks(self.drawing, self.refinement.plants.parts):
+            if isinstance(made, Block):
+                yield made
+            else:
+                self._waiting.append(made)
+
+    def facet_parts(self, again: bool = False) -> Iterator[Parts]:
+        """Facets of all that is drawn as such, block by block, after `mesh_blocks`.
+
+        again: whether they will be asked for once more, so that they have to stay.
+        """
+        waiting = list(self._waiting)
+        if not again:
+            self._waiting.clear()
+        while waiting:
+            yield waiting.pop(0)
+        form = self.drawing.form
+        more = []
+        if self.assets is not None:
+            more = [(ASSETS, made) for made in planned_facets(*self.assets, self.pixels, form)]
+        polygons = hidden_polygon_facets(self.refinement, self.camera, self.pixels.seen, FACETS_AT_ONCE)
+        for facets, seen in polygons:
+            more.append((None, (facets if form is None else form(facets, seen), seen)))
+        for species in (ASSETS, None):
+            made = [(some, seen) for of, (some, seen) in more if of == species and len(some)]
+            if made:
+                yield Parts(species, tuple(made))
 
 
 @dataclass(frozen=True)
@@ -94,6 +126,8 @@ class EmissionForm:
     ----------
     blocks : callable
         Makes the buffers of a `Refined`, for proxies that the renderer lights.
+    form : callable or None
+        Given the camera and `Refined.disc`, what facets become where they are made; None in forms without facets.
     baked_blocks : callable or None
         The same with baked light, given that light and the number of the first facet in its list of sheets. None:
         proxies of this form are always lit by the renderer.
@@ -106,6 +140,7 @@ class EmissionForm:
     """
 
     blocks: Callable[[Refined], Iterator[Buffers]]
+    form: Callable[[Camera, float], Form] | None = None
     baked_blocks: Callable[[Refined, BakedLight, int], Iterator[Buffers]] | None = None
     primitive_bytes: float = BYTES_PER_POLYGON
     faces: float | None = None
@@ -142,23 +177,21 @@ class AsSpheres:
         return spheres_of(facets, self.camera if seen else None, self.disc)
 
 
-def facet_blocks(refined: Refined) -> Iterator[MeshBuffers]:
-    """Proxies as microsurfaces."""
-    return _blocks(refined, as_triangles)
+def _triangles_everywhere(_camera: Camera, _disc: float) -> Form:
+    return as_triangles
 
 
-def sphere_blocks(refined: Refined) -> Iterator[PointBuffers]:
-    """Proxies as microspheres, one for each facet of `facet_blocks`."""
-    return _blocks(refined, AsSpheres(refined.camera, refined.disc, seen_too=True))
+def _spheres_everywhere(camera: Camera, disc: float) -> Form:
+    return AsSpheres(camera, disc, seen_too=True)
 
 
-def mixed_blocks(refined: Refined) -> Iterator[Buffers]:
-    """Proxies in the form that suits each: facets where they are seen, spheres where they are not."""
-    return _blocks(refined, AsSpheres(refined.camera, refined.disc, seen_too=False))
+def _spheres_where_hidden(camera: Camera, disc: float) -> Form:
+    return AsSpheres(camera, disc, seen_too=False)
 
 
-def _blocks(refined: Refined, form: Form) -> Iterator[Any]:
-    for parts in refined.facet_parts(form):
+def facet_blocks(refined: Refined) -> Iterator[Buffers]:
+    """Facets as the form of the drawing has made them: triangles, spheres, or triangles where they are seen."""
+    for parts in refined.facet_parts():
         triangles = [some for some, _ in parts if isinstance(some, Triangles)]
         spheres = [some for some, _ in parts if isinstance(some, Spheres)]
         if triangles:
@@ -197,10 +230,10 @@ def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Ite
         yield replace(made, attributes={**made.attributes, **baked}, species=parts.species)
 
 
-MICROSURFACES = EmissionForm(facet_blocks, _baked_facets)
-MICROSPHERES = EmissionForm(sphere_blocks, _baked_spheres, primitive_bytes=BYTES_PER_SPHERE)
+MICROSURFACES = EmissionForm(facet_blocks, _triangles_everywhere, _baked_facets)
+MICROSPHERES = EmissionForm(facet_blocks, _spheres_everywhere, _baked_spheres, primitive_bytes=BYTES_PER_SPHERE)
 #: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
-AUTOMATIC = EmissionForm(mixed_blocks, _baked_facets)
+AUTOMATIC = EmissionForm(facet_blocks, _spheres_where_hidden, _baked_facets)
 #: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because
 #: their shape shows.
-SHELLS = EmissionForm(shell_blocks, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)
+SHELLS = EmissionForm(shell_blocks, None, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)

@@ -17,8 +17,7 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.envelopes import reaches
 from ..growth.growth import WholeBranches
-from ..leaves.levels import chosen_polygons, coarse_error
-from ..refinement.contents import PlantParts
+from ..leaves.levels import coarse_error
 from ..species.species import LEAF_KINDS
 from ..subplants.wood_detail import Pixels
 
@@ -28,8 +27,6 @@ TOLERANCE = 0.5
 FADING = 0.25
 #: A leaf is no more than so many times as near as its branch, as far as this counts.
 _NEARER = 4.0
-#: Mean of what random numbers of leaves make of their lengths, see `leaf_meshes`.
-_MEAN = 0.85
 
 
 @dataclass(frozen=True)
@@ -57,12 +54,11 @@ class LeafDetail:
         slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
         return Pixels(lambda points: coarser * camera.extent_around(points), coarser * slope)
 
-    def lengths(self, whole: WholeBranches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
+    def lengths(self, whole: WholeBranches) -> NDArray[np.float64]:
         """Lengths (n,) of the leaves of branches in tolerances, where they come nearest.
 
-        What is hidden in part counts as shorter. 0 where the models of the species are certainly fine enough.
+        0 where the models of the species are certainly fine enough.
         """
-        visibility = np.broadcast_to(visibility, len(whole)) ** FADING
         branches, camera = whole.branches, self.camera
         out = np.zeros(len(branches))
         most = 1.0 / np.maximum(self._errors()[self.flora.rows["species"][branches.row]], 1e-300)
@@ -72,7 +68,7 @@ class LeafDetail:
         beside = size + reaches(self.flora.rows)[branches.row] * branches.length
         # The base tells of most branches that they are too far away.
         around = camera.extent_around(branches.position)
-        pixels = size / self._nearest(around, branches.length + beside) / self.tolerance * visibility
+        pixels = size / self._nearest(around, branches.length + beside) / self.tolerance
         near = np.flatnonzero(pixels > most)
         if not len(near):
             return out
@@ -80,32 +76,8 @@ class LeafDetail:
         extent = camera.extent_around(knots.reshape(-1, 3)).reshape(len(near), -1).min(axis=1)
         between = np.linalg.norm(np.diff(knots, axis=1), axis=2).max(axis=1) / 2.0
         nearest = self._nearest(extent, between + beside[near])
-        out[near] = size[near] / np.maximum(nearest, extent / _NEARER) / self.tolerance * visibility[near]
+        out[near] = size[near] / np.maximum(nearest, extent / _NEARER) / self.tolerance
         return out
-
-    def more(self, parts: PlantParts, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
-        """Expected polygons (n,) of the leaves of parts beyond those of their models, were all of them real."""
-        row, leaves = parts.branches.row, self.leaves(parts)
-        out = np.zeros(len(row))
-        if not np.isfinite(self.tolerance):
-            return out
-        extent = np.maximum(self.camera.extent_around(parts.branches.position), 1e-300) * self.tolerance
-        width = _MEAN * visibility**FADING * self.flora.leaf_width[row] * parts.branches.scale / extent
-        species = self.flora.rows["species"][row]
-        for s in np.flatnonzero(self._errors() > 0):
-            own = np.flatnonzero((species == s) & (leaves > 0))
-            if len(own):
-                forms = self.flora.forms[s][0]
-                more = [chosen_polygons(f, width[own] / f.width) - f.polygons for f in forms]
-                out[own] = np.mean(more, axis=0)
-        return out * leaves
-
-    def leaves(self, parts: PlantParts) -> NDArray[np.float64]:
-        """Expected leaves (n,) of parts."""
-        one = self.flora.one_leaf_area(parts.branches)
-        return np.where(
-            self.flora.leaf_count[parts.branches.row] > 0, parts.totals.leaf_area / np.maximum(one, 1e-300), 0.0
-        )
 
     def _errors(self) -> NDArray[np.float64]:
         """Largest error (species,) of a species' models."""

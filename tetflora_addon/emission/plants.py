@@ -1,67 +1,57 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From decisions to buffers: polygons of explicit plants, block by block, and the transition from leaves to facets.
-
-Blocks are runs of tetrahedra in front-to-back order: each is one region of space, and only one block's buffers are in
-memory at a time. Proxies are in `facets` and `shells`.
+"""Leaves that are drawn as themselves, and plants that are expanded without regard to what is seen.
 
 A leaf whose width in pixels is below the limit is a facet, one that is wider by `decisions.BAND` is real; in between
 a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
 keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
 Real leaves are single kites first, and have their faces from a few pixels of width on, one after another; where
 these can be told from what they stand for, finer ones, see `leaf_detail`.
-Wood goes by its own width or that of its leaves, whichever is larger: a trunk is a tube even among invisible leaves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..buffers import BLOCK_POLYGONS, MeshBuffers, concatenate_buffers
+from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.axes import axes
 from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, trunks
-from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Seeds
 from ..processes.pool import WORTH_PROCESSES, in_processes
-from ..refinement.contents import TWIGS, feature_width
-from ..refinement.decisions import real_fraction
+from ..refinement.contents import PlantParts, as_pieces, piece_totals
+from ..refinement.decisions import Decision, real_fraction
 from ..refinement.loop import Refinement
+from ..refinement.shared_parts import SharePoints, lowered
+from ..refinement.shares import opened, share_points
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import chunks, expand
 from ..subplants.tubes import tube_buffers
-from ..subplants.twigs import twig_buffers
-from .leaf_detail import FADING, TOLERANCE, LeafDetail
-from .portions import MIXED, Portions, Sight, in_chunks
+from .leaf_detail import TOLERANCE, LeafDetail
 
-#: Fraction of leaves that counts at least: opening sub-plants for a few real leaves is work as well.
-_LEAST_REAL = 0.1
+#: Pixels from which on a part that lies in explicit tetrahedra in part is opened.
+MIXED = 24.0
 #: Width in pixels up to which real leaves are kites.
 KITES = 2.0
-#: Width in pixels from which wood is tubes however little is seen of it: its facets would be a row of shards. A budget
-#: that makes leaves facets at more than so many pixels takes tubes in the same proportion.
-SHARDS, _GIVES_WAY = 1.4, 2.2
 
 
 @dataclass(frozen=True)
 class Transition:
-    """Fractions of leaves and wood that are real.
+    """Fractions of leaves that are real.
 
     Attributes
     ----------
     flora : Flora
     camera : Camera
     limit : float
-        Width in pixels up to which leaves are facets, where nothing hides them. What is hidden in part counts as
-        smaller: the roots of its visibility.
+        Width in pixels up to which leaves are facets.
     tolerance : float
         Pixels by which margins of near leaves may be off.
     """
@@ -76,44 +66,18 @@ class Transition:
         """How finely near leaves are drawn."""
         return LeafDetail(self.flora, self.camera, self.tolerance)
 
-    def fraction(
-        self, width: NDArray[np.float64], position: NDArray[np.float64], visibility: NDArray[np.float64] | float = 1.0
-    ) -> NDArray[np.float64]:
-        """Real fraction (n,) of things of a width (n,) in metres at places (n, 3): a smooth step in the logarithm."""
-        pixels = width / np.maximum(self.camera.extent_around(position), 1e-300) * visibility**FADING
-        return real_fraction(pixels, self.limit)
+    def of_branches(self, branches: Branches) -> NDArray[np.float64]:
+        """Real fraction (n,) of the leaves of sub-plants: a smooth step in the logarithm of their width."""
+        return self._fraction(branches, self.limit)
 
-    def of_kites(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
+    def of_kites(self, branches: Branches) -> NDArray[np.float64]:
         """Fraction (n,) of the real leaves of branches that are single kites."""
-        small = self.limit / KITES
-        return 1.0 - self.fraction(feature_width(self.flora, branches) * small, branches.position, visibility)
+        return 1.0 - self._fraction(branches, KITES)
 
-    def of_branches(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
-        """Real fraction (n,) of the leaves and the wood of sub-plants; of leafless ones by the base of their branch."""
-        return self.fraction(feature_width(self.flora, branches), branches.position, visibility)
-
-    def of_thickness(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
-        """Fraction (n,) of branches like these that are tubes."""
-        width = 2.0 * branches.radius
-        pixels = width / np.maximum(self.camera.extent_around(branches.position), 1e-300)
-        whole = real_fraction(pixels, SHARDS * max(1.0, self.limit / _GIVES_WAY)) * (np.asarray(visibility) > 0.0)
-        return np.maximum(self.fraction(width, branches.position, visibility), whole)
-
-    def of_bare_wood(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.bool_]:
-        """Branches (n,) that are tubes although none of their leaves is real."""
-        return uniform(branches.key, Draw.TRANSITION) < self.of_thickness(branches, visibility)
-
-    def of_wood(
-        self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0
-    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Branches (n,) that are tubes, if their leaves may be real, and (n,) that are triangles then."""
-        number = uniform(branches.key, Draw.TRANSITION)
-        own, leaves = 2.0 * branches.radius, self.of_branches(branches, visibility)
-        among = self.fraction(
-            np.minimum(TWIGS * own, feature_width(self.flora, branches)), branches.position, visibility
-        )
-        tubes = number < np.maximum(among, self.of_thickness(branches, visibility))
-        return tubes, ~tubes & (number < leaves)
+    def _fraction(self, branches: Branches, limit: float) -> NDArray[np.float64]:
+        row = branches.row
+        width = np.where(self.flora.leaf_count[row] > 0, self.flora.leaf_width[row] * branches.scale, 0.0)
+        return real_fraction(width / np.maximum(self.camera.extent_around(branches.position), 1e-300), limit)
 
 
 @dataclass(frozen=True)
@@ -142,125 +106,44 @@ class Block:
     fraction: float
 
 
-def explicit_blocks(
-    flora: Flora,
-    result: Refinement,
-    camera: Camera,
-    transition: Transition | None = None,
-    tolerance: float = np.inf,
-    sight: Sight | None = None,
-) -> Iterator[Block]:
-    """Polygons of explicit tetrahedra, and thick wood of all that is seen, in blocks from front to back.
+def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance: float = np.inf) -> Iterator[Block]:
+    """Polygons of all that lies in explicit tetrahedra for the most part, where shells stand for the rest.
 
-    With a transition, small leaves are left to facets, by a random number of each leaf. Without, everything that lies
-    in explicit tetrahedra for the most part is polygons, and the margins of near leaves may be off by a tolerance.
-    A sight of the result with a transition may be given where there is one.
+    Parts that lie in explicit tetrahedra in part are opened; margins of near leaves may be off by a tolerance, pixels.
     """
-    sight = sight or Sight(flora, result, camera, facets=transition is not None)
-    yield from portion_blocks(sight, sight.portions(), transition, tolerance)
-
-
-def portion_blocks(
-    sight: Sight,
-    portions: Portions,
-    transition: Transition | None = None,
-    tolerance: float = np.inf,
-    form: Callable[[Block], Any] | None = None,
-) -> Iterator[Any]:
-    """The polygons of `explicit_blocks` of some portions (n,), or what a form makes of each block where it is made."""
-    flora = sight.flora
-    detail = LeafDetail(flora, sight.camera, tolerance) if transition is None else transition.detail
-    portions = portions.take(np.flatnonzero(_may_be_real(portions, transition)))
-    expected = portions.parts.totals.polygons + detail.more(
-        portions.parts, np.where(portions.best > 0, portions.best, 1.0)
-    )
-    expected *= portions.within * np.maximum(_real_leaves(portions, transition), _LEAST_REAL)
-    done, whole = np.cumsum(expected), max(float(expected.sum()), 1.0)
-    runs = (
-        (number, float(done[run[-1]]) / whole if len(run) else 1.0, portions.take(run))
-        for number, run in enumerate(in_chunks(expected, BLOCK_POLYGONS))
-    )
-    made_of = _MadeOf(sight, transition, detail, form)
-    for made in in_processes(_blocks_of_run, made_of, runs, float(expected.sum()) > WORTH_PROCESSES):
+    tree, explicit, plants = result.tree, result.chosen(Decision.EXPLICIT), result.plants
+    parts, points = plants.parts, plants.points
+    full, bodies = [Branches.empty()], [Branches.empty()]
+    while len(parts):
+        area = points.optical_area.astype(np.float64)
+        whole = np.maximum(np.bincount(points.part, area, len(parts)), 1e-300)
+        inside = np.bincount(points.part, area * explicit[points.cell], len(parts)) / whole
+        mixed = (inside > 0.0) & (inside < 1.0) & parts.can_open(flora) & (plants.pixels(parts) > MIXED)
+        real = ~mixed & (inside >= 0.5)
+        full.append(parts.branches.take(np.flatnonzero(real & ~parts.alone)))
+        bodies.append(parts.branches.take(np.flatnonzero(real & parts.alone)))
+        made = []
+        for new, _, lines in opened(flora, parts.take(np.flatnonzero(mixed))):
+            made.append((new, share_points(flora, new, plants.pixels(new), lines)))
+        first = np.cumsum([0, *(len(new) for new, _ in made)])
+        parts = PlantParts.concatenate([new for new, _ in made])
+        points = SharePoints.concatenate(
+            [replace(own, part=own.part + np.int32(start)) for (_, own), start in zip(made, first, strict=False)]
+        )
+        if len(points):
+            points = replace(points, cell=lowered(tree, points))
+    detail = LeafDetail(flora, camera, tolerance)
+    runs = []
+    for alone, some in ((False, Branches.concatenate(full)), (True, Branches.concatenate(bodies))):
+        # Front to back, ties by the plants themselves, so that their order in the scene does not matter.
+        away = np.linalg.norm(some.position - camera.eye, axis=1)
+        some = some.take(np.lexsort([some.key, away]))
+        polygons = piece_totals(flora, as_pieces(some)).polygons if alone else flora.face_counts(some)
+        runs += [(alone, some.take(run)) for run in chunks(polygons, BLOCK_POLYGONS)]
+    items = [(number, (number + 1) / len(runs), *run) for number, run in enumerate(runs)]
+    for made in in_processes(_expanded, (flora, detail), items, len(items) > 1):
         while made:
             yield made.pop(0)
-
-
-@dataclass(frozen=True)
-class _MadeOf:
-    """What all blocks are made of."""
-
-    sight: Sight
-    transition: Transition | None
-    detail: LeafDetail
-    form: Callable[[Block], Any] | None
-
-
-def _blocks_of_run(made_of: _MadeOf, run: tuple[int, float, Portions]) -> list[Any]:
-    """The meshes of one run of portions: its number, the fraction that is done with it, and the portions."""
-    number, fraction, portions = run
-    sight, transition = made_of.sight, made_of.transition
-    parts = _real_parts(sight, portions, transition)
-    blocks = _block(sight.flora, *parts, number, fraction, made_of.detail, transition)
-    return list(blocks if made_of.form is None else map(made_of.form, blocks))
-
-
-def _may_be_real(portions: Portions, transition: Transition | None) -> NDArray[np.bool_]:
-    """Portions (n,) of which leaves or wood may be polygons."""
-    may = _real_leaves(portions, transition) > 0
-    if transition is not None:
-        may |= (portions.best > 0) & (transition.of_thickness(portions.parts.branches, portions.best) > 0)
-    return may
-
-
-def _real_leaves(portions: Portions, transition: Transition | None) -> NDArray[np.float64]:
-    """Fraction (n,) of the leaves of portions that is real where they are seen best."""
-    if transition is None:
-        return portions.real.astype(float)
-    return np.where(
-        portions.real & (portions.best > 0), transition.of_branches(portions.parts.branches, portions.best), 0.0
-    )
-
-
-def _real_parts(
-    sight: Sight, portions: Portions, transition: Transition | None
-) -> tuple[list[WholeBranches], WholeBranches | None, NDArray[np.float64]]:
-    """Branches with all that is to be real of them, branches of which only the wood is, and visibilities.
-
-    The ``plant`` of branches is their place among the visibilities.
-    """
-    flora = sight.flora
-    full, bodies, bare, visibility, count = [], [], [], [np.zeros(0)], 0
-    while len(portions):
-        parts = portions.parts
-        mixed = portions.mixed & (sight.pixels(portions) > MIXED)
-        open_here = parts.can_open(flora) & mixed
-        if transition is None:
-            real, wood = portions.real & (portions.visibility >= 0.5), np.zeros(len(parts), bool)
-        else:
-            real = portions.real & (transition.of_branches(parts.branches, portions.visibility) > 0)
-            wood = ~real & (transition.of_thickness(parts.branches, portions.visibility) > 0)
-        # A sub-plant with small leaves may grow on a thick branch.
-        open_here |= wood & parts.can_open(flora)
-        ready = ~open_here & (real | wood)
-        at = np.flatnonzero(ready)
-        own = parts.branches.take(at)
-        own = replace(own, plant=np.arange(count, count + len(at), dtype=np.int32))
-        visibility.append(portions.visibility[at])
-        count += len(at)
-        alone, only_wood = parts.alone[at], wood[at]
-        full.append(own.take(np.flatnonzero(~alone & ~only_wood)))
-        bodies.append(own.take(np.flatnonzero(alone & ~only_wood)))
-        bare.append(own.take(np.flatnonzero(alone & only_wood)))
-        # What is opened for its thick wood alone keeps one visibility, as its facets do.
-        portions = sight.opened(replace(portions, mixed=mixed).take(np.flatnonzero(open_here)))
-        portions = portions.take(np.flatnonzero(_may_be_real(portions, transition)))
-    made = list(expand(flora, Branches.concatenate(full)))
-    bodies, bare = (Branches.concatenate(some) for some in (bodies, bare))
-    if len(bodies):
-        made.append(WholeBranches(bodies, axes(flora.rows, bodies)))
-    thin = WholeBranches(bare, axes(flora.rows, bare)) if len(bare) else None
-    return made, thin, np.concatenate(visibility)
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) -> Iterator[Block]:
@@ -269,64 +152,24 @@ def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) ->
     detail = None if camera is None else LeafDetail(flora, camera)
     full = flora.polygons[plants.row] if plants.crown is None else flora.face_counts(plants)
     parts = list(chunks(full, BLOCK_POLYGONS))
-    runs = ((number, (number + 1) / len(parts), plants.take(run)) for number, run in enumerate(parts))
+    runs = ((number, (number + 1) / len(parts), False, plants.take(run)) for number, run in enumerate(parts))
     worth = len(parts) > 1 and float(full.sum()) > WORTH_PROCESSES
     for made in in_processes(_expanded, (flora, detail), runs, worth):
         while made:
             yield made.pop(0)
 
 
-def _expanded(given: tuple[Flora, LeafDetail | None], run: tuple[int, float, Branches]) -> list[Block]:
-    """The meshes of one run of whole plants."""
-    (flora, detail), (number, fraction, plants) = given, run
-    whole = list(expand(flora, plants))
-    return list(_block(flora, whole, None, np.zeros(0), number, fraction, detail))
-
-
-def _block(
-    flora: Flora,
-    branches: list[WholeBranches],
-    bare: WholeBranches | None,
-    visibility: NDArray[np.float64],
-    number: int,
-    fraction: float,
-    detail: LeafDetail | None = None,
-    transition: Transition | None = None,
-) -> Iterator[Block]:
-    """Meshes of branches of any species, and of the wood alone of ``bare`` ones."""
-    of_branches = [flora.species_of(some.branches.row) for some in branches]
-    of_bare = np.zeros(0, int) if bare is None else flora.species_of(bare.branches.row)
-
-    def fractions_of(some: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        seen = visibility[some.plant]
-        return transition.of_branches(some, seen), transition.of_kites(some, seen)
-
-    def lengths_of(some: WholeBranches) -> NDArray[np.float64]:
-        return detail.lengths(some, visibility[some.branches.plant] if len(visibility) else 1.0)
-
-    made: list[tuple[str, int, int, MeshBuffers | None]] = []
-    for s in np.unique(np.concatenate([np.zeros(0, int), of_bare, *of_branches])):
-        whole = [some.take(np.flatnonzero(kind == s)) for some, kind in zip(branches, of_branches, strict=True)]
-        leaves = leaf_meshes(
-            flora, int(s), whole, None if transition is None else fractions_of, None if detail is None else lengths_of
-        )
-        made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaves]
-        twigs = []
-        if transition is not None:
-            wood = [transition.of_wood(some.branches, visibility[some.branches.plant]) for some in whole]
-            twigs = [some.take(np.flatnonzero(thin)) for some, (_, thin) in zip(whole, wood, strict=True)]
-            whole = [some.take(np.flatnonzero(tubes)) for some, (tubes, _) in zip(whole, wood, strict=True)]
-        if bare is not None:
-            own = bare.take(np.flatnonzero(of_bare == s))
-            tubes = transition.of_bare_wood(own.branches, visibility[own.branches.plant])
-            whole.append(own.take(np.flatnonzero(tubes)))
-        bark = [tube_buffers(flora, whole, None if detail is None else detail.wood), twig_buffers(flora, twigs)]
-        made.append(("bark", 0, int(s), concatenate_buffers([some for some in bark if some is not None])))
-        del whole
-    # The caller copies each block into Blender; meanwhile its sources and the blocks already taken are not kept.
-    del branches, bare
-    while made:
-        kind, form, s, buffers = made.pop(0)
-        if buffers is not None:
-            yield Block(kind, form, s, number, buffers, fraction)
-        del buffers
+def _expanded(given: tuple[Flora, LeafDetail | None], run: tuple[int, float, bool, Branches]) -> list[Block]:
+    """The meshes of one run of whole sub-plants, or of branches alone."""
+    (flora, detail), (number, fraction, alone, plants) = given, run
+    whole = [WholeBranches(plants, axes(flora.rows, plants))] if alone else list(expand(flora, plants))
+    species = [flora.species_of(some.branches.row) for some in whole]
+    made: list[Block] = []
+    for s in np.unique(np.concatenate([np.zeros(0, int), *species])).tolist():
+        own = [some.take(np.flatnonzero(kind == s)) for some, kind in zip(whole, species, strict=True)]
+        for leaves in leaf_meshes(flora, s, own, None, None if detail is None else detail.lengths):
+            made.append(Block(LEAF_KINDS[leaves.kind], leaves.form, s, number, leaves.buffers, fraction))
+        bark = tube_buffers(flora, own, None if detail is None else detail.wood)
+        if bark is not None:
+            made.append(Block("bark", 0, s, number, bark, fraction))
+    return made

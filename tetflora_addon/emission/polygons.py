@@ -201,6 +201,16 @@ def _at_corners(
     return np.concatenate([values[corner].astype(np.float64), between])
 
 
+def hidden_polygon_facets(
+    result: Refinement, camera: Camera, facet_pixels: float, at_once: float
+) -> Iterator[tuple[Facets, bool]]:
+    """`polygon_facets` of all polygons in proxies, hidden or not."""
+    held = result.holdings.polygons
+    proxies = held.take(result.chosen(Decision.PROXY, Decision.HIDDEN)[held.cell])
+    if len(proxies):
+        yield from polygon_facets(proxies, result, camera, facet_pixels, at_once)
+
+
 def polygon_facets(
     held: Held[Polygons], result: Refinement, camera: Camera, facet_pixels: float, at_once: float = np.inf
 ) -> Iterator[tuple[Facets, bool]]:

@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What runs in each of the other Pythons: it calls functions of the engine that it is told to call.
 
-It is started as a file, outside the package: ``python child.py PACKAGE``, where the package has the name that it has
-in Blender, whatever that is. Paths for imports come in the first message. It ends with the one that started it, or
-when there has been nothing to do for a while.
+It is started as a file, outside the package: ``python child.py PACKAGE PATHS``, where the package has the name that it
+has in Blender, whatever that is, and the paths for imports are a list in JSON. It first says that it is there, or why
+it cannot be. It ends with the one that started it, or when there has been nothing to do for a while.
 """
 
 import importlib
 import importlib.machinery
 import importlib.util
+import json
 import os
 import signal
 import sys
@@ -49,7 +50,7 @@ def engine(package: str) -> None:
 def peak() -> int:
     """Bytes that this process has held at most; 0 where the system does not tell."""
     if sys.platform == "linux":  # where the other call tells what the process that started this one had held
-        for line in Path("/proc/self/status").read_text().splitlines():
+        for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
     if resource is None:
@@ -82,14 +83,19 @@ class _Clock:
 def main() -> None:
     """Answer messages until there are none."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the one who started this
-    # What prints goes to the error stream: the other one is for messages.
     given, made = os.fdopen(os.dup(0), "rb", 1 << 16), os.fdopen(os.dup(1), "wb", 1 << 16)
-    os.dup2(2, 1)
-    package = sys.argv[1]
-    sys.path[:] = sys.argv[2].split(os.pathsep)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what prints is lost: this stream is for messages
+    package, paths = sys.argv[1:]
+    sys.path[:] = json.loads(paths)
     engine(package)
-    memory = importlib.import_module(f"{package}.memory")
     messages = importlib.import_module(f"{package}.processes.messages")
+    try:
+        memory = importlib.import_module(f"{package}.memory")
+        importlib.import_module("numpy")
+    except Exception as error:
+        messages.send(made, ("failed", repr(error)))
+        return
+    messages.send(made, ("ready", ""))
     shared: dict[int, object] = {}
     clock = _Clock(memory.give_back)
     while True:

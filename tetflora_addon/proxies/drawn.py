@@ -80,15 +80,21 @@ Drawn = Facets | Triangles | Spheres
 _Drawn = TypeVar("_Drawn", Facets, Triangles, Spheres)
 
 
+def triangle_corners(facets: Facets) -> NDArray[np.float32]:
+    """Corners (n, 3, 3) of a triangle for each facet."""
+    reach = CIRCUMRADIUS * facets.side[:, None]
+    longer = 1.0 if facets.stretch is None else facets.stretch[:, None]
+    a, b = reach / longer * facets.across, reach * longer * facets.along
+    corners = [facets.centre + b, facets.centre - SIN_60 * a - b / 2, facets.centre + SIN_60 * a - b / 2]
+    return np.stack([c.astype(np.float32) for c in corners], 1)
+
+
 def triangles_of(facets: Facets) -> Triangles:
     """A triangle for each facet.
 
     Triangles take half of a renderer's memory and time for squares of the same area.
     """
-    reach = CIRCUMRADIUS * facets.side[:, None]
-    a, b = reach * facets.across, reach * facets.along
-    corners = [facets.centre + b, facets.centre - SIN_60 * a - b / 2, facets.centre + SIN_60 * a - b / 2]
-    return Triangles(np.stack([c.astype(np.float32) for c in corners], 1), *_shaded(facets))
+    return Triangles(triangle_corners(facets), *_shaded(facets))
 
 
 def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi) -> Spheres:

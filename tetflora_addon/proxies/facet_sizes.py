@@ -9,7 +9,7 @@ the distance from the view.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,10 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import extents
 from ..growth.branches import Branches
-from ..refinement.contents import Held, Totals, bounding_cylinders
+from ..refinement.contents import Held, Totals
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons
-from ..subplants.pieces import Pieces
-from .thrown_shadows import ThrownShadows
 
 #: How much larger facets of hidden tetrahedra are: where the optical depth in front just hides them, and at most, in
 #: proportion to the depth. For the depth alone they are never wider than so many pixels: some of what is deeply hidden
@@ -249,15 +247,6 @@ def polygon_facet_sizes(held: Held[Polygons], camera: Camera, hidden: NDArray[np
     )
 
 
-def subplant_facet_sizes(
-    flora: Flora, own: Branches, totals: Totals, shadows: ThrownShadows, visibility: NDArray, coarse: NDArray
-) -> FacetSizes:
-    """Facets of sub-plants (n,) of given totals (n,), visibility (n,) and coarseness (n,) where that is 0."""
-    place, faces = bounding_cylinders(flora, own)[0], flora.branch_faces(own)
-    sizes = _facet_sizes(totals, place, flora.one_leaf_area(own), faces, np.ones(len(own)), shadows, visibility, coarse)
-    return replace(sizes, kept=opaque_fractions(flora, own, totals))
-
-
 def opaque_fractions(flora: Flora, own: Branches, totals: Totals) -> NDArray[np.float64]:
     """Fraction (n,) of the optical area of sub-plants that makes them opaque to all but a few hundredths of light.
 
@@ -266,28 +255,3 @@ def opaque_fractions(flora: Flora, own: Branches, totals: Totals) -> NDArray[np.
     bound = extents(flora, own)
     silhouette = _FILLED * 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * own.length**2
     return np.minimum(_LAYERS * silhouette / np.maximum(totals.optical_area, 1e-300), 1.0)
-
-
-def piece_facet_sizes(
-    flora: Flora, own: Pieces, totals: Totals, shadows: ThrownShadows, visibility: NDArray, coarse: NDArray
-) -> FacetSizes:
-    """Facets of pieces (n,); parameters as for `subplant_facet_sizes`."""
-    place, faces = (own.start + own.end) / 2, flora.rows["sides"][own.branches.row]
-    part = own.t1 - own.t0
-    return _facet_sizes(totals, place, flora.one_leaf_area(own.branches), faces, part, shadows, visibility, coarse)
-
-
-def _facet_sizes(
-    totals: Totals,
-    place: NDArray,
-    one_leaf: NDArray,
-    faces: NDArray,
-    part: NDArray,
-    shadows: ThrownShadows,
-    visibility: NDArray,
-    coarse: NDArray,
-) -> FacetSizes:
-    least = np.sqrt(totals.wood_area / 2 / np.maximum(faces, 1))
-    extent, away = shadows.camera.extent_around(place), shadows.camera.clearance(place)
-    falls = shadows.distance(place, away)
-    return FacetSizes(extent, one_leaf, least, visibility, coarse, away, falls, totals, part, np.ones(len(part)))

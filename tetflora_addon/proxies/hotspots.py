@@ -126,5 +126,5 @@ def _towards_eye(camera: Camera, places: NDArray[np.float64]) -> NDArray[np.floa
     """Unit vectors (n, 3) from places to the eye."""
     if camera.kind == "ORTHO":
         return np.broadcast_to(camera.frame[:, 2], places.shape)
-    way = camera.position - places
+    way = camera.eye - places
     return way / np.maximum(np.linalg.norm(way, axis=1), 1e-9)[:, None]

@@ -39,6 +39,8 @@ _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 _GOLDEN = (np.sqrt(5) - 1) / 2
 _MOVED = 0.04  # of the length of a sub-plant's branch
 _SKY = np.array([0.0, 0.0, 1.0])
+#: Length of facets of wood over that of equilateral triangles of their area: a facet of a pixel is four long.
+STRETCH = 3.0
 #: Reaches by which facets beside the view are moved at most, and the least squared slope of the way out that counts.
 _MOST_MOVED, _LEAST_SLOPE = 3.0, 0.25
 SIN_60 = np.sqrt(3) / 2
@@ -48,7 +50,7 @@ CIRCUMRADIUS = 2 / 27**0.25
 
 @dataclass(frozen=True)
 class Facets(Arrays):
-    """Equilateral triangles as a structure of arrays.
+    """Triangles as a structure of arrays, with two sides of equal length.
 
     Attributes
     ----------
@@ -63,6 +65,8 @@ class Facets(Arrays):
         Metres a second; None for plants at rest.
     roughness : (n,) float64 or None
         Of the gloss of assets; None where the material knows.
+    stretch : (n,) float64 or None
+        Length along ``along`` over that of an equilateral triangle of the same area; None for 1.
     """
 
     centre: NDArray[np.float64]
@@ -73,6 +77,7 @@ class Facets(Arrays):
     transmission: NDArray[np.float64]
     velocity: NDArray[np.float64] | None = None
     roughness: NDArray[np.float64] | None = None
+    stretch: NDArray[np.float64] | None = None
 
     @property
     def normal(self) -> NDArray[np.float64]:
@@ -109,7 +114,7 @@ def subplant_facets(
     part = np.ones(len(subplants)) if weight is None else weight
     wood_side = leaf_side if wood_side is None else wood_side
     leaves = _leaves_of_subplants(flora, subplants, totals, leaf_side, part, real, once)
-    made = Facets.concatenate([leaves, _wood_of_subplants(flora, subplants, totals, wood_side, part, real)])
+    made = _joined([leaves, _wood_of_subplants(flora, subplants, totals, wood_side, part, real)])
     return made if subplants.crown is None else made.take(np.flatnonzero(made.side > 0))
 
 
@@ -131,12 +136,17 @@ def piece_facets(
     if real_wood is not None:
         totals = replace(totals, wood_area=np.where(real_wood, 0.0, totals.wood_area))
     part = np.ones(len(pieces)) if weight is None else weight
-    return Facets.concatenate(
+    return _joined(
         [
             _leaves_of_pieces(flora, pieces, totals, leaf_side, part, real, once),
             _wood_of_pieces(flora, pieces, totals, leaf_side if wood_side is None else wood_side, part),
         ]
     )
+
+
+def _joined(parts: list[Facets]) -> Facets:
+    """Facets of leaves and wood as one."""
+    return Facets.concatenate([p if p.stretch is not None else replace(p, stretch=np.ones(len(p))) for p in parts])
 
 
 def kept_out_of_view(
@@ -330,9 +340,7 @@ def _wood_of_subplants(
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     colour = flora.rows["branch_colour"][points.row[pick], 0]
     velocity = _carried(flora, subplants, owner, centre)
-    return Facets(
-        centre, _across(axis, key), axis, np.sqrt(area * weight[owner]), colour, np.zeros(len(owner)), velocity
-    )
+    return _strips(centre, axis, key, np.sqrt(area * weight[owner]), dimmed(colour, owner, weight, None), velocity)
 
 
 def _wood_of_pieces(flora: Flora, pieces: Pieces, totals: Totals, side: NDArray, weight: NDArray) -> Facets:
@@ -347,9 +355,15 @@ def _wood_of_pieces(flora: Flora, pieces: Pieces, totals: Totals, side: NDArray,
     if pieces.branches.later is not None:
         lines = axes(flora.rows, pieces.branches)
         velocity = (lines.later.at(owner, t)[0] - lines.at(owner, t)[0]) / moment(flora.rows)
-    return Facets(
-        centre, _across(axis, key), axis, np.sqrt(area * weight[owner]), colour, np.zeros(len(owner)), velocity
-    )
+    return _strips(centre, axis, key, np.sqrt(area * weight[owner]), dimmed(colour, owner, weight, None), velocity)
+
+
+def _strips(
+    centre: NDArray, axis: NDArray, key: NDArray[np.uint64], side: NDArray, colour: NDArray, velocity: NDArray | None
+) -> Facets:
+    """Facets of wood: long and thin, as branches are, along axes (n, 3)."""
+    stretch, none = np.full(len(side), STRETCH), np.zeros(len(side))
+    return Facets(centre, _across(axis, key), axis, side, colour, none, velocity, stretch=stretch)
 
 
 def _carried(

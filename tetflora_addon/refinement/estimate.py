@@ -19,20 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera.camera import Camera
-from .decisions import real_fraction
 from .settings import RefinementSettings
 
 #: Seconds of any refinement, of each plant, and of each polygon or facet.
 SECONDS = 1.0
 SECONDS_PER_PLANT = 2.5e-5
-SECONDS_PER_PRIMITIVE = 3.3e-6
+SECONDS_PER_PRIMITIVE = 5.5e-6
 #: Facets of a covered pixel, one behind the other, if they are as large as one; numbers go with the inverse square of
 #: their size.
-FACETS_PER_PIXEL = 1.7
-#: Polygons of a plant whose leaves are all real over all that it has: far leaves are triangles, and some are hidden.
-REAL = 0.2
+FACETS_PER_PIXEL = 5.0
 #: Of what is seen, for plants that are out of view or hidden.
-UNSEEN = 0.5
+UNSEEN = 0.3
 #: Bytes of each plant, and of each polygon or facet in Blender and the renderer together.
 BYTES_PER_PLANT = 500.0
 BYTES_PER_PRIMITIVE = 610.0
@@ -130,15 +127,13 @@ def estimate(
 
 def _primitives(stand: Stand, camera: Camera, settings: RefinementSettings) -> float:
     """Polygons and facets that a picture needs without limits."""
-    inside, pixel, each = _seen(stand, camera)
-    real = real_fraction(stand.leaf / pixel, settings.leaf_limit)
-    dense = FACETS_PER_PIXEL / settings.facet**2
+    _, pixel, each = _seen(stand, camera)
+    # Leaves that are larger than facets are drawn as they are: there are fewer of them for each pixel.
+    dense = FACETS_PER_PIXEL / np.maximum(settings.facet, stand.leaf / pixel) ** 2
     picture = camera.width * camera.height
-    pixels = (1.0 - real) * each
-    covered = -picture * np.expm1(-stand.weight * pixels.sum() / picture)
-    facets = min(stand.weight * np.minimum((1.0 - real) * stand.polygons, dense * pixels).sum(), dense * covered)
-    made = REAL * stand.weight * (inside * real * stand.polygons).sum()
-    return float((1.0 + UNSEEN) * (facets + made))
+    shown = stand.weight * each.sum()
+    full = -picture * np.expm1(-shown / picture) / max(shown, 1e-9)
+    return float((1.0 + UNSEEN) * stand.weight * np.minimum(stand.polygons, full * dense * each).sum())
 
 
 def covered_pixels(stand: Stand, camera: Camera) -> NDArray[np.float64]:

@@ -41,10 +41,10 @@ class RefinementSettings:
         max=1000.0,
     )
     leaf_limit: float = setting(
-        0.2,
+        0.6,
         "Leaf Limit",
-        "Leaves narrower than this become proxies; up to 2.5 times this width, a growing fraction stays real. Below "
-        "half the facet size, leaves cost more polygons than facets",
+        "Leaves narrower than this become facets; up to 2.5 times this width, a growing fraction stays real. About "
+        "half the facet size; below that, leaves cost more polygons than facets",
         subtype='PIXEL',
         min=0.05,
         soft_max=4.0,
@@ -107,9 +107,10 @@ class RefinementSettings:
         soft_max=40,
     )
     facet: float = setting(
-        0.33,
+        1.2,
         "Facet Size",
-        "Size in pixels of the small facets that proxies are drawn with. Larger values give fewer, coarser facets",
+        "Size in pixels of the small facets that stand for leaves, at most: where there are few, they are finer. "
+        "Larger values give fewer, coarser facets",
         subtype='PIXEL',
         min=0.1,
         soft_max=4.0,
@@ -172,7 +173,7 @@ FIRST_LOOK = 320
 _FIRST_TETRAHEDRA, _FIRST_RESOLUTION = 4_000, 96
 #: What the qualities of the panel stand for.
 QUALITIES: dict[str, dict[str, float]] = {
-    "DRAFT": {"cutoff": 6.0, "leaf_limit": 1.0, "facet": 1.2, "visibility_resolution": 128},
-    "PREVIEW": {"cutoff": 3.0, "leaf_limit": 0.5, "facet": 0.7, "visibility_resolution": 192},
-    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.2, "facet": 0.33, "visibility_resolution": 256},
+    "DRAFT": {"cutoff": 6.0, "leaf_limit": 1.25, "facet": 2.5, "visibility_resolution": 128},
+    "PREVIEW": {"cutoff": 3.0, "leaf_limit": 0.9, "facet": 1.8, "visibility_resolution": 192},
+    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.6, "facet": 1.2, "visibility_resolution": 256},
 }

@@ -10,6 +10,10 @@ from dataclasses import asdict, dataclass, field
 _NAMED = 3  # objects that a message names before it only counts
 
 
+#: How much coarser than asked for facets are before somebody is told.
+COARSER = 1.5
+
+
 @dataclass(frozen=True)
 class Step:
     """The state after one pass through the loop.
@@ -64,6 +68,8 @@ class Statistics:
         Passes through the loop; ``levels`` in `as_dict`, as in saved files and the output of the command line.
     facet_pixels : float
         Side of the facets of proxies, pixels, which a budget may have increased; 0 for shells.
+    facet_asked : float
+        That which the settings ask for.
     complete : bool
         False where a limit of the settings stopped the loop.
     seconds : dict of str to float
@@ -89,6 +95,7 @@ class Statistics:
     tetrahedra_proxy: int = 0
     passes: int = 0
     facet_pixels: float = 0.0
+    facet_asked: float = 0.0
     complete: bool = True
     seconds: dict[str, float] = field(default_factory=dict)
     memory_mb: float = 0.0
@@ -105,9 +112,20 @@ class Statistics:
         away = f"{min(self.strays.values()) / 1e3:,.0f} km from the camera, far beyond all else"
         return f"Left out, because too far to be seen: {names}{more}, {away}; move it closer or delete it"
 
+    @property
+    def coarser(self) -> str:
+        """A warning where facets are coarser than asked for by a half or more; else an empty text."""
+        if not self.facet_asked or self.facet_pixels < COARSER * self.facet_asked:
+            return ""
+        return (
+            f"Facets are {self.facet_pixels:.2g} pixels large, where {self.facet_asked:.2g} are set: no more fit into "
+            "Max Memory or Max Polygons. Raise these, or render a smaller image"
+        )
+
     def as_dict(self) -> dict:
         """Plain dictionary, ready for JSON."""
-        return {"levels" if name == "passes" else name: value for name, value in asdict(self).items()}
+        fields_ = {"levels" if name == "passes" else name: value for name, value in asdict(self).items()}
+        return {**fields_, "coarser": self.coarser}
 
 
 class Stopwatch:

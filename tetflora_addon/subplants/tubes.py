@@ -28,7 +28,9 @@ _RINGS_AT_ONCE = 48_000
 _ABOVE = 4.0
 
 
-def tube_buffers(flora: Flora, whole: Sequence[WholeBranches], pixels: Pixels | None = None) -> MeshBuffers | None:
+def tube_buffers(
+    flora: Flora, whole: Sequence[WholeBranches], pixels: Pixels | None = None, most_sides: int | None = None
+) -> MeshBuffers | None:
     """Tubes of whole branches of any rows.
 
     Parameters
@@ -37,13 +39,17 @@ def tube_buffers(flora: Flora, whole: Sequence[WholeBranches], pixels: Pixels | 
     whole : sequence of WholeBranches
     pixels : Pixels, optional
         How large they are; near branches are rounder then, and bent, and have feet.
+    most_sides : int, optional
+        Sides of a tube at most, for what is a few pixels wide.
 
     Returns
     -------
     MeshBuffers or None
         Quads with ``UVMap``, ``tf_colour``, ``tf_transmission`` and ``tf_girth``; None without branches.
     """
-    sorts = sorted((sort for some in whole for sort in _sorts(flora, some, pixels)), key=lambda sort: sort.sides)
+    sorts = sorted(
+        (sort for some in whole for sort in _sorts(flora, some, pixels, most_sides)), key=lambda sort: sort.sides
+    )
     if not sorts:
         return None
     vertices, faces = (sum(numbers) for numbers in zip(*(sort.numbers() for sort in sorts), strict=True))
@@ -52,6 +58,11 @@ def tube_buffers(flora: Flora, whole: Sequence[WholeBranches], pixels: Pixels | 
         for rings, sides, inside in sorts.pop(0).made(flora):
             tubes.add(flora, rings, sides, inside)
     return tubes.buffers()
+
+
+def tube_faces(flora: Flora, whole: WholeBranches, pixels: Pixels | None = None) -> int:
+    """Faces that `tube_buffers` makes, without making them."""
+    return sum(sort.numbers()[1] for sort in _sorts(flora, whole, pixels))
 
 
 @dataclass(frozen=True)
@@ -106,11 +117,12 @@ class _Sort:
                 yield buds[0], bud_sides(self.sides), whole.take(buds[1])
 
 
-def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None) -> Iterator[_Sort]:
+def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None, most_sides: int | None = None) -> Iterator[_Sort]:
     """Branches by their sides."""
     if not len(whole):
         return
     sides = flora.rows["sides"][whole.branches.row]
+    sides = sides if most_sides is None else np.minimum(sides, most_sides)
     near = np.zeros(len(whole), bool)
     if pixels is not None:
         fine = fineness(flora, whole, pixels)

@@ -25,7 +25,9 @@ from .pieces import Pieces, wood_areas
 from .tubes import base_girth
 
 
-def twig_buffers(flora: Flora, whole: Sequence[WholeBranches]) -> MeshBuffers | None:
+def twig_buffers(
+    flora: Flora, whole: Sequence[WholeBranches], wider: Sequence[NDArray[np.float64]] | None = None
+) -> MeshBuffers | None:
     """Triangles in the place of tubes.
 
     Parameters
@@ -33,16 +35,20 @@ def twig_buffers(flora: Flora, whole: Sequence[WholeBranches]) -> MeshBuffers | 
     flora : Flora
     whole : sequence of WholeBranches
         Of any rows.
+    wider : sequence of (n,) float64, optional
+        How many times as wide each triangle is: it stands for so many twigs.
 
     Returns
     -------
     MeshBuffers or None
         Attributes as of `tubes.tube_buffers`; None without branches.
     """
-    return concatenate_buffers([_triangles(flora, some) for some in whole if len(some)])
+    wider = [np.ones(len(some)) for some in whole] if wider is None else wider
+    some = zip(whole, wider, strict=True)
+    return concatenate_buffers([_triangles(flora, own, times) for own, times in some if len(own)])
 
 
-def _triangles(flora: Flora, whole: WholeBranches) -> MeshBuffers:
+def _triangles(flora: Flora, whole: WholeBranches, times: NDArray[np.float64]) -> MeshBuffers:
     branches, number = whole.branches, len(whole)
     base, tip = _ends(whole.lines)
     along = tip - base
@@ -54,7 +60,7 @@ def _triangles(flora: Flora, whole: WholeBranches) -> MeshBuffers:
     # A triangle is half as wide on average as at its base.
     none = np.zeros(number)
     surface = wood_areas(flora, Pieces(branches, none, none + 1.0, base, tip))
-    half = 0.5 * (surface / np.maximum(length, 1e-12))[:, None] * across
+    half = 0.5 * (times * surface / np.maximum(length, 1e-12))[:, None] * across
     corners = np.stack([base - half, base + half, tip], axis=1)
     motion = {}
     if whole.lines.later is not None:

@@ -13,6 +13,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, select
 from tetflora_addon import memory
 from tetflora_addon.blender.job import contents, forecast
 from tetflora_addon.blender.scene.camera import read_camera
+from tetflora_addon.processes import pool
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -99,7 +100,8 @@ def test_settings_and_camera_show_at_once():
     scene = bpy.context.scene
     before = _forecast()
     scene.render.resolution_percentage *= 2
-    assert _forecast().primitives > 1.2 * before.primitives
+    # Leaves that are large enough to be drawn as they are do not become more.
+    assert _forecast().primitives > before.primitives
     scene.render.resolution_percentage //= 2
     scene.tetflora.quality = 'DRAFT'
     assert _forecast().primitives <= before.primitives
@@ -177,5 +179,5 @@ def test_denoising_needs_memory_that_results_cannot_have(monkeypatch):
     scene.cycles.use_denoising = True
     denoised = contents.memory_left(scene, seen)
     pixels = seen.width * seen.height
-    assert plain == 3e9 - pixels * memory.BYTES_PER_PIXEL
+    assert plain == 3e9 - pixels * memory.BYTES_PER_PIXEL - pool.share(4e9)
     assert plain - denoised == pixels * memory.BYTES_PER_DENOISED_PIXEL

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
+from tetflora_addon import memory
 from tetflora_addon.blender.job import plant_mesh
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -126,8 +127,9 @@ def test_refused_whole_with_a_reason(monkeypatch):
     with pytest.raises(RuntimeError, match='"bad": zero scale'):
         bpy.ops.tetflora.make_plant_mesh()
     select(good)
-    monkeypatch.setattr(plant_mesh, "MOST_POLYGONS", 10)
-    with pytest.raises(RuntimeError, match="select fewer"):
+    monkeypatch.setattr(memory, "LEAST", 1000.0)
+    bpy.context.scene.tetflora.max_memory = 0.001
+    with pytest.raises(RuntimeError, match=r"A mesh of a plant would .* Max Memory .*select fewer"):
         bpy.ops.tetflora.make_plant_mesh()
     assert len(bpy.data.meshes) == before
     assert good.tetflora.enabled

@@ -75,9 +75,12 @@ def test_statistics_say_what_is_in_the_scene():
     meshed = sum(len(o.data.polygons) for o in _made(scene) if o["tetflora_kind"] in {"leaf", "bark"})
     proxies = [o for o in _made(scene) if o["tetflora_kind"] == "proxy"]
     assert statistics.polygons_meshed == meshed > 0
-    assert len(proxies) == 1
-    assert len(proxies[0].data.materials) == 1
-    assert statistics.polygons_proxy == len(proxies[0].data.polygons) > 0
+    assert all(len(o.data.materials) == 1 for o in proxies)
+    # Where Python cannot resize point clouds, nodes make them of the vertices of a mesh without faces.
+    numbers = [
+        (len(o.data.polygons) or len(o.data.vertices)) if o.type == 'MESH' else len(o.data.points) for o in proxies
+    ]
+    assert statistics.polygons_proxy == sum(numbers) > 0
     assert statistics.plants == 3
     assert json.loads(scene.tetflora.statistics) == json.loads(json.dumps(statistics.as_dict()))
 
@@ -86,7 +89,7 @@ def test_statistics_say_what_is_in_the_scene():
 def test_the_result_fits_the_budget(form):
     """In the scene, not in expectation; and the statistics say how coarse the facets became."""
     scene = _forest()
-    free = _refine(scene, proxy_form=form)
+    free = _refine(scene, proxy_form=form, leaf_limit=0.2)
     whole = free.polygons_meshed + free.polygons_proxy
     for share in (0.5, 0.2):
         fitted = _refine(scene, max_polygons=int(share * whole))
@@ -103,15 +106,14 @@ def test_shadows_of_what_is_behind_the_camera_are_refined_if_asked_for():
     add_plant("tree", location=(0.0, -18.0, 0.0))
     scene = bpy.context.scene
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", 'SUN'))
-    sun.rotation_euler = (1.05, 0.0, 0.0)  # it shines to where the camera looks
+    sun.rotation_euler = (1.52, 0.0, 0.0)  # low: all of the shadow falls to where the camera looks
     scene.collection.objects.link(sun)
     scene.render.resolution_x, scene.render.resolution_y = 320, 240
     coarse = _refine(scene)
     fine = _refine(scene, shadow_cutoff=4.0)
     assert coarse.polygons_meshed == 0
-    assert fine.polygons_meshed > 300
-    sun.hide_render = True
-    assert _refine(scene).polygons_meshed == 0
+    assert fine.polygons_proxy > 2 * coarse.polygons_proxy
+    assert _refine(scene, shadow_cutoff=0.0).polygons_proxy == coarse.polygons_proxy
 
 
 def test_results_carry_uvs_materials_and_smooth_tubes():

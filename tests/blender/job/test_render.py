@@ -109,6 +109,25 @@ def test_animations_are_refined_for_the_camera_and_plants_of_each_frame(stage, s
     assert datablocks() == before
 
 
+@pytest.mark.parametrize("draws", [False, True])
+def test_a_frame_is_made_in_the_main_thread_while_nothing_locks_the_window(
+    stage, stub, tmp_path, draws, monkeypatch, capfd
+):
+    """Which waits for it, and so cannot draw; and the artist is told which setting does without."""
+    handed = []
+
+    def in_main_thread(function=lambda: None):
+        handed.append(getattr(function, "func", function))
+        return function()
+
+    monkeypatch.setattr(render, "window_draws", lambda: draws)
+    monkeypatch.setattr(render, "in_main_thread", in_main_thread)
+    assert _still(stage, tmp_path / "a.png") == 0.0
+    assert (render._make in handed) == draws
+    said = capfd.readouterr().err
+    assert said.count(f'Lock Interface of the scene "{stage.name}" is off') == draws
+
+
 @pytest.mark.parametrize("persistent", [False, True])
 def test_stills_leave_nothing_behind_render_after_render(stage, stub, tmp_path, persistent):
     stage.render.use_persistent_data = persistent

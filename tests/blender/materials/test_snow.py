@@ -259,7 +259,7 @@ def test_soil_has_snow_while_a_scene_has():
 
 @pytest.mark.parametrize("turn", [0.0, np.pi / 2])
 def test_a_crown_of_facets_is_as_white_as_its_leaves(turn):
-    """From above and from the side; facets and leaves differ by up to a tenth, in summer too."""
+    """From above and from the side; facets and leaves differ by up to a seventh, in summer too."""
     small_scene(sky=0.5, sun=35.0, samples=24, size=48, width=14.0)
     scene = bpy.context.scene
     scene.render.film_transparent = True  # without the sky behind
@@ -272,4 +272,4 @@ def test_a_crown_of_facets_is_as_white_as_its_leaves(turn):
         scene.tetflora.expand_everything = everything
         refine.refine(scene, depsgraph())
         seen.append(_mean())
-    np.testing.assert_allclose(*seen, rtol=0.12)
+    np.testing.assert_allclose(*seen, rtol=0.15)

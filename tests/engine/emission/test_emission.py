@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,19 +15,13 @@ from tests.engine.refinement.test_loop import run
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.emission import facets, plants
-from tetflora_addon.emission.budget import afford
-from tetflora_addon.emission.forms import Refined, facet_blocks
-from tetflora_addon.emission.plants import Transition, expanded_blocks, explicit_blocks
-from tetflora_addon.emission.portions import Sight
+from tetflora_addon.emission import plants
+from tetflora_addon.emission.plants import expanded_blocks, explicit_blocks
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.facet_sizes import FacetPixels
-from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights
 from tetflora_addon.proxies.summaries import summarise
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
-from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.tetrahedra.geometry import volume
 
 
@@ -52,22 +45,6 @@ def with_decision(
     shape = result.decision.shape
     seen = result.transmittance if visibility is None else np.broadcast_to(visibility, shape).astype(float)
     return replace(result, decision=np.broadcast_to(decision, shape).astype(np.int8), transmittance=seen)
-
-
-def all_real(flora: Flora, camera: Camera) -> Transition:
-    """Nothing is too small to be drawn as it is."""
-    return Transition(flora, camera, 1e-9)
-
-
-def unweighted(monkeypatch: pytest.MonkeyPatch, flora: Flora) -> None:
-    """Facets have all of the area that they stand for, not what leaves of a cluster show of it."""
-    ones = np.ones((len(flora.rows), len(COUNTS)))
-    monkeypatch.setattr(facets, "facet_weights", lambda *_: FacetWeights(ones[None], ones[None]))
-
-
-def positions(blocks: list) -> list[bytes]:
-    """All places and attributes of meshes, bit by bit."""
-    return [b"".join([m.positions.tobytes(), *(v.tobytes() for _, v in m.attributes.values())]) for m in blocks]
 
 
 def test_the_scene_has_every_decision() -> None:
@@ -132,122 +109,6 @@ def test_explicit_polygons_are_about_as_many_as_expected() -> None:
     assert made == pytest.approx(expected, rel=0.15)
 
 
-def test_facets_have_the_area_of_what_is_not_explicit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """But for what leaves of a cluster hide of each other; without a transition they stand for all plants."""
-    flora, _, camera, result = scene()
-    mesh = support.facet_buffers(flora, result, camera)
-    check_topology(mesh)
-    whole = result.totals.optical_area.sum()
-    assert 0.4 * whole < support.face_areas(mesh).sum() < 1.05 * whole
-    unweighted(monkeypatch, flora)
-    assert support.face_areas(support.facet_buffers(flora, result, camera)).sum() == pytest.approx(whole, rel=0.05)
-    real = all_real(flora, camera)
-    rest = support.facet_buffers(flora, result, camera, transition=real)
-    leaves = support.face_areas(rest)[rest.attributes["tf_transmission"][1] > 0].sum()
-    proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
-    # A part that reaches into an explicit tetrahedron may be real as a whole.
-    assert leaves == pytest.approx(result.totals.leaf_area[proxies].sum(), rel=0.15)
-
-
-def test_facets_are_as_large_as_asked_for_and_larger_where_hidden() -> None:
-    """In pixels at their own distance, for wood; hidden wood of few faces gets larger facets still."""
-    flora, _, camera, result = scene()
-    numbers = {}
-    for decision in (Decision.PROXY, Decision.HIDDEN):
-        mesh = support.facet_buffers(flora, with_decision(result, decision, 1.0), camera, 0.5)
-        numbers[decision] = mesh.polygons
-        wood = mesh.attributes["tf_transmission"][1] == 0
-        centre = support.face_centres(mesh)[wood]
-        pixels = np.sqrt(support.face_areas(mesh)[wood])
-        pixels /= np.linalg.norm(centre - camera.position, axis=1) * camera.pixel_size
-        if decision == Decision.PROXY:
-            assert np.median(pixels) == pytest.approx(0.5, rel=0.25)
-        else:
-            assert np.quantile(pixels, 0.01) > 1.0 * 0.75
-    assert numbers[Decision.HIDDEN] < numbers[Decision.PROXY]
-
-
-def test_facets_are_about_as_many_as_expected() -> None:
-    """Of whatever is decided, seen however well, at any size: the budget rests on it."""
-    flora, _, camera, result = scene()
-    for decision, visibility in ((Decision.PROXY, 1.0), (Decision.PROXY, 0.2), (Decision.HIDDEN, 1e-3)):
-        one = with_decision(result, decision, visibility)
-        for pixels in (FacetPixels(0.3), FacetPixels(1.0, 2.0)):
-            sight = Sight(flora, one, camera)
-            expected = facets.sizes_of(flora, sight.portions(), sight.shadows).counts(pixels).sum()
-            made = support.facet_buffers(flora, one, camera, pixels).polygons
-            assert made == pytest.approx(expected, rel=0.15), (decision, visibility, pixels)
-
-
-def test_chunks_of_facets_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    flora, _, camera, result = scene()
-    once = support.facet_buffers(flora, result, camera)
-    monkeypatch.setattr(facets, "FACETS_AT_ONCE", 500)
-    chunked = support.facet_buffers(flora, result, camera)
-    assert chunked.polygons == once.polygons
-    quads = [np.unique(m.positions.reshape(-1, 9), axis=0) for m in (once, chunked)]
-    assert (quads[0] == quads[1]).all()
-
-
-def test_facets_are_made_in_chunks_that_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By facets, not by branches: thick wood close to the eye is cut into very many."""
-    flora, _, camera, result = scene()
-    made: dict[str, list[int]] = {"piece_facets": [], "subplant_facets": []}
-    for name, numbers in made.items():
-        inner = getattr(facets, name)
-
-        def counted(*args: object, inner: object = inner, numbers: list[int] = numbers) -> object:
-            out = inner(*args)
-            numbers.append(len(out))
-            return out
-
-        monkeypatch.setattr(facets, name, counted)
-    monkeypatch.setattr(facets, "FACETS_AT_ONCE", 2_000)
-    total = support.facet_buffers(flora, with_decision(result, Decision.PROXY), camera, 0.15)
-    assert sum(map(sum, made.values())) == total.polygons
-    for numbers in made.values():
-        assert sum(numbers) > 8_000
-        # One thing alone may exceed the limit, but then it has a chunk of its own.
-        assert len(numbers) > sum(numbers) / max(2_000, max(numbers)) / 2
-        assert np.median(numbers) < 2 * 2_000
-
-
-def test_facets_come_in_blocks_of_bounded_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Together they are all facets; each is of one species, of which only the last block is small."""
-    flora, _, camera, result = scene()
-    once = support.facet_buffers(flora, result, camera, 1.0)
-    monkeypatch.setattr(facets, "FACETS_AT_ONCE", 300)
-    monkeypatch.setattr(facets, "BLOCK_POLYGONS", 700)
-    made = Refined(flora, result, camera, FacetPixels(1.0))
-    largest = max(len(some) for parts in made.facet_parts() for some, _ in parts)
-    blocks = list(facet_blocks(made))
-    sizes = [b.polygons for b in blocks]
-    assert sum(sizes) == once.polygons
-    assert len(blocks) > 3
-    assert min(a.polygons for a, b in pairwise(blocks) if a.species == b.species) >= 700
-    # What one part of a plant has at most comes on top.
-    assert max(sizes) < 700 + largest
-    assert largest < 3_000
-    assert sorted({b.species for b in blocks}) == list(range(len(flora.species)))
-    assert [b.species for b in blocks] == sorted(b.species for b in blocks)
-
-
-def test_the_order_of_plants_changes_nothing() -> None:
-    """Real leaves, bark and facets are the same to the last bit, also of copies of one plant, with any budget."""
-    flora, seeds, camera, _ = scene()
-    seeds = replace(seeds, seed=seeds.seed % 7)
-    made = []
-    for order in (np.arange(len(seeds)), np.arange(len(seeds))[::-1], np.random.default_rng(1).permutation(len(seeds))):
-        _, result = run(flora, seeds.take(order), camera)
-        detail = afford(flora, result, camera, RefinementSettings(max_polygons=20_000))
-        transition = Transition(flora, camera, detail.leaf_limit / 2)
-        blocks = [b.buffers for t in (None, transition) for b in explicit_blocks(flora, result, camera, t)]
-        proxies = facet_blocks(Refined(flora, result, camera, detail.pixels, transition))
-        made.append((detail.pixels, positions([*blocks, *proxies])))
-    assert made[0] == made[1] == made[2]
-    assert len(made[0][1]) > 6
-
-
 def test_shells_hold_what_explicit_does_not() -> None:
     """Whatever is decided: polygons and shells together have the area of the plants."""
     flora, seeds, camera, result = scene()
@@ -264,19 +125,6 @@ def test_shells_hold_what_explicit_does_not() -> None:
         assert 0 < held <= shell
         assert 0.05 * whole < real < whole
         assert real + held == pytest.approx(whole, rel=0.05)
-
-
-def test_what_was_off_screen_comes_back_identical() -> None:
-    """The camera turns away and back again: polygons and facets are the same to the last digit."""
-    flora, seeds, camera, _ = scene()
-    away = replace(camera, frame=camera.frame @ np.diag([-1.0, 1.0, -1.0]))
-    made = []
-    for view in (camera, away, camera):
-        _, result = run(flora, seeds, view)
-        blocks = [b.buffers for b in explicit_blocks(flora, result, camera)]
-        made.append([m.positions for m in (*blocks, support.facet_buffers(flora, result, view))])
-    assert all(np.array_equal(a, b) for a, b in zip(made[0], made[2], strict=True))
-    assert sum(map(len, made[1])) < sum(map(len, made[0])) / 2
 
 
 def test_shells_are_the_cells_of_proxies() -> None:
@@ -296,16 +144,10 @@ def test_shells_are_the_cells_of_proxies() -> None:
     assert mesh.attributes["tf_colour"][1].max() <= 1
 
 
-def test_nothing_to_draw() -> None:
-    """All explicit leaves no proxy, all proxies leave no block."""
+def test_all_proxies_leave_no_block_and_all_explicit_no_shell() -> None:
     flora, _, camera, result = scene()
-    explicit = with_decision(result, Decision.EXPLICIT)
-    assert proxy_shells(flora, explicit) is None
-    assert support.facet_buffers(flora, explicit, camera, transition=all_real(flora, camera)) is None
+    assert proxy_shells(flora, with_decision(result, Decision.EXPLICIT)) is None
     assert list(explicit_blocks(flora, with_decision(result, Decision.PROXY), camera)) == []
-    # Facets so large that none of what there is makes one.
-    proxies = with_decision(result, Decision.PROXY)
-    assert list(facet_blocks(Refined(flora, proxies, camera, FacetPixels(1e9)))) == []
 
 
 def test_copies_of_a_seed_are_all_made() -> None:

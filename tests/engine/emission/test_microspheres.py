@@ -4,20 +4,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
 from tests.engine import support
 from tests.engine.emission.test_emission import scene
 from tetflora_addon.arrays import unit
+from tetflora_addon.buffers import MeshBuffers, PointBuffers
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.emission import facets as subject
-from tetflora_addon.emission.forms import Refined, facet_blocks, sphere_blocks
+from tetflora_addon.emission.forms import AsSpheres, as_triangles, facet_blocks
 from tetflora_addon.proxies.drawn import LEAST_COVER, facet_mesh, facing, joined, sphere_points, spheres_of
-from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.proxies.microsurfaces import Facets
 
 EYE = np.array([2.0, -30.0, 4.0])
@@ -73,21 +69,22 @@ def test_places_and_looks_are_those_of_the_facets() -> None:
         assert (values == expected.astype(np.float32)).all()
 
 
-def test_a_refinement_has_a_sphere_for_each_facet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the same blocks, of bounded size; leaves that lie flat cover less than half of their area for a level view."""
+def test_a_refinement_has_a_sphere_for_each_facet() -> None:
+    """Where all are spheres as many as facets; where only hidden ones are, triangles where they are seen."""
     flora, _, view, result = scene()
-    refined = Refined(flora, result, view, FacetPixels(1.0))
-    whole = sum(block.polygons for block in facet_blocks(refined))
-    monkeypatch.setattr(subject, "FACETS_AT_ONCE", 300)
-    monkeypatch.setattr(subject, "BLOCK_POLYGONS", 700)
-    facets, blocks = list(facet_blocks(refined)), list(sphere_blocks(refined))
-    assert [block.polygons for block in blocks] == [block.polygons for block in facets]
-    assert [block.species for block in blocks] == [block.species for block in facets]
-    assert sum(block.polygons for block in blocks) == whole
-    begun = [a for a, b in pairwise(blocks) if a.species == b.species]
-    assert min(block.polygons for block in begun) >= 700
-    area = sum(support.face_areas(block).sum() for block in facets)
-    cover = sum(discs(block.radius).sum() for block in blocks)
-    assert 0.2 * area < cover < 0.5 * area
-    again = list(sphere_blocks(replace(refined, refinement=replace(result))))
-    assert all((a.radius == b.radius).all() for a, b in zip(blocks, again, strict=True))
+    made = {}
+    for name, form in (
+        ("all", AsSpheres(view, np.pi, True)),
+        ("hidden", AsSpheres(view, np.pi, False)),
+        ("none", as_triangles),
+    ):
+        refined = support.refined(flora, result, view, form=form)
+        list(refined.mesh_blocks())
+        made[name] = list(facet_blocks(refined))
+    numbers = {name: sum(block.polygons for block in blocks) for name, blocks in made.items()}
+    assert numbers["all"] == numbers["hidden"] == numbers["none"] > 1000
+    kinds = {name: {type(block) for block in blocks} for name, blocks in made.items()}
+    assert kinds == {"all": {PointBuffers}, "hidden": {PointBuffers, MeshBuffers}, "none": {MeshBuffers}}
+    area = sum(support.face_areas(block).sum() for block in made["none"])
+    cover = sum(discs(block.radius).sum() for block in made["all"])
+    assert 0.2 * area < cover < 0.6 * area

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
@@ -17,18 +16,14 @@ from tests.engine.refinement.test_loop import check, run
 from tetflora_addon.arrays import spread
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.compiled.orientation import leaf_moments
-from tetflora_addon.emission import facets
-from tetflora_addon.emission.plants import Transition, expanded_blocks, explicit_blocks
-from tetflora_addon.emission.portions import Sight
+from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves, settled
 from tetflora_addon.growth.growth import leaf_counts, trunks
 from tetflora_addon.jobs import at_once
-from tetflora_addon.proxies.facet_sizes import FacetPixels
-from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights, facet_weights, fitting
-from tetflora_addon.proxies.microsurfaces import Facets
+from tetflora_addon.proxies.facet_weights import facet_weights, fitting
 from tetflora_addon.refinement.shares import SharedPlants
 from tetflora_addon.species.fingerprints import fingerprint
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
@@ -165,25 +160,22 @@ SCENES = {**{solid: one_order(solid, 4_000) for solid in SOLIDS}, "cone on a tru
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("pixels", [2, 8, 32, 200])
-def test_all_area_is_drawn_at_any_size(name: str, pixels: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_area_is_drawn_at_any_size(name: str, pixels: int) -> None:
     """Real leaves and facets together have the plants' area, and facets lie where leaves are."""
     flora = support.compiled(SCENES[name])
     seeds = support.grove(9, 5.0)
     camera = support.camera((30, 0, 18), (0, 0, 2), pixels=5 * pixels, view=20.0, kind="ORTHO")
     _, result = run(flora, seeds, camera)
     check(flora, seeds, result)
-    ones = np.ones((len(flora.rows), len(COUNTS)))
-    monkeypatch.setattr(facets, "facet_weights", lambda *_: FacetWeights(ones[None], ones[None]))
-    sight, transition = Sight(flora, result, camera), Transition(flora, camera, 1.5)
-    made = [f for part in facets.facet_parts(flora, result, camera, FacetPixels(0.5), transition) for f in drawn(part)]
-    area = sum((some.side**2).sum() for some in made)
-    for block in explicit_blocks(flora, result, camera, transition, sight=sight):
+    blocks, made, _ = support.drawn(flora, result, camera, 0.5, 1.5, weighted=False, hidden=0.4)
+    area = (made.side**2).sum()
+    for block in blocks:
         area += support.face_areas(block.buffers).sum() / (2 if block.kind == "bark" else 1)
     whole = trunks(flora.rows, seeds)
     expected = flora.leaf_areas(whole).sum()
     assert area == pytest.approx(expected + flora.wood_areas(whole).sum() / 2, rel=0.03)
-    if pixels >= 8 and made:
-        beside = np.concatenate([some.centre for some in made]) - [0.0, 0.0, 2.0]
+    if pixels >= 8 and len(made):
+        beside = made.centre - [0.0, 0.0, 2.0]
         away = np.abs(beside[:, None, :2] - seeds.position[None, :, :2]).max(axis=2).min(axis=1)
         assert away.max() < RADIUS * 4 + 0.2
 
@@ -200,10 +192,6 @@ def test_points_of_a_solid_are_all_different_and_even() -> None:
     centre = [0.0, 0.0, 4 * (BARE + 1) / 2]
     relative = (place - centre) / np.array([4 * RADIUS, 4 * RADIUS, 2 * (1 - BARE)])
     assert (relative**2).sum(axis=1).mean() == pytest.approx(0.6, abs=0.02)
-
-
-def drawn(part: facets.Parts) -> Iterator[Facets]:
-    return (some for some, _ in part)
 
 
 def test_weights_of_solids_are_whole_where_facets_are_as_small_as_leaves() -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,16 +15,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from tests.engine.emission.test_emission import all_real, scene
+from tests.engine import support
+from tests.engine.emission.test_emission import scene
 from tetflora_addon import parallel
-from tetflora_addon.emission import facets, plants
-from tetflora_addon.emission.facets import facet_parts
-from tetflora_addon.emission.plants import explicit_blocks
+from tetflora_addon.emission.drawing import TILE
 from tetflora_addon.growth.hashing import uniform
 from tetflora_addon.processes import pool
 from tetflora_addon.processes.messages import Closed, receive, send
 from tetflora_addon.processes.pool import in_processes
-from tetflora_addon.proxies.facet_sizes import FacetPixels
 
 KEYS = np.arange(1000, dtype=np.uint64)
 
@@ -32,10 +31,8 @@ KEYS = np.arange(1000, dtype=np.uint64)
 def two(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Two processes, on any machine, however little there is to do."""
     monkeypatch.setattr(parallel, "threads", lambda: 2)
-    monkeypatch.setattr(plants, "WORTH_PROCESSES", 0)
-    monkeypatch.setattr(facets, "WORTH_PROCESSES", 0)
     yield
-    assert not pool._broken.is_set()
+    assert not pool._pool.broken
 
 
 @given(
@@ -102,7 +99,7 @@ class _Nested:
 
 def test_who_is_killed_is_replaced(two: None) -> None:
     list(in_processes(uniform, KEYS, range(4)))
-    for child in list(pool._children):
+    for child in list(pool._pool.children):
         child._process.kill()
     assert len(list(in_processes(uniform, KEYS, range(7)))) == 7
 
@@ -131,14 +128,12 @@ def arrays_of(thing: object) -> list[np.ndarray]:
 
 def test_blocks_do_not_depend_on_the_number_of_processes(two: None, monkeypatch: pytest.MonkeyPatch) -> None:
     flora, _, camera, result = scene()
-    pixels, transition = FacetPixels(1.0), all_real(flora, camera)
-    transition = type(transition)(flora, camera, 3.0)
+    camera = replace(camera, width=2 * TILE, height=120)
     found = []
     for number in (2, 1):
         monkeypatch.setattr(parallel, "threads", lambda number=number: number)
-        blocks = list(explicit_blocks(flora, result, camera, transition))
-        parts = [list(some) for some in facet_parts(flora, result, camera, pixels, transition)]
-        found.append(arrays_of([blocks, parts]))
+        blocks, facets, _ = support.drawn(flora, result, camera, 1.5, 0.6)
+        found.append(arrays_of([blocks, facets]))
     assert len(found[0]) == len(found[1]) > 10
     for one, other in zip(*found, strict=True):
         assert one.tobytes() == other.tobytes()

@@ -24,7 +24,7 @@ from tetflora_addon.proxies.facet_sizes import (
     FacetPixels,
     FacetSizes,
     coarseness,
-    subplant_facet_sizes,
+    opaque_fractions,
 )
 from tetflora_addon.proxies.microsurfaces import subplant_facets
 from tetflora_addon.proxies.thrown_shadows import ThrownShadows
@@ -45,10 +45,11 @@ def sizes(
         extent_around=lambda points: np.full(len(points), extent),
         clearance=lambda points: np.full(len(points), clearance),
     )
-    totals = subplant_totals(flora, own)
-    return subplant_facet_sizes(
-        flora, own, totals, ThrownShadows(camera), np.full(PLANTS, visibility), np.full(PLANTS, coarse)
-    ), own
+    totals, every, away = subplant_totals(flora, own), np.ones(PLANTS), np.full(PLANTS, clearance)
+    least = np.sqrt(totals.wood_area / 2 / np.maximum(flora.branch_faces(own), 1))
+    falls = ThrownShadows(camera).distance(own.position, away)
+    view = extent * every, flora.one_leaf_area(own), least, visibility * every, coarse * every, away, falls
+    return FacetSizes(*view, totals, every, opaque_fractions(flora, own, totals)), own
 
 
 @given(st.floats(-100.0, 1e5), st.floats(1e-4, 10.0))

@@ -4,12 +4,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tetflora_addon.proxies.hotspots import balance, balanced_colours, mean_overlap, overlap
+from tests.engine import support
+from tetflora_addon.growth.growth import trunks
+from tetflora_addon.proxies.hotspots import balance, balanced_colours, light_ratios, mean_overlap, overlap
+from tetflora_addon.refinement.lights import Light
 
 EXTINCTION = st.floats(0.01, 20.0)
 SIZE = st.floats(0.005, 1.0)
@@ -68,3 +73,16 @@ def test_mean_overlap_lies_between() -> None:
     a = np.geomspace(1e-2, 1e2, 30)
     assert (mean_overlap(a) >= overlap(a / np.sqrt(2.0)) - 1e-6).all()
     assert (mean_overlap(a) <= 2.0).all()
+
+
+def test_the_eye_counts_and_not_where_a_camera_of_several_stands() -> None:
+    """A camera that is set back for a view cell sees hotspots as the one in the middle of the cell does."""
+    flora = support.small_flora()
+    plants = trunks(flora.rows, support.plants([1, 2], position=[(0, 0, 0), (3, 1, 0)]))
+    eye = support.camera((0, -8, 2), (0, 0, 2), pixels=64)
+    back = replace(eye, position=eye.position + 3.0 * eye.frame[:, 2], setback=3.0, cell_radius=0.1)
+    assert back.eye == pytest.approx(eye.eye)
+    sun = Light("SUN", np.zeros(3), np.array([0.1, 1.0, -0.2]) / np.linalg.norm([0.1, 1.0, -0.2]))
+    ratios = [light_ratios(flora, plants, np.full(2, 0.3), view, (sun,)) for view in (eye, back)]
+    assert ratios[1] == pytest.approx(ratios[0], rel=1e-9)
+    assert (ratios[0] != 1.0).all()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Weights of species that are not shipped: quick, in steps, only where facets are drawn, and those of all rays."""
+"""Weights of species that are not shipped: quick, in steps, and those of all rays."""
 
 from __future__ import annotations
 
@@ -9,15 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.engine import support
-from tetflora_addon.camera.camera import Camera
-from tetflora_addon.compiled.flora import Flora, compile_species
-from tetflora_addon.emission import facets
-from tetflora_addon.emission.plants import Transition
+from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import facet_weights as subject
-from tetflora_addon.refinement import loop
-from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.species.species import Range, Species
 
@@ -71,32 +65,3 @@ def test_weights_are_measured_in_steps_and_what_is_stopped_leaves_nothing(monkey
     at_once(subject.measuring(flora, [0]))
     assert subject.unmeasured(flora) == []
     assert list(subject.measuring(flora, [0])) == []
-
-
-def seen_from(distance: float, limit: float, monkeypatch: pytest.MonkeyPatch) -> tuple[list[int], list[str]]:
-    """Species of which facets may be drawn, and those that making all facets measures; of one edited plant."""
-    measured = []
-    real = subject.fitting
-
-    def noted(flora: Flora, number: int, rays: float):
-        measured.append(flora.species[number].identifier)
-        return real(flora, number, rays)
-
-    monkeypatch.setattr(subject, "fitting", noted)
-    monkeypatch.setattr(subject, "_found", {})
-    subject._of_states.cache_clear()
-    flora = compile_species([edited("grass", leaves=1.4)])
-    seeds = replace(support.plants(1), species=np.zeros(1, np.int32))
-    frame = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    eye = np.array([0.0, -distance, 0.2])
-    camera = Camera("PERSP", eye, frame, (-0.5, 0.5, -0.5, 0.5), 0.01, 10.0 * distance, 200, 200)
-    refinement = at_once(loop.refine(flora, seeds, camera, RefinementSettings()))
-    transition = Transition(flora, camera, limit)
-    drawn = facets.drawn_species(facets.Sight(flora, refinement, camera), transition)
-    list(facets.facet_parts(flora, refinement, camera, facets.FacetPixels(0.33), transition))
-    return drawn, measured
-
-
-def test_nothing_is_measured_where_no_facet_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert seen_from(2.0, 1e-9, monkeypatch) == ([], [])
-    assert seen_from(2.0, 1e9, monkeypatch) == ([0], ["edited"])

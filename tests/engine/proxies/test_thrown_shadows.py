@@ -13,10 +13,7 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.growth.growth import trunks
-from tetflora_addon.proxies.facet_sizes import COARSE, FacetPixels, subplant_facet_sizes
 from tetflora_addon.proxies.thrown_shadows import ThrownShadows
-from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.refinement.lights import Light
 
 #: Looks north from the origin at eye height; a metre beside its axis is out of view near it only.
@@ -72,18 +69,3 @@ def test_more_lights_never_make_a_shadow_longer() -> None:
     one, two = sun(0, 1, -0.3), sun(1, 0.2, -0.2)
     both = distances(list(points), one, two)
     assert (both == np.minimum(distances(list(points), one), distances(list(points), two))).all()
-
-
-def test_what_throws_shadows_into_the_view_is_finer() -> None:
-    flora = support.small_flora()
-    own = trunks(flora.rows, support.plants(np.arange(20)))
-    own = replace(own, position=np.tile([0.0, -10.0, 5.0], (20, 1)))
-    given = flora, own, subplant_totals(flora, own)
-    none, coarse = np.zeros(20), np.full(20, COARSE)
-    throws, not_ = (
-        subplant_facet_sizes(*given, ThrownShadows(CAMERA, (light,), 0.0), none, coarse)
-        for light in (sun(0, 1, -0.2), sun(0, -1, -0.2))
-    )
-    pixels = FacetPixels(1.0, 16.0)
-    assert (throws.sides(pixels)[0] <= not_.sides(pixels)[0]).all()
-    assert throws.counts(pixels).sum() > 2.0 * not_.counts(pixels).sum()

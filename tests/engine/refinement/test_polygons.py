@@ -15,9 +15,7 @@ from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.assets.mesh_features import mesh_features
 from tetflora_addon.buffers import MeshBuffers
-from tetflora_addon.emission import budget
 from tetflora_addon.emission.budget import afford
-from tetflora_addon.emission.forms import Refined, facet_blocks
 from tetflora_addon.emission.polygons import mended, polygon_blocks, polygon_buffers, polygon_facets
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.branches import Branches
@@ -355,28 +353,9 @@ def test_large_polygons_stay_whole_among_proxies(facet_pixels: float | None) -> 
     assert np.isfinite(shells.attributes["tf_kappa"][1]).all()
 
 
-def test_a_budget_counts_polygons() -> None:
+def test_a_budget_leaves_polygons_their_place() -> None:
+    """What your own meshes have is taken off first."""
     meshes, camera = grove()
-    result, flora = refined(meshes, camera), support.small_flora()
-    sizes = []
-    for most in (0, 3_000, 1_000):
-        detail = afford(flora, result, camera, RefinementSettings(max_polygons=most))
-        made = [b.buffers for b in polygon_blocks(detail.refinement, camera, detail.pixels.seen)]
-        scene = Refined(flora, detail.refinement, camera, pixels=detail.pixels)
-        facets = sum(block.polygons for block in facet_blocks(scene))
-        sizes.append(sum(b.polygons for b in made) + facets)
-        assert sizes[-1] <= (most or np.inf)
-    assert sizes[0] > sizes[1] > sizes[2] > 500
-
-
-def test_polygons_out_of_sight_take_nothing_from_what_the_image_shows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only from a limit that somebody has set."""
-    meshes, camera = grove()
-    behind = replace(camera, frame=camera.frame @ np.diag([-1.0, 1.0, -1.0]))
-    result, flora, options = refined(meshes, behind), support.small_flora(), RefinementSettings()
-    monkeypatch.setattr(budget, "enough", lambda camera: 100.0)
-    detail = afford(flora, result, behind, options)
-    assert detail.pixels.seen == options.facet
-    assert detail.pixels.hidden == 1.0
-    assert detail.refinement is result
-    assert afford(flora, result, behind, replace(options, max_polygons=100)).pixels.seen > options.facet
+    result = refined(meshes, camera)
+    number = len(result.holdings.polygons)
+    assert afford(result, camera, RefinementSettings(max_polygons=2 * number)).most < 2 * number - number + 1

@@ -15,6 +15,7 @@ from ...compiled.flora import Flora, compile_species
 from ...emission.light import Sources
 from ...growth.growth import trunks
 from ...growth.seeds import Seeds
+from ...processes import pool
 from ...refinement.lights import Light
 from ...refinement.polygons import Polygons
 from ...refinement.settings import RefinementSettings
@@ -207,9 +208,14 @@ def picture_bytes(scene: bpy.types.Scene, camera: Camera) -> int:
     return memory.picture_bytes(camera.width * camera.height, bool(cycles and cycles.use_denoising))
 
 
-def memory_left(scene: bpy.types.Scene, camera: Camera) -> float:
-    """Bytes that the scene's limit of memory leaves for results now; infinite without a limit."""
-    return memory.allowance(scene.tetflora.max_memory, picture_bytes(scene, camera))
+def memory_left(scene: bpy.types.Scene, camera: Camera | None = None) -> float:
+    """Bytes that the scene's limit of memory leaves for results now; infinite without a limit.
+
+    What other processes of TetFlora will take is kept for them.
+    """
+    most = scene.tetflora.max_memory
+    picture = 0 if camera is None else picture_bytes(scene, camera)
+    return memory.allowance(most, picture + pool.share(memory.limit(most)))
 
 
 def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:

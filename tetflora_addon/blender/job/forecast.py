@@ -21,6 +21,7 @@ from ...compiled.crowns import Crown
 from ...emission.budget import enough
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
+from ...processes import pool
 from ...refinement.estimate import Estimate, Stand, estimate
 from ..attributes import read
 from ..runtime import Handlers
@@ -74,10 +75,13 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
         camera = read_camera(scene, depsgraph)
     except TetFloraError:
         return None
-    used = (memory.resident() or 0) + picture_bytes(scene, camera)
+    others = pool.share(memory.limit(scene.tetflora.max_memory))
+    used = (memory.resident() or 0) + others + picture_bytes(scene, camera)
     allowed = memory_left(scene, camera)
     everything = scene.tetflora.expand_everything
-    return estimate(stand, camera, settings_from(scene), used, allowed, enough(camera), everything)
+    return estimate(
+        stand, camera, settings_from(scene), used, allowed, enough(camera, scene.tetflora.facet), everything
+    )
 
 
 def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:

@@ -28,10 +28,8 @@ from ..scene.ages import classed
 from ..scene.own_ages import stored_ages
 from ..scene.skeletons import kind_of
 from ..worker import call_in_thread
-from .contents import compile_for, expected_polygons, in_year
-
-#: Most polygons of one conversion; more would fill the memory of most computers.
-MOST_POLYGONS = 30_000_000
+from .contents import compile_for, expected_polygons, in_year, memory_left
+from .limits import check_fits
 
 _UPRIGHT = np.eye(3)
 
@@ -145,10 +143,8 @@ def _make_plant_mesh_steps(
     kinds = dict.fromkeys(s.identifiers[0] for s in seeds)
     floras = {kind: in_year(scene, compile_for((kind,), scene, depsgraph)) for kind in kinds}
     polygons = sum(expected_polygons(floras[s.identifiers[0]], s) for s in seeds)
-    if polygons > MOST_POLYGONS:
-        raise SceneError(
-            f"{len(plants):,} plants have about {polygons:,.0f} polygons; select fewer, the limit is {MOST_POLYGONS:,}"
-        )
+    what = "A mesh of a plant" if len(plants) == 1 else f"Meshes of {len(plants):,} plants"
+    check_fits(what, polygons, memory_left(scene), "or select fewer plants")
     made, data_made, switched = [], [], []
     whole = False
     try:

@@ -15,20 +15,19 @@ from functools import partial
 import bpy
 import numpy as np
 
-from ... import memory, parallel
+from ... import memory
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
 from ...emission.asset_plan import plan_of
 from ...emission.asset_sight import AssetSight
 from ...emission.budget import afford
-from ...emission.facets import drawn_species
+from ...emission.drawing import drawing
 from ...emission.forms import EmissionForm, Refined
-from ...emission.plants import Transition, expanded_blocks, explicit_blocks
+from ...emission.plants import Transition, expanded_blocks
 from ...emission.polygons import polygon_blocks
-from ...emission.portions import Sight
 from ...jobs import Progress
 from ...processes import pool
-from ...proxies.facet_weights import measuring, unmeasured
+from ...proxies.facet_weights import facet_weights, measuring, unmeasured
 from ...refinement import loop
 from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
@@ -36,7 +35,6 @@ from ...refinement.settings import FIRST_LOOK, RefinementSettings
 from ...refinement.statistics import Statistics, Stopwatch
 from ..compat import drawn_disc
 from ..main_thread import in_main_thread
-from ..preferences import wanted_threads
 from ..results.collection import Results
 from ..results.forms import form_of
 from ..results.hiding import hide_originals, remove_results
@@ -50,6 +48,7 @@ from ..worker import at_once, call_in_thread, nobody_waits, steps_in_thread
 from .asset_writing import write_assets, write_plain
 from .assets import Bound, asset_warnings, bind_steps, is_plain
 from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
+from .limits import check_expanded, use_machine
 from .writing import bake_light, write_blocks, write_polygons
 
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
@@ -123,7 +122,7 @@ def _refine_steps(
     first_look: bool,
 ) -> Generator[Progress, bool | None, Statistics]:
     clock, scene = Stopwatch(), results.scene
-    parallel.use(wanted_threads(scene))
+    use_machine(scene)
     yield Progress(0.0, "Reading the scene")
     if camera is None or given is None:
         depsgraph.update()  # reading what was deleted since the last step would crash Blender
@@ -150,6 +149,8 @@ def _refine_steps(
     statistics.instances = sum(len(one) for one in given.places)
     asset_warnings.clear()
     bound, left = None, memory_left(scene, camera)
+    if not refined:
+        yield from call_in_thread(progress, check_expanded, flora, given.seeds, camera, left)
     plain = not refined or is_plain(scene, given.places, depsgraph, left)
     if not plain:
         bound = yield from bind_steps(scene, given.places, depsgraph, camera, left)
@@ -304,6 +305,7 @@ def _refined(
     settings: RefinementSettings,
     form: EmissionForm,
     disc: float,
+    baked: bool,
     statistics: Statistics,
     clock: Stopwatch,
 ) -> Generator[Progress, bool | None, Refined]:
@@ -311,24 +313,40 @@ def _refined(
     refinement = yield from _run_loop(flora, given, bound, camera, settings, statistics)
     yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
     assets = None if bound is None else (AssetSight(refinement, camera, form.facets), bound.keeping)
-    detail = afford(flora, refinement, camera, settings, form.faces, form.primitive_bytes, assets)
+    if form.facets and unmeasured(flora):
+        yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
+        for name, done in measuring(flora, range(len(flora.species))):
+            yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
+        yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
+    detail = afford(refinement, camera, settings, form.faces, form.primitive_bytes, assets)
     clock.lap("refine")
     _count(statistics, detail.refinement)
     statistics.strays = given.named(refinement.strays)
     planned = None
     if assets is not None:
         sight = assets[0] if detail.refinement is refinement else AssetSight(detail.refinement, camera, form.facets)
-        planned = sight, plan_of(sight, detail.leaf_limit if form.facets else None, bound.keeping)
+        planned = sight, plan_of(sight, detail.asset_limit if form.facets else None, bound.keeping)
     refinement = detail.refinement
     if not form.facets:
         return Refined(flora, refinement, camera, tolerance=detail.tolerance, assets=planned)
     transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
-    yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
-    sight = detail.sight or Sight(flora, refinement, camera)
-    if unmeasured(flora):
-        for name, done in measuring(flora, drawn_species(sight, transition)):
-            yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
-    return Refined(flora, refinement, camera, detail.pixels, transition, disc, detail.tolerance, sight, planned)
+    # Light is baked for facets, whatever is made of them then.
+    becomes = None if baked else form.form(camera, disc)
+    sizes, weights = detail.pixels, facet_weights(flora)
+    with_all = drawing(
+        flora,
+        refinement,
+        camera,
+        transition,
+        sizes.seen,
+        weights,
+        sizes.hidden,
+        given.occluders,
+        becomes,
+        detail.most,
+        settings.shadow_cutoff,
+    )
+    return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc)
 
 
 def _write_refined(
@@ -348,17 +366,16 @@ def _write_refined(
     # What the process holds already and what the image takes count too.
     settings = replace(settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
     disc = drawn_disc(scene.render.engine)
-    work = _refined(flora, given, bound, camera, settings, form.emission, disc, statistics, clock)
+    baked = given.sources is not None
+    work = _refined(flora, given, bound, camera, settings, form.emission, disc, baked, statistics, clock)
     refined = yield from steps_in_thread(work, Progress(0.05, "Refining, pass 1"))
     in_main_thread(results.open)
     baking = None
     if given.sources is not None:
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-    how = refined.transition, refined.tolerance, refined.sight
-    blocks = explicit_blocks(flora, refined.refinement, camera, *how)
-    yield from write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
+    yield from write_blocks(results, flora, refined.mesh_blocks(), statistics, _LOOP_FRACTION, baking)
     if given.explicit is not None:
-        blocks = polygon_blocks(refined.refinement, camera, refined.facet_pixels)
+        blocks = polygon_blocks(refined.refinement, camera, None if refined.pixels is None else refined.pixels.seen)
         yield from write_polygons(results, given.explicit, blocks, statistics, baking)
     hidden = []
     if refined.assets is not None:

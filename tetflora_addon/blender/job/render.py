@@ -9,7 +9,8 @@ Their order has these reasons (tried on 4.5 and 5.2):
 - 5.2 crashes if objects that were rendered are deleted in ``render_post`` or ``render_write``, while the renderer still
   holds them. They are deleted in the next ``render_pre``, and in ``render_complete`` or ``render_cancel`` at the end.
 - Results of a render are marked as runtime data, which Blender never writes into a file.
-- With a window, handlers run in the thread of the render: what links, hides or removes goes to the main thread.
+- With a window, handlers run in the thread of the render: what links, hides or removes goes to the main thread; without
+  *Lock Interface*, everything does.
 """
 
 import sys
@@ -20,7 +21,7 @@ from functools import partial
 import bpy
 
 from ...errors import TetFloraError
-from ..main_thread import in_main_thread
+from ..main_thread import in_main_thread, window_draws
 from ..results.collection import has_results, leave_out_of_file, result_collections
 from ..results.forms import raise_settings, restore_settings
 from ..results.hiding import (
@@ -32,7 +33,7 @@ from ..results.hiding import (
     unpack_override_marks,
 )
 from ..results.output import KIND, adopt_materials, release_materials
-from ..runtime import Handlers, Listeners, complain, failed_frames
+from ..runtime import Handlers, Listeners, complain, failed_frames, remember
 from ..saved_files import clear_unreadable, migrate
 from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
 from ..scene.plants import NoPlantsError
@@ -90,8 +91,13 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     try:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
         if wanted and has_contents(scene):
+            make = partial(_make, scene)
             with looked_at_once():
-                _make(scene)
+                if window_draws():
+                    _warn_of_unlocked(scene)
+                    in_main_thread(make)
+                else:
+                    make()
             made = True
         elif not scene.tetflora.refine_at_render and has_plants(scene) and not _has_meshes(scene):
             _warn_of_nothing()
@@ -102,7 +108,9 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     except Exception as error:
         # Blender would only print it and go on.
         traceback.print_exc()
-        _complain(scene, f"unexpected error, please report it as a bug: {error!r}")
+        text = f"unexpected error, please report it as a bug: {error!r}"
+        _complain(scene, text)
+        remember(text, error)
     finally:
         if not made:
             in_main_thread(partial(_take_back, scene))
@@ -258,6 +266,11 @@ def _has_meshes(scene: bpy.types.Scene) -> bool:
 def _warn_of_nothing() -> None:
     if _warn("nothing is refined and Refine at Render is off, so the render shows no plants", ""):
         nothing_refined.notify()
+
+
+def _warn_of_unlocked(scene: bpy.types.Scene) -> None:
+    name = _rendering.outer or scene.name
+    _warn(f'Lock Interface of the scene "{name}" is off, so the window stands still while frames are refined', "lock")
 
 
 def _warn(text: str, about: str) -> bool:

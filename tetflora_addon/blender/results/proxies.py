@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...buffers import MeshBuffers, PointBuffers
-from ...emission.facets import ASSETS
-from ...emission.forms import Buffers, Refined
+from ...emission.forms import ASSETS, Buffers, Refined
 from ...emission.light import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ...jobs import Progress
 from ...refinement.statistics import Statistics
@@ -53,10 +52,10 @@ class Baking:
     def add_facets(self, refined: Refined) -> Iterator[int]:
         """Add the facets of all proxies; yields how many there are so far.
 
-        They are made again for the meshes: all of them at once may not fit into memory.
+        They stay, to be written with their light.
         """
         count = 0
-        for parts in refined.facet_parts():
+        for parts in refined.facet_parts(again=True):
             for facets, _ in parts:
                 self.sheets.add_facets(facets)
                 count += len(facets)
@@ -126,7 +125,8 @@ def write_proxies(
     emission = form.emission
     baked = baking is not None and emission.baked_blocks is not None
     blocks = emission.baked_blocks(refined, baking.light, baking.first_facet) if baked else emission.blocks(refined)
-    statistics.facet_pixels = refined.facet_pixels or 0.0
+    statistics.facet_pixels = float(refined.facet_pixels or 0.0)
+    statistics.facet_asked = results.scene.tetflora.facet if refined.facet_pixels else 0.0
     with closing(in_thread((buffers for buffers in blocks), ahead=1)) as made:
         number, progress = 0, Progress(0.95, "Making proxies")
         yield progress

@@ -1,0 +1,303 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is drawn: as fine as a pixel where it is seen, behind full pixels where it is not, the same in any order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.engine import support
+from tests.engine.emission.test_emission import scene
+from tests.engine.refinement.test_loop import run
+from tetflora_addon import parallel
+from tetflora_addon.camera.camera import Camera
+from tetflora_addon.emission import drawing as subject
+from tetflora_addon.emission.budget import afford
+from tetflora_addon.emission.coverage import MARGIN, Coverage
+from tetflora_addon.emission.forms import as_triangles, facet_blocks
+from tetflora_addon.emission.plants import expanded_blocks
+from tetflora_addon.emission.shade import Shade
+from tetflora_addon.proxies.drawn import triangle_corners
+from tetflora_addon.proxies.microsurfaces import Facets
+from tetflora_addon.refinement.lights import Light
+from tetflora_addon.refinement.loop import Refinement
+from tetflora_addon.refinement.settings import RefinementSettings
+
+WIDTH = 96
+
+
+@cache
+def wood() -> tuple:
+    """Birches so close together that most of them are hidden, seen from beside and a little above."""
+    flora = support.flora()
+    seeds = support.grove(100, 2.0)
+    seeds = replace(seeds, species=np.full(100, support.SPECIES.index("birch"), np.int32))
+    camera = support.camera((0, -36, 20), (0, 0, 6), pixels=WIDTH, view=0.7)
+    return flora, seeds, camera, replace(run(flora, seeds, camera)[1], lights=(SUN,))
+
+
+SUN = Light("SUN", np.zeros(3), np.array([0.6, 0.3, -0.74]), 0.01)
+
+
+@cache
+def drawn_wood() -> tuple:
+    flora, _, camera, result = wood()
+    return support.drawn(flora, result, camera, 1.2, 0.6)
+
+
+def pixels_of(facets: Facets, camera: Camera) -> np.ndarray:
+    return facets.side / camera.extent_around(facets.centre)
+
+
+def coverage_of(blocks: list, facets: Facets, seen: np.ndarray, camera: Camera) -> Coverage:
+    """Of all that is seen, made anew."""
+    made = Coverage(camera)
+    made.draw(*made.of_corners(triangle_corners(facets)[seen])[1:])
+    for mesh in (b.buffers for b in blocks):
+        size, first = np.diff(mesh.face_offsets), mesh.face_offsets[:-1]
+        for k in range(1, int(size.max()) - 1):
+            some = np.flatnonzero(size > k + 1)
+            corner = mesh.corner_verts[np.stack([first[some], first[some] + k, first[some] + k + 1], axis=1)]
+            made.draw(*made.of_corners(mesh.positions[corner])[1:])
+    return made
+
+
+def test_facets_that_are_seen_are_as_large_as_asked_for() -> None:
+    """Up to the leaf that each stands for, which is smaller here; and none is larger than asked for by a half."""
+    camera = wood()[2]
+    _, facets, seen = drawn_wood()
+    pixels = pixels_of(facets, camera)[seen]
+    assert np.median(pixels) == pytest.approx(1.2, rel=0.35)
+    assert np.quantile(pixels, 0.99) < 1.8
+
+
+def test_no_facet_of_wood_in_the_image_is_larger_than_a_pixel_and_a_half() -> None:
+    camera = wood()[2]
+    _, facets, seen = drawn_wood()
+    wooden = seen & (facets.transmission == 0)
+    assert wooden.any()
+    assert pixels_of(facets, camera)[wooden].max() < 1.5
+    # Long and thin, as branches are.
+    corners = triangle_corners(facets)[wooden].astype(float)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    assert (longest > 2.5 * facets.side[wooden]).all()
+
+
+def test_what_is_hidden_never_shows() -> None:
+    """Each facet that the camera is not to see lies behind pixels that are full, or beside the image."""
+    _, _, camera, _ = wood()
+    blocks, facets, seen = drawn_wood()
+    cover = coverage_of(blocks, facets, seen, camera)
+    prints = cover.of_corners(triangle_corners(facets)[~seen])[0]
+    small = pixels_of(facets, camera)[~seen] < 1.5
+    assert (cover.hidden(prints) | small).mean() > 0.999
+    assert (facets.side[~seen][~cover.hidden(prints)] ** 2).sum() < 0.02 * (facets.side[~seen] ** 2).sum()
+
+
+def test_no_facet_of_what_is_outside_is_in_the_image() -> None:
+    """A plant of which a little is in the corner of the image: what is large lies beyond it as a whole."""
+    flora = support.flora()
+    seeds = support.plants([3], support.SPECIES.index("birch"), [(11.2, 0, 0)])
+    camera = support.camera((0, -30, 8), (0, 0, 8), pixels=WIDTH, view=0.7)
+    _, facets, seen = support.drawn(flora, run(flora, seeds, camera)[1], camera, 1.2, 0.6)
+    cover = Coverage(camera)
+    inside = ~cover.outside(cover.of_corners(triangle_corners(facets))[0])
+    assert inside.any() and (~seen).any()
+    assert pixels_of(facets, camera)[inside & ~seen].max(initial=0.0) < 6.0
+    assert (inside & ~seen & (pixels_of(facets, camera) > 1.5)).sum() < 0.02 * inside.sum()
+
+
+def test_primitives_follow_the_image_however_deep_the_wood_is() -> None:
+    """Three times as deep a wood has about as many: what lies behind full pixels costs next to nothing."""
+    flora, _, camera, _ = wood()
+    numbers = []
+    for deep in (1, 3):
+        seeds = support.grove(100, 2.0)
+        place = np.concatenate([seeds.position + [0, 20.0 * k, 0] for k in range(deep)])
+        every = support.plants(np.arange(len(place)), support.SPECIES.index("birch"), place)
+        blocks, facets, _ = support.drawn(flora, run(flora, every, camera)[1], camera, 1.2, 0.6)
+        numbers.append(sum(b.buffers.polygons for b in blocks) + len(facets))
+    assert numbers[1] < 1.4 * numbers[0]
+    assert numbers[0] < 9.0 * camera.width * camera.height
+
+
+def test_few_facets_stand_for_what_nobody_sees() -> None:
+    camera = wood()[2]
+    _, facets, seen = drawn_wood()
+    hidden = facets.take(np.flatnonzero(~seen))
+    assert len(hidden) < 4.0 * camera.width * camera.height
+
+
+def optical(blocks: list, facets: Facets) -> np.ndarray:
+    """Area (2,) of leaves and of wood that can block light: closed tubes, of quads, show half of theirs."""
+    leafy = facets.transmission > 0
+    out = np.array([(facets.side[leafy] ** 2).sum(), (facets.side[~leafy] ** 2).sum()])
+    for block in blocks:
+        half = 0.5 if block.kind == "bark" else 1.0
+        sizes = np.where(np.diff(block.buffers.face_offsets) == 3, 1.0, half)
+        out[int(block.kind == "bark")] += (support.face_areas(block.buffers) * sizes).sum()
+    return out
+
+
+def test_area_is_that_of_the_plants() -> None:
+    """Of leaves and of wood, whatever they are drawn as and merged into, where nothing is thinned out."""
+    flora, seeds, camera, result = scene()
+    whole = optical(list(expanded_blocks(flora, seeds)), Facets.empty())
+    blocks, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False, hidden=0.33)
+    assert optical(blocks, facets) == pytest.approx(whole, rel=0.06)
+
+
+def test_thinning_of_what_nobody_sees_loses_little() -> None:
+    """Of primitives that cannot be merged behind full pixels a part is left out where there are many."""
+    flora, seeds, camera, result = scene()
+    whole = optical(list(expanded_blocks(flora, seeds)), Facets.empty())
+    blocks, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False)
+    assert (optical(blocks, facets) > 0.85 * whole).all()
+    assert (optical(blocks, facets) < 1.06 * whole).all()
+
+
+def digest(made: tuple) -> list:
+    blocks, facets, seen = made
+    meshes = [
+        b"".join([b.buffers.positions.tobytes(), *(v.tobytes() for _, v in b.buffers.attributes.values())])
+        for b in blocks
+    ]
+    return [*meshes, facets.centre.tobytes(), facets.side.tobytes(), seen.tobytes()]
+
+
+def test_the_order_of_plants_changes_nothing() -> None:
+    """Real leaves, bark and facets are the same to the last bit, also of copies of one plant."""
+    flora, seeds, camera, _ = scene()
+    seeds = replace(seeds, seed=seeds.seed % 7)
+    made = []
+    for order in (np.arange(len(seeds)), np.arange(len(seeds))[::-1], np.random.default_rng(1).permutation(len(seeds))):
+        result = run(flora, seeds.take(order), camera)[1]
+        made.append(digest(support.drawn(flora, result, camera, 1.0, 0.6)))
+    assert made[0] == made[1] == made[2]
+
+
+def test_processes_and_batches_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tiles follow from the image alone: one process or two, one tile after the other."""
+    flora, _, camera, result = scene()
+    wide = replace(camera, width=2 * subject.TILE, height=160)
+    made = []
+    for threads in (1, 2):
+        monkeypatch.setattr(parallel, "_wanted", threads)
+        made.append(digest(support.drawn(flora, result, wide, 1.5, 0.6)))
+    assert made[0] == made[1]
+
+
+def test_equal_seeds_are_ordinary() -> None:
+    """Plants that are copies of one have facets as large as plants that are all different."""
+    flora, seeds, camera, _ = wood()
+    means = []
+    for kinds in (100, 1):
+        result = run(flora, replace(seeds, seed=seeds.seed % kinds), camera)[1]
+        _, facets, seen = support.drawn(flora, result, camera, 1.2, 0.6)
+        means.append((len(facets), pixels_of(facets, camera)[seen].mean()))
+    assert means[1][1] == pytest.approx(means[0][1], rel=0.05)
+    assert means[1][0] == pytest.approx(means[0][0], rel=0.15)
+
+
+def test_what_was_off_screen_comes_back_identical() -> None:
+    """The camera turns away and back again: polygons and facets are the same to the last digit."""
+    flora, seeds, camera, _ = scene()
+    away = replace(camera, frame=camera.frame @ np.diag([-1.0, 1.0, -1.0]))
+    made = [digest(support.drawn(flora, run(flora, seeds, view)[1], view, 1.0, 0.6)) for view in (camera, away, camera)]
+    assert made[0] == made[2] != made[1]
+
+
+def number_of(result: Refinement, settings: RefinementSettings) -> int:
+    flora, _, camera, _ = wood()
+    detail = afford(result, camera, settings)
+    sizes = detail.pixels
+    options = {"hidden": sizes.hidden, "most": detail.most}
+    blocks, facets, _ = support.drawn(flora, result, camera, sizes.seen, detail.leaf_limit, **options)
+    return sum(b.buffers.polygons for b in blocks) + len(facets)
+
+
+@pytest.mark.parametrize("share", [0.8, 0.6, 0.3, 0.1, 0.05])
+def test_a_budget_holds(share: float) -> None:
+    """To the last primitive, however tight it is; and most of it is used."""
+    _, _, _, result = wood()
+    free = number_of(result, RefinementSettings())
+    most = int(share * free)
+    made = number_of(result, RefinementSettings(max_polygons=most))
+    assert 0.5 * most < made <= most
+
+
+def test_less_memory_is_coarser_everywhere() -> None:
+    """Error grows evenly: facets grow with the root of what is missing."""
+    _, _, camera, result = wood()
+    sides = [
+        afford(result, camera, RefinementSettings(max_polygons=most)).pixels.seen for most in (100_000, 25_000, 6_000)
+    ]
+    assert sides == sorted(sides)
+    assert sides[2] / sides[1] == pytest.approx(2.0, rel=0.5)
+
+
+def test_qualities_are_in_order() -> None:
+    """Final is never coarser than Preview, nor that than Draft."""
+    from tetflora_addon.refinement.settings import QUALITIES
+
+    _, _, camera, result = wood()
+    sides = []
+    for name in ("FINAL", "PREVIEW", "DRAFT"):
+        quality = QUALITIES[name]
+        settings = RefinementSettings(facet=quality["facet"], leaf_limit=quality["leaf_limit"])
+        sides.append(afford(result, camera, settings).pixels.seen)
+    assert sides == sorted(sides)
+
+
+def test_shade_is_the_depth_of_what_is_in_the_light() -> None:
+    """Along the sun; half of the area of sheets, over that of the ground, lies before what is below all of them."""
+    random = np.random.default_rng(1)
+    place = random.uniform([-20, -20, 0], [20, 20, 10], (40_000, 3))
+    area = np.full(len(place), 3.0 * 40 * 40 / len(place))
+    shade = Shade(place, area, (Light("SUN", np.zeros(3), np.array([0.0, 0.0, -1.0])),))
+    middle = random.uniform(-15, 15, (200, 2))
+    for height, expected in ((-1.0, 1.5), (5.5, 0.675), (12.0, 0.0)):
+        points = np.column_stack([middle, np.full(200, height)])
+        assert shade.depth(points).mean() == pytest.approx(expected, abs=0.08)
+    low = np.column_stack([middle, np.zeros(200)])
+    assert shade.depth(low, 10.0).mean() < 0.2 < shade.depth(low).mean()
+
+
+def test_quarters_are_the_facet_divided() -> None:
+    """Their corners lie on it, and their areas add up."""
+    _, facets, _ = drawn_wood()
+    facets = facets.take(slice(0, 500))
+    four = subject.quarters(facets)
+    assert (four.side**2).sum() == pytest.approx((facets.side**2).sum())
+    whole, parts = triangle_corners(facets).astype(float), triangle_corners(four).astype(float)
+    middles = 0.5 * (whole + np.roll(whole, -1, axis=1))
+    known = np.concatenate([whole, middles], axis=1)
+    for k in range(4):
+        own = parts[k * len(facets) : (k + 1) * len(facets)]
+        away = np.linalg.norm(own[:, :, None] - known[:, None], axis=3).min(axis=2)
+        assert (away < 1e-3 * facets.side[:, None] + 1e-5).all()
+
+
+def test_nothing_to_draw() -> None:
+    flora, _, camera, result = scene()
+    empty = replace(result, plants=result.plants.without_parts())
+    blocks, facets, _ = support.drawn(flora, empty, camera)
+    assert blocks == [] and len(facets) == 0
+
+
+def test_triangles_are_the_facets() -> None:
+    flora, _, camera, result = scene()
+    facets = support.drawn(flora, result, camera)[1]
+    scene_ = support.refined(flora, result, camera, form=as_triangles)
+    list(scene_.mesh_blocks())
+    blocks = list(facet_blocks(scene_))
+    assert sum(b.polygons for b in blocks) == len(facets)
+    assert sum(support.face_areas(b).sum() for b in blocks) == pytest.approx((facets.side**2).sum(), rel=1e-4)
+
+
+def test_margins_are_part_of_the_image() -> None:
+    assert Coverage(wood()[2]).width == WIDTH + 2 * MARGIN

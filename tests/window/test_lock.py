@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames are refined while the real window draws nothing, *Lock Interface* or not, see lock_steps.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from devtools import window
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
+    result = window.run_in_window(full_blender, HERE / "lock_steps.py", pictures / "lock", 300, resources)
+    assert result["ok"], result["error"]
+    return result["values"]
+
+
+def test_a_locked_window_leaves_the_work_to_the_thread_of_the_render(seen: dict) -> None:
+    *where, errors = seen["locked"]
+    assert where == [[False, False]] * 3 and errors == []
+
+
+def test_for_an_unlocked_one_the_main_thread_works_and_draws_nothing(seen: dict) -> None:
+    *where, errors = seen["unlocked"]
+    assert where == [[True, False]] * 3 and errors == []
+
+
+def test_one_timer_lives_as_long_as_the_extension(seen: dict) -> None:
+    assert (seen["timer"], seen["timers_at_end"], seen["timer_after"]) == (True, True, False)

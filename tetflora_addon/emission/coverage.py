@@ -1,0 +1,265 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Coverage of the image by what is drawn: where pixels are full, what lies behind is hidden, and nothing else is.
+
+The paper renders front to back and keeps an alpha buffer (sections 6.3 and 7). What is drawn here is opaque, so that a
+depth for each pixel says the same: a pixel is full from the depth of what covers its centre on. Parts are tested by
+their bounds against the farthest depth in the rectangle of pixels that they may touch (Greene, Kass and Miller,
+"Hierarchical Z-buffer visibility", SIGGRAPH 1993); a part is hidden only where all of that is full before it begins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, spread
+from ..camera.camera import Camera, circle_of_confusion
+
+#: Pixels around the image that count as part of it: the filter of a renderer reaches there.
+MARGIN = 2
+#: Pairs of a triangle and a pixel of its box that are tested together: some 100 bytes each.
+PAIRS_BATCH = 1 << 20
+#: How much nearer than what it hides something is, over the depth of that: as far as several eyes count.
+_NEARER = 1.0
+#: Rectangles are read from a level of the pyramid in which they span at most so many cells on each side.
+_CELLS = 4
+
+
+@dataclass(frozen=True)
+class Footprints(Arrays):
+    """What things (n) may touch of the image.
+
+    Attributes
+    ----------
+    low, high : (n, 2) float32
+        Corners of a rectangle that holds each of them, pixels from the lower left of the buffer.
+    near : (n,) float32
+        Least depth, metres.
+    """
+
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+    near: NDArray[np.float32]
+
+
+class Coverage:
+    """Depth from which on each pixel of an image is full.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its image, and so many pixels around it.
+    tile : int, int, optional
+        First column and end of what this buffer knows; by default all of the image. Nothing hides beyond.
+
+    Attributes
+    ----------
+    depth : (height, columns) float32
+        Depth of what covers the centre of each pixel, metres; infinite where nothing does.
+    """
+
+    def __init__(self, camera: Camera, tile: tuple[int, int] | None = None) -> None:
+        wide = camera.widened(MARGIN / camera.width, MARGIN / camera.height)
+        self.camera, self.width, self.height = wide, wide.width, wide.height
+        first, end = (0, wide.width) if tile is None else tile
+        self.first, self.end = max(first, 0), min(end, wide.width)
+        self.depth = np.full((wide.height, self.end - self.first), np.inf, np.float32)
+        self._pyramid: list[NDArray[np.float32]] = []
+        left, right, bottom, top = wide.window
+        self._scale = np.array([wide.width / (right - left), wide.height / (top - bottom)])
+
+    def project(self, points: NDArray[np.floating]) -> tuple[NDArray, NDArray, NDArray]:
+        """Columns and rows (n,) in pixels, and depths (n,) in metres, of points (n, 3)."""
+        return _projected(self.camera, points, self._scale)
+
+    def of_spheres(self, centre: NDArray[np.float64], radius: NDArray[np.float64]) -> Footprints:
+        """Footprints of spheres around points (n, 3), radii (n,) in metres.
+
+        Those that reach behind the eye's plane may touch everything, unless they are out of view as a whole.
+        """
+        camera = self.camera
+        column, row, depth = self.project(centre)
+        near = depth - radius
+        left, _, bottom, _ = camera.window
+        scale = self._scale
+        if camera.kind == "ORTHO":
+            reach = radius[:, None] * scale
+        elif camera.kind == "PANO":
+            angle = np.arcsin(np.clip(radius / np.maximum(depth, 1e-9), 0.0, 1.0))
+            local = camera.to_camera_space(centre)
+            cosine = np.hypot(local[:, 0], local[:, 2]) / np.maximum(depth, 1e-9)
+            reach = np.stack([angle / np.maximum(cosine - np.sin(angle), 1e-3), angle], axis=1) * scale
+        else:
+            # The silhouette of a sphere beside the axis is an ellipse, longer by its slope.
+            slope = np.stack([column / scale[0] + left, row / scale[1] + bottom], axis=1)
+            reach = (radius / np.maximum(near, 1e-9))[:, None] * np.sqrt(1.0 + slope**2) * scale
+        place, reach = np.stack([column, row], axis=1), reach + self.blur(centre, depth)[:, None]
+        low, high = place - reach, place + reach
+        if camera.kind != "ORTHO":
+            around = near <= camera.near if camera.kind == "PERSP" else near <= 0.0
+            beside = around & (camera.clearance(centre) > radius)
+            low[around], high[around] = -np.inf, np.inf
+            high[beside] = -np.inf
+        if camera.kind == "PANO":
+            round_ = high[:, 0] - low[:, 0] > self.width / 2.0
+            low[round_], high[round_] = -np.inf, np.inf
+        return Footprints(low.astype(np.float32), high.astype(np.float32), near.astype(np.float32))
+
+    def of_corners(self, corners: NDArray[np.floating]) -> tuple[Footprints, NDArray, NDArray, NDArray]:
+        """Footprints of polygons with corners (n, k, 3), and the columns, rows and depths (n, k) of these."""
+        n, k = corners.shape[:2]
+        column, row, depth = (v.reshape(n, k) for v in self.project(corners.reshape(-1, 3)))
+        near = depth.min(axis=1)
+        blur = self.blur(corners[:, 0], near)
+        low = np.stack([column.min(axis=1) - blur, row.min(axis=1) - blur], axis=1)
+        high = np.stack([column.max(axis=1) + blur, row.max(axis=1) + blur], axis=1)
+        if self.camera.kind == "PERSP":
+            around = near <= self.camera.near
+            low[around], high[around] = -np.inf, np.inf
+            high[depth.max(axis=1) <= 0.0] = -np.inf
+        elif self.camera.kind == "PANO":
+            round_ = high[:, 0] - low[:, 0] > self.width / 2.0
+            low[round_], high[round_] = -np.inf, np.inf
+        return Footprints(low, high, near), column, row, depth
+
+    def blur(self, points: NDArray[np.floating], depth: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Pixels (n,) by which points (n, 3) at depths (n,) are spread, and shifted between the eyes of a view.
+
+        One buffer stands for all moments of the shutter and all eyes: what is tested reaches so much farther.
+        """
+        camera, spread_ = self.camera, np.zeros(len(depth))
+        if camera.lens_radius > 0.0:
+            spread_ = spread_ + circle_of_confusion(camera, depth) * self._scale.max()
+        if camera.cell_radius > 0.0:
+            # What hides is a part of the way nearer, and moves against what it hides as the eye does.
+            spread_ = spread_ + _NEARER * camera.cell_radius / np.maximum(depth, 1e-6) * self._scale.max()
+        here = None
+        for other in camera.shutter:
+            here = self.project(points)[:2] if here is None else here
+            moved = replace(camera, position=other.position, frame=other.frame, shutter=())
+            there = _projected(moved, points, self._scale)
+            spread_ = np.maximum(spread_, np.hypot(there[0] - here[0], there[1] - here[1]))
+        return spread_
+
+    def outside(self, prints: Footprints) -> NDArray[np.bool_]:
+        """Things (n,) of which nothing is in the image."""
+        return (
+            (prints.high[:, 0] < 0)
+            | (prints.high[:, 1] < 0)
+            | (prints.low[:, 0] > self.width)
+            | (prints.low[:, 1] > self.height)
+        )
+
+    def hidden(self, prints: Footprints) -> NDArray[np.bool_]:
+        """Things (n,) behind full pixels wherever they are in the image; those outside are."""
+        if not self._pyramid:
+            self._pyramid = _maxima(self.depth)
+        size, first = np.array([self.end - self.first, self.height]), np.array([self.first, 0])
+        # Pixels that this buffer does not know of, and those of what reaches around the eye, may all be empty.
+        known = np.isfinite(prints.near) & ~((prints.low[:, 0] < self.first) & (self.first > 0))
+        known &= ~((prints.high[:, 0] > self.end) & (self.end < self.width)) & np.isfinite(prints.high[:, 0])
+        low = np.clip(np.floor(np.clip(prints.low, -1.0, 1e9)) - first, 0, size - 1).astype(np.int64)
+        high = np.clip(np.floor(np.clip(prints.high, -1.0, 1e9)) - first, 0, size - 1).astype(np.int64)
+        span = np.maximum((high - low).max(axis=1) + 1, 1)
+        level = np.ceil(np.log2(span / (_CELLS - 1)).clip(0)).astype(np.int64)
+        level = np.minimum(level, len(self._pyramid) - 1)
+        out = np.zeros(len(low), bool)
+        for number in np.unique(level):
+            some, table = np.flatnonzero(level == number), self._pyramid[number]
+            first, last = low[some] >> number, high[some] >> number
+            farthest = np.zeros(len(some), np.float32)
+            wide, tall = (last - first).max(axis=0) + 1
+            for i in range(int(tall)):
+                r = np.minimum(first[:, 1] + i, last[:, 1]) * table.shape[1]
+                for j in range(int(wide)):
+                    np.maximum(farthest, np.take(table, r + np.minimum(first[:, 0] + j, last[:, 0])), out=farthest)
+            out[some] = farthest < prints.near[some]
+        return (out & known) | self.outside(prints)
+
+    def draw(self, column: NDArray, row: NDArray, depth: NDArray) -> None:
+        """Fill pixels whose centres triangles cover, given the columns, rows and depths (n, 3) of their corners."""
+        low_x, high_x = column.min(axis=1), column.max(axis=1)
+        low_y, high_y = row.min(axis=1), row.max(axis=1)
+        far = depth.max(axis=1)
+        # What is nearer than that does not hide what is behind it from all eyes.
+        ok = (depth.min(axis=1) > max(self.camera.hides_from, 0.0)) & np.isfinite(far)
+        if self.camera.kind == "PANO":
+            ok &= high_x - low_x < self.width / 2.0
+        x0 = np.clip(np.ceil(low_x - 0.5), self.first, self.end).astype(np.int64)
+        x1 = np.clip(np.floor(high_x - 0.5), -1, self.end - 1).astype(np.int64)
+        y0 = np.clip(np.ceil(low_y - 0.5), 0, self.height).astype(np.int64)
+        y1 = np.clip(np.floor(high_y - 0.5), -1, self.height - 1).astype(np.int64)
+        wide, count = np.maximum(x1 - x0 + 1, 0), np.maximum(x1 - x0 + 1, 0) * np.maximum(y1 - y0 + 1, 0)
+        some = np.flatnonzero(ok & (count > 0))
+        if not len(some):
+            return
+        self._pyramid = []
+        flat = self.depth.reshape(-1)
+        ends = np.cumsum(count[some])
+        start = 0
+        while start < len(some):
+            before = ends[start - 1] if start else 0
+            stop = max(start + 1, int(np.searchsorted(ends, before + PAIRS_BATCH, side="right")))
+            which = some[start:stop]
+            owner, index = spread(count[which])
+            t = which[owner]
+            dy, dx = np.divmod(index, wide[t])
+            px, py = x0[t] + dx, y0[t] + dy
+            inside, z = _covered(column, row, depth, t, px + 0.5, py + 0.5)
+            # Of small triangles the farthest corner, of large ones the depth at the pixel.
+            z = np.minimum(z, far[t])[inside].astype(np.float32)
+            np.minimum.at(flat, (py * self.depth.shape[1] + px - self.first)[inside], z)
+            start = stop
+
+
+def _projected(
+    camera: Camera, points: NDArray[np.floating], scale: NDArray[np.float64]
+) -> tuple[NDArray, NDArray, NDArray]:
+    """`Coverage.project` for a camera with so many pixels (2,) for each unit of its window."""
+    left, _, bottom, _ = camera.window
+    # By component, in the precision of the points: a product with a matrix of three rows takes many times as long.
+    away = [points[:, i] - points.dtype.type(camera.position[i]) for i in range(3)]
+    frame = camera.frame.astype(points.dtype)
+    across, up, depth = (sum(away[i] * frame[i, k] for i in range(3)) for k in range(3))
+    depth = -depth
+    if camera.kind == "PANO":
+        local = np.stack([across, up, depth], axis=-1)
+        (across, up), depth = camera.longitude_latitude(local), np.linalg.norm(local, axis=-1)
+    elif camera.kind == "PERSP":
+        ahead = np.maximum(depth, 1e-6)
+        across, up = across / ahead, up / ahead
+    return (across - left) * scale[0], (up - bottom) * scale[1], depth
+
+
+def _covered(
+    column: NDArray, row: NDArray, depth: NDArray, t: NDArray, x: NDArray, y: NDArray
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Whether triangles t (m,) cover points x, y (m,), and their depths (m,) there."""
+    ax, bx, cx = (column[t, k] - x for k in range(3))
+    ay, by, cy = (row[t, k] - y for k in range(3))
+    u, v, w = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
+    whole = u + v + w
+    sign = np.where(whole < 0, -1.0, 1.0)
+    inside = (u * sign >= 0) & (v * sign >= 0) & (w * sign >= 0) & (whole != 0)
+    # 1 / depth is linear in the image.
+    inverse = (u / depth[t, 0] + v / depth[t, 1] + w / depth[t, 2]) * sign
+    return inside, np.abs(whole) / np.maximum(inverse, 1e-30)
+
+
+def _maxima(depth: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+    """Pyramid of the largest of four depths each, from the image to one cell."""
+    levels = [depth]
+    while max(levels[-1].shape) > 1:
+        last = levels[-1]
+        height, width = last.shape
+        padded = np.zeros((height + height % 2, width + width % 2), np.float32)
+        padded[:height, :width] = last
+        levels.append(
+            np.maximum(
+                np.maximum(padded[::2, ::2], padded[1::2, ::2]), np.maximum(padded[::2, 1::2], padded[1::2, 1::2])
+            )
+        )
+    return levels
