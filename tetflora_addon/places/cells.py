@@ -139,7 +139,7 @@ def place_in(text: str) -> tuple[float, float, int]:
     way : int
         -1 for two plain numbers, whose order nobody tells; else the EPSG code that stands there, or 0.
     """
-    plain = _PAIR.fullmatch(text.strip())
+    plain = _PAIR.fullmatch(text.strip()) or re.search(r"\((-?\d+\.\d+), *(-?\d+\.\d+)\)\s*$", text)  # below an address
     if plain is not None:
         return float(plain[1].replace(",", ".")), float(plain[2].replace(",", ".")), -1
     known = _WELL_KNOWN.fullmatch(text.strip())

@@ -39,7 +39,8 @@ _TRUNKS = ("diameter", "girth")
 _SMALLER = {"diameter": (2.5, 150.0), "girth": (8.0, 500.0)}
 #: Years since the death of trees of which only is known that they are dead: twigs have fallen, limbs have not.
 DEAD_YEARS = 5.0
-_SPREAD = 2.0  # degrees within which all points of an inventory may lie that calls degrees x and y
+#: Degrees within which all points of an inventory may lie that calls degrees x and y; and meters that no plot has.
+_SPREAD, _NARROW = 2.0, 0.1
 #: Choices of units.
 METRIC, IMPERIAL = 'METRIC', 'IMPERIAL'
 _PREVIEWED, _SAMPLE, _SHOWN = 300, 60, 3  # rows that are looked at, values of them, and values that are shown
@@ -176,6 +177,9 @@ def taken_for(table_: Table, chosen: Mapping[str, Title]) -> dict[str, Title]:
             if found[title].field in decided:
                 found[title] = found[title]._replace(field="")
     fields = {title.field for title in found.values()}
+    if "longitude" in fields and "latitude" not in fields:  # the German word for latitude is that for width, too
+        found |= {title: Title("latitude", 0.0, 1) for title in samples if title.lower() == "breite"}
+        fields = {title.field for title in found.values()}
     free = [title for title in samples if not found[title].field and found[title].doubt < NEVER]
     if table_.points is None and not ({"longitude", "latitude"} <= fields or {"x", "y"} <= fields or "place" in fields):
         _by_values(found, free, samples, "place", 0.9)
@@ -219,6 +223,8 @@ def _confirmed(title: Title, sample: NDArray[np.str_]) -> Title:
     if name in NAMES:
         doubtful = (title.doubt > 0 or name == "leaf") and _share(name, sample) < 0.3
         return none if numbers.all() or doubtful else title
+    if name == "planted":
+        return title if any(map(_YEAR.search, sample.tolist())) else none
     if name in _MOST:
         known = values[kinds == NUMBER]
         bare = len(known) > 0 and not (kinds == RANGE).any() and not units.any()
@@ -491,7 +497,8 @@ def _are_degrees(points: NDArray[np.float64]) -> bool:
     """Whether coordinates that are called x and y are degrees: nobody lists trees of a plot so small."""
     if not len(points) or (np.abs(points) > (180.0, 90.0)).any():
         return False
-    return bool((np.ptp(points, axis=0) < _SPREAD).all() and (points != np.round(points, 3)).mean() > 0.5)
+    spread = np.ptp(points, axis=0).max()
+    return bool(spread < _SPREAD and ((points != np.round(points, 3)).mean() > 0.5 or 0.0 < spread < _NARROW))
 
 
 def _no_tree(text: str, condition: bool) -> str:

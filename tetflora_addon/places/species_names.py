@@ -32,6 +32,7 @@ _FIRST, _JOINING = {"fr", "es", "it"}, {"de", "nl"}
 #: Words that the former have between others, and adjectives that they put first.
 _LINKS = {"de", "du", "des", "d", "del", "della", "dei", "di", "do", "da", "a", "al", "aux", "la", "le", "les", "el"}
 _BEFORE = {"grand", "petit", "gran", "gros", "vrai", "faux", "fausse", "jeune", "arbre", "arbol", "albero", "grande"}
+_FALSE = {"faux", "fausse", "falso", "falsa", "false"}
 _AFTER = {"tree", "trees", "shrub", "bush", "baum", "strauch", "arbre", "arbol", "albero", "boom", "common", "other"}
 _LEAST = 4  # letters of a word that may be the end of another
 _LONG = 6  # letters of a genus that may be misspelt by one
@@ -215,7 +216,9 @@ def _common(words: list[str]) -> Match | None:
     last = next((word.match for key in keys if (word := known.words.get(key)) and word.last), None)
     if last is None and len(words) > 1 and words[-1] in _AFTER:
         return _named(words[:-1])
-    begin = words
+    begin, false = words, next((i for i, word in enumerate(words) if i and word in _FALSE), 0)
+    if false and (match := _named(words[:false])):  # "robinier faux acacia"
+        return match
     while begin and begin[0] in (_LINKS if len(begin) < len(words) else _BEFORE):
         begin = begin[1:]
     keys = ["".join(way[:i]) for way in (words, begin) for i in range(len(way), 0, -1)]

@@ -43,6 +43,8 @@ FIELDS = {
 #: Fields that may be told by several columns.
 NAMES = ("genus", "name", "common", "leaf", "family")
 _SIZES = {"h": "height", "d": "diameter", "z": "z", "e": "x", "n": "y"}  # of a single letter
+#: Meanings of what may stand beside them, as in "H tot" and "E UTM"; True for numbers, as in "LV95 E".
+_BESIDE = {"h": {"filler", "dead"}, "d": {"filler"}, "z": {"filler"}, "e": {"grid", True}, "n": {"grid", True}}
 _MOST_UNKNOWN = 4  # letters that may stand beside words that are known
 _SHORTEST = 4  # letters of the beginning of a word, where a name ends after ten
 _STRONG = {"breast", "girth"}
@@ -119,7 +121,8 @@ def _cut(text: str) -> list[str]:
 def read_title(title: str) -> Title:
     """What a title says."""
     words, units, _ = _words()
-    title = re.sub(r"(?i)\bd[ _]?1[.,]?30?\b", "dbh", title[:200])  # the diameter at 1.3 m
+    title = re.sub(r"(?i)\bd[ _]?(?:1[.,]?30?|bh)(?![a-z0-9])", "dbh", title[:200])  # the diameter at 1.3 m
+    title = re.sub(r"(?i)(stamm|kronen?)[ _]?dm(?![a-z])", r"\1durchmesser", title)
     once = re.sub(r"[^\W\d_]+", lambda run: re.sub(r"(?<=[a-z])(?=[A-Z])", " ", run[0]), title)
     ways = [[part for word in plain_words(text) for part in _parts(word)] for text in dict.fromkeys((title, once))]
     parts = min(ways, key=lambda way: (sum(part.startswith("?") for part in way), len(way)))
@@ -132,12 +135,13 @@ def read_title(title: str) -> Title:
         elif not part.isdigit() and part not in units:
             unknown += len(part.lstrip("?"))
     plain = [part.lstrip("?") for part in parts if part not in units or part == parts[0]]
-    if len(plain) == 1 and plain[0] in _SIZES:
-        return Title(_SIZES[plain[0]], unit, 0)
+    letter = next((part for part in plain if part in _SIZES), None)
+    if letter and all(part == letter or words.get(part, part.isdigit()) in _BESIDE[letter] for part in plain):
+        return Title(_SIZES[letter], unit, 0)
     field, doubt = _field(set(meant) - {"filler"})
     if unknown > _MOST_UNKNOWN and not _STRONG.intersection(meant):
         field = ""
-    if unknown and field == "crown_width" and "crown" not in meant:
+    if (unknown > 1 and field == "place") or (unknown and field == "crown_width" and "crown" not in meant):
         field = ""
     return Title(field, unit if field else 0.0, doubt + (unknown > 0), "class" in meant)
 

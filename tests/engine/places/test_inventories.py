@@ -86,9 +86,10 @@ def test_what_columns_mean(title, name, unit):
 
 
 _TITLES = {
-    "height": "TREE_HEIGH, TREEHEIGHTinMETRES, hauteurenm, height_range_id, 樹高",
-    "diameter": "DBH_1_99_, D130, DIAM_BREAS",
-    "crown_width": "Schirmdurchmesser, canopyspre, diametre_houppier, diameter_crown",
+    "height": "TREE_HEIGH, TREEHEIGHTinMETRES, hauteurenm, height_range_id, H_TOT_M, 樹高",
+    "diameter": "DBH_1_99_, D130, DIAM_BREAS, D_BH cm, StammDM",
+    "girth": "StU, PAP",
+    "crown_width": "CRN_DIA_M, kr_durchm, KronenDM, Schirmdurchmesser, canopyspre, diametre_houppier, diameter_crown",
     "crown_base": "crownBaseHeightM, Kronenansatzhöhe",
     "planted": "Pflanzjahr, annee de plantation, plant_date, Year Planted",
     "status": "Tree Status, condition",
@@ -96,8 +97,8 @@ _TITLES = {
     "name": "Name_lat, tradart_vet, SP_CODE, GATTUNG_ART",
     "common": "Gattung Deutsch, dansk_navn",
     "family": "familia",
-    "x": "POINT_X, X_L93",
-    "y": "yRel, Y_LAMBERT93",
+    "x": "POINT_X, X_L93, Standort_X, RW, E_UTM, lv95_e",
+    "y": "yRel, Y_LAMBERT93, HW, N_UTM",
     "place": "geo_point_2d, the_geom, WKT",
     "latitude": "LAT_WGS84",
     "longitude": "経度",
@@ -117,6 +118,29 @@ def test_titles_of_cities():
 
 def test_names_of_streets_and_parks():
     assert len(inventories.names_unknown()) <= 12, inventories.names_unknown()
+
+
+def test_false_names_are_of_the_genus_before_them():
+    names = "Robinier faux-acacia", "Érable faux platane", "Chêne faux-liège", "Falsa acacia"
+    assert [species_named(name).species for name in names] == ["ash", "maple", "oak", "ash"]
+
+
+def test_degrees_in_german_and_below_addresses(tmp_path):
+    found = _read(tmp_path, "Art;Länge;Breite\nEiche;9,1;48,1\n")
+    assert found.points.tolist() == [[9.1, 48.1]] and not found.sizes["crown_width"].any()
+    found = _read(tmp_path, 'species,Location\noak,"12 Main St\n(42.36, -71.05)"\n')
+    assert found.points.tolist() == [[-71.05, 42.36]]
+
+
+def test_rounded_degrees_called_x_and_y(tmp_path):
+    text = "species,x,y\npine,12.49,41.89\npine,12.48,41.88\n"
+    assert _read(tmp_path, text).system.code == 4326
+    assert _read(tmp_path, text.replace("48,", "98,")).system.code == 0  # a plot
+
+
+def test_who_planted_a_tree_is_no_year(tmp_path):
+    found = _read(tmp_path, "species,planted by,x,y\noak,Jones,0,0\n")
+    assert "columns not used: planted by" in found.notes
 
 
 @pytest.mark.parametrize("name", inventories.cases())
