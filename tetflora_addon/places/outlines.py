@@ -213,14 +213,16 @@ def _measured(tags: dict[str, Any], usual: str, keys: re.Pattern) -> float:
         return found
     for key, value in tags.items():
         plain = re.sub(r"[^a-zäöüß]", "", key)
-        if keys.fullmatch(plain) and (found := _measure(value)):
+        if not key.startswith("roof:") and keys.fullmatch(plain) and (found := _measure(value)):
             return found * (0.3048 if _FEET.search(plain) else 1.0)
     return 0.0
 
 
 def _measure(value: Any) -> float:
     """Metres of a width or height, or a number; 0 for what tells none. Maps have texts of all kinds there."""
-    found = re.match(r"\s*(\d+(?:[.,]\d+)?)\s*(m|ft|')?", str(value)) if isinstance(value, str | int | float) else None
+    found = (
+        re.match(r"[~≈\s]*(\d+(?:[.,]\d+)?)\s*(m|ft|')?", str(value)) if isinstance(value, str | int | float) else None
+    )
     if found is None:
         return 0.0
     return float(found[1].replace(",", ".")[:20]) * (0.3048 if found[2] in ("ft", "'") else 1.0)

@@ -228,7 +228,10 @@ def _figures(own: Definition) -> tuple:
     if own.method == "geo":
         return own.method, *shape, tuple(round(v, 2) for v in own.shift), round(own.meridian, 6)
     # Datums follow from ellipsoids here: whoever writes the figures of a national map means that map.
-    numbers = (*(round(v, 6) for v in own.parameters[:-2]), *(round(v, 2) for v in own.parameters[-2:]))
+    angles, lengths = own.parameters[:-2], own.parameters[-2:]
+    if own.method in ("lcc2", "aea"):  # of two parallels either may come first
+        angles = *angles[:2], *sorted(angles[2:])
+    numbers = (*(round(v, 6) for v in angles), *(round(v, 2) for v in lengths))
     return own.method, *shape, round(own.meridian, 6), round(own.unit, 7), numbers
 
 

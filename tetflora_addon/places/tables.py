@@ -8,6 +8,7 @@ import csv
 import io
 import math
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NAME, SceneError, readable, shown
-from ..files import read_whole
+from ..files import json_of, read_whole
 from .cells import middle_of
 from .layers import MAX_BYTES, MAX_ROWS, read_features
 
@@ -187,9 +188,12 @@ def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
     """Properties with those that lie within others, as OpenStreetMap's tags do."""
     out = dict(properties)
     for title, value in properties.items():
-        if title == "other_tags" and isinstance(value, str):  # as GDAL writes them
-            value = dict(re.findall(r'"((?:[^"\\]|\\.)*)"=>"((?:[^"\\]|\\.)*)"', value))
-        if isinstance(value, dict):
+        if title in ("other_tags", "all_tags", "tags") and isinstance(value, str):  # as GDAL writes them
+            pairs = re.findall(r'"((?:[^"\\]|\\.)*)"=>"((?:[^"\\]|\\.)*)"', value)
+            value = {key: re.sub(r"\\(.)", r"\1", text) for key, text in pairs}
+            with suppress(ValueError):
+                value = value or json_of(properties[title].encode())
+        if isinstance(value, dict) and value:
             out.pop(title)
             out = flat_tags(value) | out if len(value) < MAX_COLUMNS else out
     return out

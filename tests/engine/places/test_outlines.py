@@ -49,6 +49,10 @@ def test_kinds_widths_and_heights(tmp_path):
         ("Polygon", _AREA, {"building": "yes", "building:levels": "3"}, (BUILDING, 0.0, 9.0)),
         ("Polygon", _AREA, {"building": "no", "landuse": "meadow"}, (MEADOW, 0.0, 0.0)),
         ("Polygon", _AREA, {"building": "yes", "height": "about 20"}, (BUILDING, 0.0, 7.0)),
+        ("Polygon", _AREA, {"building": "yes", "roof:height": "3", "height": "~12m"}, (BUILDING, 0.0, 12.0)),
+        ("Polygon", _AREA, {"tags": '{"building": "yes", "height": "9"}'}, (BUILDING, 0.0, 9.0)),
+        ("Polygon", _AREA, {"other_tags": '"name"=>"a \\"b\\"","building"=>"yes"'}, (BUILDING, 0.0, 7.0)),
+        ("Polygon", _AREA, {"Funktion": "Wohnhaus", "HOEHE": "12,4"}, (BUILDING, 0.0, 12.4)),
     ],
 )
 def test_what_features_are(tmp_path, kind, coordinates, properties, expected):

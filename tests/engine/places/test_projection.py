@@ -142,6 +142,13 @@ _TRANSVERSE = (
             "0.0 /* false easting\n0.0 /* false northing\n",
             5070,
         ),
+        (
+            f'PROJCS["x",{_NAD83},PROJECTION["Lambert_Conformal_Conic"],PARAMETER["False_Easting",6561666.666666666],'
+            'PARAMETER["False_Northing",1640416.666666667],PARAMETER["Central_Meridian",-120.5],'
+            'PARAMETER["Standard_Parallel_1",37.06666666666667],PARAMETER["Standard_Parallel_2",38.43333333333333],'
+            'PARAMETER["Latitude_Of_Origin",36.5],UNIT["Foot_US",0.3048006096012192]]',
+            2227,
+        ),
         ("urn:ogc:def:crs:EPSG::25832", 25832),
         ("http://www.opengis.net/def/crs/EPSG/0/25832", 25832),
         ("http://www.opengis.net/gml/srs/epsg.xml#31467", 31467),
