@@ -16,7 +16,7 @@ from ..tetflora_addon.blender.places.columns import (
     columns_in,
     show_columns,
 )
-from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE
+from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE, Import
 from ..tetflora_addon.blender.places.outlines import Drawn, outline_steps, told
 from ..tetflora_addon.blender.places.rasters import PATTERN
 from ..tetflora_addon.blender.places.terrain import ImportedGround, terrain_steps
@@ -35,6 +35,11 @@ from .populations import selected_grounds
 
 _LAYERS = ";".join(f"*{ending}" for ending in ENDINGS)
 _UNLINKED = {'SKIP_SAVE'}
+
+
+def _file(text: str) -> Path | None:
+    """A file that was chosen beside the first; None for none."""
+    return Path(bpy.path.abspath(text)) if text else None
 
 
 class _Importing(ModalJob, ImportHelper):
@@ -67,6 +72,27 @@ class _Importing(ModalJob, ImportHelper):
         options=_UNLINKED,
     )
 
+    crop: EnumProperty(
+        name="Crop",
+        description="What to leave out of a large area",
+        items=(
+            (WHOLE, "Nothing", "All of the file"),
+            (MIDDLE, "To Its Middle", "A square around the middle"),
+            (EXISTING, "To the Scene", "The selected meshes or imported terrain, or else all that the scene has"),
+        ),
+        default=WHOLE,
+        options=_UNLINKED,
+    )
+    crop_size: FloatProperty(
+        name="Side",
+        description="Side of the square",
+        default=2000.0,
+        min=1.0,
+        soft_max=20_000.0,
+        max=500_000.0,
+        unit='LENGTH',
+        options=_UNLINKED,
+    )
     chosen: BoolProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
     _browsing = False
@@ -91,14 +117,16 @@ class _Importing(ModalJob, ImportHelper):
         return {'CANCELLED'}
 
     @property
-    def system(self) -> int:
-        """The chosen coordinate system."""
-        return PLAIN if self.plain else self.code
-
-    @property
     def path(self) -> Path:
         """The chosen file."""
         return Path(bpy.path.abspath(self.filepath))
+
+    def order(self, context: bpy.types.Context, **others: Any) -> Import:
+        """What is to be imported."""
+        code = PLAIN if self.plain else self.code
+        selected, graph = tuple(selected_grounds(context)), context.evaluated_depsgraph_get()
+        crop = {"crop": self.crop, "side": self.crop_size}
+        return Import(context.scene, graph, self.path, code, self.new_origin, selected, **crop, **others)
 
 
 class _Raster(_Importing):
@@ -127,11 +155,12 @@ class _Raster(_Importing):
         options=_UNLINKED,
     )
 
-    @property
-    def tiles(self) -> list[Path]:
-        """The other chosen files."""
+    def order(self, context: bpy.types.Context, **others: Any) -> Import:
+        """What is to be imported, with the other chosen files as tiles."""
         folder = Path(bpy.path.abspath(self.directory)) if self.directory else self.path.parent
-        return [folder / file.name for file in self.files if file.name and folder / file.name != self.path]
+        tiles = (folder / file.name for file in self.files if file.name)
+        tiles = tuple(tile for tile in tiles if tile != self.path)
+        return super().order(context, factor=self.factor, shift=self.shift, tiles=tiles, **others)
 
     def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
         """Settings of another call, with files by their names."""
@@ -164,17 +193,7 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
     )
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, ImportedGround]:
-        return terrain_steps(
-            context.scene,
-            self.path,
-            self.most,
-            self.system,
-            self.factor,
-            self.shift,
-            self.new_origin,
-            self.tiles,
-            Path(bpy.path.abspath(self.image)) if self.image else None,
-        )
+        return terrain_steps(self.order(context), self.most, _file(self.image))
 
     def finish(self, context: bpy.types.Context, result: ImportedGround) -> set[str]:
         select_only(context, [result.object])
@@ -261,27 +280,6 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
         ),
         options=_UNLINKED,
     )
-    crop: EnumProperty(
-        name="Crop",
-        description="What to leave out of a large area",
-        items=(
-            (WHOLE, "Nothing", "All of the file"),
-            (MIDDLE, "To Its Middle", "A square around the middle"),
-            (EXISTING, "To the Scene", "The selected meshes or imported terrain, or else all that the scene has"),
-        ),
-        default=WHOLE,
-        options=_UNLINKED,
-    )
-    crop_size: FloatProperty(
-        name="Side",
-        description="Side of the square",
-        default=2000.0,
-        min=1.0,
-        soft_max=20_000.0,
-        max=500_000.0,
-        unit='LENGTH',
-        options=_UNLINKED,
-    )
     table: CollectionProperty(type=TetFloraInventoryColumn, options={'HIDDEN', 'SKIP_SAVE'})
     active: IntProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
@@ -314,19 +312,7 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
         chosen = self.species if self.unknown == 'SPECIES' and self.species != NO_SPECIES else self.unknown
-        return inventory_steps(
-            context.scene,
-            context.evaluated_depsgraph_get(),
-            self.path,
-            selected_grounds(context),
-            chosen,
-            self.system,
-            self.units,
-            self.skip,
-            self.new_origin,
-            columns=columns_in(self.columns),
-            crop=(self.crop, self.crop_size),
-        )
+        return inventory_steps(self.order(context), chosen, self.units, self.skip, columns_in(self.columns))
 
     def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
         return self.planted(context, result)
@@ -368,20 +354,7 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
         self.species = self.species or mix_in(context.scene.tetflora.populate)
-        return canopy_steps(
-            context.scene,
-            context.evaluated_depsgraph_get(),
-            self.path,
-            selected_grounds(context),
-            parse_weights(self.species),
-            self.least,
-            self.system,
-            self.factor,
-            self.shift,
-            self.new_origin,
-            Path(bpy.path.abspath(self.below)) if self.below else None,
-            self.tiles,
-        )
+        return canopy_steps(self.order(context), parse_weights(self.species), self.least, _file(self.below))
 
     def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
         return self.planted(context, result)
@@ -409,15 +382,7 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
     )
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Drawn]:
-        return outline_steps(
-            context.scene,
-            context.evaluated_depsgraph_get(),
-            self.path,
-            selected_grounds(context),
-            self.system,
-            self.new_origin,
-            "" if self.kind == 'KEYS' else self.kind.title(),
-        )
+        return outline_steps(self.order(context), "" if self.kind == 'KEYS' else self.kind.title())
 
     def finish(self, _context: bpy.types.Context, result: Drawn) -> set[str]:
         return self.done(readable("; ".join([f"Outlines imported: {told(result.number)}", *result.notes])))

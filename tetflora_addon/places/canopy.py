@@ -65,11 +65,11 @@ def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
     if (surface.system.code == 0) != (ground.system.code == 0):
         raise SceneError(f"{what}the coordinate system of one of the two rasters is not known; set Coordinate System")
     h, w = surface.values.shape
-    steps, out = np.stack([ground.along, ground.down]), np.empty((h, w), np.float32)
+    out = np.empty((h, w), np.float32)
     for top in range(0, h, _ROWS):
         row = np.arange(top, min(top + _ROWS, h))
         places = surface.places(np.tile(np.arange(w), len(row)), np.repeat(row, w))
-        column, line = np.linalg.solve(steps.T, (between(places, surface.system, ground.system) - ground.corner).T)
+        column, line = ground.cells(between(places, surface.system, ground.system)).T
         inside = (column >= -0.5) & (column <= ground.values.shape[1] - 0.5)
         inside &= (line >= -0.5) & (line <= ground.values.shape[0] - 0.5)
         below = np.where(inside, ground.at(np.nan_to_num(column), np.nan_to_num(line)), np.nan)
@@ -111,11 +111,10 @@ def checked_canopy(values: NDArray[np.float32], what: str) -> tuple[NDArray[np.f
 
 def without_areas(raster: Raster, areas: Sequence[NDArray[np.float64]]) -> tuple[Raster, int]:
     """A raster with nothing known within areas (k, 2) in its own coordinates, and how many cells that are."""
-    steps = np.stack([raster.along, raster.down])
     h, w = raster.values.shape
     inside = np.zeros((h, w), bool)
     for area in areas:
-        ring = np.linalg.solve(steps.T, (area - raster.corner).T).T
+        ring = raster.cells(area)
         low = np.clip(np.floor(ring.min(axis=0)), 0, (w, h)).astype(np.int64)
         high = np.clip(np.ceil(ring.max(axis=0)) + 1, 0, (w, h)).astype(np.int64)
         if not (high > low).all():

@@ -192,7 +192,7 @@ def mosaic(tiles: Sequence[Raster], names: Sequence[str]) -> Raster:
                 f"{name}: its coordinate system or cells are not those of {names[0]}; import it by itself, or make one "
                 "raster of all, for example with gdalwarp"
             )
-        off = np.linalg.solve(steps.T, tile.corner - first.corner)
+        off = first.cells(tile.corner[None])[0]
         if not np.abs(off).max() < 1e6:
             raise SceneError(f"{name}: it lies too far from {names[0]}; import it by itself")
         places.append(np.rint(off).astype(np.int64))

@@ -254,6 +254,7 @@ def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float
     width, depth = np.linalg.norm(sides[1::2] - sides[::2], axis=1) / 1000.0
     if not max(width, depth) < 2.0 * MOST_AWAY / 1000.0:
         raise SceneError(
-            f"{what}it is {width:,.0f} by {depth:,.0f} km large; crop it to {MOST_AWAY / 500.0:,.0f} km or less"
+            f"{what}it is {width:,.0f} by {depth:,.0f} km large; choose a Crop, or crop it to "
+            f"{MOST_AWAY / 500.0:,.0f} km or less"
         )
     return place

@@ -68,6 +68,18 @@ class Raster:
         """Coordinates (n, 2) of places given in cells; 0, 0 is the middle of the first cell."""
         return self.corner + np.outer(column, self.along) + np.outer(row, self.down)
 
+    def cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Column and row, (n, 2), of places given by their coordinates."""
+        return np.linalg.solve(np.stack([self.along, self.down]).T, (points - self.corner).T).T
+
+    def part(self, cells: NDArray[np.float64]) -> Raster:
+        """The part that holds some cells (n, 2), by column and row, as far as they are there."""
+        most = self.values.shape[::-1]
+        low = np.clip(np.floor(cells.min(axis=0)), 0, most).astype(np.int64)
+        high = np.clip(np.ceil(cells.max(axis=0)) + 1, 0, most).astype(np.int64)
+        values = self.values[low[1] : high[1], low[0] : high[0]]
+        return replace(self, values=values, corner=self.places(low[:1], low[1:])[0])
+
     @property
     def outline(self) -> NDArray[np.float64]:
         """Coordinates of the four corners, (4, 2)."""

@@ -12,23 +12,20 @@ from collections import Counter
 from collections.abc import Generator
 from dataclasses import dataclass
 from math import pi
-from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SceneError
 from ...jobs import Progress
 from ...places.outlines import BUILDING, KINDS, WATER, MapFeature, denser, one_ring, read_outlines
 from ...planting.height_grid import HeightGrid
 from ..compat import shader_tree
 from ..placing.terrain import HALF_WIDTH
 from ..worker import call_in_thread
-from .jobs import importing
-from .origin import in_scene, origin_for, remember
-from .terrain import grounds_in, heights_steps
+from .origin import Import, importing
+from .terrain import heights_steps
 
 _STEP, _ABOVE = 4.0, 0.08  # metres between points of roads on the ground, and how far they lie above it
 _SINK = 0.3  # metres that a building reaches into the ground below its lowest corner
@@ -63,25 +60,11 @@ class Drawn:
 
 
 @importing
-def outline_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    grounds: list[bpy.types.Object],
-    code: int,
-    new: bool,
-    kind: str = "",
-) -> Generator[Progress, Any, Drawn]:
+def outline_steps(order: Import, kind: str = "") -> Generator[Progress, Any, Drawn]:
     """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
 
     Parameters
     ----------
-    grounds : list of objects
-        To lie on; imported ground if empty.
-    code : int
-        EPSG code of the coordinates; 0 where the file tells.
-    new : bool
-        Let its middle be the scene's origin, whatever was imported before.
     kind : str
         What all are taken for; empty to tell them by their keys.
 
@@ -90,19 +73,24 @@ def outline_steps(
     SceneError
         The file is broken, or cannot lie in this scene.
     """
-    progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
+    progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress
-    try:
-        outlines, system, notes = yield from call_in_thread(progress, read_outlines, path, code, kind)
-    except OSError as error:
-        raise SceneError(f"{what}cannot read the file: {error.strerror or error}") from None
-    sizes = [len(ring) for outline in outlines for ring in outline.rings]
+    outlines, system, notes = yield from call_in_thread(progress, read_outlines, order.path, order.code, kind)
     points = np.concatenate([ring for outline in outlines for ring in outline.rings])
-    place = origin_for(scene, system, points, new, what)
-    flat = iter(np.split(in_scene(place, points, system, what), np.cumsum(sizes)[:-1]))
+    box = order.box(points, system)
+    if box is not None:
+        number = len(outlines)
+        outlines = [outline for outline in outlines if any(box.holds(ring).any() for ring in outline.rings)]
+        if not outlines:
+            raise order.nothing_left()
+        points = np.concatenate([ring for outline in outlines for ring in outline.rings])
+        notes.append(f"{number - len(outlines):,} beyond the Crop")
+    sizes = [len(ring) for outline in outlines for ring in outline.rings]
+    place = order.origin(points, system)
+    flat = iter(np.split(order.local(place, points, system), np.cumsum(sizes)[:-1]))
     rings = [[next(flat) for _ in outline.rings] for outline in outlines]
-    heights = yield from heights_steps(grounds_in(scene, grounds), depsgraph, Progress(0.4, "Reading the ground"))
-    top = bpy.data.collections.new(path.stem)
+    heights = yield from heights_steps(order, Progress(0.4, "Reading the ground"))
+    top = bpy.data.collections.new(order.path.stem)
     made = [bpy.data.collections.new(kind) for kind in KINDS]
     looks = {}
     try:
@@ -118,8 +106,8 @@ def outline_steps(
     for collection in found:
         top.children.link(collection)
     bpy.data.batch_remove([collection for collection in made if not collection.objects])
-    scene.collection.children.link(top)
-    remember(scene, place)
+    order.scene.collection.children.link(top)
+    order.remember(place)
     return Drawn(found, Counter(outline.kind for outline in outlines), [*notes, f"coordinates: {system.name}"])
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from ...places.grids import ENDINGS, mosaic, read_grid
 from ...places.projection import chosen_system
 from ...places.rasters import MAX_CELLS, Raster, checked_size, in_degrees, world_file
 from ..worker import call_in_thread, steps_in_thread
+from .origin import Import
 
 #: For windows that choose files.
 PATTERN = ";".join(f"*{ending}" for ending in (*ENDINGS, ".png"))
@@ -34,36 +35,31 @@ _VOIDS = (-32768.0, -32767.0, -99999.0)  # what stands for nothing where no file
 _MOST = 100_000.0  # metres above the sea or below it
 
 
-def read_raster(
-    paths: Path | Sequence[Path], code: int, factor: float, shift: float
-) -> Generator[Progress, Any, Raster]:
-    """Read a raster, or several tiles as one; yields progress.
+def read_raster(order: Import, path: Path | None = None) -> Generator[Progress, Any, Raster]:
+    """Read the raster of an import, its tiles as one; yields progress.
 
     Parameters
     ----------
-    code : int
-        As of `chosen_system`.
-    factor, shift : float
-        Metres of a value, and what is added.
+    path : Path, optional
+        Another file, which is read whole, in its place.
 
     Raises
     ------
+    OSError
+        One cannot be read.
     SceneError
         One is broken, or lacks a place.
     """
-    tiles, paths = [], [paths] if isinstance(paths, Path) else list(paths)
+    tiles, paths, code = [], [order.path, *order.tiles] if path is None else [path], order.code
     for path in paths:
         progress = Progress(0.0, f"Reading {path.name}")
         yield progress
-        try:
-            if path.suffix.lower() in ENDINGS:
-                raster = yield from steps_in_thread(read_grid(path), progress)
-            elif path.suffix.lower() == ".png":
-                raster = _png(path)
-            else:
-                raise SceneError(f"{path.name}: use a GeoTIFF (.tif), an ASCII grid (.asc), or one of {PATTERN}")
-        except OSError as error:
-            raise SceneError(f"{path.name}: cannot read the file: {error.strerror or error}") from None
+        if path.suffix.lower() in ENDINGS:
+            raster = yield from steps_in_thread(read_grid(path), progress)
+        elif path.suffix.lower() == ".png":
+            raster = _png(path)
+        else:
+            raise SceneError(f"{path.name}: use a GeoTIFF (.tif), an ASCII grid (.asc), or one of {PATTERN}")
         what = f"{path.name}: "
         raster = replace(raster, system=chosen_system(code, raster.system, what))
         raster = raster if code else in_degrees(raster, what)
@@ -76,8 +72,12 @@ def read_raster(
                 f"{what}with the {len(tiles) - 1:,} before it, more than {MAX_CELLS:,} cells; import fewer"
             )
     raster = yield from call_in_thread(Progress(0.5, "Joining tiles"), mosaic, tiles, [path.name for path in paths])
-    if (factor, shift) != (1.0, 0.0):
-        raster = replace(raster, values=raster.values * np.float32(factor) + np.float32(shift))
+    if paths[0] == order.path and (box := order.box(raster.outline, raster.system)) is not None:
+        raster = raster.part(raster.cells(box.corners))
+        if min(raster.values.shape) < 2 or not np.isfinite(raster.values).any():
+            raise order.nothing_left()
+    if (order.factor, order.shift) != (1.0, 0.0):
+        raster = replace(raster, values=raster.values * np.float32(order.factor) + np.float32(order.shift))
     low, high = (float(f(raster.values[np.isfinite(raster.values)])) for f in (np.min, np.max))
     if not -_MOST < low <= high < _MOST:
         raise SceneError(

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,13 +24,10 @@ from ..compat import shader_tree
 from ..materials.nodes import Graph
 from ..materials.soil import soil_material
 from ..placing.terrain import read_ground
-from ..runtime import JobData, guarded
 from ..worker import call_in_thread
-from .origin import in_scene, origin_for, remember
+from .origin import TERRAIN, Import, importing
 from .rasters import read_raster
 
-#: On objects that are imported ground.
-TERRAIN = "tetflora_terrain"
 #: Colors of soil and of what grows on it, linear RGB, and the fraction that is green.
 _SOIL, _GREEN, _COVERED = (0.06, 0.043, 0.028), (0.05, 0.075, 0.018), 0.8
 _FINEST, _MOST_CELLS = 0.5, 4_000_000  # of the grid that heights are read from: metres
@@ -56,29 +53,14 @@ class ImportedGround:
     notes: list[str]
 
 
-def terrain_steps(
-    scene: bpy.types.Scene,
-    path: Path,
-    most: int,
-    code: int,
-    factor: float,
-    shift: float,
-    new: bool,
-    tiles: Sequence[Path] = (),
-    image: Path | None = None,
-) -> Generator[Progress, Any, ImportedGround]:
+@importing
+def terrain_steps(order: Import, most: int, image: Path | None = None) -> Generator[Progress, Any, ImportedGround]:
     """Make ground; yields progress. Closing the steps leaves all as it was.
 
     Parameters
     ----------
     most : int
         Faces.
-    code, factor, shift
-        As of `read_raster`.
-    new : bool
-        Let its middle be the scene's origin, whatever was imported before.
-    tiles : sequence of Path
-        Other files of the same grid.
     image : Path, optional
         An orthophoto, which becomes its color.
 
@@ -87,46 +69,30 @@ def terrain_steps(
     SceneError
         The file is broken, or cannot lie in this scene.
     """
-    return guarded(JobData("Importing", scene), _steps(scene, [path, *tiles], most, code, factor, shift, new, image))
-
-
-def _steps(
-    scene: bpy.types.Scene,
-    paths: list[Path],
-    most: int,
-    code: int,
-    factor: float,
-    shift: float,
-    new: bool,
-    image: Path | None,
-) -> Generator[Progress, Any, ImportedGround]:
-    raster = yield from read_raster(paths, code, factor, shift)
-    path = paths[0]
-    what = f"{path.name}: "
+    raster = yield from read_raster(order)
     photo = None if image is None else _photo_place(image, raster.system)
-    place = origin_for(scene, raster.system, raster.outline, new, what)
+    place = order.origin(raster.outline, raster.system)
     coarse = yield from call_in_thread(Progress(0.7, "Making the ground"), raster.coarser, most)
     h, w = coarse.values.shape
     column, row = np.tile(np.arange(w), h), np.repeat(np.arange(h), w)
-    flat = in_scene(place, coarse.places(column, row), coarse.system, what)
+    flat = order.local(place, coarse.places(column, row), coarse.system)
     points = np.column_stack([flat, coarse.values.ravel()])
     yield Progress(0.8, "Making the ground")
     faces = _faces(coarse)
     if not len(faces):
-        raise SceneError(f"{what}no four neighboring cells have values")
+        raise SceneError(f"{order.what}no four neighboring cells have values")
     used = np.unique(faces)
     number = np.zeros(h * w, np.int64)
     number[used] = np.arange(len(used))
     uv = np.column_stack([column / (w - 1), 1.0 - row / (h - 1)])[used]
     material, notes = None, [*raster.notes, f"coordinates: {raster.system.name}"]
     if photo is not None:
-        cells = between(coarse.places(column, row)[used], coarse.system, photo.system) - photo.corner
-        cells = np.linalg.solve(np.stack([photo.along, photo.down]).T, cells.T).T + 0.5
+        cells = photo.cells(between(coarse.places(column, row)[used], coarse.system, photo.system)) + 0.5
         material, uv, beside = _photo_material(image, cells)
         notes += [f"{beside:,} of {len(uv):,} vertices lie beside the image"] * (beside > 0)
-    made = _mesh(path.stem, points[used], number[faces], uv, material)
-    scene.collection.objects.link(made)
-    remember(scene, place)
+    made = _mesh(order.path.stem, points[used], number[faces], uv, material)
+    order.scene.collection.objects.link(made)
+    order.remember(place)
     step = float(np.linalg.norm(points[faces[:, 0], :2] - points[faces[:, 1], :2], axis=1).mean())
     return ImportedGround(made, step, coarse is not raster, notes)
 
@@ -144,10 +110,7 @@ def _faces(raster: Raster) -> NDArray[np.int64]:
 
 def _photo_place(path: Path, ground: System) -> Raster:
     """Where an orthophoto lies; in the system of the ground if it has none of its own."""
-    try:
-        place = place_of_image(path)
-    except OSError as error:
-        raise SceneError(f"{path.name}: cannot read the file: {error.strerror or error}") from None
+    place = place_of_image(path)
     place = replace(place, system=chosen_system(0, place.system, f"{path.name}: ")) if place.system.code else place
     if place.system.code and not ground.code:
         raise SceneError(
@@ -209,17 +172,10 @@ def _mesh(
     return made
 
 
-def grounds_in(scene: bpy.types.Scene, selected: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Meshes to put things on: those that are selected, else what was imported as ground."""
-    return selected or [obj for obj in scene.objects if obj.type == 'MESH' and obj.get(TERRAIN)]
-
-
-def heights_steps(
-    objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, progress: Progress
-) -> Generator[Progress, Any, HeightGrid | None]:
-    """Heights of some ground; None where there is none."""
-    if not objects:
+def heights_steps(order: Import, progress: Progress) -> Generator[Progress, Any, HeightGrid | None]:
+    """Heights of the ground that an import lies on; None where there is none."""
+    if not order.grounds:
         return None
-    triangles = read_ground(objects, depsgraph).triangles
+    triangles = read_ground(order.grounds, order.depsgraph).triangles
     cell = cell_for(triangles, _FINEST, _MOST_CELLS)
     return (yield from call_in_thread(progress, height_grid, triangles, cell))

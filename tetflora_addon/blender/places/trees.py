@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field, replace
 from math import tau
 from pathlib import Path
@@ -33,11 +33,10 @@ from ..scene.sizes import fits_of
 from ..species.edits import catalogue, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .completion import complete
-from .jobs import importing
-from .origin import WHOLE, cropped, in_scene, origin_for, remember
+from .origin import Import, importing
 from .outlines import building_areas
 from .rasters import read_raster
-from .terrain import grounds_in, heights_steps
+from .terrain import heights_steps
 
 #: Attributes of fields by the names that sizes have in inventories.
 ATTRIBUTES = {
@@ -86,47 +85,29 @@ class Planted:
 
 @importing
 def inventory_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    grounds: list[bpy.types.Object],
-    unknown: str,
-    code: int,
-    units: str,
-    skip: bool,
-    new: bool,
-    seed: int = 0,
-    columns: Mapping[str, str] | None = None,
-    crop: tuple[str, float] = (WHOLE, 0.0),
+    order: Import, unknown: str, units: str, skip: bool, columns: Mapping[str, str] | None = None
 ) -> Generator[Progress, Any, Planted]:
     """Make a field of the trees of a file; yields progress. Closing the steps leaves all as it was.
 
     Parameters
     ----------
-    grounds : list of objects
-        To stand on; imported ground if empty.
     unknown : str
         `GENERIC`, `LEFT_OUT`, or the identifier of a species for trees of species that nobody knows.
-    code, units, skip, columns
+    units, skip, columns
         As of `read_inventory`.
-    new : bool
-        Let its middle be the scene's origin, whatever was imported before.
-    crop : tuple
-        As of `cropped`.
 
     Raises
     ------
     SceneError
         The file is broken, or cannot lie in this scene.
     """
-    progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
+    progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress
-    try:
-        inventory = yield from call_in_thread(progress, read_inventory, path, code, units, skip, columns)
-    except OSError as error:
-        raise SceneError(f"{what}cannot read the file: {error.strerror or error}") from None
-    inside = cropped(scene, grounds_in(scene, grounds), inventory.points, inventory.system, crop, what)
-    if not inside.all():
+    inventory = yield from call_in_thread(progress, read_inventory, order.path, order.code, units, skip, columns)
+    if (box := order.box(inventory.points, inventory.system)) is not None:
+        inside = box.holds(inventory.points)
+        if not inside.any():
+            raise order.nothing_left()
         inventory = replace(
             inventory,
             name=inventory.name[inside],
@@ -134,18 +115,18 @@ def inventory_steps(
             sizes={name: values[inside] for name, values in inventory.sizes.items()},
             notes=[*inventory.notes, f"{(~inside).sum():,} beyond the Crop"],
         )
-    place = origin_for(scene, inventory.system, inventory.points, new, what)
-    flat = in_scene(place, inventory.points, inventory.system, what)
+    place = order.origin(inventory.points, inventory.system)
+    flat = order.local(place, inventory.points, inventory.system)
     notes = [*inventory.notes, f"coordinates: {inventory.system.name}"]
     made = Planted(notes=notes, inventory=inventory)
     identifiers, kinds = _species(inventory, unknown, made)
     kept = np.flatnonzero(kinds >= 0)
     if not len(kept):
-        raise SceneError(f"{what}none of its trees is of a known species; choose what stands for unknown ones")
+        raise SceneError(f"{order.what}none of its trees is of a known species; choose what stands for unknown ones")
     kinds, sizes = kinds[kept], {name: values[kept] for name, values in inventory.sizes.items()}
     yield Progress(0.5, "Completing sizes")
-    sizes["height"], made.completed = complete(sizes, kinds, identifiers, lambda name: species_for(scene, name))
-    yield from _plant(scene, depsgraph, path.stem, grounds, place, flat[kept], kinds, identifiers, sizes, seed, made)
+    sizes["height"], made.completed = complete(sizes, kinds, identifiers, lambda name: species_for(order.scene, name))
+    yield from _plant(order, place, flat[kept], kinds, identifiers, sizes, made)
     return made
 
 
@@ -176,19 +157,7 @@ def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[st
 
 @importing
 def canopy_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    grounds: list[bpy.types.Object],
-    mix: Mapping[str, float],
-    least: float,
-    code: int,
-    factor: float,
-    shift: float,
-    new: bool,
-    below: Path | None = None,
-    tiles: Sequence[Path] = (),
-    seed: int = 0,
+    order: Import, mix: Mapping[str, float], least: float, below: Path | None = None
 ) -> Generator[Progress, Any, Planted]:
     """Make a field of the trees that a raster of canopy height shows; yields progress. Closing the steps leaves all
     as it was.
@@ -199,37 +168,31 @@ def canopy_steps(
         Weights of species by identifier.
     least : float
         Height of the smallest tree, metres.
-    code, factor, shift
-        As of `read_raster`.
     below : Path, optional
         Elevations of the ground, which are subtracted.
-    tiles : sequence of Path
-        Other files of the same grid.
 
     Raises
     ------
     SceneError
         The file is broken, has no trees, or cannot lie in this scene.
     """
-    raster = yield from read_raster([path, *tiles], code, factor, shift)
-    what = f"{path.name}: "
+    raster, what = (yield from read_raster(order)), order.what
     made = Planted(notes=[*raster.notes, f"coordinates: {raster.system.name}"])
     if below is not None:
-        ground = yield from read_raster(below, code, factor, shift)
+        ground = yield from read_raster(order, below)
         progress = Progress(0.05, "Subtracting the ground")
         raster = yield from call_in_thread(progress, heights_above, raster, ground, what)
     values, notes = checked_canopy(raster.values, what)
     raster = replace(raster, values=values)
     made.notes += notes
-    place = origin_for(scene, raster.system, raster.outline, new, what)
+    place = order.origin(raster.outline, raster.system)
     h, w = raster.values.shape
     # Steps from a cell in the middle to the next ones, in metres of the scene.
-    middle, along, down = in_scene(
-        place, raster.places(np.array([0, 1, 0]) + w // 2, np.array([0, 0, 1]) + h // 2), raster.system, what
-    )
+    near = raster.places(np.array([0, 1, 0]) + w // 2, np.array([0, 0, 1]) + h // 2)
+    middle, along, down = order.local(place, near, raster.system)
     along, down = along - middle, down - middle
     cell = float(np.sqrt(abs(along[0] * down[1] - along[1] * down[0])))
-    if roofs := building_areas(scene):
+    if roofs := building_areas(order.scene):
         flat_cells = replace(raster, corner=middle - along * (w // 2) - down * (h // 2), along=along, down=down)
         flat_cells, number = yield from call_in_thread(
             Progress(0.1, "Leaving out roofs"), without_areas, flat_cells, roofs
@@ -242,9 +205,9 @@ def canopy_steps(
     number = len(found.height)
     if not number:
         raise SceneError(f"{what}nothing in it is {least:g} m high; check its unit, or lower Smallest Tree")
-    flat = in_scene(place, raster.places(found.column, found.row), raster.system, what)
+    flat = order.local(place, raster.places(found.column, found.row), raster.system)
     identifiers = list(mix)
-    keys = child_key(child_key(key_of_seed(seed), _SPECIES), np.arange(number))
+    keys = child_key(child_key(key_of_seed(0), _SPECIES), np.arange(number))
     kinds = species_by_weight(tuple(mix.values()), uniform(keys, 0))
     unit = np.stack([along / np.linalg.norm(along), down / np.linalg.norm(down)])
     sizes = {
@@ -252,7 +215,7 @@ def canopy_steps(
         "crown_width": found.width.astype(np.float32),
         "offset": np.column_stack([found.offset @ unit, np.zeros(number)]).astype(np.float32),
     }
-    yield from _plant(scene, depsgraph, path.stem, grounds, place, flat, kinds, identifiers, sizes, seed, made)
+    yield from _plant(order, place, flat, kinds, identifiers, sizes, made)
     return made
 
 
@@ -261,38 +224,34 @@ _SPECIES, _AZIMUTH, _SEED = 1, 2, 3
 
 
 def _plant(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    name: str,
-    grounds: list[bpy.types.Object],
+    order: Import,
     place: MapOrigin,
     flat: NDArray[np.float64],
     kinds: NDArray[np.int32],
     identifiers: list[str],
     sizes: dict[str, NDArray[np.float32]],
-    seed: int,
     made: Planted,
 ) -> Generator[Progress, Any, None]:
     """Make the field; its plants stand on the ground, those beside it as high as the ground is on average."""
     progress = Progress(0.8, "Standing trees on the ground")
     yield progress
-    heights = yield from heights_steps(grounds_in(scene, grounds), depsgraph, progress)
+    heights = yield from heights_steps(order, progress)
     z = np.zeros(len(flat))
     if heights is not None:
         z = heights.at(heights.height, flat)
         beside = ~np.isfinite(z)
         made.beside = int(beside.sum())
         z[beside] = z[~beside].mean() if not beside.all() else 0.0
-    keys = child_key(key_of_seed(seed), np.arange(len(flat)))
+    keys = child_key(key_of_seed(0), np.arange(len(flat)))
     seeds = (uniform(keys, _SEED) * 2**31).astype(np.int32)
     turns = tau * uniform(keys, _AZIMUTH)
     placement = Placement(np.column_stack([flat, z]), turns, np.ones(len(flat)), kinds, seeds, len(flat))
     age = sizes.get("age")
     ages = None if age is None else np.where(sizes["height"] > 0.0, 0.0, age)
-    fit = yield from _fit_steps(scene, placement, identifiers, sizes)
+    fit = yield from _fit_steps(order.scene, placement, identifiers, sizes)
     yield Progress(0.95, "Making the field")
-    made.object = add_field(scene, placement, identifiers, ages=ages)
-    made.object.name = made.object.data.name = name
+    made.object = add_field(order.scene, placement, identifiers, ages=ages)
+    made.object.name = made.object.data.name = order.path.stem
     for key, attribute in ATTRIBUTES.items():
         if key in sizes and sizes[key].any():
             write(made.object.data, attribute, sizes[key], data_type='FLOAT')
@@ -300,7 +259,7 @@ def _plant(
         if values is not None:
             write(made.object.data, attribute, values, data_type='FLOAT_VECTOR')
     made.number = len(flat)
-    remember(scene, place)
+    order.remember(place)
 
 
 def _fit_steps(
