@@ -8,6 +8,7 @@ for "nothing known", scale and offset are GDAL's.
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import struct
@@ -21,51 +22,25 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
 from ..jobs import Progress
-from .methods import Ellipsoid
+from .methods import Definition, Ellipsoid
 from .pixels import Layout, read_pixels
-from .prj import described, system_in
+from .prj import described, system_in, utm_zone
 from .projection import System, known_systems
 from .rasters import Raster, check_regular, checked_size, system_beside, without_nodata, world_file
 
-_WIDTH, _HEIGHT, _BITS, _BANDS, _FORMAT = 256, 257, 258, 277, 339
-_STRIPS, _STRIP_BYTES, _TILES, _TILE_BYTES = 273, 279, 324, 325
-_SCALE, _TIEPOINT, _MATRIX, _GEO, _NODATA, _METADATA = 33550, 33922, 34264, 34735, 42113, 42112
-_KIND, _COMPRESSION, _COLOURS, _FILL, _ROWS, _PLANES, _PREDICTOR = 254, 259, 262, 266, 278, 284, 317
-_ACROSS, _DOWN, _EXTRA, _DOUBLES, _TEXTS = 322, 323, 338, 34736, 34737
-#: Tags: names for messages.
-_NAMES = {
-    254: "NewSubfileType", 256: "ImageWidth", 257: "ImageLength", 258: "BitsPerSample", 259: "Compression",
-    262: "PhotometricInterpretation", 266: "FillOrder", 273: "StripOffsets", 277: "SamplesPerPixel",
-    278: "RowsPerStrip", 279: "StripByteCounts", 284: "PlanarConfiguration", 317: "Predictor", 322: "TileWidth",
-    323: "TileLength", 324: "TileOffsets", 325: "TileByteCounts", 338: "ExtraSamples", 339: "SampleFormat",
-    33550: "ModelPixelScale", 33922: "ModelTiepoint", 34264: "ModelTransformation", 34735: "GeoKeyDirectory",
-    34736: "GeoDoubleParams", 34737: "GeoAsciiParams", 42112: "GDAL_METADATA", 42113: "GDAL_NODATA",
-}  # fmt: skip
+_TABLES: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("geotiff.json").read_text(encoding="utf-8"))
+#: Names of tags and of geographic keys by their numbers, and numbers of tags by their names.
+_TAGS, _KEYS = ({int(number): name for number, name in _TABLES[kind].items()} for kind in ("tags", "keys"))
+_NUMBERS = {name: number for number, name in _TAGS.items()}
 #: Types of values: letter for `struct`; others, such as fractions, occur in none of these tags.
 _TYPES = {1: "B", 2: "s", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 11: "f", 12: "d", 16: "Q", 17: "q"}
 _MOST_TAGS, _MOST_BYTES = 4096, 64_000_000
-#: Keys of the directory of geographic keys: kind of model, whether values belong to points, codes, units.
-_MODEL, _RASTER, _GEOGRAPHIC, _PROJECTED, _UNIT, _UNIT_SIZE, _VERTICAL = 1024, 1025, 2048, 3072, 3076, 3077, 4099
-_CITATIONS, _ZONE, _METHOD, _AXIS, _FLATTENING, _SHIFT = (3073, 1026, 2049), 3074, 3075, 2057, 2059, 2062
 _UNITS = {9001: 1.0, 9002: 0.3048, 9003: 1200.0 / 3937.0}
-_OWN = 32767  # "user-defined"
-#: Methods by their numbers, and what their keys hold.
-_METHODS = {
-    1: "transverse mercator", 3: "hotine oblique mercator", 7: "mercator", 8: "lambert conformal conic",
-    9: "lambert conformal conic", 10: "lambert azimuthal equal area", 11: "albers", 15: "polar stereographic",
-    16: "oblique stereographic",
-}  # fmt: skip
-_FIGURES = {
-    3078: "first", 3079: "second", 3080: "longitude", 3081: "latitude", 3082: "east", 3083: "north", 3084: "longitude",
-    3085: "latitude", 3086: "east", 3087: "north", 3088: "longitude", 3089: "latitude", 3090: "east", 3091: "north",
-    3092: "scale", 3093: "scale", 3094: "azimuth", 3095: "longitude", 3096: "skew",
-}  # fmt: skip
-_UTM_ZONES = 16000  # and 16100 in the south
+_OWN, _UTM_ZONES = 32767, 16000  # "user-defined"; and 16100 in the south
 #: Types of values: letter for `numpy.dtype` by format.
 _LETTERS = {1: "u", 2: "i", 3: "f"}
 _SIZES = {1: (8, 16, 32, 64), 2: (8, 16, 32, 64), 3: (16, 32, 64)}
-_MOST_IMAGES = 64
-_PALETTE = 3
+_MOST_IMAGES, _PALETTE = 64, 3
 _LARGEST_PIECE, _MOST_PIECE = 65_536, 50_000_000  # pixels of a side, and of a strip or tile
 
 
@@ -105,12 +80,12 @@ def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
         values = without_nodata(values.astype(np.float32), nothing if values.dtype.kind == "f" else None)
         values[absent] = np.nan
         scale, offset = tags.scale()
-        height = _UNITS.get(tags.keys().get(_VERTICAL, 9001), 1.0)
+        height = _UNITS.get(tags.keys().get("VerticalUnits", 9001), 1.0)
         if (scale, offset, height) != (1.0, 0.0, 1.0):
             values = without_nodata((values * scale + offset) * np.float32(height), None)
             notes += ["scale and offset of the file used"] * ((scale, offset) != (1.0, 0.0))
             notes += ["heights in feet read as such"] * (height != 1.0)
-        if tags.one(_COLOURS, 1) == _PALETTE:
+        if tags.one("PhotometricInterpretation", 1) == _PALETTE:
             notes.append("its values are numbers of colors in a palette; check that they are heights")
         return Raster(values, *place, system, tuple(notes))
 
@@ -181,12 +156,12 @@ class _Tags:
         for at in range(0, number * entry, entry):
             tag, kind = struct.unpack(self.order + "HH", data[at : at + 4])
             middle = at + 4 + (8 if self.big else 4)
-            if tag in _NAMES:
+            if tag in _TAGS:
                 many = self._unpack("Q" if self.big else "I", data[at + 4 : middle])
-                found[tag] = kind, many, data[middle : at + entry]
+                found[_TAGS[tag]] = kind, many, data[middle : at + entry]
         return found
 
-    def values(self, tag: int) -> tuple | bytes | None:
+    def values(self, tag: str) -> tuple | bytes | None:
         """Values of a tag, a text as bytes; None where there is no such tag."""
         if tag not in self.found:
             return None
@@ -196,11 +171,11 @@ class _Tags:
         letter = _TYPES[kind]
         size = number * struct.calcsize(letter)
         if size > len(here):
-            here = self._bytes(self._unpack("Q" if self.big else "I", here), size, _NAMES[tag])
+            here = self._bytes(self._unpack("Q" if self.big else "I", here), size, tag)
         out = struct.unpack(f"{self.order}{number}{letter}", here[:size])
         return out[0] if letter == "s" else out
 
-    def numbers(self, tag: int, least: int) -> tuple | None:
+    def numbers(self, tag: str, least: int) -> tuple | None:
         """Finite values of a tag, at least so many."""
         values = self.values(tag)
         if values is not None and (
@@ -209,47 +184,52 @@ class _Tags:
             raise self.broken(tag, f"must be {least} finite numbers or more")
         return values
 
-    def broken(self, tag: int, text: str) -> SceneError:
+    def broken(self, tag: str, text: str) -> SceneError:
         """The error of a tag."""
-        return SceneError(f"{self.name}: tag {_NAMES[tag]} ({tag}) {text}")
+        return SceneError(f"{self.name}: tag {tag} ({_NUMBERS[tag]}) {text}")
 
     def check_kind(self) -> None:
         """Refuse what has no values that can be heights."""
-        bands = self.one(_BANDS, 1)
-        extra = self.numbers(_EXTRA, 1) or ()
+        bands = self.one("SamplesPerPixel", 1)
+        extra = self.numbers("ExtraSamples", 1) or ()
         if bands != 1 and not (bands == 2 and extra and extra[0] in (1, 2)):
-            raise self.broken(_BANDS, f"is {bands}; write one band only, for example with gdal_translate -b 1")
+            raise self.broken(
+                "SamplesPerPixel", f"is {bands}; write one band only, for example with gdal_translate -b 1"
+            )
         self._layout()
 
     def _layout(self) -> Layout:
         """How the pixels lie in the file."""
-        width, height = self.one(_WIDTH), self.one(_HEIGHT)
+        width, height = self.one("ImageWidth"), self.one("ImageLength")
         checked_size(width, height, f"{self.name}: ")
-        bits, form = self.one(_BITS, 1), self.one(_FORMAT, 1)
+        bits, form = self.one("BitsPerSample", 1), self.one("SampleFormat", 1)
         form = 1 if form == 4 else form
-        if bits not in _SIZES.get(form, ()) and not (bits == 1 and self.one(_KIND, 0) & 4):
+        if bits not in _SIZES.get(form, ()) and not (bits == 1 and self.one("NewSubfileType", 0) & 4):
             raise self.broken(
-                _BITS,
+                "BitsPerSample",
                 f"is {bits}, of format {form}; write 32-bit floats, for example with gdal_translate -ot Float32",
             )
-        tiled = _TILES in self.found
-        across = self.one(_ACROSS) if tiled else width
-        down = self.one(_DOWN) if tiled else min(self.one(_ROWS, height), height)
+        tiled = "TileOffsets" in self.found
+        across = self.one("TileWidth") if tiled else width
+        down = self.one("TileLength") if tiled else min(self.one("RowsPerStrip", height), height)
         if not (0 < across <= _LARGEST_PIECE and 0 < down <= _LARGEST_PIECE and across * down <= _MOST_PIECE):
-            raise self.broken(_ACROSS if tiled else _ROWS, f"gives pieces of {across:,} by {down:,} pixels")
-        samples = 1 if self.one(_PLANES, 1) == 2 else self.one(_BANDS, 1)
+            raise self.broken(
+                "TileWidth" if tiled else "RowsPerStrip", f"gives pieces of {across:,} by {down:,} pixels"
+            )
+        samples = 1 if self.one("PlanarConfiguration", 1) == 2 else self.one("SamplesPerPixel", 1)
         dtype = np.dtype(f"{self.order}{_LETTERS[form]}{max(bits // 8, 1)}")
         return Layout(
             width, height, across, down, tiled, bits, samples, dtype,
-            self.one(_COMPRESSION, 1), self.one(_PREDICTOR, 1), self.one(_FILL, 1) == 2,
+            self.one("Compression", 1), self.one("Predictor", 1), self.one("FillOrder", 1) == 2,
         )  # fmt: skip
 
     def pixels(self) -> Generator[Progress, object, tuple[NDArray[Any], NDArray[np.bool_]]]:
         """As `read_pixels`."""
-        where, size = (_TILES, _TILE_BYTES) if _TILES in self.found else (_STRIPS, _STRIP_BYTES)
-        offsets, sizes = self.numbers(where, 1), self.numbers(size, 1)
+        kind = "Tile" if "TileOffsets" in self.found else "Strip"
+        where = f"{kind}Offsets"
+        offsets, sizes = self.numbers(where, 1), self.numbers(f"{kind}ByteCounts", 1)
         if offsets is None or sizes is None:
-            raise SceneError(f"{self.name}: tag {_NAMES[where]} ({where}) is missing")
+            raise SceneError(f"{self.name}: tag {where} ({_NUMBERS[where]}) is missing")
         if len(offsets) != len(sizes) or any(
             a < 0 or b < 0 or a + b > self.size for a, b in zip(offsets, sizes, strict=True)
         ):
@@ -263,7 +243,7 @@ class _Tags:
             while self.next and self.next not in seen and len(seen) < _MOST_IMAGES:
                 seen.add(self.next)
                 self.found = self._directory(self.next)
-                if self.one(_KIND, 0) & 4 and (self.one(_HEIGHT), self.one(_WIDTH)) == shape:
+                if self.one("NewSubfileType", 0) & 4 and (self.one("ImageLength"), self.one("ImageWidth")) == shape:
                     values, absent = yield from self.pixels()
                     return (values != 0) & ~absent
         finally:
@@ -272,7 +252,7 @@ class _Tags:
 
     def scale(self) -> tuple[np.float32, np.float32]:
         """Factor and summand of values, as GDAL's metadata have them."""
-        text = self.values(_METADATA)
+        text = self.values("GDAL_METADATA")
         text = text.decode("utf-8", "replace") if isinstance(text, bytes) else ""
         out = []
         for role, usual in (("scale", 1.0), ("offset", 0.0)):
@@ -282,58 +262,47 @@ class _Tags:
             except ValueError:
                 value = math.nan
             if not abs(value) < 1e6:
-                raise self.broken(_METADATA, f"has a {role} of {shown(found[1])}")
+                raise self.broken("GDAL_METADATA", f"has a {role} of {shown(found[1])}")
             out.append(np.float32(value))
         return out[0], out[1]
 
     def system(self) -> tuple[System, float]:
         """The system, and metres of its unit where it is none that lies on Earth."""
-        geo = self.keys()
-        for key in _CITATIONS:
-            text = str(geo.get(key, ""))
-            if (
-                re.search(r"(PROJCS|GEOGCS)\s*\[", text)
-                and (found := system_in(text[re.search("PROJCS|GEOGCS", text).start() :]))[0].code
-            ):
+        geo, known = self.keys(), known_systems()
+        for key in ("ProjectedCitation", "GTCitation", "GeodeticCitation"):
+            text = re.search(r"(?:PROJCS|GEOGCS)\s*\[.*", str(geo.get(key, "")), re.DOTALL)
+            if text and (found := system_in(text[0]))[0].code:
                 return found
-        flat = geo.get(_GEOGRAPHIC, 0)
-        code = geo.get(_PROJECTED, 0) if geo.get(_MODEL) != 2 else flat
-        unit = float(geo.get(_UNIT_SIZE, 0.0) or _UNITS.get(geo.get(_UNIT, 9001), 1.0))
+        flat, degrees = geo.get("GeodeticCRS", 0), geo.get("GTModelType") == 2
+        code = flat if degrees else geo.get("ProjectedCRS", 0)
+        unit = float(geo.get("ProjLinearUnitSize", 0.0) or _UNITS.get(geo.get("ProjLinearUnits", 9001), 1.0))
         if code not in (0, _OWN):
             return System(int(code)), 1.0
-        known = known_systems()
         datum = known.get(flat, known[4326])
-        if flat not in known and 6.2e6 < geo.get(_AXIS, 0.0) < 6.5e6 and geo.get(_FLATTENING, 0.0) > 100.0:
-            shift = geo.get(_SHIFT, ())
-            shift = (
-                (*shift, *[0.0] * (7 - len(shift))) if isinstance(shift, tuple) and len(shift) in (3, 7) else (0.0,) * 7
-            )
-            datum = replace(datum, ellipsoid=Ellipsoid(geo[_AXIS], geo[_FLATTENING]), shift=shift)
-        if geo.get(_MODEL) == 2:
+        axis, flattening = geo.get("EllipsoidSemiMajorAxis", 0.0), geo.get("EllipsoidInvFlattening", 0.0)
+        if flat not in known and 6.2e6 < axis < 6.5e6 and flattening > 100.0:
+            shift = geo.get("GeogTOWGS84", ())
+            shift = shift if isinstance(shift, tuple) and len(shift) in (3, 7) else ()
+            datum = Definition("geo", Ellipsoid(axis, flattening), (*shift, *[0.0] * (7 - len(shift))))
+        if degrees:
             return System(-2, own=datum), 1.0
-        south, zone = divmod(int(geo.get(_ZONE, 0)) - _UTM_ZONES, 100)
+        south, zone = divmod(int(geo.get("Projection", 0)) - _UTM_ZONES, 100)
         if south in (0, 1) and 1 <= zone <= 60:
-            given = {
-                "latitude": 0.0,
-                "longitude": 6.0 * zone - 183.0,
-                "scale": 0.9996,
-                "east": 5e5,
-                "north": 1e7 * south,
-            }
-            return described("transverse mercator", given, datum)
-        given = {name: float(geo[key]) for key, name in _FIGURES.items() if isinstance(geo.get(key), int | float)}
+            return described("transverse mercator", utm_zone(zone, south == 1), datum)
+        numbers = {key: value for key, value in geo.items() if isinstance(value, int | float)}
+        given = {name: float(numbers[key]) for key, name in _TABLES["figures"].items() if key in numbers}
         given |= {name: unit * given[name] for name in ("east", "north") if name in given}
         try:
-            return described(_METHODS.get(geo.get(_METHOD, 0), ""), given, replace(datum, unit=unit))
+            return described(_TABLES["methods"].get(str(geo.get("ProjMethod")), ""), given, replace(datum, unit=unit))
         except (ValueError, ZeroDivisionError, OverflowError):
             return System(), unit
 
-    def one(self, tag: int, default: int | None = None) -> int:
+    def one(self, tag: str, default: int | None = None) -> int:
         """The first value of a tag."""
         values = self.numbers(tag, 1)
         if values is None:
             if default is None:
-                raise SceneError(f"{self.name}: tag {_NAMES[tag]} ({tag}) is missing")
+                raise SceneError(f"{self.name}: tag {tag} ({_NUMBERS[tag]}) is missing")
             return default
         if int(values[0]) != values[0] or values[0] < 0:
             raise self.broken(tag, f"is {shown(values[0])}")
@@ -341,47 +310,47 @@ class _Tags:
 
     def place(self) -> list[NDArray[np.float64]] | None:
         """Middle of the first pixel, and steps along and down, in the units of the file."""
-        matrix = self.numbers(_MATRIX, 16)
+        matrix = self.numbers("ModelTransformation", 16)
         if matrix is not None:
             m = np.array(matrix[:16], np.float64).reshape(4, 4)
-            place, tag = (m[:2, 3], m[:2, 0], m[:2, 1]), _MATRIX
+            place, tag = (m[:2, 3], m[:2, 0], m[:2, 1]), "ModelTransformation"
         else:
-            scale, tie, tag = self.numbers(_SCALE, 2), self.numbers(_TIEPOINT, 6), _SCALE
+            scale, tie, tag = self.numbers("ModelPixelScale", 2), self.numbers("ModelTiepoint", 6), "ModelPixelScale"
             if scale is None or tie is None:
                 return None
             along, down = np.array([scale[0], 0.0]), np.array([0.0, -scale[1]])
             place = np.array(tie[3:5]) - tie[0] * along - tie[1] * down, along, down
         place = [*place]
-        if self.keys().get(_RASTER, 1) != 2:  # values belong to areas, whose corner is told
+        if self.keys().get("GTRasterType", 1) != 2:  # values belong to areas, whose corner is told
             place[0] = place[0] + (place[1] + place[2]) / 2.0
         if not np.abs(np.concatenate(place)).max() < 1e10 or not abs(np.linalg.det(np.stack(place[1:]))) > 0.0:
             raise self.broken(tag, "gives cells without a size or a place")
         return place
 
-    def keys(self) -> dict[int, Any]:
-        """Geographic keys: whole numbers, numbers, tuples of numbers, and texts."""
-        values = self.numbers(_GEO, 4)
+    def keys(self) -> dict[str, Any]:
+        """Geographic keys that are known here: whole numbers, numbers, tuples of numbers, and texts."""
+        values = self.numbers("GeoKeyDirectory", 4)
         if values is None:
             return {}
         if len(values) < 4 + 4 * int(values[3]):
-            raise self.broken(_GEO, f"tells of {values[3]} keys and is too short for them")
-        doubles, texts = self.numbers(_DOUBLES, 1) or (), self.values(_TEXTS)
-        out: dict[int, Any] = {}
+            raise self.broken("GeoKeyDirectory", f"tells of {values[3]} keys and is too short for them")
+        doubles, texts = self.numbers("GeoDoubleParams", 1) or (), self.values("GeoAsciiParams")
+        out: dict[str, Any] = {}
         for key, place, number, at in np.array(values[4 : 4 + 4 * int(values[3])], np.int64).reshape(-1, 4).tolist():
             if place == 0:
-                out[key] = at
-            elif place == _DOUBLES and 0 <= at < len(doubles):
-                out[key] = doubles[at] if number == 1 else doubles[at : at + number]
-            elif place == _TEXTS and isinstance(texts, bytes):
-                out[key] = texts[at : at + number].decode("latin-1")
+                out[_KEYS.get(key, "")] = at
+            elif _TAGS.get(place) == "GeoDoubleParams" and 0 <= at < len(doubles):
+                out[_KEYS.get(key, "")] = doubles[at] if number == 1 else doubles[at : at + number]
+            elif _TAGS.get(place) == "GeoAsciiParams" and isinstance(texts, bytes):
+                out[_KEYS.get(key, "")] = texts[at : at + number].decode("latin-1")
         return out
 
     def nothing(self) -> float | None:
         """Value of pixels of which nothing is known."""
-        text = self.values(_NODATA)
+        text = self.values("GDAL_NODATA")
         if text is None or (isinstance(text, bytes) and not text.strip(b"\0 ")):
             return None
         try:
             return float(text.split(b"\0")[0])
         except (ValueError, AttributeError):
-            raise self.broken(_NODATA, f"is {shown(text)}, which is not a number") from None
+            raise self.broken("GDAL_NODATA", f"is {shown(text)}, which is not a number") from None

@@ -133,7 +133,7 @@ def _well_known(node: _Node) -> tuple[System, float]:
     name = "web" if "pseudo" in _plain(node[1][0]) else method[1][0] if method else ""
     zone = re.search(r"utmzone(\d{1,2})([ns])", _plain(node[1][0]))
     if zone and not given:  # a name that says all
-        name, given = "transverse", _zone(int(zone[1]), zone[2] == "s")
+        name, given = "transverse", utm_zone(int(zone[1]), zone[2] == "s")
     return described(name, given, replace(datum, unit=metres))
 
 
@@ -235,7 +235,7 @@ def _figures(own: Definition) -> tuple:
     return own.method, *shape, round(own.meridian, 6), round(own.unit, 7), numbers
 
 
-def _zone(zone: int, south: bool) -> dict[str, float]:
+def utm_zone(zone: int, south: bool) -> dict[str, float]:
     """Parameters of a zone of UTM."""
     return {"latitude": 0.0, "longitude": 6.0 * zone - 183.0, "scale": 0.9996, "east": 5e5, "north": 1e7 * south}
 
@@ -253,7 +253,7 @@ def _old(text: str) -> tuple[System, float]:
     if name == "UTM":
         zone = int(float(words["zone"]))
         south = zone < 0 or float(words.get("yshift", "0")) < 0
-        return described("transverse", _zone(abs(zone), south), datum)
+        return described("transverse", utm_zone(abs(zone), south), datum)
     keys = (
         ("scale", "longitude", "latitude") if name.startswith("TRANS") else ("first", "second", "longitude", "latitude")
     )

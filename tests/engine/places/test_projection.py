@@ -177,5 +177,5 @@ def test_a_system_without_a_code_is_used_by_its_figures():
 
 
 def test_what_is_too_large_says_how_large_it_is():
-    with pytest.raises(SceneError, match=r"a.asc: it is \d+ by 5\d\d km large; crop it"):
+    with pytest.raises(SceneError, match=r"a.asc: it is \d+ by 5\d\d km large; choose a Crop, or crop it"):
         place_about(System(4326), np.array([5.0, 45.0]), np.array([15.0, 50.0]), "a.asc: ")
