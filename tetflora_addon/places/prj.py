@@ -20,37 +20,13 @@ import numpy as np
 from .methods import METHODS, WGS84, Definition, Ellipsoid
 from .projection import LONGITUDE_LATITUDE, System, code_in, known_systems, read_figures
 
+_FIGURES = read_figures()
 #: Geographic systems by what names of datums begin with, and methods by what theirs do; letters and digits only.
-_DATUMS: dict[str, int] = read_figures()["datums"]
-_METHODS: dict[str, str] = read_figures()["methods"]
-#: What parameters mean by a part of their names; the first that fits counts.
-_PARAMETERS = (
-    ("2nd|parallel2", "second"), ("1st|parallel", "first"), ("easting", "east"), ("northing", "north"),
-    ("scale", "scale"), ("skew|rectifiedgridangle|xyplane", "skew"), ("azimuth", "azimuth"),
-    ("^lat", "latitude"), ("^lon|meridian", "longitude"),
-)  # fmt: skip
-_ORDER = {
-    "lcc2": ("latitude", "longitude", "first", "second"),
-    "aea": ("latitude", "longitude", "first", "second"),
-    "stereB": ("first", "longitude"),
-    "mercB": ("first", "longitude"),
-    "laea": ("latitude", "longitude"),
-    "web": ("latitude", "longitude"),
-    "omercA": ("latitude", "longitude", "azimuth", "skew", "scale"),
-    "omercB": ("latitude", "longitude", "azimuth", "skew", "scale"),
-}
-_SINGLE = ("latitude", "longitude", "scale")
-#: Codes of the usual systems, which count before others with the same figures.
-_USUAL = (
-    (32601, 32760),
-    (25828, 25838),
-    (26901, 26923),
-    (28348, 28358),
-    (31466, 31469),
-    (4326, 4326),
-    (4258, 4258),
-    (4269, 4269),
-)
+_DATUMS: dict[str, int] = _FIGURES["datums"]
+_METHODS: dict[str, str] = _FIGURES["methods"]
+#: What parameters mean by a part of their names, of which the first that fits counts; and those of methods in order.
+_PARAMETERS: dict[str, str] = _FIGURES["parameters"]
+_ORDER: dict[str, list[str]] = _FIGURES["order"]
 _FOOT, _SURVEY_FOOT = 0.3048, 1200.0 / 3937.0
 _Node = tuple[str, list[Any]]
 
@@ -123,7 +99,7 @@ def _well_known(node: _Node) -> tuple[System, float]:
     method = _child(conversion, "PROJECTION", "METHOD")
     given = {}
     for name, *rest in (part[1] for part in conversion[1] if isinstance(part, tuple) and part[0] == "PARAMETER"):
-        key = next((key for part, key in _PARAMETERS if re.search(part, _plain(name))), "")
+        key = next((key for part, key in _PARAMETERS.items() if re.search(part, _plain(name))), "")
         own = next((part[1][1] for part in rest[1:] if isinstance(part, tuple) and part[0].endswith("UNIT")), None)
         if key in ("east", "north"):
             given[key] = rest[0] * (metres if own is None else own)
@@ -199,7 +175,7 @@ def described(method: str, given: Mapping[str, float], datum: Definition) -> tup
     if "swiss" in plain or kind == "omercB":
         given = {"azimuth": 90.0} | given
     given["skew"] = given.get("skew", given.get("azimuth", 0.0))
-    order = (*_ORDER.get(kind, _SINGLE), "east", "north")
+    order = (*_ORDER.get(kind, _ORDER[""]), "east", "north")
     if kind not in METHODS or not all(isfinite(given.get(key, float("nan"))) for key in order):
         return System(), datum.unit
     own = replace(datum, method=kind, parameters=tuple(float(given[key]) for key in order))
@@ -218,7 +194,7 @@ def _system(own: Definition) -> System:
 @cache
 def _codes() -> dict[Any, int]:
     """Lowest codes of systems by their figures."""
-    usual = {code for first, last in _USUAL for code in range(first, last + 1)}
+    usual = {code for first, last in _FIGURES["usual"] for code in range(first, last + 1)}
     codes = sorted(known_systems(), key=lambda code: (code not in usual, code))
     return {_figures(known_systems()[code]): code for code in reversed(codes)}
 

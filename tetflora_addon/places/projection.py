@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -96,9 +96,10 @@ def known_systems() -> dict[int, Definition]:
     data = read_figures()
     ellipsoids, shifts = [Ellipsoid(*e) for e in data["ellipsoids"]], [tuple(s) for s in data["shifts"]]
     found = {}
-    for method, ellipsoid, shift, meridian, unit, parameters, codes in data["systems"]:
-        own = Definition(method, ellipsoids[ellipsoid], shifts[shift], meridian, data["units"][unit], tuple(parameters))
-        found.update(dict.fromkeys(codes, own))
+    for method, ellipsoid, shift, meridian, unit, rows in data["systems"]:
+        own = Definition(method, ellipsoids[ellipsoid], shifts[shift], meridian, data["units"][unit])
+        for parameters, codes in rows:
+            found.update(dict.fromkeys(codes, replace(own, parameters=tuple(parameters))))
     return found | {code: found[flat] for code, flat in _HEIGHTS.items()}
 
 
