@@ -8,37 +8,20 @@ import json
 import math
 import re
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-_MISSING = ("", "-", "--", "?", ".", "n/a", "#n/a", "nan", "n.a.", "k.a.", "n.d.")
-_NUMBER = r"\d+(?:[.,’' ]\d{3})*(?:[.,]\d+)?(?:e[+-]?\d+)?|[.,]\d+"
-_METRES = {
-    0.3048: r"ft|feet|foot|pieds?|pies|fuss|fuß|′|'",
-    0.0254: r"inch(?:es)?|in|zoll|pouces?|pulgadas|″|''|\"",
-    0.01: r"cm|zentimeter|centim[eè]tr?e?[rs]*|cent[ií]metr[io]s?",
-    0.001: r"mm|millim[eè]tr?e?[rs]*",
-    0.1: r"dm",
-    1.0: r"m(?:tr|ts?)?|met[er]{2}s?|m[eè]tres?|metr[io]s?",
-    0.0: r"years?|yrs?|jahre?|ans?|a[nñ]os?|anni|jaar",
-}
-_UNIT = "|".join(_METRES.values())
-_LESS = (
-    r"<=?|≤|bis(?: zu)?|up to|less than|under|below|unter|moins de|jusqu'?[aà]|"
-    r"menos de|menor (?:de|que|a)|hasta|meno di|fino a|tot"
-)
-_MORE = (
-    r">=?|≥|more than|greater than|over|above|at least|[uü]ber|[uü]ebersteigt|ab|mehr als|mindestens|plus de|au moins|"
-    r"m[aá]s de|mayor (?:de|que|a)|oltre|pi[uù] di|meer dan"
-)
-_PLUS = r"\+|(?:and|or|und|oder|et|ou|y|o|e|en) (?:more|above|over|mehr|gr[oö]sser|plus|m[aá]s|oltre|pi[uù]|meer)"
+from .titles import table
+
+_CELLS: dict[str, Any] = table()["cells"]
+_MISSING, _METRES = _CELLS["missing"], {float(metres): forms for metres, forms in _CELLS["units"].items()}
+_NUMBER, _UNIT = r"\d+(?:[.,’' ]\d{3})*(?:[.,]\d+)?(?:e[+-]?\d+)?|[.,]\d+", "|".join(_METRES.values())
 _SHAPE = re.compile(
-    rf"(?:class|klasse|classe|clase|[a-z]\.)?\s*(?:[øØ⌀]|ca\.?|circa|approx\.?|~|≈|about|etwa|env\.?|environ|between|zwischen|von|from|entre|de|tra|da)?\s*"
-    rf"(?:(?P<less>{_LESS})|(?P<more>{_MORE}))?\s*(?P<low>-?(?:{_NUMBER}))(?P<over>\+)?\s*(?P<first>{_UNIT})?\.?\s*"
-    rf"(?:(?P<sep>-|–|—|/|;|\+|to|bis(?: unter)?|[aà]|al|and|und|et|y|e|tot|hasta|<|…|\.\.\.?)\s*"
-    rf"(?:<=?\s*)?(?P<high>{_NUMBER})\s*(?P<second>{_UNIT})?\.?\s*)?(?P<plus>{_PLUS})?",
+    rf"(?:{_CELLS['class']})?\s*(?:{_CELLS['about']})?\s*(?:(?P<less>{_CELLS['less']})|(?P<more>{_CELLS['more']}))?\s*"
+    rf"(?P<low>-?(?:{_NUMBER}))(?P<over>\+)?\s*(?P<first>{_UNIT})?\.?\s*(?:(?P<sep>{_CELLS['to']})\s*(?:<=?\s*)?"
+    rf"(?P<high>{_NUMBER})\s*(?P<second>{_UNIT})?\.?\s*)?(?P<plus>{_CELLS['plus']})?",
 )
 _FLOAT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
 #: What a cell holds.

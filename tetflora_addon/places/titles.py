@@ -16,30 +16,15 @@ from typing import NamedTuple
 
 from .species_names import plain_words
 
+
+@cache
+def table() -> dict:
+    """What `titles.json` holds."""
+    return json.loads(Path(__file__).with_name("titles.json").read_text(encoding="utf-8"))
+
+
 #: What a column may hold, with its name for artists.
-FIELDS = {
-    "": "Not Used",
-    "name": "Species",
-    "common": "Common Name",
-    "genus": "Genus",
-    "family": "Family",
-    "leaf": "Conifer or Broadleaf",
-    "height": "Height",
-    "diameter": "Trunk Diameter",
-    "girth": "Trunk Girth",
-    "crown_width": "Crown Width",
-    "crown_radius": "Crown Radius",
-    "crown_base": "Crown Base",
-    "age": "Age",
-    "planted": "Year of Planting",
-    "status": "Status",
-    "dead": "Dead",
-    "x": "X, East",
-    "y": "Y, North",
-    "longitude": "Longitude",
-    "latitude": "Latitude",
-    "place": "Both Coordinates",
-}
+FIELDS: dict[str, str] = table()["fields"]
 #: Fields that may be told by several columns.
 NAMES = ("genus", "name", "common", "leaf", "family")
 _SIZES = {"h": "height", "d": "diameter", "z": "z", "e": "x", "n": "y"}  # of a single letter
@@ -70,12 +55,6 @@ class Title(NamedTuple):
     unit: float
     doubt: int
     classes: bool = False
-
-
-@cache
-def table() -> dict:
-    """What `titles.json` holds."""
-    return json.loads(Path(__file__).with_name("titles.json").read_text(encoding="utf-8"))
 
 
 @cache
