@@ -3,6 +3,7 @@
 """Import real places: terrain, trees that were measured or seen from above, and outlines of a map."""
 
 from collections.abc import Generator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,7 @@ from ..tetflora_addon.blender.places.columns import (
 )
 from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE, Import
 from ..tetflora_addon.blender.places.outlines import Drawn, outline_steps, told
-from ..tetflora_addon.blender.places.rasters import PATTERN
-from ..tetflora_addon.blender.places.terrain import ImportedGround, terrain_steps
+from ..tetflora_addon.blender.places.terrain import PATTERN, ImportedGround, terrain_steps
 from ..tetflora_addon.blender.places.trees import GENERIC, LEFT_OUT, Planted, canopy_steps, inventory_steps
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
 from ..tetflora_addon.errors import TetFloraError, readable
@@ -34,7 +34,11 @@ from .base import ModalJob, counted, in_object_mode, select_only
 from .populations import selected_grounds
 
 _LAYERS = ";".join(f"*{ending}" for ending in ENDINGS)
-_UNLINKED = {'SKIP_SAVE'}
+#: Settings that the next import does not begin with.
+_Bool, _Enum, _Float, _Int, _String = (
+    partial(kind, options={'SKIP_SAVE'})
+    for kind in (BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty)
+)
 
 
 def _file(text: str) -> Path | None:
@@ -47,7 +51,7 @@ class _Importing(ModalJob, ImportHelper):
 
     needs = (in_object_mode,)
 
-    code: IntProperty(
+    code: _Int(
         name="Coordinate System",
         description=(
             "EPSG code of the coordinates in the file, such as 4326 for longitude and latitude, or 25832 for a zone of "
@@ -56,23 +60,20 @@ class _Importing(ModalJob, ImportHelper):
         default=0,
         min=0,
         max=999_999,
-        options=_UNLINKED,
     )
-    plain: BoolProperty(
+    plain: _Bool(
         name="Plain Meters",
         description="Take coordinates for meters of a plane, whatever the file says of its coordinate system",
-        options=_UNLINKED,
     )
-    new_origin: BoolProperty(
+    new_origin: _Bool(
         name="New Origin",
         description=(
             "Put the middle of this file at the world origin. Otherwise it lies where it is in relation to what was "
             "imported before"
         ),
-        options=_UNLINKED,
     )
 
-    crop: EnumProperty(
+    crop: _Enum(
         name="Crop",
         description="What to leave out of a large area",
         items=(
@@ -81,9 +82,8 @@ class _Importing(ModalJob, ImportHelper):
             (EXISTING, "To the Scene", "The selected meshes or imported terrain, or else all that the scene has"),
         ),
         default=WHOLE,
-        options=_UNLINKED,
     )
-    crop_size: FloatProperty(
+    crop_size: _Float(
         name="Side",
         description="Side of the square",
         default=2000.0,
@@ -91,7 +91,6 @@ class _Importing(ModalJob, ImportHelper):
         soft_max=20_000.0,
         max=500_000.0,
         unit='LENGTH',
-        options=_UNLINKED,
     )
     chosen: BoolProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
@@ -135,7 +134,7 @@ class _Raster(_Importing):
     filter_glob: StringProperty(default=PATTERN, options={'HIDDEN'})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
-    factor: FloatProperty(
+    factor: _Float(
         name="Meters per Value",
         description="Factor on the values of the file: 0.3048 for feet, 0.1 for decimeters",
         default=1.0,
@@ -143,16 +142,14 @@ class _Raster(_Importing):
         soft_max=10.0,
         max=1e6,
         precision=4,
-        options=_UNLINKED,
     )
-    shift: FloatProperty(
+    shift: _Float(
         name="Height of 0",
         description="What is added to all values, meters",
         default=0.0,
         min=-20_000.0,
         max=20_000.0,
         unit='LENGTH',
-        options=_UNLINKED,
     )
 
     def order(self, context: bpy.types.Context, **others: Any) -> Import:
@@ -174,22 +171,20 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
     bl_idname = "tetflora.import_terrain"
     bl_label = "Import Terrain"
 
-    most: IntProperty(
+    most: _Int(
         name="Most Faces",
         description="Number of faces at most; a finer raster is averaged in blocks",
         default=500_000,
         min=100,
         soft_max=4_000_000,
         max=20_000_000,
-        options=_UNLINKED,
     )
-    image: StringProperty(
+    image: _String(
         name="Orthophoto",
         description=(
             "Image of the same place that becomes the color of the ground: GeoTIFF, or JPEG or PNG with a world file"
         ),
         subtype='FILE_PATH',
-        options=_UNLINKED,
     )
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, ImportedGround]:
@@ -242,7 +237,7 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
     bl_label = "Import Tree Inventory"
 
     filter_glob: StringProperty(default=f"*.csv;*.tsv;*.txt;{_LAYERS}", options={'HIDDEN'})
-    units: EnumProperty(
+    units: _Enum(
         name="Units",
         description="Units of columns that do not name theirs",
         items=(
@@ -250,9 +245,8 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
             (IMPERIAL, "Imperial", "Feet; trunks in inches"),
         ),
         default=METRIC,
-        options=_UNLINKED,
     )
-    unknown: EnumProperty(
+    unknown: _Enum(
         name="Unknown Species",
         description="What stands for trees whose species is not known here",
         items=(
@@ -261,24 +255,18 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
             (LEFT_OUT, "Leave Out", "No tree"),
         ),
         default=GENERIC,
-        options=_UNLINKED,
     )
-    species: EnumProperty(
-        name="Species", description="Species that stands for unknown ones", items=operator_items, options=_UNLINKED
-    )
-    skip: BoolProperty(
-        name="Skip Broken Rows",
-        description="Leave out rows with values that cannot be, instead of refusing the file",
-        options=_UNLINKED,
+    species: _Enum(name="Species", description="Species that stands for unknown ones", items=operator_items)
+    skip: _Bool(
+        name="Skip Broken Rows", description="Leave out rows with values that cannot be, instead of refusing the file"
     )
 
-    columns: StringProperty(
+    columns: _String(
         name="Columns",
         description=(
             "JSON object of what columns hold, for those whose titles and values do not tell it: "
             '{"Hoogte dm": "height", "X1": "crown_width ft", "X2": ""}'
         ),
-        options=_UNLINKED,
     )
     table: CollectionProperty(type=TetFloraInventoryColumn, options={'HIDDEN', 'SKIP_SAVE'})
     active: IntProperty(options={'HIDDEN', 'SKIP_SAVE'})
@@ -327,15 +315,14 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
     bl_idname = "tetflora.import_canopy"
     bl_label = "Import Canopy Height"
 
-    species: StringProperty(
+    species: _String(
         name="Species",
         description=(
             "Comma-separated identifiers of species with optional weights: beech:3, spruce. Empty for the species of "
             "Populate"
         ),
-        options=_UNLINKED,
     )
-    least: FloatProperty(
+    least: _Float(
         name="Smallest Tree",
         description="Lower canopy is left out",
         default=3.0,
@@ -343,13 +330,11 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
         soft_max=10.0,
         max=100.0,
         unit='LENGTH',
-        options=_UNLINKED,
     )
-    below: StringProperty(
+    below: _String(
         name="Ground Below",
         description="Raster of the elevations of the ground, to subtract from those of a surface model; empty for none",
         subtype='FILE_PATH',
-        options=_UNLINKED,
     )
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
@@ -370,7 +355,7 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
     bl_label = "Import Outlines"
 
     filter_glob: StringProperty(default=_LAYERS, options={'HIDDEN'})
-    kind: EnumProperty(
+    kind: _Enum(
         name="Take All As",
         description="What all areas and lines of the file are",
         items=(
@@ -378,7 +363,6 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
             *((kind.upper(), kind, f"All are {kind.lower()}") for kind in KINDS),
         ),
         default='KEYS',
-        options=_UNLINKED,
     )
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Drawn]:

@@ -23,7 +23,7 @@ from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.places import columns, outlines, trees
 from tetflora_addon.blender.places.completion import curves_of
 from tetflora_addon.blender.places.origin import KEY, Import, importing, origin_of
-from tetflora_addon.blender.places.rasters import read_raster
+from tetflora_addon.blender.places.terrain import read_raster
 from tetflora_addon.blender.placing.terrain import lines_of, read_ground
 from tetflora_addon.blender.runtime import GoneError
 from tetflora_addon.blender.species.edits import species_for

@@ -35,8 +35,7 @@ from ..worker import call_in_thread, steps_in_thread
 from .completion import complete
 from .origin import Import, importing
 from .outlines import building_areas
-from .rasters import read_raster
-from .terrain import heights_steps
+from .terrain import heights_steps, read_raster
 
 #: Attributes of fields by the names that sizes have in inventories.
 ATTRIBUTES = {
