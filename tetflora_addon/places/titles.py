@@ -132,54 +132,15 @@ def _parts(word: str) -> list[str]:
 
 
 def _field(meant: set[str]) -> tuple[str, int]:
-    """The field that meanings of words make up, and the doubt."""
-    if {"plant", "year"} <= meant:
-        return "planted", 0
-    if "cultivar" in meant and not meant & {"species", "genus"}:
-        return "", NEVER
-    meant = meant - {"plant", "cultivar"}
-    if "veto" in meant or ("id" in meant and not meant & {"breast", "girth", "crown", "height", "diameter"}):
-        return "", NEVER
-    if meant & {"species", "genus", "name", "latin", "common"} and "lat" in meant:
-        meant = (meant - {"lat"}) | {"latin"}
-    place = meant & {"x", "y", "longitude", "latitude", "lat", "place"}
-    if place and not meant - place - {"grid", "width"}:
-        core = place - {"place"}
-        for name, also in (("longitude", {"x"}), ("latitude", {"lat", "y"})):
-            if core & {name, "lat"} and core <= {name, *also}:
-                return name, 0
-        return (core.pop(), 0) if len(core) == 1 else ("place", 1)
-    if meant == {"grid"}:
-        return "place", 2
-    sizes = meant - {"trunk", "class", "name", "type", "id"}
-    if "crown" in sizes:
-        if sizes & {"status", "species", "age"}:
-            return "", 0
-        by = next((name for name in ("radius", "base") if name in sizes), "width")
-        return ("height", 2) if by == "width" and "height" in sizes and "diameter" not in sizes else (f"crown_{by}", 0)
-    if meant & {"planted"} and not meant & {"species", "genus", "name", "height"}:
-        return "planted", 0
-    for name, field in (("girth", "girth"), ("breast", "diameter"), ("diameter", "diameter")):
-        if name in sizes:
-            return field, 0
-    if sizes & {"base"} or {"trunk", "height"} <= meant:  # the height of a trunk is that below the crown
-        return ("crown_base", 0) if "height" in sizes else ("", 0)
-    for name, field in (("height", "height"), ("width", "crown_width"), ("age", "age")):
-        if name in sizes:
-            return field, 0
-    if meant & {"dead", "status"}:
-        return ("dead" if "dead" in meant else "status"), 0
-    if "family" in meant:
-        return "family", 0
-    if "genus" in meant:
-        return ("common", 0) if "common" in meant else ("name", 0) if "species" in meant else ("genus", 0)
-    if "common" in meant:
-        return "common", int(not meant & {"species", "name", "type"})
-    if meant & {"latin", "species"}:
-        return "name", 0
-    if "leaf" in meant:
-        return "leaf", 0
-    return ("common", 2) if meant & {"name", "type"} else ("", 0)
+    """The field that meanings of words make up, and the doubt, by the first rule that fits.
+
+    Of a rule ``a|b !c =d|e`` there is one of a and b, no c, and nothing but d and e.
+    """
+    for rule, name, doubt in table()["rules"]:
+        parts = [(part[0], meant.intersection(part.lstrip("!=").split("|"))) for part in rule.split()]
+        if all(some == meant if way == "=" else bool(some) != (way == "!") for way, some in parts):
+            return name, doubt
+    return "", 0
 
 
 def meaning(title: str) -> tuple[str, float]:
