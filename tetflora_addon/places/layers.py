@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sqlite3
 import struct
+from collections.abc import Iterator
 from contextlib import closing
 from itertools import pairwise
 from pathlib import Path
@@ -91,6 +92,43 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], int]:
         if geometry is not None and not isinstance(geometry.get("type"), str):
             raise SceneError(f"{name}: feature {number:,}: its geometry has no type")
     return features, chosen or _code(data.get("crs"), name)
+
+
+def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]:
+    """Points, lines and areas of a geometry: type and coordinates of each, as GeoJSON has them.
+
+    Raises
+    ------
+    SceneError
+        It is no geometry of GeoJSON; ``where`` begins the message.
+    """
+    kind = geometry["type"] if geometry else "Point"
+    parts = [geometry] if geometry else []
+    if kind == "GeometryCollection":
+        parts = geometry.get("geometries")
+        if not isinstance(parts, list) or not all(
+            isinstance(p, dict) and isinstance(p.get("type"), str) and p["type"] != kind for p in parts
+        ):
+            raise SceneError(f"{where}: its geometries are no list of geometries")
+    for part in parts:
+        kind, values = part["type"], part.get("coordinates")
+        if kind not in _GEOMETRIES:
+            raise SceneError(f"{where}: {shown(kind)} is no geometry of GeoJSON")
+        many = kind.startswith("Multi")
+        yield from ((kind.removeprefix("Multi"), each) for each in (list_of(values, where) if many else [values]))
+
+
+def list_of(value: Any, where: str) -> list[Any]:
+    """Coordinates that are a list.
+
+    Raises
+    ------
+    SceneError
+        They are none; ``where`` begins the message.
+    """
+    if not isinstance(value, list):
+        raise SceneError(f"{where}: its coordinates are {shown(value)}, not a list")
+    return value
 
 
 def _json(content: bytes) -> Any:

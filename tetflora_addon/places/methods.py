@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import asin, atan2, cos, exp, log, sin, sqrt, tan
+from math import asin, atan2, cos, exp, inf, log, sin, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -261,13 +261,6 @@ def _mercator(ell: Ellipsoid, latitude: float, _meridian: float, scale: float | 
     )
 
 
-def _web(ell: Ellipsoid, _latitude: float, _meridian: float) -> tuple[_Way, _Way]:
-    return (
-        lambda longitude, phi: (ell.a * longitude, ell.a * np.arcsinh(np.tan(phi))),
-        lambda x, y: (x / ell.a, np.arctan(np.sinh(y / ell.a))),
-    )
-
-
 def _double(ell: Ellipsoid, foot: float, _meridian: float, scale: float) -> tuple[_Way, _Way]:
     """Oblique stereographic projection of a sphere, onto which the ellipsoid is projected before."""
     e2, s = ell.e2, sin(foot)
@@ -391,7 +384,7 @@ METHODS: dict[str, Callable[..., tuple[_Way, _Way]]] = {
     "stereB": _polar,
     "mercA": _mercator,
     "mercB": _mercator,
-    "web": _web,
+    "web": lambda ell, *_: _mercator(Ellipsoid(ell.a, inf), 0.0, 0.0),  # as if that were a sphere
     "laea": _azimuthal,
     "omercA": _oblique,
     "omercB": lambda *given: _oblique(*given, True),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import NAME, SceneError, readable, shown
-from .layers import LAYER, read_features
+from ..errors import NAME, SceneError, readable
+from .layers import LAYER, list_of, parts_of, read_features
 from .projection import System, chosen_system
 from .tables import MAX_POINTS, coordinates, flat_tags
 
@@ -120,33 +121,13 @@ def read_outlines(path: Path, code: int = 0, kind: str = "") -> tuple[list[MapFe
     return found, system, notes
 
 
-def _rings(geometry: dict[str, Any] | None, where: str) -> list[tuple[tuple[NDArray[np.float64], ...], bool]]:
+def _rings(geometry: dict[str, Any] | None, where: str) -> Iterator[tuple[tuple[NDArray[np.float64], ...], bool]]:
     """Areas and lines of a geometry, an area as border and holes."""
-    kind = None if geometry is None else geometry["type"]
-    if kind in (None, "Point", "MultiPoint"):
-        return []
-    if kind == "GeometryCollection":
-        parts = geometry.get("geometries")
-        if not isinstance(parts, list) or not all(
-            isinstance(p, dict) and isinstance(p.get("type"), str) and p["type"] != kind for p in parts
-        ):
-            raise SceneError(f"{where}: its geometries are no list of geometries")
-        return [found for part in parts for found in _rings(part, where)]
-    given = geometry.get("coordinates")
-    many = {"LineString": lambda: [given], "MultiLineString": lambda: given}.get(kind)
-    if many is not None:
-        lines = [coordinates(line, where) for line in _list(many(), where)]
-        return [((line,), False) for line in lines]
-    if kind not in ("Polygon", "MultiPolygon"):
-        raise SceneError(f"{where}: {shown(kind)} is no geometry of GeoJSON")
-    areas = [given] if kind == "Polygon" else _list(given, where)
-    return [(tuple(_ring(ring, where) for ring in _list(area, where)), True) for area in areas if area != []]
-
-
-def _list(value: Any, where: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise SceneError(f"{where}: its coordinates are {shown(value)}, not a list")
-    return value
+    for kind, values in parts_of(geometry, where):
+        if kind == "LineString":
+            yield (coordinates(values, where),), False
+        elif kind == "Polygon" and values != []:
+            yield tuple(_ring(ring, where) for ring in list_of(values, where)), True
 
 
 def _ring(values: Any, where: str) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import NAME, SceneError, readable, shown
 from ..files import json_of, read_whole
 from .cells import middle_of
-from .layers import MAX_BYTES, MAX_ROWS, read_features
+from .layers import MAX_BYTES, MAX_ROWS, parts_of, read_features
 
 MAX_COLUMNS = 500
 _DELIMITERS = ",;\t|"
@@ -168,20 +168,14 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
 
 def _points_of(geometry: dict[str, Any] | None, where: str) -> NDArray[np.float64]:
     """Places (n, 2) of a geometry: its points, or the middle of its first area."""
-    kind = geometry["type"] if geometry else ""
-    if kind == "GeometryCollection":
-        parts = geometry.get("geometries")
-        parts = [part for part in parts if isinstance(part, dict)] if isinstance(parts, list) else []
-        found = (_points_of(part, where) for part in parts if isinstance(part.get("type"), str))
-        return next((points for points in found if len(points)), np.zeros((0, 2)))
-    values = geometry.get("coordinates") if geometry else None
-    if kind in ("Point", "MultiPoint"):
-        return coordinates([values] if kind == "Point" else values, where, texts=True)
-    for _ in range({"Polygon": 1, "MultiPolygon": 2}.get(kind, 0)):
-        values = values[0] if isinstance(values, list) and values else None
-    if kind not in ("Polygon", "MultiPolygon") or values is None:
-        return np.zeros((0, 2))
-    return np.array([middle_of(coordinates(values, where, texts=True))])
+    parts = list(parts_of(geometry, where))
+    points = [values for kind, values in parts if kind == "Point"]
+    area = next(
+        (values[0] for kind, values in parts if kind == "Polygon" and isinstance(values, list) and values), None
+    )
+    if points or area is None:
+        return coordinates(points, where, texts=True)
+    return np.array([middle_of(coordinates(area, where, texts=True))])
 
 
 def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
