@@ -72,6 +72,7 @@ def cell_of(text: str, points: bool = False) -> Quantity:
 
 
 def _value(text: str, points: bool) -> float:
+    """A number as people write it."""
     text = re.sub(r"[’' ]", "", text)
     comma, point = text.rfind(","), text.rfind(".")
     if min(comma, point) >= 0:  # the last one parts decimals
@@ -84,6 +85,7 @@ def _value(text: str, points: bool) -> float:
 
 
 def _unit(text: str | None) -> float:
+    """Metres of a unit by its name; 0 for none."""
     return next((metres for metres, forms in _METRES.items() if text and re.fullmatch(forms, text)), 0.0)
 
 

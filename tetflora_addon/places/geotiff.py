@@ -132,12 +132,14 @@ class _Tags:
         self.found = self._directory(offset)
 
     def _bytes(self, offset: int, number: int, what: str) -> bytes:
+        """A part of the file; what it is begins the message if it is not there."""
         if offset + number > self.size or number > _MOST_BYTES:
             raise SceneError(f"{self.name}: {what}: the file ends before it; it is damaged or was not copied whole")
         self.file.seek(offset)
         return self.file.read(number)
 
     def _unpack(self, letter: str, data: bytes) -> int:
+        """A number in the order of bytes that the file has."""
         return struct.unpack(self.order + letter, data)[0]
 
     def _directory(self, offset: int) -> dict[int, tuple[int, int, bytes]]:

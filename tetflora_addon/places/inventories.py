@@ -142,6 +142,7 @@ def preview(path: Path) -> list[Column]:
 
 
 def _table(path: Path, skip: bool, most: int | None = None, code: int = 0) -> Table:
+    """Rows of a file, of which there is at least one."""
     layer = path.suffix.lower() in ENDINGS
     found = read_points(path, skip, most, code) if layer else read_csv(path, skip, most)
     if not len(found.numbers):
@@ -249,6 +250,7 @@ class _Reading:
                 self.found.setdefault(what.field, []).append((title, what))
 
     def inventory(self, code: int) -> Inventory:
+        """The trees of the table; refuses the file or leaves out rows."""
         self._leave_out()
         sizes = {name: self._size(name) for name in _MOST}
         for name, source, factor in (("diameter", "girth", 1.0 / math.pi), ("crown_width", "crown_radius", 2.0)):
@@ -284,6 +286,7 @@ class _Reading:
         )
 
     def _texts(self, title: str) -> NDArray[np.str_]:
+        """Texts of a column, which is one that is used."""
         self.used[title] = next(name for name, found in self.found.items() if title in dict(found))
         return self.table.columns[title]
 
@@ -462,6 +465,7 @@ class _Reading:
         return points, int(found[:, 2].max(initial=0.0))
 
     def _coordinate(self, column: str) -> NDArray[np.float64]:
+        """Numbers (n,) of a column of coordinates, in metres or degrees."""
         title, what = self.found[column][0]
         texts = self._texts(title)
         values, _, kinds = cells(texts)
@@ -508,4 +512,5 @@ def _no_tree(text: str, condition: bool) -> str:
 
 
 def _away(metres: float) -> str:
+    """How far a row is from others, for messages."""
     return f"{metres / 1000.0:,.0f} km from" if math.isfinite(metres) else "too far from"

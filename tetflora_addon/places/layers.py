@@ -257,6 +257,7 @@ def _shape(record: bytes) -> _Feature | None:
 
 
 def _points(data: bytes, at: int, number: int) -> NDArray[np.float64]:
+    """Points (n, 2) that begin at some byte."""
     return np.frombuffer(data, "<f8", 2 * number, at).reshape(-1, 2)
 
 
@@ -267,6 +268,7 @@ def _turn(ring: NDArray[np.float64]) -> float:
 
 
 def _inside(point: NDArray[np.float64], ring: NDArray[np.float64]) -> bool:
+    """Whether a point lies within a ring (n, 2)."""
     (x, y), (x1, y1), (x2, y2) = point, ring.T, np.roll(ring, -1, axis=0).T
     crossed = (y1 > y) != (y2 > y)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -148,6 +148,7 @@ class Definition:
 
     @property
     def _turned(self) -> NDArray[np.float64]:
+        """Matrix (3, 3) of the turn and the scale of the shift."""
         x, y, z = np.radians(np.array(self.shift[3:6]) / 3600.0)
         return (1.0 + 1e-6 * self.shift[6]) * np.array([[1.0, -z, y], [z, 1.0, -x], [-y, x, 1.0]])
 
@@ -166,6 +167,7 @@ class Definition:
 
 
 def _transverse(ell: Ellipsoid, foot: float, _meridian: float, scale: float) -> tuple[_Way, _Way]:
+    """Transverse Mercator."""
     n = 1.0 / (2.0 * ell.inverse - 1.0)
     radius = scale * ell.a / (1.0 + n) * (1.0 + n**2 / 4.0 + n**4 / 64.0)
     alphas = (
@@ -226,6 +228,7 @@ def _cone(n: float, foot: float, radius: Callable, latitude: Callable) -> tuple[
 
 
 def _lambert(ell: Ellipsoid, foot: float, _meridian: float, *others: float) -> tuple[_Way, _Way]:
+    """Lambert's conformal cone, with one parallel and a scale, or with two."""
     first, second = others if len(others) == 2 else (foot, foot)
     scale = 1.0 if len(others) == 2 else others[0]
     n, psi = sin(first), float(ell.isometric(np.array(first)))
@@ -241,6 +244,7 @@ def _lambert(ell: Ellipsoid, foot: float, _meridian: float, *others: float) -> t
 
 
 def _albers(ell: Ellipsoid, foot: float, _meridian: float, first: float, second: float) -> tuple[_Way, _Way]:
+    """Albers' cone, true to area."""
     m1, m2 = ell.cosine(first) ** 2, ell.cosine(second) ** 2
     q1, q2 = ell.authalic(np.array([first, second])).tolist()
     n = (m1 - m2) / (q2 - q1) if abs(first - second) > 1e-9 else sin(first)
@@ -254,6 +258,7 @@ def _albers(ell: Ellipsoid, foot: float, _meridian: float, first: float, second:
 
 
 def _mercator(ell: Ellipsoid, latitude: float, _meridian: float, scale: float | None = None) -> tuple[_Way, _Way]:
+    """Mercator, with a scale or a parallel that is true to it."""
     radius = ell.a * (ell.cosine(latitude) if scale is None else scale)
     return (
         lambda longitude, phi: (radius * longitude, radius * ell.isometric(phi)),
@@ -295,6 +300,7 @@ def _double(ell: Ellipsoid, foot: float, _meridian: float, scale: float) -> tupl
 
 
 def _polar(ell: Ellipsoid, latitude: float, _meridian: float, scale: float | None = None) -> tuple[_Way, _Way]:
+    """Polar stereographic projection, with a scale or a parallel that is true to it."""
     side = np.sign(latitude)
     rim = sqrt((1.0 + ell.e) ** (1.0 + ell.e) * (1.0 - ell.e) ** (1.0 - ell.e))
     if scale is None:

@@ -131,6 +131,7 @@ def _rings(geometry: dict[str, Any] | None, where: str) -> Iterator[tuple[tuple[
 
 
 def _ring(values: Any, where: str) -> NDArray[np.float64]:
+    """A ring (k, 2) without its last point, which is the first."""
     ring = coordinates(values, where)
     if len(ring) > 1 and (ring[0] == ring[-1]).all():
         ring = ring[:-1]
@@ -145,6 +146,7 @@ def _lower(tags: dict[str, Any]) -> dict[str, Any]:
 def _outline(
     tags: dict[str, Any], names: tuple[str, ...], rings: tuple[NDArray[np.float64], ...], closed: bool, chosen: str
 ) -> MapFeature:
+    """A feature of its kind, with width and height."""
     kind, value = _kind(tags, names, closed)
     kind = chosen or kind
     width = height = 0.0

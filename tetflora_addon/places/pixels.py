@@ -144,6 +144,7 @@ def _running(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _bits_turned(data: bytes, own: Layout) -> bytes:
+    """Bytes with the highest bit first."""
     return data.translate(_TURNED) if own.reversed else data
 
 
@@ -221,6 +222,7 @@ def _packed(data: bytes, most: int) -> bytes:
 
 
 def _inflated(data: bytes, most: int) -> bytes:
+    """Deflate."""
     return zlib.decompressobj().decompress(data, most + 1)  # one more, so that the sum at the end is checked
 
 

@@ -66,10 +66,12 @@ def _nodes(text: str) -> _Node | None:
 
 
 def _child(node: _Node, *names: str) -> _Node | None:
+    """The first part of a node with one of some names."""
     return next((part for part in node[1] if isinstance(part, tuple) and part[0] in names), None)
 
 
 def _well_known(node: _Node) -> tuple[System, float]:
+    """The system of a node of well-known text, and metres of its unit."""
     projected, flat = (
         ("PROJCS", "PROJCRS", "PROJECTEDCRS"),
         ("GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS", "GEODETICCRS"),
@@ -114,11 +116,13 @@ def _well_known(node: _Node) -> tuple[System, float]:
 
 
 def _code(node: _Node) -> int:
+    """The EPSG code that a node names; 0 for none."""
     own = _child(node, "AUTHORITY", "ID")
     return int(own[1][1]) if own and str(own[1][0]).upper() == "EPSG" else 0
 
 
 def _plain(name: Any) -> str:
+    """Small letters and digits of a name."""
     return re.sub("[^a-z0-9]", "", str(name).lower())
 
 
@@ -150,6 +154,7 @@ def datum_named(name: str) -> Definition | None:
 
 
 def _code_of_datum(name: str) -> int:
+    """EPSG code of the geographic system of a datum; 0 for unknown ones."""
     name = _plain(name)
     fitting = [part for part in _DATUMS if name.removeprefix("d").startswith(part) or name.startswith(part)]
     return _DATUMS[max(fitting, key=len)] if fitting else 0
@@ -200,6 +205,7 @@ def _codes() -> dict[Any, int]:
 
 
 def _figures(own: Definition) -> tuple:
+    """Figures of a system, rounded so that the same ones are equal."""
     shape = round(own.ellipsoid.a, 1), round(own.ellipsoid.inverse, 6)
     if own.method == "geo":
         return own.method, *shape, tuple(round(v, 2) for v in own.shift), round(own.meridian, 6)

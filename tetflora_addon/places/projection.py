@@ -81,6 +81,7 @@ class System:
 
 @cache
 def _about(longitude: float, latitude: float) -> Definition:
+    """Transverse Mercator about a place."""
     return Definition("tm", parameters=(latitude, longitude, 1.0, 0.0, 0.0))
 
 

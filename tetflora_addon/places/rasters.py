@@ -266,6 +266,7 @@ def numbers_in(piece: bytes, name: str, line: int) -> NDArray[np.float64]:
 
 
 def _split(text: bytes) -> NDArray[np.float64] | None:
+    """Numbers (n,) of a text; None if one of them is none."""
     if not text.strip():  # of which NumPy makes -1
         return np.empty(0)
     with warnings.catch_warnings():
@@ -277,6 +278,7 @@ def _split(text: bytes) -> NDArray[np.float64] | None:
 
 
 def _number(text: str, what: str) -> float:
+    """A number of a head; what it is begins the message."""
     try:
         value = float(text)
     except ValueError:

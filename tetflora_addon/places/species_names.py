@@ -96,12 +96,14 @@ def names_in(groups: dict[str, dict[str, str]], separator: str | None = None) ->
 
 
 def _shorter(word: str) -> Iterator[str]:
+    """A word, and without one of its letters after the first."""
     yield word
     yield from (word[:i] + word[i + 1 :] for i in range(1, len(word)))
 
 
 @cache
 def _known() -> _Names:
+    """The table, indexed by joined words."""
     data = table()
     known = _Names({}, {}, {}, {}, {}, {})
     own = {words_of(name)[0] for names in data["species"].values() for name in names["scientific"]}
@@ -187,6 +189,7 @@ def best_of(names: Sequence[str], among: Container[str] | None = None) -> tuple[
 
 
 def _named(words: list[str]) -> Match | None:
+    """What words mean as a whole or as a common name."""
     return _exactly(words) or _common(words)
 
 

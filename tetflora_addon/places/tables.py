@@ -212,6 +212,7 @@ def coordinates(values: Any, where: str, texts: bool = False) -> NDArray[np.floa
 
 
 def _texts(cells: Any) -> NDArray[np.str_]:
+    """Cells (n,) without spaces around them."""
     return np.char.strip(np.array([cell[:_LONGEST] for cell in cells], dtype=np.str_))
 
 

@@ -151,6 +151,7 @@ def meaning(title: str) -> tuple[str, float]:
 
 @cache
 def _values() -> dict[tuple[str, ...], str]:
+    """What words of cells say, by these words."""
     values = {what: texts for what, texts in table()["values"].items() if what != "rest"}
     return {tuple(plain_words(text)): what for what, texts in values.items() for text in texts.split(";")}
 

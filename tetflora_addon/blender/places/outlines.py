@@ -125,6 +125,7 @@ def building_areas(scene: bpy.types.Scene) -> list[NDArray[np.float64]]:
 
 
 def _remove(collections: list[bpy.types.Collection], materials: list[bpy.types.Material]) -> None:
+    """Take back what was drawn."""
     objects = [obj for collection in collections for obj in collection.objects]
     curves = [obj.data for obj in objects]
     bpy.data.batch_remove([*objects, *collections])

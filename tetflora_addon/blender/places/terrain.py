@@ -99,6 +99,7 @@ def read_raster(order: Import, path: Path | None = None) -> Generator[Progress, 
 
 
 def _png(path: Path) -> Raster:
+    """The raster of a gray PNG with a world file."""
     content = read_whole(path, _MOST_FILE)
     if len(content) < _PNG_HEAD.size or content[:8] != b"\x89PNG\r\n\x1a\n" or content[12:16] != b"IHDR":
         raise SceneError(f"{path.name}: this is no PNG file")
@@ -252,6 +253,7 @@ def _photo_material(path: Path, cells: NDArray[np.float64]) -> tuple[bpy.types.M
 def _mesh(
     name: str, points: NDArray, faces: NDArray, uv: NDArray, material: bpy.types.Material | None
 ) -> bpy.types.Object:
+    """A smooth mesh with UV; soil if it has no material."""
     middle = np.round((points.min(axis=0) + points.max(axis=0)) / 2.0)
     middle[2] = 0.0
     mesh = bpy.data.meshes.new(name)
