@@ -15,6 +15,7 @@ from benchmarks import places_files as files
 from devtools import build
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.places.origin import origin_of
+from tetflora_addon.places.inventories import preview
 from tetflora_addon.places.projection import System, to_degrees
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -38,6 +39,36 @@ def _labels(step, operator, *settings):
     for name in settings:
         assert f"**{kind.properties[name].name}**" in step
     assert kind.name in step
+
+
+def test_my_citys_trees(tmp_path, monkeypatch, capfd):
+    """A register as cities of Germany write it: words of the office, places as well-known text, vacant sites."""
+    steps = _recipe("My City's Trees")
+    columns = "baumid;gattung_art;art_dtsch;pflanzjahr;kronendm;stammumfang_cm;baumhoehe;strasse;geom"
+    rows = [
+        f"{n};Tilia cordata 'Greenspire';Winter-Linde;19{60 + n};7;110;12,5;Weg;POINT (11.5{n:02d} 48.1)"
+        for n in range(20)
+    ]
+    rows += ["20;;freier Standort;;;;;Weg;POINT (11.501 48.1)", "21;Quercus robur;Stiel-Eiche;;;;;Weg;POINT (0 0)"]
+    path = tmp_path / "trees.csv"
+    path.write_text("\n".join([columns, *rows]) + "\n", encoding="latin-1")
+    _labels(steps[1], "import_inventory")
+    _labels(steps[2] + "Import Tree Inventory", "import_inventory", "units", "code", "crop", "crop_size")
+    taken = {column.title: column.field for column in preview(path)}
+    assert taken["gattung_art"] == "name" and taken["kronendm"] == "crown_width" and taken["geom"] == "place"
+    with pytest.raises(RuntimeError, match=r"line 23.*0, 0 is .* Skip Broken Rows"):
+        _call("import_inventory", path)
+    _labels(steps[3] + "Import Tree Inventory", "import_inventory", "skip")
+    field = _call("import_inventory", path, skip=True, crop='MIDDLE', crop_size=500.0)
+    told = capfd.readouterr().out
+    assert "left out: vacant (1)" in told and "beyond the Crop" in told and "coordinates: EPSG:4326" in told
+    assert read(field.data, "tf_height") == pytest.approx(12.5) and len(field.data.vertices) < 20
+    assert "**Refine**" in steps[4]
+    # The script below the steps, word by word, on a table with its column.
+    path.write_text("species,H,lon,lat\noak,40,11.51,48.1\nelm,about 3 or 4,11.51,48.1\n")
+    monkeypatch.chdir(tmp_path)
+    exec(re.search(r"`(bpy\.ops\.tetflora\.import_inventory\([^`]*)`", steps[4])[1])
+    assert read(bpy.context.view_layer.objects.active.data, "tf_height") == pytest.approx([12.192])
 
 
 def test_a_laser_canopy(tmp_path):
