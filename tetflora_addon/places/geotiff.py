@@ -58,19 +58,7 @@ def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
     with path.open("rb") as file:
         tags = _Tags(file, path.stat().st_size, path.name)
         tags.check_kind()
-        place, (system, unit), notes = tags.place(), tags.system(), []
-        if place is None:
-            beside = world_file(path)
-            if beside is None:
-                raise SceneError(
-                    f"{path.name}: tag ModelPixelScale (33550) is missing, and there is no world file (.tfw)"
-                )
-            *place, other, unit = beside
-            system = system if system.code else other
-        elif not system.code and unit == 1.0:
-            system, unit = system_beside(path)
-        if not system.code:
-            place = [unit * v for v in place]
+        (place, system), notes = _place(path, tags), []
         values, absent = yield from tags.pixels()
         mask = yield from tags.mask(values.shape)
         if mask is not None:
@@ -99,19 +87,18 @@ def place_of_image(path: Path) -> Raster:
         As `read_tiff`.
     """
     check_regular(path)
-    place = None
-    if path.suffix.lower() in (".tif", ".tiff"):
+    if path.suffix.lower() not in (".tif", ".tiff"):
+        place, system = _place(path)
+    else:
         with path.open("rb") as file:
-            tags = _Tags(file, path.stat().st_size, path.name)
-            place, (system, unit) = tags.place(), tags.system()
-    beside = world_file(path) if place is None else None
-    if beside is not None:
-        *place, system, unit = beside
-    if place is None:
-        raise SceneError(f"{path.name}: it has no place: neither tags of GeoTIFF nor a world file beside it")
-    if not system.code:
-        place = [unit * v for v in place]
+            place, system = _place(path, _Tags(file, path.stat().st_size, path.name))
     return Raster(np.zeros((1, 1), np.float32), *place, system)
+
+
+def _place(path: Path, tags: _Tags | None = None) -> tuple[list[NDArray[np.float64]], System]:
+    """Middle of the first pixel, steps along and down, and the system, by tags or else by files beside the image."""
+    place, system = (tags.place(), tags.system()) if tags is not None else (None, System())
+    return world_file(path) if place is None else place, system_beside(path) if system == System() else system
 
 
 class _Tags:
@@ -268,18 +255,18 @@ class _Tags:
             out.append(np.float32(value))
         return out[0], out[1]
 
-    def system(self) -> tuple[System, float]:
-        """The system, and metres of its unit where it is none that lies on Earth."""
+    def system(self) -> System:
+        """The system that its keys tell."""
         geo, known = self.keys(), known_systems()
         for key in ("ProjectedCitation", "GTCitation", "GeodeticCitation"):
             text = re.search(r"(?:PROJCS|GEOGCS)\s*\[.*", str(geo.get(key, "")), re.DOTALL)
-            if text and (found := system_in(text[0]))[0].code:
+            if text and (found := system_in(text[0])).code:
                 return found
         flat, degrees = geo.get("GeodeticCRS", 0), geo.get("GTModelType") == 2
         code = flat if degrees else geo.get("ProjectedCRS", 0)
         unit = float(geo.get("ProjLinearUnitSize", 0.0) or _UNITS.get(geo.get("ProjLinearUnits", 9001), 1.0))
         if code not in (0, _OWN):
-            return System(int(code)), 1.0
+            return System(int(code))
         datum = known.get(flat, known[4326])
         axis, flattening = geo.get("EllipsoidSemiMajorAxis", 0.0), geo.get("EllipsoidInvFlattening", 0.0)
         if flat not in known and 6.2e6 < axis < 6.5e6 and flattening > 100.0:
@@ -287,7 +274,7 @@ class _Tags:
             shift = shift if isinstance(shift, tuple) and len(shift) in (3, 7) else ()
             datum = Definition("geo", Ellipsoid(axis, flattening), (*shift, *[0.0] * (7 - len(shift))))
         if degrees:
-            return System(-2, own=datum), 1.0
+            return System(-2, own=datum)
         south, zone = divmod(int(geo.get("Projection", 0)) - _UTM_ZONES, 100)
         if south in (0, 1) and 1 <= zone <= 60:
             return described("transverse mercator", utm_zone(zone, south == 1), datum)
@@ -297,7 +284,7 @@ class _Tags:
         try:
             return described(_TABLES["methods"].get(str(geo.get("ProjMethod")), ""), given, replace(datum, unit=unit))
         except (ValueError, ZeroDivisionError, OverflowError):
-            return System(), unit
+            return System(unit=unit)
 
     def one(self, tag: str, default: int | None = None) -> int:
         """The first value of a tag."""

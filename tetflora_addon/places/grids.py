@@ -97,14 +97,8 @@ def _xyz(path: Path) -> Generator[Progress, object, Raster]:
     checked_size(width, height, f"{name}: ")
     values = np.full((height, width), np.nan, np.float32)
     values[height - 1 - row, column] = z
-    system, unit = system_beside(path)
-    return Raster(
-        without_nodata(values, -9999.0),
-        unit * np.array([west, south + dy * (height - 1)]),
-        np.array([unit * dx, 0.0]),
-        np.array([0.0, -unit * dy]),
-        system,
-    )
+    corner, steps = np.array([west, south + dy * (height - 1)]), (np.array([dx, 0.0]), np.array([0.0, -dy]))
+    return Raster(without_nodata(values, -9999.0), corner, *steps, system_beside(path))
 
 
 def _even(values: NDArray[np.float64], name: str, what: str) -> tuple[float, float, NDArray[np.int64]]:

@@ -395,7 +395,7 @@ class _Reading:
         name, given, found = self.table.name, self.table.points, self.found
         pair = "coordinates"
         if given is not None:
-            points, code = given, code or self.table.code
+            points, system = given, self.table.system
         else:
             metres = "x" in found and "y" in found
             degrees = "longitude" in found and "latitude" in found
@@ -419,8 +419,7 @@ class _Reading:
             if metres and not code and _are_degrees(points[self.good]):
                 metres = False
                 self.notes.append("x and y read as longitude and latitude")
-            code = code or (0 if metres else LONGITUDE_LATITUDE)
-        system = chosen_system(code, System(), f"{name}: ")
+            system = chosen_system(code or (0 if metres else LONGITUDE_LATITUDE), System(), f"{name}: ")
         if system.geographic:
             some = np.abs(points[self.good])
             if len(some) and 90.0 < np.median(some[:, 1]) <= 180.0 and np.median(some[:, 0]) <= 90.0:

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from ..errors import SceneError, shown
 from ..files import is_regular, json_of, read_whole
 from .prj import system_in
-from .projection import LONGITUDE_LATITUDE, System, code_in, known_systems, may_be_degrees, to_degrees
+from .projection import LONGITUDE_LATITUDE, System, chosen_system, code_in, known_systems, may_be_degrees
+from .rasters import system_beside
 
 MAX_BYTES, MAX_ROWS = 200_000_000, 2_000_000
 #: Endings of files that `read_features` reads.
@@ -36,13 +37,13 @@ _DEEPEST = 32  # collections within each other
 _Feature = dict[str, Any]
 
 
-def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], int]:
-    """Features of a file, of which each is an object with a geometry, and their EPSG code; 0 for plain metres.
+def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
+    """Features of a file, of which each is an object with a geometry, and their system.
 
     Parameters
     ----------
     chosen : int
-        EPSG code that counts in place of the file's own; 0 for none.
+        As of `chosen_system`.
 
     Raises
     ------
@@ -54,22 +55,15 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], int]:
     name = path.name
     if path.suffix.lower() in (".shp", ".gpkg"):
         try:
-            features, own = _shapes(path) if path.suffix.lower() == ".shp" else _package(path)
+            features, system = _shapes(path) if path.suffix.lower() == ".shp" else _package(path)
         except (struct.error, ValueError, IndexError, KeyError, TypeError, OverflowError, RecursionError, MemoryError):
             raise SceneError(f"{name}: it is damaged or was not copied whole") from None
-        system, unit = own
-        if chosen:
-            return features, chosen
-        if system.code == -2 or unit != 1.0:  # its own figures, or lengths in feet of which nobody knows where they are
-            for feature in features:
-                _convert(feature["geometry"], system, unit)
-            system = System(LONGITUDE_LATITUDE) if system.code else System()
-        elif not system.code and may_be_degrees(*_corners(features)):
+        if not chosen and system == System() and may_be_degrees(*_corners(features)):
             raise SceneError(
                 f"{name}: no file tells its coordinate system (.prj); set Coordinate System to 4326 for longitude and "
                 "latitude, or turn on Plain Meters"
             )
-        return features, system.code
+        return features, chosen_system(chosen, system, f"{name}: ")
     try:
         data = _json(read_whole(path, MAX_BYTES))
     except ValueError as error:
@@ -91,7 +85,7 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], int]:
             raise SceneError(f"{name}: feature {number:,}: it has no geometry, or properties that are no object")
         if geometry is not None and not isinstance(geometry.get("type"), str):
             raise SceneError(f"{name}: feature {number:,}: its geometry has no type")
-    return features, chosen or _code(data.get("crs"), name)
+    return features, chosen_system(chosen or _code(data.get("crs"), name), System(), f"{name}: ")
 
 
 def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]:
@@ -167,25 +161,6 @@ def _code(crs: Any, name: str) -> int:
     )
 
 
-def _convert(geometry: _Feature | None, system: System, unit: float) -> None:
-    """Put degrees, or metres of another unit, in place of coordinates."""
-
-    def moved(values: Any) -> Any:
-        if values and isinstance(values[0], list | tuple) and values[0] and isinstance(values[0][0], list | tuple):
-            return [moved(part) for part in values]
-        if not values:
-            return values
-        alone = not isinstance(values[0], list | tuple)
-        points = np.array([values] if alone else [v[:2] for v in values], np.float64)[:, :2]
-        points = (to_degrees(system, points) if system.code else unit * points).tolist()
-        return points[0] if alone else points
-
-    for part in (geometry or {}).get("geometries", ()):
-        _convert(part, system, unit)
-    if geometry and "coordinates" in geometry:
-        geometry["coordinates"] = moved(geometry["coordinates"])
-
-
 def _corners(features: list[_Feature]) -> NDArray[np.float64]:
     """The corners (2, 2) of all coordinates."""
     found: list[Any] = []
@@ -203,7 +178,7 @@ def _corners(features: list[_Feature]) -> NDArray[np.float64]:
     return np.stack([points.min(axis=0), points.max(axis=0)]) if len(points) else np.full((2, 2), np.inf)
 
 
-def _shapes(path: Path) -> tuple[list[_Feature], tuple[System, float]]:
+def _shapes(path: Path) -> tuple[list[_Feature], System]:
     """Features of a shapefile, with the table and the system beside it."""
     content = read_whole(path, MAX_BYTES)
     if content[:4] != b"\0\0\x27\x0a":
@@ -224,8 +199,7 @@ def _shapes(path: Path) -> tuple[list[_Feature], tuple[System, float]]:
         at += 8 + size
         if len(features) > MAX_ROWS:
             raise SceneError(f"{path.name}: more than {MAX_ROWS:,} features; cut it")
-    prj = next((p for p in (path.with_suffix(".prj"), path.with_suffix(".PRJ")) if p.exists()), None)
-    return features, system_in(read_whole(prj, 65_536).decode("latin-1")) if prj else (System(), 1.0)
+    return features, system_beside(path)
 
 
 def _shape(record: bytes) -> _Feature | None:
@@ -311,12 +285,12 @@ def _dbase(path: Path) -> list[dict[str, Any] | None] | None:
     return rows
 
 
-def _package(path: Path) -> tuple[list[_Feature], tuple[System, float]]:
+def _package(path: Path) -> tuple[list[_Feature], System]:
     """Features of all layers of a GeoPackage, in the system of the first."""
     if not is_regular(path):
         read_whole(path, MAX_BYTES)  # which says what it is
     features: list[_Feature] = []
-    first: tuple[System, float] | None = None
+    first: System | None = None
     try:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as base:
             base.text_factory = lambda data: data.decode("utf-8", "replace")
@@ -326,7 +300,7 @@ def _package(path: Path) -> tuple[list[_Feature], tuple[System, float]]:
             ).fetchall()
             for table, column, by, code, text in layers:
                 known = str(by).upper() == "EPSG" and code in known_systems()
-                own = (System(int(code)), 1.0) if known else system_in(str(text))
+                own = System(int(code)) if known else system_in(str(text))
                 first = first or own
                 if own != first:
                     raise SceneError(
@@ -344,7 +318,7 @@ def _package(path: Path) -> tuple[list[_Feature], tuple[System, float]]:
                         raise SceneError(f"{path.name}: more than {MAX_ROWS:,} features; cut it")
     except sqlite3.Error as error:
         raise SceneError(f"{path.name}: this is no GeoPackage, or damaged: {error}") from None
-    return features, first or (System(), 1.0)
+    return features, first or System()
 
 
 def _geometry(blob: Any) -> _Feature | None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import NAME, SceneError, readable
 from .layers import LAYER, list_of, parts_of, read_features
-from .projection import System, chosen_system
+from .projection import System
 from .tables import MAX_POINTS, coordinates, flat_tags
 
 WOOD, MEADOW, WATER, ROAD, BUILDING, OTHER = "Woods", "Meadows", "Water", "Roads", "Buildings", "Others"
@@ -88,8 +88,7 @@ def read_outlines(path: Path, code: int = 0, kind: str = "") -> tuple[list[MapFe
     SceneError
         It is broken, or has no outlines; names the feature.
     """
-    features, own = read_features(path, code)
-    system = chosen_system(own, System(), f"{path.name}: ")
+    features, system = read_features(path, code)
     found: list[MapFeature] = []
     points = slivers = 0
     for number, feature in enumerate(features, 1):

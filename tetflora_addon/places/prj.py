@@ -31,8 +31,8 @@ _FOOT, _SURVEY_FOOT = 0.3048, 1200.0 / 3937.0
 _Node = tuple[str, list[Any]]
 
 
-def system_in(text: str) -> tuple[System, float]:
-    """The system that a text describes, and metres of its unit where it is none that lies on Earth."""
+def system_in(text: str) -> System:
+    """The system that a text describes; plain in the unit that it names if it is none that lies on Earth."""
     with suppress(ValueError, IndexError, TypeError, OverflowError, RecursionError, ZeroDivisionError):
         if re.search(r"^\s*projection\s", text, re.IGNORECASE):
             return _old(text)
@@ -42,7 +42,7 @@ def system_in(text: str) -> tuple[System, float]:
             if root is not None:
                 return _well_known(root)
     code = code_in(text)
-    return (System(code) if code in known_systems() else System()), 1.0
+    return System(code) if code in known_systems() else System()
 
 
 def _nodes(text: str) -> _Node | None:
@@ -70,8 +70,8 @@ def _child(node: _Node, *names: str) -> _Node | None:
     return next((part for part in node[1] if isinstance(part, tuple) and part[0] in names), None)
 
 
-def _well_known(node: _Node) -> tuple[System, float]:
-    """The system of a node of well-known text, and metres of its unit."""
+def _well_known(node: _Node) -> System:
+    """The system of a node of well-known text."""
     projected, flat = (
         ("PROJCS", "PROJCRS", "PROJECTEDCRS"),
         ("GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS", "GEODETICCRS"),
@@ -79,14 +79,14 @@ def _well_known(node: _Node) -> tuple[System, float]:
     while node[0] not in projected + flat:
         inner = _child(node, "SOURCECRS", "COMPD_CS", "COMPOUNDCRS", *projected, *flat)
         if inner is None:
-            return System(), 1.0
+            return System()
         node = inner
     code = _code(node)
     if code in known_systems():
-        return System(code), 1.0
+        return System(code)
     base = node if node[0] in flat else _child(node, *flat, "BASEGEOGCRS", "BASEGEODCRS")
     if base is None:
-        return System(), 1.0
+        return System()
     unit = _child(node, "UNIT", "LENGTHUNIT")
     axis = _child(node, "AXIS")
     unit = unit or (axis and _child(axis, "LENGTHUNIT")) or ("", ["metre", 1.0])
@@ -96,7 +96,7 @@ def _well_known(node: _Node) -> tuple[System, float]:
     angle = degrees(angle[1][1]) if angle else 1.0
     if node is base:
         named = _code_of_datum(str((_child(base, "DATUM", "ENSEMBLE") or ("", [""]))[1][0]))
-        return System(named) if named and known_systems()[named] == datum else _system(datum), 1.0
+        return System(named) if named and known_systems()[named] == datum else _system(datum)
     conversion = _child(node, "CONVERSION") or node
     method = _child(conversion, "PROJECTION", "METHOD")
     given = {}
@@ -160,7 +160,7 @@ def _code_of_datum(name: str) -> int:
     return _DATUMS[max(fitting, key=len)] if fitting else 0
 
 
-def described(method: str, given: Mapping[str, float], datum: Definition) -> tuple[System, float]:
+def described(method: str, given: Mapping[str, float], datum: Definition) -> System:
     """The system of a method by its name, with parameters in degrees and metres, on a datum."""
     plain = re.sub("[0-9]sp", "", _plain(method))
     kind = _METHODS.get(max((m for m in _METHODS if plain.startswith(m)), key=len, default=""), "")
@@ -182,10 +182,10 @@ def described(method: str, given: Mapping[str, float], datum: Definition) -> tup
     given["skew"] = given.get("skew", given.get("azimuth", 0.0))
     order = (*_ORDER.get(kind, _ORDER[""]), "east", "north")
     if kind not in METHODS or not all(isfinite(given.get(key, float("nan"))) for key in order):
-        return System(), datum.unit
+        return System(unit=datum.unit)
     own = replace(datum, method=kind, parameters=tuple(float(given[key]) for key in order))
     own.ways[0](*_SOMEWHERE)  # figures that no map can have are an error, and no system
-    return _system(own), 1.0
+    return _system(own)
 
 
 _SOMEWHERE = (np.array([0.1]), np.array([0.1]))
@@ -222,7 +222,7 @@ def utm_zone(zone: int, south: bool) -> dict[str, float]:
     return {"latitude": 0.0, "longitude": 6.0 * zone - 183.0, "scale": 0.9996, "east": 5e5, "north": 1e7 * south}
 
 
-def _old(text: str) -> tuple[System, float]:
+def _old(text: str) -> System:
     """Words of ArcInfo: a name and a value on each line, and parameters with comments below."""
     head, _, tail = text.partition("Parameters")
     words = {line.split()[0].lower(): " ".join(line.split()[1:]).upper() for line in head.splitlines() if line.split()}
@@ -230,7 +230,7 @@ def _old(text: str) -> tuple[System, float]:
     metres = _FOOT if "INT" in units and "F" in units else _SURVEY_FOOT if units.startswith("F") else 1.0
     datum = datum_named(words.get("datum", "")) or Definition("geo")
     if name.startswith("GEO"):
-        return System(_code_of_datum(words.get("datum", "")) or LONGITUDE_LATITUDE), 1.0
+        return System(_code_of_datum(words.get("datum", "")) or LONGITUDE_LATITUDE)
     datum = replace(datum, unit=metres)
     if name == "UTM":
         zone = int(float(words["zone"]))

@@ -41,12 +41,15 @@ class System:
         The place, degrees.
     own : Definition, optional
         Of the file.
+    unit : float
+        Metres of plain coordinates, or of those that are taken for meters of the system.
     """
 
     code: int = 0
     longitude: float = 0.0
     latitude: float = 0.0
     own: Definition | None = field(default=None, repr=False)
+    unit: float = 1.0
 
     @property
     def definition(self) -> Definition:
@@ -65,18 +68,17 @@ class System:
     @property
     def metric(self) -> bool:
         """Whether coordinates are true meters, but for some parts in a thousand."""
-        return self.code in (0, -1) or (
-            self.own is None and self.definition.method in TRUE and self.definition.unit == 1.0
-        )
+        return self.code == -1 or (self.code > 0 and self.definition.method in TRUE and self.definition.unit == 1.0)
 
     @property
     def name(self) -> str:
         """For messages."""
         if self.code > 0:
             return f"EPSG:{self.code}"
-        return {0: "plain meters", -2: "the system that the file defines"}.get(
-            self.code, f"the plane about {self.latitude:.5f}, {self.longitude:.5f}"
-        )
+        return {
+            0: "plain meters" if self.unit == 1.0 else f"plain units of {self.unit:g} m",
+            -2: "the system that the file defines",
+        }.get(self.code, f"the plane about {self.latitude:.5f}, {self.longitude:.5f}")
 
 
 @cache
@@ -152,7 +154,7 @@ def code_in(text: str) -> int | None:
 
 def to_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Longitude and latitude on WGS 84 in degrees, (n, 2), of points (n, 2) in a system that lies on Earth."""
-    points, own = np.asarray(points, np.float64), system.definition
+    points, own = system.unit * np.asarray(points, np.float64), system.definition
     if own.method == "geo":
         if not any(own.shift):
             return points
@@ -177,12 +179,15 @@ def from_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.floa
         return np.degrees(np.stack([longitude, latitude], axis=1))
     there, _, meridian = own.ways
     off = longitude - np.radians(meridian)
-    return np.stack(there(np.where(np.abs(off) <= np.pi, off, (off + np.pi) % (2.0 * np.pi) - np.pi), latitude), axis=1)
+    off = np.where(np.abs(off) <= np.pi, off, (off + np.pi) % (2.0 * np.pi) - np.pi)
+    return np.stack(there(off, latitude), axis=1) / system.unit
 
 
 def between(points: NDArray[np.float64], source: System, target: System) -> NDArray[np.float64]:
-    """Points (n, 2) of one system in another; both lie on Earth, or are the same."""
-    return points if source == target else from_degrees(target, to_degrees(source, points))
+    """Points (n, 2) of one system in another; both lie on Earth, or both are plain."""
+    if source == target or source.code == target.code == 0:
+        return points * (source.unit / target.unit)
+    return from_degrees(target, to_degrees(source, points))
 
 
 @dataclass(frozen=True)
@@ -208,13 +213,7 @@ class MapOrigin:
         SceneError
             Nobody can tell where they lie, or they are too far away; ``what`` begins the message.
         """
-        if system != self.system and 0 in (system.code, self.system.code):
-            known, other = ("the scene", "the file") if system.code == 0 else ("the file", "the scene")
-            raise SceneError(
-                f"{what}{known} lies on Earth, and the coordinate system of {other} is not known; set Coordinate "
-                "System to its EPSG code, or turn on New Origin"
-            )
-        local = between(points, system, self.system) - [self.east, self.north]
+        local = self.offsets(points, system, what)
         far = np.abs(local).max(initial=0.0)
         if not far < MOST_AWAY:
             away = f"{far / 1000.0:,.0f} km" if np.isfinite(far) else "too far"
@@ -223,6 +222,22 @@ class MapOrigin:
                 "file, or turn on New Origin to put it in the middle by itself"
             )
         return local
+
+    def offsets(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
+        """Metres from the origin, (n, 2), of points (n, 2) of a system, however far.
+
+        Raises
+        ------
+        SceneError
+            Nobody can tell where they lie; ``what`` begins the message.
+        """
+        if (system.code == 0) != (self.system.code == 0):
+            known, other = ("the scene", "the file") if system.code == 0 else ("the file", "the scene")
+            raise SceneError(
+                f"{what}{known} lies on Earth, and the coordinate system of {other} is not known; set Coordinate "
+                "System to its EPSG code, or turn on New Origin"
+            )
+        return between(points, system, self.system) - [self.east, self.north]
 
 
 #: Metres from the origin within which all of a scene must lie.
@@ -238,9 +253,9 @@ def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float
         They are no places on Earth.
     """
     middle = (np.asarray(low, np.float64) + high) / 2.0
-    if system.metric:
-        east, north = np.round(middle).tolist()
-        place = MapOrigin(system, east, north)
+    if system.metric or system.code == 0:
+        east, north = np.round(system.unit * middle).tolist()
+        place = MapOrigin(system if system.code else System(), east, north)
     else:
         longitude, latitude = np.round(to_degrees(system, middle[None])[0], 6).tolist()
         if not (abs(longitude) <= 360.0 and abs(latitude) < 89.0):

@@ -149,7 +149,7 @@ def in_degrees(raster: Raster, what: str) -> Raster:
     SceneError
         Nobody can tell; ``what`` begins the message.
     """
-    if raster.system.code or not may_be_degrees(raster.outline.min(axis=0), raster.outline.max(axis=0)):
+    if raster.system != System() or not may_be_degrees(raster.outline.min(axis=0), raster.outline.max(axis=0)):
         return raster
     cell = max(np.abs(raster.along).max(), np.abs(raster.down).max())
     if cell < _DEGREES:
@@ -226,9 +226,8 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
         raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values")
     nothing = header.get("nodata_value", -9999.0)
     values = without_nodata(values.reshape(height, width), nothing)
-    system, unit = system_beside(path)
-    first = unit * np.array([corner[0], corner[1] + (height - 1) * dy])
-    return Raster(values, first, np.array([unit * dx, 0.0]), np.array([0.0, -unit * dy]), system)
+    first = np.array([corner[0], corner[1] + (height - 1) * dy])
+    return Raster(values, first, np.array([dx, 0.0]), np.array([0.0, -dy]), system_beside(path))
 
 
 def _ascii_head(header: dict[str, float], name: str) -> tuple[int, int, tuple[float, float], float, float]:
@@ -297,27 +296,23 @@ def without_nodata(values: NDArray[np.floating], nothing: float | None) -> NDArr
     return np.where(bad, np.float32(np.nan), values)
 
 
-def system_beside(path: Path) -> tuple[System, float]:
-    """The system in a file ``.prj`` beside another, and metres of its unit where it is none that lies on Earth."""
+def system_beside(path: Path) -> System:
+    """The system in a file ``.prj`` beside another."""
     for beside in (path.with_suffix(".prj"), path.with_suffix(".PRJ")):
         with suppress(OSError):
             return system_in(read_whole(beside, 16 * _SMALL).decode("latin-1"))
-    return System(), 1.0
+    return System()
 
 
-def world_file(
-    path: Path,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], System, float] | None:
-    """Middle of the first cell, steps along and down, system and metres of its unit, of an image's world file.
-
-    None without one.
+def world_file(path: Path) -> list[NDArray[np.float64]]:
+    """Middle of the first cell, and steps along and down, of the world file of an image.
 
     Raises
     ------
     OSError
         It cannot be read.
     SceneError
-        It is broken; names the line.
+        There is none, or it is broken; names the line.
     """
     for ending in WORLD_FILES.get(path.suffix.lower(), ()):
         beside = next((p for p in (path.with_suffix(ending), path.with_suffix(ending.upper())) if p.exists()), None)
@@ -331,5 +326,8 @@ def world_file(
         )
         if not abs(a * e - b * d) > 0.0:
             raise SceneError(f"{beside.name}: line 1: its cells have no size")
-        return np.array([x, y]), np.array([a, d]), np.array([b, e]), *system_beside(path)
-    return None
+        return [np.array([x, y]), np.array([a, d]), np.array([b, e])]
+    names = ", ".join(WORLD_FILES.get(path.suffix.lower(), ()))
+    raise SceneError(
+        f"{path.name}: nothing tells where it lies: no tags of GeoTIFF, and no world file ({names}) beside it"
+    )

@@ -20,6 +20,7 @@ from ..errors import NAME, SceneError, readable, shown
 from ..files import json_of, read_whole
 from .cells import middle_of
 from .layers import MAX_BYTES, MAX_ROWS, parts_of, read_features
+from .projection import System
 
 MAX_COLUMNS = 500
 _DELIMITERS = ",;\t|"
@@ -44,8 +45,8 @@ class Table:
         Texts (n,) of each column by its name.
     points : (n, 2) float64, optional
         Coordinates from geometry.
-    code : int, optional
-        EPSG code that goes with them.
+    system : System, optional
+        That goes with them.
     broken : int
         Rows that were left out because they are not like the others.
     first : str
@@ -59,7 +60,7 @@ class Table:
     numbers: NDArray[np.int64]
     columns: dict[str, NDArray[np.str_]]
     points: NDArray[np.float64] | None = None
-    code: int | None = None
+    system: System | None = None
     broken: int = 0
     first: str = ""
     notes: list[str] = field(default_factory=list)
@@ -149,7 +150,7 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
     SceneError
         It is broken; names the feature.
     """
-    features, code = read_features(path, chosen)
+    features, system = read_features(path, chosen)
     name, without = path.name, 0
     points, numbers, rows = [np.zeros((0, 2))], [], []
     for number, feature in enumerate(features[:most], 1):
@@ -163,7 +164,7 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
         raise SceneError(f"{name}: {len(titles):,} kinds of properties; {MAX_COLUMNS} is the limit")
     columns = {title: _texts([_text(row.get(title)) for row in rows]) for title in titles}
     notes = [f"{without:,} feature{'s' * (without > 1)} without a place"] if without else []
-    return Table(name, "feature", np.array(numbers, np.int64), columns, np.concatenate(points), code, notes=notes)
+    return Table(name, "feature", np.array(numbers, np.int64), columns, np.concatenate(points), system, notes=notes)
 
 
 def _points_of(geometry: dict[str, Any] | None, where: str) -> NDArray[np.float64]:

@@ -124,3 +124,20 @@ def test_scenes_of_national_systems(tmp_path, code):
     field = _call("import_inventory", table)
     tree = read(field.data, "position")[0] + np.array(field.location)
     assert tree[:2] == pytest.approx(cells[9:11, 9:11].mean(axis=(0, 1)), abs=0.01)
+
+
+def test_plain_feet_become_meters(tmp_path):
+    """Of a file by itself, and beside others on a map of meters; a map of degrees cannot tell where they are."""
+    path = tmp_path / "a.asc"
+    path.write_text(files.ascii_grid(files.hills(20), 10.0))
+    path.with_suffix(".prj").write_text('PROJCS["x",GEOGCS["y",DATUM["z"]],PROJECTION["odd"],UNIT["Foot",0.3048]]')
+    assert _call("import_terrain", path).dimensions.x == pytest.approx(19 * 3.048, abs=1e-3)
+    bpy.context.scene["tetflora_place"] = dict(bpy.context.scene["tetflora_place"]) | {"code": 25832}
+    ground = _call("import_terrain", path, crop='EXISTING')
+    assert ground.dimensions.x == pytest.approx(19 * 3.048, abs=1e-3)
+    place = origin_of(bpy.context.scene)
+    assert ground.location.x + place.east == pytest.approx(0.3048 * (files.EAST + 100.0), abs=1.0)
+    bpy.context.scene["tetflora_place"] = dict(bpy.context.scene["tetflora_place"]) | {"code": -1}
+    for crop in ('EXISTING', 'WHOLE'):
+        with pytest.raises(RuntimeError, match="coordinate system of the file is not known"):
+            _call("import_terrain", path, crop=crop)

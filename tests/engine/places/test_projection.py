@@ -158,7 +158,7 @@ _TRANSVERSE = (
     ],
 )
 def test_systems_by_their_texts(text, code):
-    assert system_in(text)[0].code == code
+    assert system_in(text).code == code
 
 
 def test_a_system_without_a_code_is_used_by_its_figures():
@@ -166,14 +166,14 @@ def test_a_system_without_a_code_is_used_by_its_figures():
     text = f'PROJCS["own",{_NAD83},PROJECTION["Transverse_Mercator"],' + _TRANSVERSE.format(
         1000.0, -81.3, 1.00002, 40, '"Foot_US",0.3048006096012192'
     )
-    system, _ = system_in(text)
+    system = system_in(text)
     place = np.array([[-81.31, 40.02]])
     own = from_degrees(system, place)
     near = from_degrees(System(-1, -81.3, 40.0), place) * 1.00002 / 0.3048006096012192 + [1000.0, 0.0]
     np.testing.assert_allclose(own, near, atol=1e-3)
     assert not system.metric
     # What lacks figures is no system, but has a unit.
-    assert system_in(text.replace('PARAMETER["Central_Meridian",-81.3],', "")) == (System(), 0.3048006096012192)
+    assert system_in(text.replace('PARAMETER["Central_Meridian",-81.3],', "")) == System(unit=0.3048006096012192)
 
 
 def test_what_is_too_large_says_how_large_it_is():

@@ -12,7 +12,7 @@ from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
 from tetflora_addon.places import rasters
 from tetflora_addon.places.geotiff import read_tiff
-from tetflora_addon.places.projection import System
+from tetflora_addon.places.projection import System, place_about
 from tetflora_addon.places.rasters import Raster, read_ascii, world_file
 
 _HILLS = files.hills(9)
@@ -104,9 +104,14 @@ def test_points_matrices_and_feet(tmp_path):
     keys = [1, 1, 0, 4, 1025, 0, 1, 2, 3072, 0, 1, 32767, 3076, 0, 1, 9002, 4099, 0, 1, 9002]
     path.write_bytes(files.geotiff(_HILLS, 10.0, extra={34735: (3, keys)}))
     raster = _tiff(path)
-    assert raster.system.code == 0
-    assert raster.corner == pytest.approx([0.3048 * files.EAST, 0.3048 * files.NORTH])
-    assert raster.along == pytest.approx([3.048, 0.0])
+    assert raster.system == System(unit=0.3048)
+    assert raster.system.name == "plain units of 0.3048 m"
+    place = place_about(raster.system, *np.sort(raster.outline[::2], axis=0))
+    local = place.local(raster.places(np.array([0, 1]), np.zeros(2)), raster.system, "")
+    assert local[1] - local[0] == pytest.approx([3.048, 0.0])
+    assert local[0] == pytest.approx(
+        [-3.048 * 0.5 * (_HILLS.shape[1] - 1), 3.048 * 0.5 * (_HILLS.shape[0] - 1)], abs=0.6
+    )
     np.testing.assert_allclose(raster.values, 0.3048 * _HILLS, rtol=1e-6)
     assert raster.notes == ("heights in feet read as such",)
     # A turned raster.
@@ -146,9 +151,10 @@ def test_a_broken_geotiff_is_told_by_its_tag(tmp_path, extra, message):
 
 def test_world_files(tmp_path):
     path = tmp_path / "a.png"
-    assert world_file(path) is None
+    with pytest.raises(SceneError, match=r"a.png: nothing tells where it lies.*\.pgw"):
+        world_file(path)
     path.with_suffix(".pgw").write_bytes(files.WORLD)
-    corner, along, down, *_ = world_file(path)
+    corner, along, down = world_file(path)
     assert (corner.tolist(), along.tolist(), down.tolist()) == ([500000, 5316000], [5, 0], [0, -5])
     path.with_suffix(".pgw").write_text("5\n0\n0\nx\n1\n2\n")
     with pytest.raises(SceneError, match=r"a.pgw: line 4"):

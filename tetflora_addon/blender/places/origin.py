@@ -8,7 +8,7 @@ The first import of a scene finds that place, and all later ones lie where they 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
@@ -69,7 +69,7 @@ class Box:
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which points (n, 2) of the file lie within it."""
-        local = between(points, self.system, self.place.system) - [self.place.east, self.place.north]
+        local = self.place.offsets(points, self.system, "")
         return ((local >= self.low) & (local <= self.high)).all(axis=1)
 
     @property
@@ -147,7 +147,9 @@ class Import:
             if place is None or not corners:
                 raise SceneError(f"{self.what}nothing was imported yet; choose a box around its middle as Crop")
             low, high = np.min(corners, axis=0)[:2] - 1.0, np.max(corners, axis=0)[:2] + 1.0
-        return Box(place, low, high, system if system.code or place.system.code == -1 else place.system)
+        known = self.known(place, system)
+        place.offsets(points, known, self.what)  # or nobody can tell where they lie
+        return Box(place, low, high, known)
 
     def nothing_left(self) -> SceneError:
         """The error of a crop that leaves nothing."""
@@ -174,8 +176,12 @@ class Import:
         SceneError
             As `MapOrigin.local`.
         """
-        known = place.system if system.code == 0 and place.system.code > 0 else system
-        return place.local(points, known, self.what)
+        return place.local(points, self.known(place, system), self.what)
+
+    @staticmethod
+    def known(place: MapOrigin, system: System) -> System:
+        """The system of the file, of which plain coordinates are taken for those of the scene's map."""
+        return replace(place.system, unit=system.unit) if system.code == 0 and place.system.code > 0 else system
 
     def remember(self, place: MapOrigin) -> None:
         """Store the place of the scene."""

@@ -25,7 +25,7 @@ from ...jobs import Progress
 from ...places.geotiff import place_of_image
 from ...places.grids import ENDINGS, mosaic, read_grid
 from ...places.projection import System, between, chosen_system
-from ...places.rasters import MAX_CELLS, Raster, checked_size, in_degrees, world_file
+from ...places.rasters import MAX_CELLS, Raster, checked_size, in_degrees
 from ...planting.height_grid import HeightGrid, cell_for, height_grid
 from ..attributes import write
 from ..compat import shader_tree
@@ -114,12 +114,8 @@ def _png(path: Path) -> Raster:
         if end > len(content) or zlib.crc32(content[at + 4 : end - 4]) != int.from_bytes(content[end - 4 : end]):
             raise SceneError(f"{path.name}: byte {at:,}: it is damaged or was not copied whole")
         at = end
-    beside = world_file(path)
-    if beside is None:
-        raise SceneError(f"{path.name}: there is no world file (.pgw) that tells where it lies")
-    *place, system, unit = beside
     values = np.rint(_pixels(path, width, height) * np.float32(2**bits - 1))
-    return Raster(values.astype(np.float32), *(place if system.code else [unit * v for v in place]), system)
+    return replace(place_of_image(path), values=values.astype(np.float32))
 
 
 def _pixels(path: Path, width: int, height: int) -> NDArray[np.float32]:
