@@ -9,15 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import zstandard
 
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
 from tetflora_addon.places.canopy import checked_canopy
 from tetflora_addon.places.grids import read_grid
 from tetflora_addon.places.outlines import read_outlines
+from tetflora_addon.places.pixels import use_zstandard
 from tetflora_addon.places.projection import between, chosen_system, place_about
 from tetflora_addon.places.rasters import in_degrees
 
+use_zstandard(zstandard)
 FOLDER = Path(__file__).parent.parent / "tests" / "data" / "places"
 
 

@@ -20,17 +20,12 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..jobs import Progress
 
-try:
-    import zstandard  # bundled with Blender
-except ImportError:  # pragma: no cover
-    zstandard = None
-
 #: Compressions that cannot be read, by name.
 OTHERS = {
     2: "CCITT", 3: "CCITT fax", 4: "CCITT fax", 6: "JPEG", 7: "JPEG", 33003: "JPEG 2000", 33005: "JPEG 2000",
-    34712: "JPEG 2000", 34887: "LERC", 50001: "WebP", 50002: "JPEG XL", 52546: "JPEG XL",
+    34712: "JPEG 2000", 34887: "LERC", 50000: "Zstandard", 50001: "WebP", 50002: "JPEG XL", 52546: "JPEG XL",
 }  # fmt: skip
-_CLEAR, _END = 256, 257
+_CLEAR, _END, _ZSTANDARD = 256, 257, 50000
 _PROGRESS = 64  # pieces between two signs of life
 
 
@@ -79,7 +74,7 @@ def read_pixels(
         A piece is damaged, or compressed in a way that cannot be read; ``name`` is the file's.
     """
     own = layout
-    if own.compression in OTHERS or own.compression not in _READERS or (own.compression == 50000 and not zstandard):
+    if own.compression not in _READERS:
         how = OTHERS.get(own.compression, f"a way without a name ({own.compression})")
         raise SceneError(
             f"{name}: tag Compression (259): it is compressed with {how}, which TetFlora does not read; write it anew, "
@@ -110,7 +105,7 @@ def read_pixels(
         file.seek(offsets[number])
         try:
             data = _READERS[own.compression](_bits_turned(file.read(sizes[number]), own), high * row)
-        except (zlib.error, lzma.LZMAError, EOFError, ValueError, IndexError, *_ZSTANDARD) as error:
+        except (zlib.error, lzma.LZMAError, EOFError, ValueError, IndexError) as error:
             raise SceneError(f"{name}: {kind} {number + 1:,} of {columns * rows:,} is damaged: {error}") from None
         if len(data) < high * row:
             raise SceneError(
@@ -226,7 +221,6 @@ def _inflated(data: bytes, most: int) -> bytes:
     return zlib.decompressobj().decompress(data, most + 1)  # one more, so that the sum at the end is checked
 
 
-_ZSTANDARD = (zstandard.ZstdError,) if zstandard else ()
 _READERS: dict[int, Callable[[bytes, int], bytes]] = {
     1: lambda data, _most: data,
     5: _lzw,
@@ -234,5 +228,16 @@ _READERS: dict[int, Callable[[bytes, int], bytes]] = {
     32946: _inflated,
     32773: _packed,
     34925: lambda data, most: lzma.LZMADecompressor().decompress(data, most + 1),
-    50000: lambda data, most: zstandard.ZstdDecompressor().stream_reader(data).read(most + 1),
 }
+
+
+def use_zstandard(module: Any) -> None:
+    """Read what is compressed with Zstandard by the module of that name, which Blender has and Python lacks."""
+
+    def read(data: bytes, most: int) -> bytes:
+        try:
+            return module.ZstdDecompressor().stream_reader(data).read(most + 1)
+        except module.ZstdError as error:
+            raise ValueError(str(error)) from None
+
+    _READERS[_ZSTANDARD] = read

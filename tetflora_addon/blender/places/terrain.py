@@ -11,6 +11,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Generator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from ...files import read_whole
 from ...jobs import Progress
 from ...places.geotiff import place_of_image
 from ...places.grids import ENDINGS, mosaic, read_grid
+from ...places.pixels import use_zstandard
 from ...places.projection import System, between, chosen_system
 from ...places.rasters import MAX_CELLS, Raster, checked_size, in_degrees
 from ...planting.height_grid import HeightGrid, cell_for, height_grid
@@ -35,6 +37,10 @@ from ..placing.terrain import read_ground
 from ..worker import call_in_thread, steps_in_thread
 from .origin import TERRAIN, Import, importing
 
+with suppress(ImportError):
+    import zstandard
+
+    use_zstandard(zstandard)
 #: For windows that choose files.
 PATTERN = ";".join(f"*{ending}" for ending in (*ENDINGS, ".png"))
 _PNG_HEAD = struct.Struct(">8s4x4sIIBB")  # signature, length and name of the first chunk, size, bits, colours
