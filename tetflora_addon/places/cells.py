@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import struct
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -24,6 +25,9 @@ _SHAPE = re.compile(
     rf"(?P<high>{_NUMBER})\s*(?P<second>{_UNIT})?\.?\s*)?(?P<plus>{_CELLS['plus']})?",
 )
 _FLOAT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
+#: Characters of a cell that count.
+LONGEST = 200
+_WITH_CODE = 0x20000000  # of well-known binary
 #: What a cell holds.
 NUMBER, RANGE, NOTHING, WORD, WRONG = range(5)
 
@@ -94,7 +98,7 @@ def cells(texts: NDArray[np.str_]) -> tuple[NDArray[np.float64], NDArray[np.floa
     distinct, index = np.unique(texts, return_inverse=True)
     points = any("." in text for text in distinct.tolist())
     found = [
-        Quantity(float(text)) if _FLOAT.fullmatch(text) else _feet(text) or cell_of(text, points)
+        Quantity(float(text)) if _FLOAT.fullmatch(text) else _in_parts(text) or cell_of(text, points)
         for text in distinct.tolist()
     ]
     values, units, kinds = (np.array(column) for column in zip(*found, strict=True))
@@ -102,12 +106,19 @@ def cells(texts: NDArray[np.str_]) -> tuple[NDArray[np.float64], NDArray[np.floa
     return values[index], units[index].astype(np.float64), kinds[index].astype(np.int64)
 
 
-def _feet(text: str) -> Quantity | None:
-    """Feet and inches."""
+def _in_parts(text: str) -> Quantity | None:
+    """Feet and inches, or degrees, minutes and seconds; None for others."""
     found = re.fullmatch(r"(\d+)\s*(?:ft|feet|['′])\s*(\d+(?:\.\d+)?)\s*(?:in|inches|\"|″|'')?", text.strip().lower())
-    return Quantity(float(found[1]) + float(found[2]) / 12.0, 0.3048) if found else None
+    if found:
+        return Quantity(float(found[1]) + float(found[2]) / 12.0, 0.3048)
+    found = re.fullmatch(_ANGLE, text.strip().upper())
+    if found is None:
+        return None
+    value = float(found[2]) + float(found[3]) / 60.0 + float((found[4] or "0").replace(",", ".")) / 3600.0
+    return Quantity(-value if found[1] or found[5] in ("S", "W") else value)
 
 
+_ANGLE = r"(-)?(\d{1,3})\s*[°º]\s*(\d{1,2})\s*['′’]\s*(\d{1,2}(?:[.,]\d+)?)?\s*(?:\"|″|”|'')?\s*([NSEW])?"
 _PAIR = re.compile(r"\(?\s*(-?\d+(?:[.,]\d+)?)°?\s*[,;/ ]\s*(-?\d+(?:[.,]\d+)?)°?\s*\)?")
 _WELL_KNOWN = re.compile(
     r"(?:srid=(\d+);\s*)?(?:multi)?(?:point|polygon|linestring)\s*(?:zm?|m)?\s*\((.*)\)", re.IGNORECASE
@@ -127,15 +138,23 @@ def place_in(text: str) -> tuple[float, float, int]:
     plain = _PAIR.fullmatch(text.strip()) or re.search(r"\((-?\d+\.\d+), *(-?\d+\.\d+)\)\s*$", text)  # below an address
     if plain is not None:
         return float(plain[1].replace(",", ".")), float(plain[2].replace(",", ".")), -1
+    if len(text) == LONGEST:  # a large area that was cut
+        text = text.rpartition(",")[0] + ")"
     known = _WELL_KNOWN.fullmatch(text.strip())
     try:
+        if re.fullmatch(r"0[01](?:[0-9a-fA-F]{2}){20,}", text):  # well-known binary, as databases write it
+            data = bytes.fromhex(text)
+            order = "<" if data[0] else ">"
+            kind, code = struct.unpack_from(f"{order}2I", data, 1)
+            code, at = (code, 9) if kind & _WITH_CODE else (0, 5)
+            return (*struct.unpack_from(f"{order}2d", data, at), code) if kind & 255 == 1 else (math.nan, math.nan, 0)
         if known is not None:
             first = known[2].lstrip("( ").split(")")[0]
             points = [[float(number) for number in point.strip("() ").split()[:2]] for point in first.split(",")]
             return *middle_of(points), int(known[1] or 0)
         if text.strip().startswith("{"):
             return *middle_of(_positions(json.loads(text).get("coordinates"))), 0
-    except (ValueError, TypeError, AttributeError, IndexError, OverflowError, RecursionError):
+    except (ValueError, TypeError, AttributeError, IndexError, OverflowError, RecursionError, struct.error):
         pass
     return math.nan, math.nan, 0
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import NAME, SceneError, readable, shown
 from ..files import json_of, read_whole
-from .cells import middle_of
+from .cells import LONGEST, middle_of
 from .layers import MAX_BYTES, MAX_ROWS, parts_of, read_features
 from .projection import System
 
@@ -214,10 +214,7 @@ def coordinates(values: Any, where: str, texts: bool = False) -> NDArray[np.floa
 
 def _texts(cells: Any) -> NDArray[np.str_]:
     """Cells (n,) without spaces around them."""
-    return np.char.strip(np.array([cell[:_LONGEST] for cell in cells], dtype=np.str_))
-
-
-_LONGEST = 200  # characters of a value that count
+    return np.char.strip(np.array([cell[:LONGEST] for cell in cells], dtype=np.str_))
 
 
 def _text(value: Any) -> str:

@@ -125,6 +125,11 @@ def test_false_names_are_of_the_genus_before_them():
     assert [species_named(name).species for name in names] == ["ash", "maple", "oak", "ash"]
 
 
+def test_degrees_minutes_and_seconds(tmp_path):
+    found = _read(tmp_path, "species\tlat\tlon\noak\t48°06'00\"N\t9°05′60\"W\n")
+    assert found.points[0] == pytest.approx([-9.1, 48.1])
+
+
 def test_degrees_in_german_and_below_addresses(tmp_path):
     found = _read(tmp_path, "Art;Länge;Breite\nEiche;9,1;48,1\n")
     assert found.points.tolist() == [[9.1, 48.1]] and not found.sizes["crown_width"].any()
@@ -136,6 +141,21 @@ def test_rounded_degrees_called_x_and_y(tmp_path):
     text = "species,x,y\npine,12.49,41.89\npine,12.48,41.88\n"
     assert _read(tmp_path, text).system.code == 4326
     assert _read(tmp_path, text.replace("48,", "98,")).system.code == 0  # a plot
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "01010000003333333333332240CDCCCCCCCC0C4840",
+        "0101000020E61000003333333333332240CDCCCCCCCC0C4840",
+        "POLYGON (("
+        + ", ".join(f"{9.1 + 1e-5 * a} {48.1 + 1e-5 * b}" for a, b in [(0, 0), (1, 0), (1, 1), (0, 1)] * 4)
+        + "))",
+    ],
+)
+def test_places_of_databases(tmp_path, place):
+    found = _read(tmp_path, f'species,geom\noak,"{place}"\n')
+    assert found.points[0] == pytest.approx([9.1, 48.1], abs=1e-4)
 
 
 def test_who_planted_a_tree_is_no_year(tmp_path):
