@@ -229,6 +229,19 @@ def test_thin_trunks_are_trees_above_breast_height():
     assert heights.max() < 6.0
 
 
+def test_trees_beside_the_ground_are_told(tmp_path, capfd):
+    ground = tmp_path / "a.asc"
+    ground.write_text(files.ascii_grid(files.hills(20), 5.0))
+    _call("import_terrain", ground)
+    path = tmp_path / "a.csv"
+    path.write_text(
+        f"species,x,y\noak,{files.EAST + 50},{files.NORTH + 50}\noak,{files.EAST + 50},{files.NORTH + 500}\n"
+    )
+    field = _call("import_inventory", path)
+    assert "1 stand beside the ground" in capfd.readouterr().out
+    assert (_vertices(field)[:, 2] > 300.0).all()
+
+
 def test_far_rows_are_named_before_any_import():
     path = inventories.FOLDER / "inv06_two_far_rows.csv"
     with pytest.raises(RuntimeError, match=r"line 12.*line 13") as caught:

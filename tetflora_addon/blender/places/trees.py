@@ -238,8 +238,10 @@ def _plant(
     z = np.zeros(len(flat))
     if heights is not None:
         z = heights.at(heights.height, flat)
-        beside = ~np.isfinite(z)
-        made.beside = int(beside.sum())
+        beside, corner = ~np.isfinite(z), np.array([heights.west, heights.south])
+        # Beyond its box the ground goes on as at its border.
+        beyond = ((flat < corner) | (flat > corner + heights.cell * np.array(heights.height.shape[::-1]))).any(axis=1)
+        made.beside = int((beside | beyond).sum())
         z[beside] = z[~beside].mean() if not beside.all() else 0.0
     keys = child_key(key_of_seed(0), np.arange(len(flat)))
     seeds = (uniform(keys, _SEED) * 2**31).astype(np.int32)
