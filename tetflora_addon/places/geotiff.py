@@ -111,12 +111,11 @@ class _Tags:
         version = struct.unpack(f"{order}H", start[2:4])[0] if order else 0
         if version not in (42, 43) or (version == 43 and start[4:8] != struct.pack(f"{order}HH", 8, 0)):
             raise SceneError(f"{name}: this is no TIFF file")
-        self.order, self.big = order, version == 43
-        if self.big and len(start) < 16:
+        if version == 43 and len(start) < 16:
             raise SceneError(f"{name}: head: the file ends within it")
-        offset = self._unpack("Q", start[8:16]) if self.big else self._unpack("I", start[4:8])
-        self.next = 0
-        self.found = self._directory(offset)
+        # Letter and bytes of offsets.
+        self.order, self.letter, self.wide, self.next = order, *(("Q", 8, 0) if version == 43 else ("I", 4, 0))
+        self.found = self._directory(self._unpack(self.letter, start[self.wide : 2 * self.wide]))
 
     def _bytes(self, offset: int, number: int, what: str) -> bytes:
         """A part of the file; what it is begins the message if it is not there."""
@@ -131,22 +130,21 @@ class _Tags:
 
     def _directory(self, offset: int) -> dict[int, tuple[int, int, bytes]]:
         """Type, number of values, and the bytes that hold them or where they are, of the tags that are known here."""
-        count, wide, entry = ("Q", 8, 20) if self.big else ("H", 2, 12)
-        number = self._unpack(count, self._bytes(offset, wide, "directory"))
+        count, size = ("Q", 8) if self.wide == 8 else ("H", 2)
+        entry = 4 + 2 * self.wide
+        number = self._unpack(count, self._bytes(offset, size, "directory"))
         if not 0 < number <= _MOST_TAGS:
             raise SceneError(f"{self.name}: directory: {number:,} tags; it is damaged")
-        data = self._bytes(offset + wide, number * entry, "directory")
-        after = offset + wide + number * entry
-        last = after + (8 if self.big else 4) > self.size
-        self.next = (
-            0 if last else self._unpack("Q" if self.big else "I", self._bytes(after, 8 if self.big else 4, "directory"))
-        )
+        data = self._bytes(offset + size, number * entry, "directory")
+        after = offset + size + number * entry
+        there = after + self.wide <= self.size
+        self.next = self._unpack(self.letter, self._bytes(after, self.wide, "directory")) if there else 0
         found = {}
         for at in range(0, number * entry, entry):
             tag, kind = struct.unpack(self.order + "HH", data[at : at + 4])
-            middle = at + 4 + (8 if self.big else 4)
+            middle = at + 4 + self.wide
             if tag in _TAGS:
-                many = self._unpack("Q" if self.big else "I", data[at + 4 : middle])
+                many = self._unpack(self.letter, data[at + 4 : middle])
                 found[_TAGS[tag]] = kind, many, data[middle : at + entry]
         return found
 
@@ -160,7 +158,7 @@ class _Tags:
         letter = _TYPES[kind]
         size = number * struct.calcsize(letter)
         if size > len(here):
-            here = self._bytes(self._unpack("Q" if self.big else "I", here), size, tag)
+            here = self._bytes(self._unpack(self.letter, here[: self.wide]), size, tag)
         out = struct.unpack(f"{self.order}{number}{letter}", here[:size])
         return out[0] if letter == "s" else out
 

@@ -22,7 +22,7 @@ from .layers import ENDINGS
 from .projection import LONGITUDE_LATITUDE, MOST_AWAY, PLAIN, System, between, chosen_system, place_about
 from .species_names import KIND, is_name, key_of, species_named
 from .tables import Table, read_csv, read_points
-from .titles import FIELDS, NAMES, NEVER, Title, meaning, read_title, said_of
+from .titles import FIELDS, NAMES, NEVER, Title, read_title, said_of
 
 #: Largest value of each size, metres or years: taller than any tree that lives.
 _MOST = {
@@ -155,7 +155,7 @@ def _chosen(table_: Table, columns: Mapping[str, str]) -> dict[str, Title]:
     found = {}
     for title, text in columns.items():
         name, _, unit = text.strip().partition(" ")
-        metres = meaning(f"height {unit}")[1] if unit else 0.0
+        metres = read_title(f"height {unit}").unit if unit else 0.0
         why = "no such column" if title not in table_.columns else ""
         if name not in FIELDS or (unit and not metres):
             why = why or f"{shown(text)} is none of {', '.join(filter(None, FIELDS))}"

@@ -104,7 +104,8 @@ def read_pixels(
         row = (own.across * own.samples * own.bits + 7) // 8
         file.seek(offsets[number])
         try:
-            data = _READERS[own.compression](_bits_turned(file.read(sizes[number]), own), high * row)
+            data = file.read(sizes[number])
+            data = _READERS[own.compression](data.translate(_TURNED) if own.reversed else data, high * row)
         except (zlib.error, lzma.LZMAError, EOFError, ValueError, IndexError) as error:
             raise SceneError(f"{name}: {kind} {number + 1:,} of {columns * rows:,} is damaged: {error}") from None
         if len(data) < high * row:
@@ -138,11 +139,7 @@ def _running(values: NDArray[Any]) -> NDArray[Any]:
     return np.cumsum(values, axis=1, dtype=values.dtype)
 
 
-def _bits_turned(data: bytes, own: Layout) -> bytes:
-    """Bytes with the highest bit first."""
-    return data.translate(_TURNED) if own.reversed else data
-
-
+#: Bytes by those with the lowest bit first.
 _TURNED = bytes(int(f"{n:08b}"[::-1], 2) for n in range(256))
 
 

@@ -143,12 +143,6 @@ def _field(meant: set[str]) -> tuple[str, int]:
     return "", 0
 
 
-def meaning(title: str) -> tuple[str, float]:
-    """What a column holds, empty if unknown, and the metres of its unit, 0 if it names none."""
-    found = read_title(title)
-    return found.field, found.unit
-
-
 @cache
 def _values() -> dict[tuple[str, ...], str]:
     """What words of cells say, by these words."""

@@ -16,7 +16,7 @@ from tetflora_addon.errors import SceneError
 from tetflora_addon.places import cells
 from tetflora_addon.places.inventories import IMPERIAL, preview, read_inventory
 from tetflora_addon.places.species_names import GENUS, KIN, KIND, SPECIES, best_of, names_in, species_named, table, told
-from tetflora_addon.places.titles import FIELDS, meaning, said_of
+from tetflora_addon.places.titles import FIELDS, read_title, said_of
 
 _CATALOGUE = Path(__file__).parents[3] / "tetflora_addon" / "catalogue"
 
@@ -82,7 +82,7 @@ def test_points_of_geojson(tmp_path):
     ],
 )
 def test_what_columns_mean(title, name, unit):
-    assert meaning(title) == (name, unit)
+    assert read_title(title)[:2] == (name, unit)
 
 
 _TITLES = {
@@ -109,7 +109,7 @@ _TITLES = {
 @pytest.mark.parametrize("name", _TITLES)
 def test_words_within_titles(name):
     titles = _TITLES[name].split(", ")
-    assert {title: meaning(title)[0] for title in titles} == dict.fromkeys(titles, name)
+    assert {title: read_title(title).field for title in titles} == dict.fromkeys(titles, name)
 
 
 def test_titles_of_cities():
