@@ -75,7 +75,7 @@ def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
         below = np.where(inside, ground.at(np.nan_to_num(column), np.nan_to_num(line)), np.nan)
         out[row] = surface.values[row] - below.reshape(len(row), w)
     if not np.isfinite(out).any():
-        raise SceneError(f"{what}the two rasters have no place in common")
+        raise SceneError(f"{what}the two rasters have no place in common; choose another Ground Below")
     return replace(surface, values=out)
 
 

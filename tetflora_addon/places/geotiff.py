@@ -110,9 +110,9 @@ class _Tags:
         order = {b"II": "<", b"MM": ">"}.get(start[:2])
         version = struct.unpack(f"{order}H", start[2:4])[0] if order else 0
         if version not in (42, 43) or (version == 43 and start[4:8] != struct.pack(f"{order}HH", 8, 0)):
-            raise SceneError(f"{name}: this is no TIFF file")
+            raise SceneError(f"{name}: this is no TIFF file; export it as GeoTIFF")
         if version == 43 and len(start) < 16:
-            raise SceneError(f"{name}: head: the file ends within it")
+            raise SceneError(f"{name}: head: the file ends within it; get it again")
         # Letter and bytes of offsets.
         self.order, self.letter, self.wide, self.next = order, *(("Q", 8, 0) if version == 43 else ("I", 4, 0))
         self.found = self._directory(self._unpack(self.letter, start[self.wide : 2 * self.wide]))
@@ -120,7 +120,9 @@ class _Tags:
     def _bytes(self, offset: int, number: int, what: str) -> bytes:
         """A part of the file; what it is begins the message if it is not there."""
         if offset + number > self.size or number > _MOST_BYTES:
-            raise SceneError(f"{self.name}: {what}: the file ends before it; it is damaged or was not copied whole")
+            raise SceneError(
+                f"{self.name}: {what}: the file ends before it; it is damaged or was not copied whole; get it again"
+            )
         self.file.seek(offset)
         return self.file.read(number)
 
@@ -134,7 +136,7 @@ class _Tags:
         entry = 4 + 2 * self.wide
         number = self._unpack(count, self._bytes(offset, size, "directory"))
         if not 0 < number <= _MOST_TAGS:
-            raise SceneError(f"{self.name}: directory: {number:,} tags; it is damaged")
+            raise SceneError(f"{self.name}: directory: {number:,} tags; it is damaged; get it again")
         data = self._bytes(offset + size, number * entry, "directory")
         after = offset + size + number * entry
         there = after + self.wide <= self.size
@@ -216,11 +218,13 @@ class _Tags:
         where = f"{kind}Offsets"
         offsets, sizes = self.numbers(where, 1), self.numbers(f"{kind}ByteCounts", 1)
         if offsets is None or sizes is None:
-            raise SceneError(f"{self.name}: tag {where} ({_NUMBERS[where]}) is missing")
+            raise SceneError(f"{self.name}: tag {where} ({_NUMBERS[where]}) is missing; export the file again")
         if len(offsets) != len(sizes) or any(
             a < 0 or b < 0 or a + b > self.size for a, b in zip(offsets, sizes, strict=True)
         ):
-            raise self.broken(where, "leads beyond the end of the file; it is damaged or was not copied whole")
+            raise self.broken(
+                where, "leads beyond the end of the file; it is damaged or was not copied whole; get it again"
+            )
         return (yield from read_pixels(self.file, self._layout(), offsets, sizes, self.name))
 
     def mask(self, shape: tuple[int, int]) -> Generator[Progress, object, NDArray[np.bool_] | None]:
@@ -289,7 +293,7 @@ class _Tags:
         values = self.numbers(tag, 1)
         if values is None:
             if default is None:
-                raise SceneError(f"{self.name}: tag {tag} ({_NUMBERS[tag]}) is missing")
+                raise SceneError(f"{self.name}: tag {tag} ({_NUMBERS[tag]}) is missing; export the file again")
             return default
         if int(values[0]) != values[0] or values[0] < 0:
             raise self.broken(tag, f"is {shown(values[0])}")
@@ -340,4 +344,4 @@ class _Tags:
         try:
             return float(text.split(b"\0")[0])
         except (ValueError, AttributeError):
-            raise self.broken("GDAL_NODATA", f"is {shown(text)}, which is not a number") from None
+            raise self.broken("GDAL_NODATA", f"is {shown(text)}, which is not a number; correct it") from None

@@ -64,7 +64,9 @@ def _hgt(path: Path) -> Raster:
     content = read_whole(path, 4 * 10**8)
     side = round((len(content) / 2) ** 0.5)
     if side < 2 or 2 * side * side != len(content):
-        raise SceneError(f"{path.name}: {len(content):,} bytes are no square of 16-bit values; it is damaged")
+        raise SceneError(
+            f"{path.name}: {len(content):,} bytes are no square of 16-bit values; it is damaged; get it again"
+        )
     checked_size(side, side, f"{path.name}: ")
     south, west = (int(found[k + 1]) * (-1 if found[k].upper() in "SW" else 1) for k in (1, 3))
     values = np.frombuffer(content, ">i2").reshape(side, side).astype(np.float32)
@@ -89,7 +91,7 @@ def _xyz(path: Path) -> Generator[Progress, object, Raster]:
     found = numbers_in(content.translate(bytes.maketrans(b",;\t", b"   ")), name, line)
     columns = len(head.translate(bytes.maketrans(b",;", b"  ")).split())
     if columns < 3 or len(found) % columns or len(found) < 4 * columns:
-        raise SceneError(f"{name}: line {line}: each line must have x, y and height")
+        raise SceneError(f"{name}: line {line}: each line must have x, y and height; correct it")
     yield Progress(0.5, f"Reading {name}")
     x, y, z = found.reshape(-1, columns)[:, :3].T
     (west, dx, column), (south, dy, row) = _even(x, name, "x"), _even(y, name, "y")
@@ -148,7 +150,7 @@ def _usgs(path: Path) -> Raster:
             at += records * _RECORD
     except (ValueError, KeyError, IndexError, OverflowError):
         raise SceneError(
-            f"{name}: this is neither an ASCII grid nor an elevation model of the USGS, or damaged"
+            f"{name}: neither an ASCII grid nor an elevation model of the USGS, or damaged; export it as GeoTIFF"
         ) from None
     west, south = min(f[0] for f in found), min(f[1] for f in found)
     column = [round((f[0] - west) / dx) for f in found]

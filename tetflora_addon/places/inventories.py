@@ -146,7 +146,10 @@ def _table(path: Path, skip: bool, most: int | None = None, code: int = 0) -> Ta
     layer = path.suffix.lower() in ENDINGS
     found = read_points(path, skip, most, code) if layer else read_csv(path, skip, most)
     if not len(found.numbers):
-        raise SceneError(found.first or f"{found.name}: it has no {'points' if found.points is not None else 'rows'}")
+        raise SceneError(
+            found.first
+            or f"{found.name}: it has no {'points' if found.points is not None else 'rows'}; choose another one"
+        )
     return found
 
 
@@ -263,7 +266,9 @@ class _Reading:
         points, system = self._points(code)
         names, index = self._names()
         if not self.good.any():
-            raise SceneError(self.first or f"{self.table.name}: none of its rows is a tree that can be used")
+            raise SceneError(
+                self.first or f"{self.table.name}: none of its rows is a tree that can be used; choose another one"
+            )
         kept = {name: values[self.good].astype(np.float32) for name, values in sizes.items()}
         if not any(values.any() for values in (kept["height"], kept["diameter"], kept["crown_width"], kept["age"])):
             self.notes.append("no column of heights, trunks or crowns: all trees are full-grown")

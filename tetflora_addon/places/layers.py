@@ -57,7 +57,7 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
         try:
             features, system = _shapes(path) if path.suffix.lower() == ".shp" else _package(path)
         except (struct.error, ValueError, IndexError, KeyError, TypeError, OverflowError, RecursionError, MemoryError):
-            raise SceneError(f"{name}: it is damaged or was not copied whole") from None
+            raise SceneError(f"{name}: it is damaged or was not copied whole; get it again") from None
         if not chosen and system == System() and may_be_degrees(*_corners(features)):
             raise SceneError(
                 f"{name}: no file tells its coordinate system (.prj); set Coordinate System to 4326 for longitude and "
@@ -74,7 +74,7 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
     elif kind == "Feature":
         data = {"features": [data]}
     elif kind != "FeatureCollection":
-        raise SceneError(f'{name}: "type" is {shown(kind)}; a GeoJSON file is a FeatureCollection')
+        raise SceneError(f'{name}: "type" is {shown(kind)}; a GeoJSON file is a FeatureCollection; export it again')
     features = data.get("features")
     if not isinstance(features, list) or len(features) > MAX_ROWS:
         raise SceneError(f'{name}: "features" must be a list of at most {MAX_ROWS:,}')
@@ -82,9 +82,11 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
         geometry = feature.get("geometry", ...) if isinstance(feature, dict) else ...
         properties = feature.get("properties") if isinstance(feature, dict) else None
         if not isinstance(geometry, dict | None) or not isinstance(properties, dict | None):
-            raise SceneError(f"{name}: feature {number:,}: it has no geometry, or properties that are no object")
+            raise SceneError(
+                f"{name}: feature {number:,}: it has no geometry, or properties that are no object; correct it"
+            )
         if geometry is not None and not isinstance(geometry.get("type"), str):
-            raise SceneError(f"{name}: feature {number:,}: its geometry has no type")
+            raise SceneError(f"{name}: feature {number:,}: its geometry has no type; correct it")
     return features, chosen_system(chosen or _code(data.get("crs"), name), System(), f"{name}: ")
 
 
@@ -103,11 +105,11 @@ def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]
         if not isinstance(parts, list) or not all(
             isinstance(p, dict) and isinstance(p.get("type"), str) and p["type"] != kind for p in parts
         ):
-            raise SceneError(f"{where}: its geometries are no list of geometries")
+            raise SceneError(f"{where}: its geometries are no list of geometries; correct them")
     for part in parts:
         kind, values = part["type"], part.get("coordinates")
         if kind not in _GEOMETRIES:
-            raise SceneError(f"{where}: {shown(kind)} is no geometry of GeoJSON")
+            raise SceneError(f"{where}: {shown(kind)} is no geometry of GeoJSON; export it again")
         many = kind.startswith("Multi")
         yield from ((kind.removeprefix("Multi"), each) for each in (list_of(values, where) if many else [values]))
 
@@ -121,7 +123,7 @@ def list_of(value: Any, where: str) -> list[Any]:
         They are none; ``where`` begins the message.
     """
     if not isinstance(value, list):
-        raise SceneError(f"{where}: its coordinates are {shown(value)}, not a list")
+        raise SceneError(f"{where}: its coordinates are {shown(value)}, not a list; correct them")
     return value
 
 
@@ -182,7 +184,7 @@ def _shapes(path: Path) -> tuple[list[_Feature], System]:
     """Features of a shapefile, with the table and the system beside it."""
     content = read_whole(path, MAX_BYTES)
     if content[:4] != b"\0\0\x27\x0a":
-        raise SceneError(f"{path.name}: this is no shapefile")
+        raise SceneError(f"{path.name}: this is no shapefile; choose another one")
     rows = _dbase(path)
     features, at = [], 100
     while at + 12 <= len(content):
@@ -317,7 +319,7 @@ def _package(path: Path) -> tuple[list[_Feature], System]:
                     if len(features) > MAX_ROWS:
                         raise SceneError(f"{path.name}: more than {MAX_ROWS:,} features; cut it")
     except sqlite3.Error as error:
-        raise SceneError(f"{path.name}: this is no GeoPackage, or damaged: {error}") from None
+        raise SceneError(f"{path.name}: this is no GeoPackage, or damaged: {error}; export it again") from None
     return features, first or System()
 
 

@@ -88,7 +88,7 @@ def read_pixels(
         or (own.predictor == 3 and own.dtype.kind != "f")
     ):
         raise SceneError(
-            f"{name}: {len(offsets):,} of {columns * rows:,} {kind}s, or an unknown predictor; it is damaged"
+            f"{name}: {len(offsets):,} of {columns * rows:,} {kind}s, or an unknown predictor; damaged: get it again"
         )
     values = np.zeros((own.height, own.width), np.uint8 if own.bits == 1 else own.dtype.newbyteorder("="))
     absent = np.zeros((own.height, own.width), bool)
@@ -107,11 +107,11 @@ def read_pixels(
             data = file.read(sizes[number])
             data = _READERS[own.compression](data.translate(_TURNED) if own.reversed else data, high * row)
         except (zlib.error, lzma.LZMAError, EOFError, ValueError, IndexError) as error:
-            raise SceneError(f"{name}: {kind} {number + 1:,} of {columns * rows:,} is damaged: {error}") from None
-        if len(data) < high * row:
             raise SceneError(
-                f"{name}: {kind} {number + 1:,} of {columns * rows:,} ends after {len(data):,} bytes of {high * row:,}"
-            )
+                f"{name}: {kind} {number + 1:,} of {columns * rows:,} is damaged: {error}; get it again"
+            ) from None
+        if len(data) < high * row:
+            raise SceneError(f"{name}: {kind} {number + 1:,} of {columns * rows:,} ends too early; get it again")
         piece = _values(np.frombuffer(data, np.uint8, high * row).reshape(high, row), own)
         values[place] = piece[: values[place].shape[0], : values[place].shape[1]]
     return values, absent

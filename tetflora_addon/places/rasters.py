@@ -138,7 +138,7 @@ def check_regular(path: Path) -> None:
     if not is_regular(path):
         with suppress(ValueError):  # a zero in its name
             path.lstat()
-        raise SceneError(f"{path.name}: it is not a regular file")
+        raise SceneError(f"{path.name}: it is not a regular file; choose another one")
 
 
 def in_degrees(raster: Raster, what: str) -> Raster:
@@ -202,14 +202,16 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
         if words:
             if key not in _HEADER or len(words) != 2:
                 raise SceneError(
-                    f"{name}: line {line}: {shown(' '.join(words))} is no line of the head of an ASCII grid"
+                    f"{name}: line {line}: {shown(' '.join(words))} is no line of the head of an ASCII grid; correct it"
                 )
             header[key] = _number(words[1], f"{name}: line {line}: {key}")
         start, line = end + 1, line + 1
     width, height, corner, dx, dy = _ascii_head(header, name)
     # Each value is at least one digit and a space: a small file is no large grid, whatever its head says.
     if len(content) - start + 1 < 2 * width * height:
-        raise SceneError(f"{name}: its head tells of {width:,} by {height:,} values, more than the file can hold")
+        raise SceneError(
+            f"{name}: its head tells of {width:,} by {height:,} values, more than the file can hold; get it again"
+        )
     values = np.empty(width * height, np.float32)
     done = 0
     while start < len(content):
@@ -219,11 +221,11 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
         piece = content[start:end]
         found = numbers_in(piece, name, line)
         if done + len(found) > len(values):
-            raise SceneError(f"{name}: more than the {len(values):,} values that its head tells of")
+            raise SceneError(f"{name}: more than the {len(values):,} values that its head tells of; get it again")
         values[done : done + len(found)] = np.clip(found, -_BEYOND, _BEYOND)
         done, start, line = done + len(found), end, line + piece.count(b"\n")
     if done < len(values):
-        raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values")
+        raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values; get it again")
     nothing = header.get("nodata_value", -9999.0)
     values = without_nodata(values.reshape(height, width), nothing)
     first = np.array([corner[0], corner[1] + (height - 1) * dy])
@@ -236,14 +238,14 @@ def _ascii_head(header: dict[str, float], name: str) -> tuple[int, int, tuple[fl
     missing += ["cellsize"] * ("cellsize" not in header and not {"dx", "dy"} <= header.keys())
     missing += [f"{a}llcorner" for a in "xy" if not header.keys() & {f"{a}llcorner", f"{a}llcenter"}]
     if missing:
-        raise SceneError(f"{name}: no ASCII grid: {', '.join(missing)} is missing in its head")
+        raise SceneError(f"{name}: no ASCII grid: {', '.join(missing)} is missing in its head; export it as GeoTIFF")
     dx, dy = header.get("dx", header.get("cellsize")), header.get("dy", header.get("cellsize"))
     width, height = header["ncols"], header["nrows"]
     if width != int(width) or height != int(height):
-        raise SceneError(f"{name}: ncols and nrows must be whole numbers")
+        raise SceneError(f"{name}: ncols and nrows must be whole numbers; correct them")
     checked_size(int(width), int(height), f"{name}: ")
     if not (0.0 < dx < _LIMIT and 0.0 < dy < _LIMIT):
-        raise SceneError(f"{name}: cellsize must be greater than 0")
+        raise SceneError(f"{name}: cellsize must be greater than 0; correct it")
     corner = tuple(
         header[f"{a}llcenter"] if f"{a}llcenter" in header else header[f"{a}llcorner"] + d / 2
         for a, d in (("x", dx), ("y", dy))
@@ -260,8 +262,8 @@ def numbers_in(piece: bytes, name: str, line: int) -> NDArray[np.float64]:
         if text.strip() and _split(text) is None:
             words = text.decode("latin-1").split()
             bad = next((w for w in words if _split(w.encode()) is None), words[0])
-            raise SceneError(f"{name}: line {line + number}: {shown(bad)} is not a number")
-    raise SceneError(f"{name}: line {line}: not a list of numbers")
+            raise SceneError(f"{name}: line {line + number}: {shown(bad)} is not a number; correct it")
+    raise SceneError(f"{name}: line {line}: not a list of numbers; correct it")
 
 
 def _split(text: bytes) -> NDArray[np.float64] | None:
@@ -281,9 +283,9 @@ def _number(text: str, what: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise SceneError(f"{what} is {shown(text)}, which is not a number") from None
+        raise SceneError(f"{what} is {shown(text)}, which is not a number; correct it") from None
     if not abs(value) < 1000 * _LIMIT and "nodata" not in what:
-        raise SceneError(f"{what} is {shown(text)}, which is too large")
+        raise SceneError(f"{what} is {shown(text)}, which is too large; correct it")
     return value
 
 
@@ -320,14 +322,14 @@ def world_file(path: Path) -> list[NDArray[np.float64]]:
             continue
         lines = read_whole(beside, _SMALL).decode("latin-1").split()
         if len(lines) != 6:
-            raise SceneError(f"{beside.name}: {len(lines)} numbers; a world file has six, one on each line")
+            raise SceneError(f"{beside.name}: {len(lines)} numbers; a world file has six, one on each line; correct it")
         a, d, b, e, x, y = (
             _number(text.replace(",", "."), f"{beside.name}: line {number}") for number, text in enumerate(lines, 1)
         )
         if not abs(a * e - b * d) > 0.0:
-            raise SceneError(f"{beside.name}: line 1: its cells have no size")
+            raise SceneError(f"{beside.name}: line 1: its cells have no size; correct it")
         return [np.array([x, y]), np.array([a, d]), np.array([b, e])]
     names = ", ".join(WORLD_FILES.get(path.suffix.lower(), ()))
     raise SceneError(
-        f"{path.name}: nothing tells where it lies: no tags of GeoTIFF, and no world file ({names}) beside it"
+        f"{path.name}: nothing tells where it lies, neither tags nor a world file ({names}); export it as GeoTIFF"
     )

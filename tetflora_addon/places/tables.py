@@ -106,7 +106,7 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
     try:
         header = [readable(cell.strip(), NAME) for cell in next(reader, [])]
         if len(header) < 2 or len(header) > MAX_COLUMNS:
-            raise SceneError(f"{name}: line 1: {len(header)} columns; names of columns must stand there")
+            raise SceneError(f"{name}: line 1: {len(header)} columns; names of columns must stand there; add them")
         before = reader.line_num
         for row in reader:
             while len(row) > len(header) and not row[-1].strip():
@@ -126,7 +126,7 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
             if len(rows) > MAX_ROWS:
                 raise SceneError(f"{name}: more than {MAX_ROWS:,} rows; cut it into pieces")
     except csv.Error as error:
-        raise SceneError(f"{name}: line {above + reader.line_num:,}: {error}") from None
+        raise SceneError(f"{name}: line {above + reader.line_num:,}: {error}; correct it") from None
     columns: dict[str, NDArray[np.str_]] = {}
     for title, texts in zip(header, zip(*rows, strict=True), strict=False):
         columns.setdefault(title, _texts(texts))
@@ -209,7 +209,7 @@ def coordinates(values: Any, where: str, texts: bool = False) -> NDArray[np.floa
             return points
     except (TypeError, ValueError, OverflowError):
         pass
-    raise SceneError(f"{where}: its coordinates are no positions of two or three finite numbers")
+    raise SceneError(f"{where}: its coordinates are no positions of two or three finite numbers; correct them")
 
 
 def _texts(cells: Any) -> NDArray[np.str_]:

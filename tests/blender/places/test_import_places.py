@@ -108,7 +108,7 @@ def test_pixels_of_png_and_ascii_grids(tmp_path):
     np.testing.assert_allclose(image.values, text.values, atol=1e-3)
     np.testing.assert_allclose(image.outline, text.outline)
     path.with_suffix(".pgw").unlink()
-    with pytest.raises(SceneError, match="no world file"):
+    with pytest.raises(SceneError, match="nothing tells where it lies, neither tags nor a world file"):
         at_once(_raster(path))
 
 
