@@ -10,8 +10,9 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -295,6 +296,11 @@ class _Reading:
         self.used[title] = next(name for name, found in self.found.items() if title in dict(found))
         return self.table.columns[title]
 
+    def _each(self, title: str, what: Callable[[str], Any]) -> NDArray[Any]:
+        """What each text (n,) of a column says."""
+        distinct, index = np.unique(self._texts(title), return_inverse=True)
+        return np.array([what(text) for text in distinct.tolist()])[index]
+
     def _refuse(self, bad: NDArray[np.bool_], column: str, why: Callable[[int], str]) -> None:
         """Refuse the file, or leave out rows."""
         bad = bad & self.good
@@ -315,9 +321,7 @@ class _Reading:
         """Leave out rows that are no trees, by what stands in place of a species or of their condition."""
         for name in ("status", *NAMES):
             for title, _ in self.found.get(name, ()):
-                distinct, index = np.unique(self._texts(title), return_inverse=True)
-                said = [_no_tree(text, name == "status") for text in distinct.tolist()]
-                what = np.array(said)[index]
+                what = self._each(title, partial(_no_tree, condition=name == "status"))
                 self.left_out.update(what[(what != "") & self.good].tolist())
                 self.good &= what == ""
 
@@ -374,25 +378,22 @@ class _Reading:
         if "planted" not in self.found:
             return np.zeros(len(self.good))
         title = self.found["planted"][0][0]
-        distinct, index = np.unique(self._texts(title), return_inverse=True)
-        years = [int(found[0]) if (found := _YEAR.search(text)) else 0 for text in distinct.tolist()]
+        years = self._each(title, lambda text: int(found[0]) if (found := _YEAR.search(text)) else 0)
         now = datetime.date.today().year
-        ages = np.array([max(now - year, 1) if year else 0 for year in years], np.float64)
         self.notes.append(f'ages from "{title}" to {now}')
-        return ages[index]
+        return np.where(years > 0, np.maximum(now - years, 1), 0).astype(np.float64)
 
     def _dead(self) -> NDArray[np.float64]:
         """Years since death, 0 for those alive."""
         years = np.zeros(len(self.good))
         for name in ("dead", "status", "name", "common"):
             for title, _ in self.found.get(name, ()):
-                distinct, index = np.unique(self._texts(title), return_inverse=True)
                 words = ("dead", "yes") if name == "dead" else ("dead",)
-                says = [said_of(text) in words and not species_named(text) for text in distinct.tolist()]
+                says = self._each(title, lambda text, words=words: said_of(text) in words and not species_named(text))
                 values = np.where(says, DEAD_YEARS, 0.0)
                 if name == "dead" and re.search("year|jahr|ann|año", title.lower()):
-                    values = np.nan_to_num(np.clip(cells(distinct)[0], 0.0, _MOST["age"]))
-                years = np.maximum(years, values[index])
+                    values = np.nan_to_num(np.clip(cells(self.table.columns[title])[0], 0.0, _MOST["age"]))
+                years = np.maximum(years, values)
         return years
 
     def _points(self, code: int) -> tuple[NDArray[np.float64], System]:
