@@ -20,8 +20,9 @@ from devtools import session
 from tetflora_addon import parallel
 from tetflora_addon.assets import kept
 from tetflora_addon.assets.compiled import compile_asset
-from tetflora_addon.blender.assets.geometry import read_source
-from tetflora_addon.blender.assets.target import Target, digest_of
+from tetflora_addon.blender.assets.geometry import read_source_steps
+from tetflora_addon.blender.assets.parts import Target, digest_of
+from tetflora_addon.jobs import at_once
 from tetflora_addon.processes import pool
 
 from . import asset_scenes, asset_trees
@@ -100,7 +101,7 @@ def compiled(kind: str, quick: bool) -> dict[str, float]:
     parallel.use(1)
     forget_peak()
     before, begun = resident_mb("VmRSS"), cpu_s()
-    source = read_source(target, depsgraph)
+    source, _ = at_once(read_source_steps(target, depsgraph))
     read = cpu_s()
     asset = compile_asset(source)
     done = cpu_s()

@@ -31,7 +31,7 @@ from tetflora_addon.growth.hashing import Draw, uniform
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.leaves.outlines import distance_to_links
 from tetflora_addon.species import catalogue
-from tetflora_addon.subplants.leaf_copies import LevelCopies
+from tetflora_addon.subplants.leaf_meshes import LevelCopies
 
 from .compare import flip_map, read_picture, render
 from .report import Targets, forget_peak, peak_mb

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A farm of one worker and of two: how much sooner two are done, and that they make the same images.
 
-``blender FILE --command tetflora farm OUT`` writes the job, Open Job Description's own runner does the work. Each
+``farm/write_job.py`` writes the job, Open Job Description's own runner does the work. Each
 worker is bound to one core and installs the extension first, as on a machine of its own; two workers take turns with
 the frames. Needs Linux, two cores, and a full Blender in ``BLENDER``.
 """
@@ -19,6 +19,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+
+from farm import write_job
 
 from .report import Targets
 
@@ -87,7 +89,21 @@ def _bundle(folder: Path, frames: int) -> Path:
     blender = os.environ["BLENDER"]
     archive = build.build(folder)
     _call([blender, "-b", "--command", "extension", "install-file", "-r", "user_default", "-e", str(archive)], home)
-    _call([blender, str(blend), "--command", "tetflora", "farm", str(folder / "job"), "--copy"], home)
+    _call(
+        [
+            blender,
+            str(blend),
+            "-b",
+            "--python-exit-code",
+            "1",
+            "--python",
+            write_job.__file__,
+            "--",
+            str(folder / "job"),
+            "--copy",
+        ],
+        home,
+    )
     return folder / "job"
 
 

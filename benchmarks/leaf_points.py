@@ -24,7 +24,7 @@ from tetflora_addon.leaves.kites import KITE, leaf_kites
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.leaves.models import LeafModel, leaf_model
 from tetflora_addon.species import catalogue
-from tetflora_addon.subplants.leaf_copies import LeafCopies
+from tetflora_addon.subplants.leaf_meshes import LeafCopies
 
 from .forest_instances import placing_nodes
 

@@ -154,7 +154,7 @@ def _activate_ground(scene: bpy.types.Scene) -> None:
 # What is not given comes from the panel's settings: defaults do not matter here.
 _RULES = properties_of(Rules, options={'SKIP_SAVE'})
 # Names that the operator shares with the scene's settings for populating.
-_SHARED = ("count", "as_field", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
+_SHARED = ("count", "as_field", "seed", "slope_max", "min_distance", "scale_min", "scale_max")
 
 
 class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
@@ -176,7 +176,7 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
         options={'SKIP_SAVE'},
     )
     seed: _RULES.seed
-    slope_limit: _RULES.slope_max
+    slope_max: _RULES.slope_max
     min_distance: _RULES.min_distance
     scale_min: _RULES.scale_min
     scale_max: _RULES.scale_max
@@ -229,7 +229,7 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
         else:
             follows = self.min_distance == self.suited
         for name in _SHARED:
-            setattr(population, "slope_max" if name == "slope_limit" else name, getattr(self, name))
+            setattr(population, name, getattr(self, name))
         population.by_density = False
         population.mix.clear()
         known = {entry.species: entry for entry in settings.mix}
@@ -248,7 +248,7 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
         settings = scene.tetflora.populate
         for name in _SHARED:
             if not self.properties.is_property_set(name) and name != "min_distance":
-                setattr(self, name, getattr(settings, "slope_max" if name == "slope_limit" else name))
+                setattr(self, name, getattr(settings, name))
         if not self.species:
             self.species = mix_in(settings)
 

@@ -60,6 +60,46 @@ def draw_properties(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, *na
         layout.prop(owner, name)
 
 
+def draw_limits(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, name: str, *more: str) -> bpy.types.UILayout:
+    """Draw least and most of something, and more of it, in a column; returns that."""
+    column = layout.column(align=True)
+    column.prop(owner, f"{name}_min")
+    for part in ("max", *more):
+        column.prop(owner, f"{name}_{part}", text=part.capitalize())
+    return column
+
+
+def draw_vertex_group(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct) -> bpy.types.Object | None:
+    """Draw the vertex group of the first ground; returns that."""
+    ground = next((entry.object for entry in owner.grounds if entry.object is not None), None)
+    if ground is not None:
+        layout.prop_search(owner, "vertex_group", ground, "vertex_groups")
+    else:
+        layout.prop(owner, "vertex_group")
+    return ground
+
+
+def draw_mask(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct) -> None:
+    """Draw vertex group and image of a population or biome."""
+    row = layout.row(align=True)
+    ground = draw_vertex_group(row, owner)
+    row.prop(owner, "invert_group", text="", icon='ARROW_LEFTRIGHT')
+    row = layout.row(align=True)
+    row.prop(owner, "image")
+    row.prop(owner, "invert_image", text="", icon='ARROW_LEFTRIGHT')
+    if owner.image is not None and ground is not None and ground.type == 'MESH':
+        layout.prop_search(owner, "uv_layer", ground.data, "uv_layers")
+    elif owner.image is not None:
+        layout.prop(owner, "uv_layer")
+
+
+def draw_paths(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct) -> None:
+    """Draw areas and paths of a population or stand."""
+    draw_properties(layout, owner, "areas", "paths")
+    if owner.paths is not None:
+        layout.prop(owner, "path_distance")
+
+
 class Button(NamedTuple):
     """An operator in a menu or panel, with another text than its label where one is given."""
 

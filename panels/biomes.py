@@ -15,7 +15,7 @@ from ..operators.biomes import (
 from ..tetflora_addon.blender.biomes.biome import active_biome, layers_of
 from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of
 from ..tetflora_addon.blender.placing.rules import awaits_update
-from .base import Button, SidebarPanel, draw_buttons, draw_properties, split_layout
+from .base import Button, SidebarPanel, draw_buttons, draw_limits, draw_mask, draw_properties, split_layout
 
 
 class TETFLORA_MT_add_biome(bpy.types.Menu):
@@ -98,35 +98,15 @@ class TETFLORA_PT_biome_limits(SidebarPanel, bpy.types.Panel):
             layout.label(text="Add a biome first", icon='INFO')
             return
         layout.prop(biome, "gives_way")
-        ground = next((entry.object for entry in biome.grounds if entry.object is not None), None)
-        row = layout.row(align=True)
-        if ground is not None:
-            row.prop_search(biome, "vertex_group", ground, "vertex_groups")
-        else:
-            row.prop(biome, "vertex_group")
-        row.prop(biome, "invert_group", text="", icon='ARROW_LEFTRIGHT')
-        row = layout.row(align=True)
-        row.prop(biome, "image")
-        row.prop(biome, "invert_image", text="", icon='ARROW_LEFTRIGHT')
-        if biome.image is not None:
-            layout.prop(biome, "uv_layer")
-        _draw_limits(layout, biome, "slope")
+        draw_mask(layout, biome)
+        draw_limits(layout, biome, "slope", "softness")
         layout.prop(biome, "use_altitude")
         if biome.use_altitude:
-            _draw_limits(layout, biome, "altitude")
-        _draw_limits(layout, biome, "wetness")
+            draw_limits(layout, biome, "altitude", "softness")
+        draw_limits(layout, biome, "wetness", "softness")
         draw_properties(layout, biome, "paths")
         if biome.paths is not None:
-            column = layout.column(align=True)
-            draw_properties(column, biome, "path_min", "path_max")
-            column.prop(biome, "path_softness", text="Softness")
-
-
-def _draw_limits(layout: bpy.types.UILayout, biome: bpy.types.PropertyGroup, name: str) -> None:
-    column = layout.column(align=True)
-    column.prop(biome, f"{name}_min")
-    column.prop(biome, f"{name}_max", text="Max")
-    column.prop(biome, f"{name}_softness", text="Softness")
+            draw_limits(layout, biome, "path", "softness")
 
 
 CLASSES = (

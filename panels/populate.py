@@ -21,7 +21,7 @@ from ..operators.populations import (
     TETFLORA_OT_set_population_ground,
     TETFLORA_OT_update_population,
 )
-from ..tetflora_addon.blender.placing.distances import distance_to_draw, empty_means, follows_species
+from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
 from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
 from ..tetflora_addon.blender.species.edits import catalogue
@@ -32,7 +32,10 @@ from .base import (
     TETFLORA_UL_mix,
     draw_below,
     draw_buttons,
+    draw_limits,
+    draw_mask,
     draw_message,
+    draw_paths,
     draw_properties,
     shown_length,
     split_layout,
@@ -128,7 +131,7 @@ class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
         TETFLORA_UL_mix.draw_in(layout, settings)
         if not settings.mix:
             known = catalogue()
-            text = f"Default: {known[empty_means(settings)].name}" if known else "The catalog has no species"
+            text = f"Default: {next(iter(known.values())).name}" if known else "The catalog has no species"
             layout.label(text=text, icon='INFO')
         elif 0 <= settings.mix_index < len(settings.mix):
             entry = settings.mix[settings.mix_index]
@@ -144,43 +147,19 @@ class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
     bl_label = "Placement"
 
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        column = layout.column(align=True)
-        column.prop(settings, "slope_min")
-        column.prop(settings, "slope_max", text="Max")
+        draw_limits(layout, settings, "slope")
         column = layout.column(align=True)
         column.prop(settings, "aspect")
         column.prop(settings, "aspect_spread", text="Spread")
         layout.prop(settings, "use_altitude")
         if settings.use_altitude:
-            column = layout.column(align=True)
-            column.prop(settings, "altitude_min", text="Min")
-            column.prop(settings, "altitude_max", text="Max")
-            column.prop(settings, "altitude_falloff", text="Falloff")
-        column = layout.column(align=True)
-        column.prop(settings, "wetness_min")
-        column.prop(settings, "wetness_max", text="Max")
-        row = column.row()
+            draw_limits(layout, settings, "altitude", "falloff")
+        row = draw_limits(layout, settings, "wetness").row()
         row.active = settings.wetness_min > 0.0 or settings.wetness_max < 1.0
         row.prop(settings, "wetness_softness", text="Softness")
         layout.prop(settings, "edge_falloff")
-        ground = next((entry.object for entry in settings.grounds if entry.object is not None), None)
-        row = layout.row(align=True)
-        if ground is not None:
-            row.prop_search(settings, "vertex_group", ground, "vertex_groups")
-        else:
-            row.prop(settings, "vertex_group")
-        row.prop(settings, "invert_group", text="", icon='ARROW_LEFTRIGHT')
-        row = layout.row(align=True)
-        row.prop(settings, "image")
-        row.prop(settings, "invert_image", text="", icon='ARROW_LEFTRIGHT')
-        if settings.image is not None:
-            if ground is not None and ground.type == 'MESH':
-                layout.prop_search(settings, "uv_layer", ground.data, "uv_layers")
-            else:
-                layout.prop(settings, "uv_layer")
-        draw_properties(layout, settings, "areas", "paths")
-        if settings.paths is not None:
-            layout.prop(settings, "path_distance")
+        draw_mask(layout, settings)
+        draw_paths(layout, settings)
 
 
 class TETFLORA_PT_populate_arrangement(_PartOfPopulate, bpy.types.Panel):

@@ -12,7 +12,15 @@ from ..operators.stands import (
 )
 from ..tetflora_addon.blender.scene.field_sizes import has_history
 from ..tetflora_addon.blender.stands.growing import is_stand, shown_stand
-from .base import Button, SidebarPanel, TETFLORA_UL_stand_species, draw_properties, split_layout
+from .base import (
+    Button,
+    SidebarPanel,
+    TETFLORA_UL_stand_species,
+    draw_paths,
+    draw_properties,
+    draw_vertex_group,
+    split_layout,
+)
 
 
 class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
@@ -62,14 +70,8 @@ class TETFLORA_PT_stand_site(_PartOfStand, bpy.types.Panel):
         draw_properties(layout.column(align=True), stand, "warmth", "winter")
         draw_properties(layout.column(align=True), stand, "moisture", "relief", "fertility")
         layout.prop(stand, "slope_max")
-        ground = next((entry.object for entry in stand.grounds if entry.object is not None), None)
-        if ground is not None:
-            layout.prop_search(stand, "vertex_group", ground, "vertex_groups")
-        else:
-            layout.prop(stand, "vertex_group")
-        draw_properties(layout, stand, "areas", "paths")
-        if stand.paths is not None:
-            layout.prop(stand, "path_distance")
+        draw_vertex_group(layout, stand)
+        draw_paths(layout, stand)
 
 
 class TETFLORA_PT_stand_detail(_PartOfStand, bpy.types.Panel):

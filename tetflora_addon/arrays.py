@@ -50,6 +50,16 @@ class _Components:
         return np.moveaxis(self.components, -1, 0)
 
 
+def srgb_of(linear: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Linear values from 0 to 1 as images store them (IEC 61966-2-1)."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def linear_of(stored: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The opposite of `srgb_of`."""
+    return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+
+
 class Arrays:
     """Base of dataclasses whose fields are columns: one row for each of n things.
 

@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-_Result = TypeVar("_Result")
+_Item, _Step, _Result = TypeVar("_Item"), TypeVar("_Step"), TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,19 @@ class Progress:
     def during(self, steps: Generator[object, None, _Result]) -> Generator[Progress, object, _Result]:
         """The same after each of some small steps; returns what these return."""
         amid = replace(self, amid=True)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as stop:
-                return stop.value
-            yield amid
+        return mapped(steps, lambda _: amid)
+
+
+def mapped(
+    steps: Generator[_Item, None, _Result], change: Callable[[_Item], _Step]
+) -> Generator[_Step, object, _Result]:
+    """The steps of a part of a job as those of the whole; returns what the part returns."""
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield change(step)
 
 
 def at_once(steps: Generator[object, object, _Result]) -> _Result:

@@ -13,6 +13,7 @@ import pytest
 
 from devtools import session
 from devtools.formats import set_format
+from farm import write_job
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tests.limits import full_disk
 from tetflora_addon.blender import preferences
@@ -190,11 +191,11 @@ def test_a_job_for_a_farm_is_written_or_not_there(tmp_path, capfd):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "project" / "shot.blend"), compress=False)
     before = _contents(tmp_path)
     with full_disk(50_000):
-        assert _command("farm", tmp_path / "job") == 1
+        assert write_job.main([str(tmp_path / "job")]) == 1
     assert str(tmp_path / "job") in _error(capfd)
     assert _contents(tmp_path) == before
     assert not (tmp_path / "job").exists()
-    assert _command("farm", tmp_path / "job", "--copy") == 0
+    assert write_job.main([str(tmp_path / "job"), "--copy"]) == 0
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="asks for the device that is always full")

@@ -10,6 +10,7 @@ import re
 import pytest
 
 from devtools import build
+from farm import write_job
 from tetflora_addon.blender import preferences, properties
 from tetflora_addon.blender.biomes.properties import TetFloraBiome
 from tetflora_addon.blender.cli.command import main
@@ -67,8 +68,8 @@ def test_every_default_is_the_one_that_is_told(clean_file):
 
 def test_every_option_of_the_command_line_is_told(blender, capsys):
     told = set(re.findall(r"`(--[a-z-]+)", MANUAL))
-    for command in ("refine", "render", "stats", "farm"):
-        assert main([command, "--help"]) == 0
+    for command in ("refine", "render", "stats", None):
+        assert (main([command, "--help"]) if command else write_job.main(["--help"])) == 0
         options = set(re.findall(r"^ +(--[a-z-]+)", capsys.readouterr().out, re.MULTILINE))
         assert "--json" in options
         assert sorted(options - told) == []

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A job that ``farm`` wrote, really run by Open Job Description's own runner: the pictures are those of one machine.
+"""A job that ``farm/write_job.py`` wrote, run by Open Job Description's own runner: pictures are those of one machine.
 
 The workers start a Blender that knows nothing of TetFlora; the job brings it along.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ import bpy
 import pytest
 
 from devtools import session
+from farm import write_job
 from tests.blender.scenes import add_camera, add_plant, tiny_render
 from tests.full.test_animation import pixels
 
@@ -28,6 +30,7 @@ Run = Callable[..., subprocess.CompletedProcess]
 
 OPENJD = (sys.executable, "-m", "openjd")
 FRAMES = (1, 2)
+TOOL = Path(write_job.__file__).parent
 
 
 @pytest.fixture(scope="module")
@@ -62,10 +65,14 @@ def expected(run: Run, scene_file: Path, tmp_path_factory: pytest.TempPathFactor
 
 def written(run: Run, scene_file: Path, folder: Path, *options: str | int) -> Path:
     """The job; checked by the runner, and nothing of the artist's is touched."""
+    tool = shutil.copytree(TOOL, folder.with_name("copied") / "farm", dirs_exist_ok=True)  # as artists use it
     before = {path: path.read_bytes() for path in scene_file.parent.rglob("*") if path.is_file()}
-    done = run(scene_file, "--command", "tetflora", "farm", folder, "--json", *options)
+    done = run(
+        "-b", scene_file, "--python-exit-code", "1", "--python", tool / "write_job.py", "--", folder, "--json", *options
+    )
     assert done.returncode == 0, done.stdout + done.stderr
-    assert json.loads(done.stdout.strip().splitlines()[-1])["frames"] == len(FRAMES)
+    figures = next(line for line in done.stdout.splitlines() if line.startswith("{"))
+    assert json.loads(figures)["frames"] == len(FRAMES)
     assert {path: path.read_bytes() for path in scene_file.parent.rglob("*") if path.is_file()} == before
     checked = subprocess.run([*OPENJD, "check", folder / "template.json"], capture_output=True, text=True, timeout=60)
     assert checked.returncode == 0, checked.stdout + checked.stderr

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..jobs import at_once
-from .asset import COUNTS, Asset, AssetKites, Clusters, SurfaceSamples
+from .asset import COUNTS, Asset, AssetKites, AssetSource, Clusters, SurfaceSamples
 from .clumping import facet_weights_of
 from .clusters import Hierarchy, hierarchy_of
 from .measures import ALONG, Measured, measured, pool_of, runs_of, shared_out, well_spread
 from .patches import patches_of
-from .source import AssetSource
 
 #: Samples of a cluster with children.
 SAMPLES_ABOVE = 64

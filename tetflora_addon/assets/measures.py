@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from ..arrays import spread
 from ..growth.hashing import child_key, key_of_seed, uniform
-from .asset import AssetKites, SurfaceSamples
+from .asset import AssetKites, AssetSource, SurfaceSamples
 from .clusters import Hierarchy
 from .kites import kites_of
 from .patches import Patches
-from .source import AssetSource
 
 #: Triangles of which all is looked at at a time.
 AT_ONCE = 60_000
@@ -186,22 +185,6 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
         woody,
         width,
     )
-
-
-def through_both_sides(
-    colour: NDArray[np.floating], transmission: NDArray[np.floating]
-) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    """Colours (n, 3) and transmissions (n,) of closed leaves as one sheet, from those of their sides.
-
-    Light that passes the first side meets the second from within, again and again: with r and t of a side, the whole
-    reflects r + t² r / (1 − r²), and t² / (1 − r²) goes through (Stokes 1862).
-    """
-    through = colour * transmission[:, None]
-    back = colour - through
-    again = 1.0 / np.maximum(1.0 - back**2, 1e-6)
-    passed = through**2 * again
-    whole = back + through**2 * back * again + passed
-    return whole, passed.sum(axis=1) / np.maximum(whole.sum(axis=1), 1e-12)
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ..arrays import spread
 from ..growth.hashing import mix
 from ..parallel import blocks
+from .asset import AssetSurface
 from .mesh_features import classified
-from .source import AssetSurface
 
 #: Faces of a patch at most; an island with more is cut into pieces of about so many that lie together.
 MOST_FACES = 48

@@ -17,6 +17,8 @@ import bpy
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from ..arrays import linear_of
+
 Geometry = bpy.types.Mesh | bpy.types.PointCloud | bpy.types.Curves
 
 
@@ -194,7 +196,7 @@ def linear_rgb(image: bpy.types.Image, pixels: NDArray[np.floating]) -> NDArray[
     """Linear RGB (..., 3) of some pixels (..., channels) of an image."""
     colour = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     if image.colorspace_settings.name == "sRGB" and not image.is_float:
-        colour = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+        colour = linear_of(colour)
     return colour
 
 

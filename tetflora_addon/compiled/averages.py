@@ -103,7 +103,7 @@ def row_leaves(
         table = [[function([getattr(m, name) for m in kinds]) if kinds else 0.0 for kinds in one] for one in forms]
         return np.array(table, dtype=np.float64)[kind]
 
-    means = (by_row(name, np.mean) for name in ("area", "polygons", "width"))
+    means = (by_row(name, np.mean) for name in ("shown_area", "polygons", "width"))
     return RowLeaves(*means, by_row("reach", np.max), transmission[kind])
 
 

@@ -57,6 +57,8 @@ LINES = 6.0
 _BATCHES = 12
 #: Width in pixels up to which wood is thin triangles; tubes take their place up to `decisions.BAND` times that.
 TUBES = 0.8
+#: Pixels that the axis of a branch may be off a straight line; ribbons follow those that bend more.
+BENT = 0.5
 #: Width in pixels from which on tubes have all of their sides, and how many they have below.
 BROAD, SIDES = 4.0, 4
 #: Fraction of a facet's area from which on each branch has a triangle; of smaller ones fewer have a wider one.
@@ -344,10 +346,11 @@ class _Tile:
             return
         flora, transition = self.flora, self.given.transition
         branches = replace(branches, plant=np.arange(len(branches), dtype=np.int32))
-        whole, real = WholeBranches(branches, axes(flora.rows, branches)), transition.of_branches(branches)
+        whole, real = WholeBranches(branches, axes(flora.rows, branches)), transition.of_own_leaves(branches)
         pieces, owner = whole_pieces(flora.rows, whole)
         species = flora.species_of(branches.row)
-        wide = 2.0 * branches.radius / np.maximum(transition.camera.extent_around(branches.position), 1e-300)
+        extent = np.maximum(transition.camera.extent_around(branches.position), 1e-300)
+        wide = 2.0 * branches.radius / extent
         tubes = uniform(branches.key, Draw.TRANSITION) < real_fraction(wide, TUBES)
         thin, detail = wide < BROAD, transition.detail
         for s in np.unique(species).tolist():
@@ -363,18 +366,23 @@ class _Tile:
             slender, broad = (whole.take(np.flatnonzero(own & tubes & (thin == is_thin))) for is_thin in (True, False))
             self._add_mesh(("bark", 0, s), tube_buffers(flora, [slender], None, SIDES), True)
             self._add_mesh(("bark", 0, s), tube_buffers(flora, [broad], detail.wood))
-            self._draw_twigs(s, whole.take(np.flatnonzero(own & ~tubes)), side)
+            self._draw_twigs(s, whole.take(np.flatnonzero(own & ~tubes)), side, extent)
 
-    def _draw_twigs(self, species: int, whole: WholeBranches, side: NDArray[np.float64]) -> None:
-        """One thin triangle each, or of very thin ones wider ones of fewer."""
+    def _draw_twigs(
+        self, species: int, whole: WholeBranches, side: NDArray[np.float64], extent: NDArray[np.float64]
+    ) -> None:
+        """One thin triangle or ribbon each, or of very thin ones wider ones of fewer."""
         branches = whole.branches
         area = np.pi * branches.radius * branches.length
         likely = np.clip(area / (TWIG * side[branches.plant] ** 2), 0.02, 1.0)
         some = np.flatnonzero(uniform(branches.key, _THIN) < likely)
-        if len(some):
-            self._add_mesh(
-                ("bark", 0, species), twig_buffers(self.flora, [whole.take(some)], [1.0 / likely[some]]), True
-            )
+        if not len(some):
+            return
+        whole = whole.take(some)
+        # The parts of a bow are off their chords by the square of their share of it.
+        off = whole.lines.bend() / (BENT * extent[branches.plant[some]])
+        parts = np.clip(np.ceil(np.sqrt(off)).astype(np.int64), 1, whole.lines.segments)
+        self._add_mesh(("bark", 0, species), twig_buffers(self.flora, whole, 1.0 / likely[some], parts), True)
 
     def _of_pieces(
         self, pieces: Pieces, side: NDArray[np.float64], real: NDArray[np.float64] | None = None, seen: bool = False

@@ -68,15 +68,23 @@ class Transition:
 
     def of_branches(self, branches: Branches) -> NDArray[np.float64]:
         """Real fraction (n,) of the leaves of sub-plants: a smooth step in the logarithm of their width."""
-        return self._fraction(branches, self.limit)
+        return self._fraction(branches, np.where(self.flora.leaf_count > 0, self.flora.leaf_width, 0.0), self.limit)
+
+    def of_own_leaves(self, branches: Branches) -> NDArray[np.float64]:
+        """Real fraction (n,) of the leaves that branches themselves bear."""
+        return self._fraction(branches, self._own_width, self.limit)
 
     def of_kites(self, branches: Branches) -> NDArray[np.float64]:
-        """Fraction (n,) of the real leaves of branches that are single kites."""
-        return 1.0 - self._fraction(branches, KITES)
+        """Fraction (n,) of the real leaves of branches themselves that are single kites."""
+        return 1.0 - self._fraction(branches, self._own_width, KITES)
 
-    def _fraction(self, branches: Branches, limit: float) -> NDArray[np.float64]:
-        row = branches.row
-        width = np.where(self.flora.leaf_count[row] > 0, self.flora.leaf_width[row] * branches.scale, 0.0)
+    @property
+    def _own_width(self) -> NDArray[np.float64]:
+        """Width (r,) of the leaves that branches of rows bear, metres."""
+        return self.flora.rows["leaf_size"][:, 0] * self.flora.leaf.width
+
+    def _fraction(self, branches: Branches, widths: NDArray[np.float64], limit: float) -> NDArray[np.float64]:
+        width = widths[branches.row] * branches.scale
         return real_fraction(width / np.maximum(self.camera.extent_around(branches.position), 1e-300), limit)
 
 

@@ -59,6 +59,15 @@ class Axes(Arrays):
         step = self.knot(branch, segment + 1) - start
         return start + (along - segment)[:, None] * step, self.frame(branch, segment)
 
+    def bend(self) -> NDArray[np.float64]:
+        """How far (n,) axes are from the straight line between their ends, metres."""
+        chord = self.knots[:, -1] - self.knots[:, 0]
+        direction = chord / np.maximum(np.linalg.norm(chord, axis=1), 1e-300)[:, None]
+        between = self.knots[:, 1:-1] - self.knots[:, :1]
+        along = np.einsum("nsi,ni->ns", between, direction)
+        square = np.einsum("nsi,nsi->ns", between, between) - along**2
+        return np.sqrt(np.maximum(square, 0.0).max(axis=1, initial=0.0))
+
     def sky_at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Sky (m, 3) at the fractions t (m,) of the axes of branches (m,); None without wind."""
         if self.skies is None:

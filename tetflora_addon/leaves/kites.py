@@ -3,8 +3,8 @@
 """A leaf of a pixel or two as one kite: a quadrilateral with the leaf's area, centroid, spread and widest place.
 
 A kite is folded along the midrib as the leaf is. A bunch of needles shows many planes: each copy takes one of them at
-random, in proportion to their areas, and has the area of the whole there: over many leaves, the area that is seen from
-any direction is kept. Of closed models, as fruit, that is half of the surface. A kite stays what it is.
+random, in proportion to their areas, and has the area that the whole shows: over many leaves, the area that is seen
+from any direction is kept. A kite stays what it is.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class LeafKites:
     Attributes
     ----------
     positions : (k, 4, 3) float64
-        Their vertices, in units of the leaf's size; each kite has the area of the model, or half of a closed one's.
+        Their vertices, in units of the leaf's size; each kite has the area that the model shows.
     uv : (k, 4, 2) float32
     share : (k,) float64
         Up to which random number, from 0 to 1, each is taken; the last is 1.
@@ -76,7 +76,7 @@ def leaf_kites(model: LeafModel) -> LeafKites:
             break
         for plane in _planes(normals[own], areas[own]):
             normal = _mean_direction(normals[own][plane], areas[own][plane])
-            found.append((_kite(model, model.area, normal, fan), areas[own][plane].sum(), material))
+            found.append((_kite(model, model.shown_area, normal, fan), areas[own][plane].sum(), material))
     positions = np.array([corners for corners, _, _ in found])
     share = np.cumsum([area for _, area, _ in found])
     return LeafKites(
@@ -167,7 +167,6 @@ def _kite(
     third = (x**3).sum(1) + x.prod(1) + (x**2 * (x.sum(1)[:, None] - x)).sum(1)
     skewness = (weight * third).sum() / 10 / variance**1.5
     widest = float(np.interp(skewness, _SKEWNESS, _WIDEST))
-    area = area * (0.5 if model.closed else 1.0)
     length = np.sqrt(18.0 * variance / (1.0 - widest * (1.0 - widest)))
     tip = (2.0 - widest) / 3.0
     # No longer than the model, or bounds would not hold it; and no needle where it is seen along its longer axis.

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import perpendicular
 from ..errors import SpeciesError
 from .compounds import Compound
 from .needles import Needles
@@ -24,6 +25,11 @@ MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices
 MAX_FACE_CORNERS = 128  # polygons are what blocks, budgets and limits count, so none may be much larger than another
 MAX_COORDINATE = 100.0  # in leaf lengths; keeps areas and bounds far from what floats can hold
 MAX_UV = 10_000.0
+#: Mean square of the second axis of normals up to which a model is flat, and part of the faces' area that silhouettes
+#: show up to which these hide each other.
+_FLAT_LEAF, _SOLID = 0.02, 0.55
+#: Directions of silhouettes, and cells along each side of their images.
+_DIRECTIONS, _CELLS = 16, 32
 
 
 @dataclass(frozen=True)
@@ -122,6 +128,18 @@ class LeafModel:
         return float(np.linalg.norm(self.face_vectors, axis=1).sum())
 
     @cached_property
+    def shown_area(self) -> float:
+        """One-sided area of flat leaves of size 1 that would show as much, turned all ways: twice the mean silhouette.
+
+        Faces of cones and fruit hide each other; those of leaves count in full.
+        """
+        spread = np.linalg.eigvalsh(self.moment)
+        if spread[1] < _FLAT_LEAF:
+            return self.area
+        shown = 2.0 * mean_silhouette(self)
+        return shown if shown < _SOLID * self.area else self.area
+
+    @cached_property
     def moment(self) -> NDArray[np.float64]:
         """(3, 3) float64: area-weighted mean of n nᵀ over the faces, in the leaf's own axes; its trace is 1."""
         areas = np.linalg.norm(self.face_vectors, axis=1)
@@ -137,6 +155,31 @@ class LeafModel:
     def width(self) -> float:
         """Extent across the midrib, in units of the leaf's size, which decides on its size in the image."""
         return float(np.ptp(self.positions[:, [0, 2]], axis=0).max())
+
+
+def mean_silhouette(model: LeafModel) -> float:
+    """Mean over directions of the area that a leaf of size 1 covers, seen from each, to a few percent.
+
+    Directions follow a spiral over half of a sphere, as far as both sides show the same.
+    """
+    first = model.corner_verts[model.face_offsets[:-1]]
+    face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))
+    corners = model.positions[np.stack([first[face], model.corner_verts, model.corner_verts[model.next_corner]])]
+    number = np.arange(_DIRECTIONS)
+    height, turn = (number + 0.5) / _DIRECTIONS, 2.399963229728653 * number
+    flat = np.sqrt(1.0 - height**2)
+    total = 0.0
+    for towards in np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1):
+        across = perpendicular(towards[None])[0]
+        flatly = corners @ np.stack([across, np.cross(towards, across)], axis=1)
+        low, high = flatly.min(axis=(0, 1)), flatly.max(axis=(0, 1))
+        cell = (high - low) / _CELLS
+        places = low + (np.stack(np.meshgrid(*[np.arange(_CELLS)] * 2), axis=-1).reshape(-1, 2) + 0.5) * cell
+        a, b, c = flatly[:, :, None] - places
+        sides = [u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0] for u, v in ((a, b), (b, c), (c, a))]
+        within = np.all([side >= 0.0 for side in sides], axis=0) | np.all([side <= 0.0 for side in sides], axis=0)
+        total += within.any(axis=0).mean() * np.prod(high - low)
+    return float(total / _DIRECTIONS)
 
 
 def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | None = None) -> LeafModel:

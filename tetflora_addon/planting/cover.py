@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..growth.hashing import child_key, key_of_seed
+from ..jobs import mapped
 from .canopy import Canopy, Sheet, fallen_on, light_on
 from .plane import clumps
 
@@ -115,12 +116,7 @@ def mapping(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, 
     """Light and what falls on the ground under plants; yields the fraction of the work that is done."""
     steps, parts = (light_on(sheet, canopy), fallen_on(sheet, canopy, kinds)), []
     for number, step in enumerate(steps):
-        while True:
-            try:
-                yield (number + next(step)) / len(steps)
-            except StopIteration as stop:
-                parts.append(stop.value)
-                break
+        parts.append((yield from mapped(step, lambda done, before=number: (before + done) / len(steps))))
     return Floor(sheet, *parts)
 
 

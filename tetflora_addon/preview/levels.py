@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, srgb_of
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..refinement.contents import Contents
@@ -229,5 +229,4 @@ def colours_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
 
 def as_shown(linear: NDArray[np.floating]) -> NDArray[np.float32]:
     """Linear colours (..., 3) as a screen shows them (IEC 61966-2-1)."""
-    value = np.clip(linear, 0.0, 1.0)
-    return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055).astype(np.float32)
+    return srgb_of(np.clip(linear, 0.0, 1.0)).astype(np.float32)

@@ -17,8 +17,6 @@ from .species import Species
 
 #: What lists begin with, and new plants are where nothing is chosen: a tree of which anybody expects a forest.
 FIRST = "beech"
-#: What an empty choice meant in files that were saved before lists began with `FIRST`: then the first by name.
-FIRST_BEFORE = "bamboo"
 
 
 @dataclass(frozen=True)

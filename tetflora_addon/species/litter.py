@@ -8,9 +8,11 @@ are a centimeter or two high, so that what grows on them sideways lies on the gr
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from math import cos, pi, sin, sqrt
+from pathlib import Path
 from typing import Any
 
 from ..leaves.models import LeafModel
@@ -31,12 +33,9 @@ _BENT = (
     {"fold": 0.38, "curl": -0.2, "wave": 0.03},
     {"fold": -0.25, "curl": 0.25, "wave": 0.03},
 )
-#: Linear RGB of dead leaves and needles, of wood without bark, and of cones: mean and variation.
+#: Linear RGB of dead leaves and needles, mean and variation, and of wood without bark.
 _BROWN = ((0.16, 0.1, 0.05), (0.1, 0.062, 0.031))
 _NEEDLE_BROWN = ((0.135, 0.068, 0.031), (0.06, 0.032, 0.014))
-_TWIG = [[0.075, 0.052, 0.034], [0.02, 0.014, 0.01]]
-_CONE = [[0.075, 0.043, 0.023], [0.02, 0.012, 0.007]]
-_CUT = [[0.17, 0.115, 0.07], [0.03, 0.02, 0.014]]
 _WEATHERED = (0.088, 0.074, 0.058)
 _STEM = 0.03  # meters, of the stem in the middle of a patch
 _TREE = 3.0  # meters: what is lower has no branches that are dead wood
@@ -48,6 +47,11 @@ _KEPT = {
 _STREWN, _HANDFUL, _NEEDLE = 0.13, 22, 0.0018
 _BURIED = 0.12  # meters, of the lower end of a log
 _CONES = 0.45  # of a patch, on average
+
+
+def _parts() -> dict[str, dict[str, Any]]:
+    """What is the same below all species: parts of orders, a cone on its side, and the round end of a log."""
+    return json.loads(Path(__file__).with_name("litter.json").read_text(encoding="utf-8"))
 
 
 def bears_needles(species: Species) -> bool:
@@ -95,33 +99,17 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
         number, radius = _LEAVES[1], 0.3
     twigs = 6 if needles else 7
     colour, variation = _NEEDLE_BROWN if needles else _BROWN
-    around = {
+    parts = _parts()
+    around = parts["around"] | {
         "length": _pair(radius / _STEM, 0.3 * radius / _STEM),
-        "thickness": [0.9, 0.1],
-        "taper": 0.3,
-        "segments": 3,
-        "sides": 3,
-        "curvature": [0, 30],
-        "angle": [87, 3],
-        "azimuth": [137.5, 40],
         "leaves": _pair(number / twigs, 0.3 * number / twigs),
-        "leaf_start": 0.22,
         "leaf_size": _pair(0.95 * size, 0.15 * size),
-        "leaf_angle": [75, 70],
-        "leaf_azimuth": [137.5, 120],
-        "leaf_light": [0.97, 0.03] if needles else [0.92, 0.07],
-        "branch_colour": _TWIG,
         "leaf_colour": [list(colour), list(variation)],
         "leaf_colour_tip": [round(1.12 * c, 3) for c in colour],
     }
-    middle = {
-        "length": [_STEM, 0.004],
-        "thickness": [0.05 if needles else 0.02, 0.004],
-        "sides": 3,
-        "branches": [twigs, 1],
-        "branch_start": 0,
-        "branch_colour": _TWIG,
-    }
+    middle = parts["middle"] | {"branches": [twigs, 1]}
+    if needles:
+        around["leaf_light"], middle["thickness"] = [0.97, 0.03], [0.05, 0.004]
     own_forms = page["leaf"] if isinstance(page["leaf"], list) else [page["leaf"]]
     dried = [one for form, own in zip(species.leaf, own_forms, strict=True) for one in _dried(form, own)]
     made = {
@@ -135,20 +123,7 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
         "orders": [middle, around],
     }
     if needles:
-        made["blossom"], made["blossom_transmission"] = _cone(), 0
-        made["spur"] = {
-            "length": [0.01, 0],
-            "thickness": 0.1,
-            "angle": [88, 2],
-            "leaf_kind": "blossom",
-            "leaves": [1, 0],
-            "leaf_start": 0.9,
-            "leaf_size": _pair(0.07, 0.02),
-            "leaf_angle": [20, 15],
-            "leaf_light": 1,
-            "leaf_colour": _CONE,
-            "branch_colour": _TWIG,
-        }
+        made |= {"blossom": parts["cone"], "blossom_transmission": 0, "spur": parts["spur"]}
         around["spurs"], around["spur_start"] = _pair(_CONES / twigs, _CONES / twigs), 0.3
     return made
 
@@ -161,19 +136,11 @@ def branch_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     orders = [_bare(order) for order in page["orders"][1:4]]
     for order in orders:
         # Twigs of a branch that fell spread over the ground, and many are gone.
-        order |= {"spray": 0.92, "azimuth": [180, 25], "attraction": 0, "segments": 4, "curvature": [0, 26]}
+        order |= _parts()["twig"]
         order["branches"] = _pair(*_fewer(order.get("branches", 0), 6))
         order["branch_colour"] = _weathered(order.get("branch_colour"), 0.4)
     orders[-1]["branches"] = 0
-    orders[0] |= {
-        "length": _pair(length, 0.4 * length),
-        "thickness": [0.0095, 0.002],
-        "taper": 0.3,
-        "segments": 7,
-        "sides": 7,
-        "angle": [88.5, 1],
-        "branch_start": 0.2,
-    }
+    orders[0] |= _parts()["bough"] | {"length": _pair(length, 0.4 * length)}
     orders[0].pop("angle_tip", None)
     return _wood(species, page, orders, "branch", f"A fallen branch of {species.name}, about {length:.1f} m long")
 
@@ -186,48 +153,18 @@ def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None
     length = min(max(0.25 * trunk.length.mean, 1.2), 1.84)
     radius = min(max(0.8 * trunk.length.mean * trunk.thickness.mean, 0.04), _BURIED)
     colour = page["orders"][0].get("branch_colour")
-    # A stem that leads down, so that the log begins in the ground and comes out of it on its way.
-    stem = {
-        "length": [_BURIED, 0],
-        "thickness": [1, 0],
-        "taper": 1,
-        "sides": 3,
-        "angle": [180, 0],
-        "branches": [1, 0],
-        "branch_start": 0.98,
-        "branch_colour": _weathered(colour, 0.65),
-    }
-    log = {
+    parts = _parts()
+    log = parts["log"] | {
         "length": _pair(length / _BURIED, 0.3 * length / _BURIED),
         "thickness": _pair(radius / _BURIED, 0),
-        "taper": 0.8,
-        "segments": 8,
-        "sides": 16,
-        "curvature": [0, 8],
-        "angle": [96, 1],
-        "branches": [6, 3],
-        "branch_start": 0.2,
-        "branch_colour": _weathered(colour, 0.65),
-        "leaf_kind": "blossom",
-        "leaves": [1, 0],
-        "leaf_start": 0.99,
         "leaf_size": _pair(2.04 * 0.8 * radius, 0),
-        "leaf_angle": [90, 0],
-        "leaf_light": 0,
-        "leaf_colour": _CUT,
     }
-    stub = {
-        "length": [0.06, 0.045],
-        "thickness": [0.26, 0.1],
-        "taper": 0.12,
-        "segments": 2,
-        "sides": 6,
-        "angle": [66, 16],
-        "azimuth": [137.5, 40],
-        "branch_colour": _weathered(colour, 0.7),
-    }
-    made = _wood(species, page, [stem, log, stub], "log", f"A fallen log of {species.name}, about {length:.1f} m long")
-    return made | {"blossom": _disc(), "blossom_transmission": 0}
+    # The stem leads down, so that the log begins in the ground and comes out of it on its way.
+    orders = [parts["stem"], log, parts["stub"]]
+    for order, how in zip(orders, (0.65, 0.65, 0.7), strict=True):
+        order["branch_colour"] = _weathered(colour, how)
+    made = _wood(species, page, orders, "log", f"A fallen log of {species.name}, about {length:.1f} m long")
+    return made | {"blossom": parts["cut"], "blossom_transmission": 0}
 
 
 #: Pages by the ending of the identifier that the fallen parts of a species have.
@@ -293,32 +230,4 @@ def _strewn(needle: float) -> dict[str, Any]:
         ends = ((-ax - bx, -ay - by), (ax - bx, ay - by), (ax + bx, ay + by), (-ax + bx, -ay + by))
         vertices += [[round(x + u, 4), round(y + v, 4), round(z, 3)] for u, v in ends]
         faces.append([4 * k + i for i in range(4)])
-    return {"vertices": vertices, "faces": faces}
-
-
-def _disc() -> dict[str, Any]:
-    """The end of a log, one unit across, that looks along it."""
-    number = 16
-    turns = [2 * pi * k / number for k in range(number)]
-    return {
-        "vertices": [[round(0.5 * cos(t), 4), round(0.5 * sin(t), 4), 0.0] for t in turns],
-        "faces": [list(range(number))],
-    }
-
-
-def _cone() -> dict[str, Any]:
-    """A cone that lies on its side, one unit long: rings of scales that stand off."""
-    rings, sides = ((0.0, 0.05), (0.1, 0.2), (0.3, 0.25), (0.5, 0.23), (0.7, 0.18), (0.88, 0.11), (1.0, 0.03)), 7
-    corners = {0: (0.1951, 0.0), 1: (0.1216, 0.1525), 2: (-0.0434, 0.1901), 3: (-0.1757, 0.0846)}
-    around = [corners[k] if k < 4 else (corners[7 - k][0], -corners[7 - k][1]) for k in range(sides)]
-    vertices = [
-        [round(x / 0.195 * r * (1.25 if (k + i) % 2 else 0.85), 3), y, round(0.2 + z / 0.195 * r, 3)]
-        for i, (y, r) in enumerate(rings)
-        for k, (x, z) in enumerate(around)
-    ]
-    faces = [
-        [i * sides + k, i * sides + (k + 1) % sides, (i + 1) * sides + (k + 1) % sides, (i + 1) * sides + k]
-        for i in range(len(rings) - 1)
-        for k in range(sides)
-    ]
     return {"vertices": vertices, "faces": faces}

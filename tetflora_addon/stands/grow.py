@@ -15,21 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TetFloraError
-from ..growth.hashing import mix
 from ..jobs import Progress
 from ..parallel import blocks, on_all_cores
 from ..setting import LENGTH, setting
-from .change import dying, fallen, grown
+from .change import MOST_PLANTS, SeedRain, dying, fallen, grown, planted
 from .guilds import Guild, Guilds
 from .light import LightGrid
-from .plants import DeadPlants, Plants, keys_of
-from .records import Records, in_order
-from .renewal import MOST_PLANTS, SeedRain, planted
+from .plants import DeadPlants, Plants, Records, in_order
 from .site import StandSite
 
 #: Plants that are looked at together.
 _BLOCK = 1 << 15
-_GIVEN = 2
 #: Most records of a stand, some 70 bytes each here and again in the file.
 MOST_RECORDS = 20_000_000
 #: Metres of open ground beyond open edges.
@@ -91,9 +87,7 @@ class StandSettings:
     )
 
 
-def grow(
-    site: StandSite, guilds: Sequence[Guild], settings: StandSettings, given: Records | None = None
-) -> Generator[Progress, object, Records]:
+def grow(site: StandSite, guilds: Sequence[Guild], settings: StandSettings) -> Generator[Progress, object, Records]:
     """Grow a stand; a job, which yields after each year and returns its records.
 
     Parameters
@@ -101,9 +95,6 @@ def grow(
     site : StandSite
     guilds : sequence of Guild
     settings : StandSettings
-    given : Records, optional
-        Plants that are there at the beginning, besides those that are planted; their species are indices of guilds.
-        The dead are left out.
 
     Returns
     -------
@@ -115,19 +106,17 @@ def grow(
     TetFloraError
         A setting cannot be, or the ground is too large; names it.
     """
-    stand = begun(site, guilds, settings, given)
+    stand = begun(site, guilds, settings)
     for year in range(settings.years):
         yield Progress(year / settings.years, f"Growing the stand: year {year} of {settings.years}")
         stand.step(year)
     return stand.finished()
 
 
-def begun(
-    site: StandSite, guilds: Sequence[Guild], settings: StandSettings, given: Records | None = None
-) -> GrowingStand:
+def begun(site: StandSite, guilds: Sequence[Guild], settings: StandSettings) -> GrowingStand:
     """A stand at its beginning, which whoever has it steps from year to year; see `grow`."""
     _check(settings)
-    return GrowingStand(site, Guilds(guilds), settings, given)
+    return GrowingStand(site, Guilds(guilds), settings)
 
 
 def _check(settings: StandSettings) -> None:
@@ -154,7 +143,7 @@ class GrowingStand:
     dead : DeadPlants
     """
 
-    def __init__(self, site: StandSite, guilds: Guilds, settings: StandSettings, given: Records | None) -> None:
+    def __init__(self, site: StandSite, guilds: Guilds, settings: StandSettings) -> None:
         self.site, self.guilds, self.settings = site, guilds, settings
         width, depth = site.size
         margin = _MARGIN if settings.open_edges else 0.0
@@ -173,38 +162,10 @@ class GrowingStand:
             )
         self.slope = site.slope()
         self.plants = planted(site, guilds, suits, settings.density, settings.seed)
-        if given is not None:
-            alive = given.take(np.flatnonzero(given.dead == 0))
-            self.plants = Plants.concatenate([self.plants, self._given(alive, suits)])
         if not len(self.plants) and settings.recruits * settings.outside * guilds.rain.sum() <= 0.0:
             raise TetFloraError("Nothing is planted and no seeds come; raise Planted, or Seedlings and Seed Rain")
         self.seeds = SeedRain(site, guilds, suits, settings.recruits, settings.outside)
         self.count, self.dead, self.kept = len(self.plants), DeadPlants.empty(), []
-
-    def _given(self, given: Records, suits: NDArray) -> Plants:
-        number, guilds, site = len(given), self.guilds, self.site
-        guild = given.species.astype(np.int64)
-        if ((guild < 0) | (guild >= len(guilds.needs))).any():
-            raise TetFloraError("A given plant is of a species that is not in the list")
-        x, y = given.position[:, 0].astype(np.float64) - site.west, given.position[:, 1].astype(np.float64) - site.south
-        width, depth = site.size
-        x, y = np.clip(x, 0.0, width * (1 - 1e-9)), np.clip(y, 0.0, depth * (1 - 1e-9))
-        height = np.maximum(given.height.astype(np.float64), 0.05)
-        girth = guilds.girths(guild, given.diameter.astype(np.float64))
-        small = given.diameter <= 0
-        girth[small] = np.take(guilds.first, guild[small]) * np.minimum(
-            height[small] / np.take(guilds.breast, guild[small]), 1
-        )
-        radius = np.where(given.crown_width > 0, 0.5 * given.crown_width, 0.7 * guilds.radii(guild, girth))
-        key = keys_of(0, _GIVEN) ^ given.seed.astype(np.int64).view(np.uint64)
-        first = len(self.plants)
-        whole = np.ones(number)
-        return Plants(
-            np.arange(first, first + number), mix(key), guild, x, y, girth, height,
-            np.minimum(given.crown_base.astype(np.float64), 0.88 * height), radius,
-            given.offset[:, 0].astype(np.float64), given.offset[:, 1].astype(np.float64), 0.6 * whole,
-            suits[guild, site.cells(x, y)], whole, np.take(guilds.mature, guild), np.zeros(number, bool),
-        )  # fmt: skip
 
     def step(self, year: int) -> None:
         """One year."""

@@ -127,10 +127,6 @@ class Guilds:
         """Diameters (n,) of trunks at breast height, metres."""
         return np.maximum(girth - np.take(self.first, guild), 0.0)
 
-    def girths(self, guild: NDArray, diameter: NDArray) -> NDArray[np.float64]:
-        """Girths (n,) of trunks of diameters at breast height (n,), metres."""
-        return diameter + np.take(self.first, guild)
-
     def masses(self, guild: NDArray, girth: NDArray, height: NDArray) -> NDArray[np.float64]:
         """Dry mass (n,) of the wood above ground, kg."""
         return np.take(self.solid, guild) * girth**2 * height

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Twigs thinner than a pixel, among leaves that are real: one triangle from base to tip each.
+"""Twigs thinner than a pixel: one triangle from base to tip each, or a ribbon along those that bend.
 
 It has half of the surface of the twig's tube, turned about its line at random: over many twigs the area that is seen
 from any direction is that of the tubes, whose far side is never seen.
@@ -8,17 +8,18 @@ from any direction is that of the tubes, whose far side is never seen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import unit
+from ..arrays import spread, unit
 from ..buffers import MeshBuffers, concatenate_buffers
 from ..compiled.flora import Flora
 from ..growth.axes import Axes
+from ..growth.branches import Branches
 from ..growth.colours import branch_colours
-from ..growth.growth import WholeBranches
+from ..growth.growth import WholeBranches, radius_at
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
 from .pieces import Pieces, wood_areas
@@ -26,26 +27,35 @@ from .tubes import base_girth
 
 
 def twig_buffers(
-    flora: Flora, whole: Sequence[WholeBranches], wider: Sequence[NDArray[np.float64]] | None = None
+    flora: Flora,
+    whole: WholeBranches,
+    wider: NDArray[np.float64] | None = None,
+    parts: NDArray[np.int64] | None = None,
 ) -> MeshBuffers | None:
-    """Triangles in the place of tubes.
+    """Triangles and ribbons in the place of tubes.
 
     Parameters
     ----------
     flora : Flora
-    whole : sequence of WholeBranches
+    whole : WholeBranches of n
         Of any rows.
-    wider : sequence of (n,) float64, optional
-        How many times as wide each triangle is: it stands for so many twigs.
+    wider : (n,) float64, optional
+        How many times as wide each is: it stands for so many twigs.
+    parts : (n,) int64, optional
+        Quadrilaterals that ribbons consist of; 1, or without it, for triangles.
 
     Returns
     -------
     MeshBuffers or None
         Attributes as of `tubes.tube_buffers`; None without branches.
     """
-    wider = [np.ones(len(some)) for some in whole] if wider is None else wider
-    some = zip(whole, wider, strict=True)
-    return concatenate_buffers([_triangles(flora, own, times) for own, times in some if len(own)])
+    wider = np.ones(len(whole)) if wider is None else wider
+    bent = np.zeros(len(whole), bool) if parts is None else parts > 1
+    straight, some = np.flatnonzero(~bent), np.flatnonzero(bent)
+    made = [_triangles(flora, whole.take(straight), wider[straight])] if len(straight) else []
+    if len(some):
+        made.append(_ribbons(flora, whole.take(some), wider[some], parts[some]))
+    return concatenate_buffers(made)
 
 
 def _triangles(flora: Flora, whole: WholeBranches, times: NDArray[np.float64]) -> MeshBuffers:
@@ -53,42 +63,103 @@ def _triangles(flora: Flora, whole: WholeBranches, times: NDArray[np.float64]) -
     base, tip = _ends(whole.lines)
     along = tip - base
     length = np.linalg.norm(along, axis=1)
-    turn = 2.0 * np.pi * uniform(branches.key, Draw.TWIG_TURN)[:, None]
-    across = np.cos(turn) * branches.frame[:, :, 0] + np.sin(turn) * branches.frame[:, :, 1]
     direction = unit(along)
+    across = _turned(branches, branches.frame)
     across = unit(across - (across * direction).sum(axis=1, keepdims=True) * direction)
     # A triangle is half as wide on average as at its base.
     none = np.zeros(number)
     surface = wood_areas(flora, Pieces(branches, none, none + 1.0, base, tip))
     half = 0.5 * (times * surface / np.maximum(length, 1e-12))[:, None] * across
     corners = np.stack([base - half, base + half, tip], axis=1)
-    motion = {}
+    velocity = None
     if whole.lines.later is not None:
-        speed = [
-            (then - now) / moment(flora.rows) for then, now in zip(_ends(whole.lines.later), (base, tip), strict=True)
-        ]
+        then = _ends(whole.lines.later)
+        speed = [(end - now) / moment(flora.rows) for end, now in zip(then, (base, tip), strict=True)]
         velocity = np.stack([speed[0], speed[0], speed[1]], axis=1).reshape(-1, 3)
-        motion = {"velocity": ("POINT", velocity.astype(np.float32))}
-    girth = base_girth(branches)
-    high = branches.length / np.maximum(girth, 1e-9)
-    uv = np.zeros((number, 3, 2), np.float32)
-    uv[:, 1, 0], uv[:, 2, 0], uv[:, 2, 1] = 1.0, 0.5, high
     each = np.arange(3 * number, dtype=np.int32)
+    uv = np.zeros((number, 3, 2))
+    uv[:, 1, 0], uv[:, 2, 0], uv[:, 2, 1] = 1.0, 0.5, _height(branches)
+    edges = np.stack([each, each + np.tile(np.array([1, 1, -2], np.int32), number)], axis=1)
+    faces = _Faces(edges, each, each, 3 * np.arange(number + 1), uv.reshape(-1, 2))
+    return _buffers(flora, branches, np.arange(number), corners.reshape(-1, 3), velocity, faces)
+
+
+def _ribbons(flora: Flora, whole: WholeBranches, times: NDArray[np.float64], parts: NDArray[np.int64]) -> MeshBuffers:
+    branches, lines = whole.branches, whole.lines
+    ring, number = spread(parts + 1)
+    place = number / parts[ring]
+    middle, frame = lines.at(ring, place)
+    own = branches.take(ring)
+    sides = flora.rows["sides"][own.row]
+    around = times[ring] * sides * np.sin(np.pi / sides) * radius_at(flora.rows, own, place)
+    half = 0.5 * around[:, None] * _turned(own, frame)
+    corners = np.stack([middle - half, middle + half], axis=1).reshape(-1, 3)
+    velocity = None
+    if lines.later is not None:
+        velocity = np.repeat((lines.later.at(ring, place)[0] - middle) / moment(flora.rows), 2, axis=0)
+    # Each ring has an edge of its own; behind all but the last are two more, and a face.
+    first = np.flatnonzero(number < parts[ring])
+    low = 2 * first
+    quads = np.stack([low, low + 1, low + 3, low + 2], axis=1)
+    rungs, beside = len(ring), np.arange(len(first))
+    edges = np.concatenate([np.arange(2 * rungs).reshape(-1, 2), quads[:, [0, 3]], quads[:, [1, 2]]])
+    left, right = rungs + beside, rungs + len(first) + beside
+    border = np.stack([first, right, first + 1, left], axis=1)
+    high = place * _height(branches)[ring]
+    across = np.array([0.0, 1.0, 1.0, 0.0])[None] + np.zeros((len(first), 1))
+    uv = np.stack([across, np.stack([high[first], high[first], high[first + 1], high[first + 1]], axis=1)], axis=2)
+    faces = _Faces(edges, quads.ravel(), border.ravel(), 4 * np.arange(len(first) + 1), uv.reshape(-1, 2))
+    return _buffers(flora, branches, ring[first], corners, velocity, faces)
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """Topology of a mesh as of `MeshBuffers`, and texture coordinates (c, 2) of its corners."""
+
+    edges: NDArray[np.integer]
+    verts: NDArray[np.integer]
+    corner_edges: NDArray[np.integer]
+    offsets: NDArray[np.integer]
+    uv: NDArray[np.float64]
+
+
+def _buffers(
+    flora: Flora,
+    branches: Branches,
+    owner: NDArray[np.integer],
+    corners: NDArray[np.float64],
+    velocity: NDArray[np.float64] | None,
+    faces: _Faces,
+) -> MeshBuffers:
+    """Buffers of faces (f,) of branches (f,), with vertices (v, 3) that move at velocities (v, 3)."""
+    motion = {} if velocity is None else {"velocity": ("POINT", velocity.astype(np.float32))}
+    colour = branch_colours(flora.rows, branches.row, branches.key)
     return MeshBuffers(
-        positions=corners.reshape(-1, 3).astype(np.float32),
-        edge_verts=np.stack([each, each + np.tile(np.array([1, 1, -2], np.int32), number)], axis=1),
-        corner_verts=each,
-        corner_edges=each,
-        face_offsets=np.arange(0, 3 * number + 1, 3, dtype=np.int32),
+        positions=corners.astype(np.float32),
+        edge_verts=faces.edges.astype(np.int32),
+        corner_verts=faces.verts.astype(np.int32),
+        corner_edges=faces.corner_edges.astype(np.int32),
+        face_offsets=faces.offsets.astype(np.int32),
         attributes={
-            "UVMap": ("CORNER", uv.reshape(-1, 2)),
-            "tf_colour": ("FACE", branch_colours(flora.rows, branches.row, branches.key).astype(np.float32)),
-            "tf_transmission": ("FACE", np.zeros(number, np.float32)),
-            "tf_girth": ("FACE", girth.astype(np.float32)),
+            "UVMap": ("CORNER", faces.uv.astype(np.float32)),
+            "tf_colour": ("FACE", colour[owner].astype(np.float32)),
+            "tf_transmission": ("FACE", np.zeros(len(owner), np.float32)),
+            "tf_girth": ("FACE", base_girth(branches)[owner].astype(np.float32)),
             **motion,
         },
         smooth=True,
     )
+
+
+def _turned(branches: Branches, frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors (n, 3) across lines with frames (n, 3, 3), turned about these at random."""
+    turn = 2.0 * np.pi * uniform(branches.key, Draw.TWIG_TURN)[:, None]
+    return np.cos(turn) * frame[:, :, 0] + np.sin(turn) * frame[:, :, 1]
+
+
+def _height(branches: Branches) -> NDArray[np.float64]:
+    """Length (n,) of the texture along branches, in girths."""
+    return branches.length / np.maximum(base_girth(branches), 1e-9)
 
 
 def _ends(lines: Axes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .cuts import TOLERANCE, CutTetrahedra, cut_tetrahedra
 from .geometry import plane_distance
 from .subdivision import bisect, divide_by_shape
 
@@ -24,7 +23,7 @@ class TetrahedralTree:
 
     Node 0 is the root. Inner nodes near it may be convex regions without a tetrahedron; terminal nodes are tetrahedra
     once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that). Between a tetrahedron and those that
-    `split_by_shape` or `cut` make of it there may be such regions too.
+    `split_by_shape` makes of it there may be such regions too.
 
     Parameters
     ----------
@@ -144,50 +143,6 @@ class TetrahedralTree:
         nodes = np.asarray(nodes, np.intp)
         planes, pieces, _ = divide_by_shape(self._tetrahedra(nodes))
         return self._divide_thrice(nodes, planes, pieces)
-
-    def cut(
-        self, nodes: ArrayLike, planes: ArrayLike, tolerance: float = TOLERANCE
-    ) -> tuple[NDArray[np.int32], CutTetrahedra]:
-        """Divide terminal tetrahedra by given planes, and what these leave into tetrahedra again.
-
-        This is for the border of a view or a clipping plane that goes through a tree that was made without it.
-
-        Parameters
-        ----------
-        nodes : (n,) int
-            Terminal nodes with a tetrahedron, each once.
-        planes : (n, 4) float64
-            Cutting planes ``(nx, ny, nz, d)``, unit normals.
-        tolerance : float
-            Vertices nearer to the plane than this, in metres, count as on it.
-
-        Returns
-        -------
-        terminals : (m,) int32
-            Node of each piece; they inherit `inside`. A node that its plane does not divide stays as it is and stands
-            for its one piece.
-        pieces : CutTetrahedra of m
-            Their owners, as places in ``nodes``, sides and tetrahedra.
-
-        Raises
-        ------
-        ValueError
-            If a node is not terminal, has no tetrahedron, or occurs twice.
-        """
-        nodes, planes = np.asarray(nodes, np.intp), np.asarray(planes, np.float64)
-        self._check_terminal(nodes)
-        pieces = cut_tetrahedra(self._tetrahedra(nodes), planes, tolerance)
-        some = np.flatnonzero(pieces.divided)
-        halves = np.repeat(nodes.astype(np.int32)[:, None], 2, axis=1)
-        halves[some] = self.divide(nodes[some], planes[some])
-        terminals = halves[pieces.owner, pieces.side]
-        # Pieces of one side stand in a row. Each is cut off from those behind it, which are the region of the next.
-        for step in range(int(pieces.step.max(initial=0))):
-            now = np.flatnonzero((pieces.step == step) & ~pieces.last)
-            terminals[now], terminals[now + 1] = self.divide(terminals[now], pieces.plane[now]).T
-        new = pieces.divided[pieces.owner]
-        self.place(terminals[new], pieces.vertices[new])
-        return terminals, pieces
 
     def divide(self, nodes: ArrayLike, planes: ArrayLike) -> NDArray[np.int32]:
         """Divide terminal nodes by given planes; the children have no tetrahedra until `place` gives them some.
@@ -312,7 +267,7 @@ class TetrahedralTree:
     def _tetrahedra(self, nodes: NDArray[np.intp]) -> NDArray[np.float64]:
         vertices = self.vertices(nodes)
         if np.isnan(vertices[:, 0, 0]).any():
-            raise ValueError("only nodes with a tetrahedron can be bisected or cut; split regions by a plane instead")
+            raise ValueError("only nodes with a tetrahedron can be bisected; split regions by a plane instead")
         return vertices
 
     def _check_terminal(self, nodes: NDArray[np.intp]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.assets.geometry import read_source_steps
-from tetflora_addon.blender.assets.target import Target
+from tetflora_addon.blender.assets.parts import Target
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 

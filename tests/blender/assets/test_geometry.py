@@ -12,8 +12,10 @@ from mathutils import Matrix
 from tests.blender.assets.surfaces import SQUARE, Paint, cards, image, read, target_of
 from tests.blender.scenes import add_mesh
 from tetflora_addon import errors
-from tetflora_addon.blender.assets.target import Target, digest_of
+from tetflora_addon.blender.assets.geometry import read_source_steps
+from tetflora_addon.blender.assets.parts import Target, digest_of
 from tetflora_addon.blender.scene.instances import references_of
+from tetflora_addon.jobs import at_once
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -179,9 +181,7 @@ def test_geometry_without_an_object_is_a_target():
     geometry = owner.evaluated_get(graph).evaluated_geometry()
     ((shown, _),) = references_of(geometry)
     target = Target(None, shown, owner, "grid")
-    from tetflora_addon.blender.assets.geometry import read_source
-
-    source = read_source(target, graph)
+    source, _ = at_once(read_source_steps(target, graph))
     assert source.faces == 4
     assert digest_of(target, graph) == source.digest
     whole, _ = read(owner)

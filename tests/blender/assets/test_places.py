@@ -31,7 +31,6 @@ def test_what_nodes_scatter_is_read_as_one_array():
     wanted[:, 0, 3], wanted[:, 1, 3] = np.arange(5), 10.0
     assert found.matrices == pytest.approx(wanted, abs=1e-5)
     assert found.keys.dtype == np.uint64 and len(set(found.keys.tolist())) == 5
-    assert places.read_scatters([ground], depsgraph())[ground].own_faces
 
 
 def test_places_are_those_that_blender_shows():

@@ -15,10 +15,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from farm import assets, bundle, template, write_job
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, tiny_render
 from tetflora_addon import errors
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.cli import assets, command, farm, farm_template
+from tetflora_addon.blender.cli import frames
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -38,7 +39,7 @@ def shot(tmp_path: Path) -> Path:
 
 
 def _run(*arguments) -> int:
-    return command.main(["farm", *map(str, arguments)])
+    return write_job.main([str(argument) for argument in arguments])
 
 
 def _read(folder: Path, title: str) -> dict:
@@ -95,9 +96,11 @@ def test_the_zip_holds_the_extension_and_nothing_else(shot, tmp_path):
     (path,) = (tmp_path / "job" / "tetflora").glob("tetflora-*.zip")
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
-    assert {"blender_manifest.toml", "__init__.py", "tetflora_addon/blender/cli/farm_installer.py"} <= set(names)
-    assert [n for n in names if "__pycache__" in n or n.startswith(("tests/", "docs/", ".", "benchmarks/"))] == []
-    farm.write_zip(tmp_path / "again.zip")
+    assert {"blender_manifest.toml", "__init__.py", "tetflora_addon/blender/cli/frames.py"} <= set(names)
+    assert [
+        n for n in names if "__pycache__" in n or n.startswith(("tests/", "docs/", ".", "benchmarks/", "farm/"))
+    ] == []
+    bundle.write_zip(tmp_path / "again.zip")
     assert (tmp_path / "again.zip").read_bytes() == path.read_bytes()
 
 
@@ -263,7 +266,7 @@ def test_the_list_is_shown_with_sizes_before_anything_is_copied(shot, tmp_path, 
 def test_a_file_that_grows_while_it_is_copied_is_no_endless_job(shot, tmp_path, capfd, monkeypatch):
     _files(shot.parent, "leaf.png")
     _image("//leaf.png")
-    monkeypatch.setattr(farm, "approve", lambda *_: _files(shot.parent, "leaf.png", size=4))
+    monkeypatch.setattr(bundle, "approve", lambda *_: _files(shot.parent, "leaf.png", size=4))
     assert _run(tmp_path / "job", "--copy") == 1
     assert "leaf.png has grown" in _error(capfd)
     assert not (tmp_path / "job").exists()
@@ -312,7 +315,7 @@ def test_what_no_worker_could_render(shot, tmp_path, capfd, spoil, says):
 
 def test_no_frames_and_frames_named_twice(shot, tmp_path, capfd):
     with pytest.raises(errors.SceneError, match="No frames"):
-        farm_template.frame_expression([(5, 4, 1)])
+        template.frame_expression([(5, 4, 1)])
     assert _run(tmp_path / "job", "--frames", "1-4,3") == 1
     assert "Frame 3 occurs twice" in _error(capfd)
     assert _run(tmp_path / "job", "--frames", "9-2") == 2
@@ -324,11 +327,11 @@ def test_lists_of_very_many_frames():
     """A frame that occurs twice is found at once, and none are counted that Blender does not have."""
     begun = time.process_time()
     with pytest.raises(errors.SceneError, match="Frame 300000 occurs twice"):
-        farm_template.frame_expression([(1, 300_000, 1), (300_000, 300_000, 1)])
+        template.frame_expression([(1, 300_000, 1), (300_000, 300_000, 1)])
     with pytest.raises(ValueError, match="again and again"):
-        farm_template.frame_runs(",".join(["0-1048574"] * 10_000))
+        frames.frame_runs(",".join(["0-1048574"] * 10_000))
     with pytest.raises(ValueError, match=r"^9{57}\.\.\. is not a range"):
-        farm_template.frame_runs("9" * 100_000)
+        frames.frame_runs("9" * 100_000)
     assert time.process_time() - begun < 5
 
 
@@ -349,7 +352,7 @@ def test_a_failure_leaves_nothing_behind(shot, tmp_path, capfd, monkeypatch):
     def no_space(*_):
         raise OSError(28, "No space left on device", "x.zip")
 
-    monkeypatch.setattr(farm, "write_zip", no_space)
+    monkeypatch.setattr(bundle, "write_zip", no_space)
     assert _run(tmp_path / "job") == 1
     assert "No space left" in _error(capfd)
     assert not (tmp_path / "job").exists()
@@ -367,18 +370,18 @@ RUNS = st.lists(
 
 @given(RUNS)
 def test_an_expression_names_the_frames_that_it_was_made_of(runs):
-    numbers = farm_template.frame_numbers(runs)
+    numbers = frames.frame_numbers(runs)
     if len(set(numbers)) < len(numbers):
         return
-    assert farm_template.frame_numbers(farm_template.frame_runs(farm_template.frame_expression(runs))) == numbers
+    assert frames.frame_numbers(frames.frame_runs(template.frame_expression(runs))) == numbers
 
 
 @pytest.mark.parametrize("text", ["", "a", "1-", "3-1", "1-9:0", "1..4", "1-9:-1", "1,,2"])
 def test_other_expressions_are_refused(text):
     with pytest.raises(ValueError, match="not a range of frames"):
-        farm_template.frame_runs(text)
+        frames.frame_runs(text)
 
 
 def test_a_name_is_no_variable():
-    assert farm_template.job_name("a{{Param.X}}\n") == "a Param.X (TetFlora)"
-    assert len(farm_template.job_name("x" * 500)) == 128
+    assert template.job_name("a{{Param.X}}\n") == "a Param.X (TetFlora)"
+    assert len(template.job_name("x" * 500)) == 128

@@ -13,7 +13,7 @@ from tetflora_addon.blender import compat
 from tetflora_addon.blender.materials import blade, materials, nodes
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.leaves.models import LEAF_MODELS
-from tetflora_addon.subplants.leaf_copies import LeafCopies
+from tetflora_addon.subplants.leaf_meshes import LeafCopies
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 

@@ -10,7 +10,6 @@ import pytest
 
 from tests.blender.scenes import add_mesh, select
 from tetflora_addon.blender.placing import brush, distances, rules
-from tetflora_addon.blender.placing.populations import add_population
 from tetflora_addon.species import catalogue
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -109,27 +108,6 @@ def test_densities_and_sizes_count():
     assert distances.distance_of(settings) == pytest.approx(2.0 * alone, rel=0.05)
     settings.by_density, settings.density = True, 2000.0
     assert distances.distance_of(settings) < 0.6
-
-
-def test_populations_of_older_files_keep_distance_and_species():
-    scene = bpy.context.scene
-    population = add_population(scene)
-    # As a file from before has it: the distance stored or at its default, and no note of where it comes from.
-    population.property_unset("distance_from")
-    population.mix.clear()
-    assert population.distance_from == 'UNSET'
-    population.property_unset("min_distance")
-    assert not population.distance_by_species
-    assert distances.distance_of(population) == 2.0
-    assert rules.rules_from(population)[1] == (catalogue.FIRST_BEFORE,)
-    new = add_population(scene)
-    assert rules.rules_from(new)[1] == (catalogue.FIRST,)
-    painted = scene.tetflora.brush
-    assert painted.distance_by_species
-    painted.strokes = 3
-    assert not painted.distance_by_species
-    assert distances.distance_of(painted) == 1.0
-    assert painted.species_choice == catalogue.FIRST_BEFORE
 
 
 def test_the_brush_follows_what_it_paints():

@@ -313,7 +313,6 @@ def test_habitats_are_written_to_files_and_read_again(tmp_path):
     assert [(e.species, e.habitat, e.shed_by) for e in read.mix] == [
         (e.species, e.habitat, e.shed_by) for e in _group().populations[1].mix
     ]
-    assert "habitat" not in population_files.as_data([_group().populations[0]])["populations"][0]["species"][0]
 
 
 def test_large_ground_has_no_more_plants_than_blender_bears():

@@ -69,7 +69,7 @@ def _places(objects):
 
 
 def test_populate_makes_a_population_that_knows_its_settings():
-    ground = _populate(count=25, seed=6, slope_limit=0.5, scale_min=0.4, scale_max=0.6)
+    ground = _populate(count=25, seed=6, slope_max=0.5, scale_min=0.4, scale_max=0.6)
     population = _active()
     assert (population.count, population.seed, population.made) == (25, 6, 25)
     assert population.slope_max == pytest.approx(0.5)

@@ -13,10 +13,9 @@ from tests.blender.renders import picture, small_scene
 from tests.blender.scenes import depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.attributes import face_offsets, members, read, values_of, write
-from tetflora_addon.blender.results.cluster_meshes import AssetMeshes, cluster_mesh_steps
+from tetflora_addon.blender.results.cluster_meshes import AssetMeshes, SurfaceArrays, cluster_mesh_steps, read_mesh
 from tetflora_addon.blender.results.collection import Results
 from tetflora_addon.blender.results.instances import add_cluster, add_cluster_instances
-from tetflora_addon.blender.results.surface_arrays import read_surface
 from tetflora_addon.jobs import at_once
 
 ENGINES = ["CYCLES", compat.eevee_engine()]
@@ -92,6 +91,13 @@ def clusters_of(asset, number, seed=1):
     for n in range(number):
         meshes.append(at_once(cluster_mesh_steps(asset, f"cluster {n}", part[which == n], face[which == n])))
     return meshes
+
+
+def read_surface(evaluated: bpy.types.Object) -> SurfaceArrays:
+    try:
+        return read_mesh(evaluated.to_mesh(), [slot.material.original for slot in evaluated.material_slots] or [None])
+    finally:
+        evaluated.to_mesh_clear()
 
 
 def shown(meshes):

@@ -13,10 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.engine.assets import trees
-from tetflora_addon.assets.asset import MESH_FACES, Asset
+from tetflora_addon.assets.asset import MESH_FACES, Asset, AssetSource
 from tetflora_addon.assets.compiled import compile_asset
-from tetflora_addon.assets.measures import through_both_sides
-from tetflora_addon.assets.source import AssetSource
 from tetflora_addon.errors import TetFloraError
 
 KINDS = sorted(trees.SOURCES)
@@ -193,22 +191,6 @@ def test_closed_leaves_are_bodies_and_trunks_are_wood() -> None:
     kinds = whole.take(whole.parent == 0)
     assert len(kinds) == 2 and ((kinds.body_area == 0) ^ (kinds.body_area == kinds.wood_area)).all()
     assert not asset.leaves_of(int(np.flatnonzero((whole.parent == 0) & (whole.body_area == 0))[0]))
-
-
-@given(st.floats(0, 1), st.floats(0, 1))
-def test_light_through_both_sides_is_the_sum_of_all_ways(albedo: float, through: float) -> None:
-    """Nothing is gained, and the series is summed by hand."""
-    colour, out = through_both_sides(np.full((1, 3), albedo), np.array([through]))
-    r, t = albedo * (1 - through), albedo * through
-    back, passed, light = r, 0.0, t
-    for _ in range(400):
-        passed += light * t
-        light *= r
-        back += light * t
-        light *= r
-    assert colour[0] == pytest.approx(back + passed, abs=1e-3)
-    assert (out * colour[:, 0])[0] == pytest.approx(passed, abs=1e-3)
-    assert 0.0 <= colour[0, 0] <= 1.0 + 1e-6 and 0.0 <= out[0] <= 1.0 + 1e-6
 
 
 @given(st.integers(0, 2**31))

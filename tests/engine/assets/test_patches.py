@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.engine.assets import trees
+from tetflora_addon.assets.asset import AssetSurface
 from tetflora_addon.assets.patches import MOST_FACES, Patches, islands, patches_of
-from tetflora_addon.assets.source import AssetSurface
 
 
 def check(one: AssetSurface) -> Patches:

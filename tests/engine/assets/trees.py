@@ -10,9 +10,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tetflora_addon.assets.asset import Asset
+from tetflora_addon.assets.asset import Asset, AssetSource, AssetSurface
 from tetflora_addon.assets.compiled import compile_asset
-from tetflora_addon.assets.source import AssetSource, AssetSurface
 
 GREEN, BROWN = (0.1, 0.3, 0.05), (0.2, 0.12, 0.08)
 

@@ -108,3 +108,16 @@ def test_widths_are_of_leaves_alone() -> None:
     bare = replace(flora, leaf_count=np.zeros_like(flora.leaf_count))
     assert Transition(flora, camera, 1e-6).of_branches(branches).min() == 1.0
     assert Transition(bare, camera, 1e-6).of_branches(branches).max() == 0.0
+
+
+def test_large_leaves_of_a_leader_are_themselves() -> None:
+    """What a branch bears decides by its own size, not by the smaller leaves of all that grows on it."""
+    flora = support.compiled(support.shipped("spruce"))
+    leaders = trunks(flora.rows, support.grove(6, 3.0))
+    camera = scene()[1]
+    size = flora.rows["leaf_size"][leaders.row, 0] * flora.leaf.width[leaders.row]
+    assert (size > 3.0 * flora.leaf_width[leaders.row]).all()
+    limit = float((size / camera.extent_around(leaders.position)).max()) / BAND
+    transition = Transition(flora, camera, limit)
+    assert transition.of_own_leaves(leaders).max() == 1.0
+    assert transition.of_branches(leaders).max() < 0.5

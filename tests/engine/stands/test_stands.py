@@ -17,12 +17,11 @@ from tetflora_addon.errors import TetFloraError
 from tetflora_addon.jobs import at_once
 from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.species.ecology import Ecology
-from tetflora_addon.stands.change import grown
+from tetflora_addon.stands.change import grown, planted
 from tetflora_addon.stands.grow import StandSettings, begun, grow
 from tetflora_addon.stands.guilds import Guild, Guilds
 from tetflora_addon.stands.light import Crowns, LightGrid
-from tetflora_addon.stands.records import LYING, Records
-from tetflora_addon.stands.renewal import planted
+from tetflora_addon.stands.plants import LYING, Records
 from tetflora_addon.stands.site import StandSite, even_site
 
 SIDE = 40.0
@@ -175,16 +174,6 @@ def test_dense_stands_thin_themselves() -> None:
     assert -1.8 < np.polyfit(number, mass, 1)[0] < -1.2
     leaves = plants.leaf_area(guilds).sum() / 3600.0
     assert 4.5 < leaves < 8.0
-
-
-def test_plants_that_are_given_grow_on() -> None:
-    rows = records().at(60.0)
-    alive = rows.take(np.flatnonzero(rows.dead == 0))
-    bare = StandSettings(years=5, interval=0, density=0.0, recruits=0.0)
-    later = at_once(grow(half_planted(), MIXED, bare, alive))
-    later = later.take(np.flatnonzero(later.dead == 0))
-    assert 0.6 * len(alive) < len(later) <= len(alive)
-    assert later.height.mean() > 0.98 * alive.height.mean()
 
 
 @pytest.mark.parametrize(

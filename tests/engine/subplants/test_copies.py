@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tetflora_addon.growth.foliage import face_light
 from tetflora_addon.leaves.kites import leaf_kites
 from tetflora_addon.leaves.models import LEAF_MODELS
-from tetflora_addon.subplants.leaf_copies import KiteCopies, LeafCopies
+from tetflora_addon.subplants.leaf_meshes import KiteCopies, LeafCopies
 
 
 def frames(number: int, seed: int = 0) -> np.ndarray:

@@ -13,8 +13,7 @@ from tests.engine import support
 from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
 from tetflora_addon.growth.growth import radius_at
 from tetflora_addon.leaves.models import LEAF_MODELS
-from tetflora_addon.subplants.leaf_copies import LeafCopies
-from tetflora_addon.subplants.leaf_meshes import LeafMesh, leaf_meshes
+from tetflora_addon.subplants.leaf_meshes import LeafCopies, LeafMesh, leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, wood_areas
 from tetflora_addon.subplants.tubes import tube_buffers
 from tetflora_addon.subplants.twigs import twig_buffers
@@ -137,7 +136,9 @@ def test_area_of_leaves_is_that_of_the_model_times_size_squared() -> None:
             number, area = number + copies, area + support.face_areas(leaf.buffers).sum()
             single &= len(flora.forms[species][leaf.kind]) == 1
         assert number == len(size)
-        expected = (size**2 * flora.leaf.area[tips.branches.row[owner]]).sum()
+        kind = flora.rows["leaf_kind"][tips.branches.row[owner]]
+        every = [np.mean([m.area for m in models]) if models else 0.0 for models in flora.forms[species]]
+        expected = (size**2 * np.array(every)[kind]).sum()
         assert area == pytest.approx(expected, rel=1e-4 if single else 0.03)  # forms are drawn by chance
 
 
@@ -222,7 +223,7 @@ def test_twigs_show_what_their_tubes_show() -> None:
     flora = support.compiled(support.shipped("birch"))
     pieces = support.grown(flora, support.plants(3, scale=0.3))[1]
     whole = support.whole_of(flora, pieces.take(pieces.branches.row == pieces.branches.row.max()))
-    twigs, tubes = twig_buffers(flora, [whole]), tube_buffers(flora, [whole])
+    twigs, tubes = twig_buffers(flora, whole), tube_buffers(flora, [whole])
     check_topology(twigs)
     check_attributes(twigs)
     assert twigs.polygons == len(whole)
@@ -237,7 +238,24 @@ def test_twigs_show_what_their_tubes_show() -> None:
     theirs = np.abs(directions @ across.T).sum(axis=1) / 2
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.03)
     np.testing.assert_allclose(ours, theirs, rtol=0.15)  # tubes are bent
-    assert twig_buffers(flora, []) is None
+    assert twig_buffers(flora, whole.take(np.zeros(0, int))) is None
+
+
+def test_ribbons_follow_twigs_that_bend() -> None:
+    """As much area as tubes show, every face near the axis, and no hole between the parts."""
+    flora = support.compiled(support.shipped("birch"))
+    pieces = support.grown(flora, support.plants(3, scale=0.3))[1]
+    whole = support.whole_of(flora, pieces.take(pieces.branches.row == pieces.branches.row.max() - 1))
+    parts = np.clip(np.arange(len(whole)) % 5, 1, whole.lines.segments)
+    ribbons, tubes = twig_buffers(flora, whole, None, parts), tube_buffers(flora, [whole])
+    check_topology(ribbons)
+    check_attributes(ribbons)
+    assert ribbons.polygons == parts.sum()
+    area = support.face_areas(ribbons)
+    assert area.sum() == pytest.approx(support.face_areas(tubes).sum() / 2, rel=0.05)
+    ends = np.concatenate([whole.lines.knots[:, 0], whole.lines.knots[:, -1]])
+    away = np.linalg.norm(ends[:, None] - ribbons.positions[None], axis=2).min(axis=1)
+    assert (away <= np.tile(2.0 * whole.branches.radius, 2)).all()  # feet are thicker
 
 
 def test_wood_says_how_thick_it_is_at_its_base() -> None:
@@ -249,7 +267,7 @@ def test_wood_says_how_thick_it_is_at_its_base() -> None:
     faces_of = rows["sides"] * (rows["segments"] + rows["rings"])
     for mesh, faces in (
         (tube_buffers(flora, [whole]), faces_of),
-        (twig_buffers(flora, [whole]), np.ones(len(girth), int)),
+        (twig_buffers(flora, whole), np.ones(len(girth), int)),
     ):
         domain, values = mesh.attributes["tf_girth"]
         assert domain == "FACE"

@@ -132,18 +132,12 @@ def test_ranks_rise_along_every_ray(kind, window, seed, far):
 
 
 def divide_at_random(tree, rng, rounds):
-    """All ways to divide, mixed, with planes through the middle of nodes and through their vertices."""
+    """Both ways to divide, mixed; some nodes stay."""
     for _ in range(rounds):
         nodes = rng.permutation(tree.terminals())[:400]
-        way = rng.integers(0, 4, len(nodes))
+        way = rng.integers(0, 3, len(nodes))
         tree.split(nodes[way == 0])
         tree.split_by_shape(nodes[way == 1])
-        cut = nodes[way == 2]
-        weights = rng.dirichlet([1, 1, 1, 1], (len(cut), 3))
-        fixed = rng.integers(0, 3, len(cut))
-        weights = np.where(np.arange(3)[:, None] < fixed[:, None, None], np.eye(4)[:3], weights)
-        vertices = tree.vertices(cut)
-        tree.cut(cut, geometry.plane_through(weights @ vertices, vertices[:, 3]))
 
 
 @CASES
@@ -161,7 +155,7 @@ def test_any_division_fills_the_root_and_points_are_found(kind, window, seed, fa
     points = rng.uniform(*bounds, (2000, 3))
     found = tree.locate(points)
     weights = geometry.barycentric(tree.vertices(found), points)
-    # Distance from the face that is passed most, metres: rounding of planes and the tolerance of cuts.
+    # Distance from the face that is passed most, metres: rounding of planes.
     heights = 1 / np.linalg.norm(geometry.barycentric_gradients(tree.vertices(found)), axis=-1)
     assert (weights * heights).min() > -1e-6
     thick = nodes[geometry.quality(tree.vertices(nodes)) > 1e-2]
@@ -201,30 +195,16 @@ def test_both_orders_are_exact_after_any_division(kind, window, seed, far):
         assert (np.minimum.accumulate(back, axis=1) == back)[held].all()
 
 
-def test_eight_and_cut_hang_where_they_say():
-    camera, bounds, rng = view("PERSP", "middle", 1)
+def test_eight_hang_where_they_say():
+    camera, bounds, _ = view("PERSP", "middle", 1)
     tree = view_root(camera, bounds)
     nodes = tree.terminals()
-    inside = tree.inside[nodes]
-    of, rest = np.concatenate([nodes[::3], nodes[1::3]]), nodes[2::3]
+    of = np.concatenate([nodes[::3], nodes[1::3]])
     made = tree.split_by_shape(of)
     assert made.shape == (len(of), 8)
     np.testing.assert_array_equal(tree.parent[tree.parent[tree.parent[made]]], np.repeat(of[:, None], 8, axis=1))
     np.testing.assert_array_equal(tree.level[made], np.repeat(tree.level[of, None] + 3, 8, axis=1))
     np.testing.assert_array_equal(tree.inside[made[:, 0]], tree.inside[of])
-    through = tree.vertices(rest).mean(axis=1)
-    normals = rng.normal(size=(len(rest), 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    planes = np.column_stack([normals, -np.sum(normals * through, axis=1)])
-    planes[0, 3] += 1e6
-    terminals, pieces = tree.cut(rest, planes)
-    assert terminals[pieces.owner == 0].tolist() == [rest[0]] and not pieces.divided[0]
-    assert pieces.divided[1:].all()
-    np.testing.assert_array_equal(tree.vertices(terminals), pieces.vertices)
-    np.testing.assert_array_equal(tree.planes(rest[1:]), planes[1:])
-    np.testing.assert_array_equal(tree.inside[terminals], inside[2::3][pieces.owner])
-    assert set(terminals) <= set(tree.terminals())
-    np.testing.assert_array_equal(tree.locate(pieces.vertices.mean(axis=1)), terminals)
 
 
 def test_bisection_does_not_make_slivers():
@@ -270,23 +250,15 @@ def test_only_terminal_tetrahedra_are_split_and_only_once():
     with pytest.raises(ValueError, match="terminal"):
         tree.split([0])
     below = tree.terminals()[:1]
-    plane = np.array([[1.0, 0, 0, -9]])
-    for divide in (
-        tree.split_by_shape,
-        lambda nodes: tree.cut(nodes, np.repeat(plane, len(nodes), 0)),
-    ):
-        with pytest.raises(ValueError, match="terminal"):
-            divide([0])
-        with pytest.raises(ValueError, match="only once"):
-            divide(np.repeat(below, 2))
+    with pytest.raises(ValueError, match="terminal"):
+        tree.split_by_shape([0])
+    with pytest.raises(ValueError, match="only once"):
+        tree.split_by_shape(np.repeat(below, 2))
     with pytest.raises(ValueError, match="region"):
         TetrahedralTree().split_by_shape([0])
     assert tree.split_by_shape(np.zeros(0, int)).shape == (0, 8)
-    assert len(tree.cut(np.zeros(0, int), np.zeros((0, 4)))[0]) == 0
     with pytest.raises(ValueError, match="region"):
         TetrahedralTree().split([0])
-    with pytest.raises(ValueError, match="region"):
-        TetrahedralTree().cut([0], plane)
     with pytest.raises(ValueError, match="eye or a direction"):
         tree.order()
 

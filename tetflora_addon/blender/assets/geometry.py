@@ -10,26 +10,16 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...assets.source import AssetSource, AssetSurface
+from ...assets.asset import AssetSource, AssetSurface
 from ...errors import SceneError
+from ...jobs import mapped
 from ..attributes import members, read
 from ..materials.face_looks import FaceReader
 from .baked_looks import BakeInput, bake_steps
-from .parts import AssetPart
-from .target import Target, digest_of_parts
+from .parts import AssetPart, Target, digest_of_parts
 
 #: Triangles whose corners become vertices at once.
 _TRIANGLES = 1 << 18
-
-
-def read_source(target: Target, depsgraph: bpy.types.Depsgraph, *, bake: bool = False) -> AssetSource:
-    """As `read_source_steps`, at once and without the warnings."""
-    steps = read_source_steps(target, depsgraph, bake=bake)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return stop.value[0]
 
 
 def read_source_steps(
@@ -64,7 +54,7 @@ def read_source_steps(
     shown: list[AssetPart] = []
     for number, part in enumerate(parts):
         steps = _surface_steps(part, depsgraph, reader, bake)
-        surface = yield from _between(steps, number / len(parts), (number + 1) / len(parts))
+        surface = yield from mapped(steps, lambda done, before=number: (before + done) / len(parts))
         if surface is not None:
             surfaces.append(surface)
             shown.append(part)
@@ -87,18 +77,6 @@ def read_source_steps(
             "make them"
         )
     return source, tuple(reader.warnings)
-
-
-def _between(
-    steps: Generator[float, None, AssetSurface | None], start: float, end: float
-) -> Generator[float, None, AssetSurface | None]:
-    """The same steps as a part of a larger job."""
-    while True:
-        try:
-            done = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield start + done * (end - start)
 
 
 def _surface_steps(

@@ -15,10 +15,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import srgb_of
 from ..attributes import members, read
 from ..materials.means import GREY, Looks
 from ..species.asset_species import PICTURE_SIDE
-from .target import Target
+from .parts import Target
 
 _POINTS = 60_000  # of a picture
 _TRIANGLES = 200_000  # of one mesh that are looked at
@@ -257,7 +258,5 @@ def _drawn(
     small = picture.reshape(PICTURE_SIDE, _FINER, PICTURE_SIDE, _FINER, 4).mean(axis=(1, 3))
     with np.errstate(invalid="ignore"):
         small[..., :3] = np.nan_to_num(small[..., :3] / small[..., 3:])
-    small[..., :3] = np.where(
-        small[..., :3] <= 0.0031308, 12.92 * small[..., :3], 1.055 * small[..., :3] ** (1 / 2.4) - 0.055
-    )
+    small[..., :3] = srgb_of(small[..., :3])
     return np.round(255.0 * small).astype(np.uint8)

@@ -23,7 +23,7 @@ from ..scene.objects import DEEPEST, ONE_BY_ONE, SURFACE_TYPES, has_nodes, rende
 from ..scene.plants import AssetPlants, read_asset_plants
 from ..scene.scatterers import is_scatter
 from ..species.asset_species import TetFloraAssetSpecies, asset_species
-from .target import Target
+from .parts import Target
 
 #: Instances up to which something that has nothing else is a group of assets; what has more is an asset of many parts.
 MOST_IN_GROUP = 256
@@ -83,13 +83,10 @@ class Scatter:
     places : list of Places
     left : dict of str to int
         Instances that are no assets, by name and number: empties, lights, cameras and volumes.
-    own_faces : bool
-        Whether the object shows a surface of its own, such as the ground that it scatters on.
     """
 
     places: list[Places] = field(default_factory=list)
     left: dict[str, int] = field(default_factory=dict)
-    own_faces: bool = False
 
 
 def read_places(
@@ -265,12 +262,7 @@ class _Walk:
                 matrices, keys = matrices[whole], keys[whole]
             if len(keys):
                 places.append(Places(target, self.owner, matrices, keys))
-        return Scatter(places, self.left, self._own_faces())
-
-    def _own_faces(self) -> bool:
-        if self.owner.type not in SURFACE_TYPES or (geometry := self._geometry(self.owner)) is None:
-            return False
-        return _has_surface(geometry)
+        return Scatter(places, self.left)
 
     def shown(self, obj: bpy.types.Object, places: NDArray[np.float64], keys: NDArray, depth: int = 0) -> None:
         """Take what an object instances."""

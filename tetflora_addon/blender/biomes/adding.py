@@ -18,13 +18,13 @@ import bpy
 
 from ...errors import SceneError, TetFloraError
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress
+from ...jobs import Progress, mapped
 from ...species.fallen import KIND as FALLEN_LEAVES
 from ...species.litter import FALLEN
 from ..placing.cover import fallen_from
 from ..placing.plant_objects import remove_fields
 from ..placing.population_data import fill_population
-from ..placing.populations import add_population, make_plants_steps, remove_population
+from ..placing.populations import add_population, free_name, make_plants_steps, remove_population
 from ..placing.rules import set_grounds
 from ..runtime import GoneError, JobData, guarded, is_there
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
@@ -92,7 +92,7 @@ def _add_steps(
         renamed = _own_species(scene, biome)
         group, uid = scene.tetflora, uuid.uuid4().hex
         made = group.biomes.add()
-        made.uid, made.name, made.source = uid, _free_name(scene, biome.name), biome.identifier
+        made.uid, made.name, made.source = uid, free_name(group.biomes, biome.name), biome.identifier
         made.gives_way = biome.gives_way
         made.data = json.dumps({"ground": biome.ground, "season": biome.season}, ensure_ascii=False)
         for obj in grounds:
@@ -230,13 +230,8 @@ def _within(
     steps: Generator[Progress, object, _Result], begin: float, end: float, title: str
 ) -> Generator[Progress, object, _Result]:
     """Steps that are a part of others."""
-    while True:
-        try:
-            step = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        message = f"{title}: {step.message}"
-        yield replace(step, fraction=begin + (end - begin) * step.fraction, message=message)
+    part = end - begin
+    return mapped(steps, lambda s: replace(s, fraction=begin + part * s.fraction, message=f"{title}: {s.message}"))
 
 
 def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
@@ -270,13 +265,6 @@ def _make_litter(scene: bpy.types.Scene, entry: bpy.types.PropertyGroup) -> None
         kind = next((k for k in (*FALLEN, FALLEN_LEAVES) if entry.species.endswith(f"_{k}")), "")
         made = fallen_from(scene, entry.shed_by, kind) if kind else ""
         entry.species = made or entry.species
-
-
-def _free_name(scene: bpy.types.Scene, name: str) -> str:
-    taken, number = {biome.name for biome in scene.tetflora.biomes}, 1
-    while (free := name if number == 1 else f"{name}.{number:03d}") in taken:
-        number += 1
-    return free
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from ...planting.plane import gradient_noise
 from ..attributes import world_matrix
 from ..materials.soil import is_soil, may_have_soil, put_soil, soil_material
 from ..placing.populations import own_objects
-from ..placing.terrain import read_ground
+from ..placing.terrain import grid_mesh, read_ground
 from ..scene.crowns import crown_for
 from ..scene.fields import fields_of, read_field
 from .biome import GROUND, data_of
@@ -62,13 +62,7 @@ def make_land(scene: bpy.types.Scene, ground: Mapping[str, Any], seed: int = 0) 
     """A hectare of land around the 3D cursor."""
     along = np.arange(-SIDE / 2, SIDE / 2 + 0.1, STEP)
     x, y = np.meshgrid(along, along)
-    points = np.stack([x, y, heights(x, y, ground, seed)], axis=2).reshape(-1, 3)
-    number = len(along)
-    first = (np.arange(number - 1)[:, None] * number + np.arange(number - 1)).reshape(-1)
-    faces = np.stack([first, first + 1, first + number + 1, first + number], axis=1)
-    mesh = bpy.data.meshes.new(NAME)
-    mesh.from_pydata(points.tolist(), [], faces.tolist(), shade_flat=False)
-    land = bpy.data.objects.new(NAME, mesh)
+    land = bpy.data.objects.new(NAME, grid_mesh(NAME, np.stack([x, y, heights(x, y, ground, seed)], axis=2)))
     land.location = scene.cursor.location
     land.tetflora.is_occluder = True
     scene.collection.objects.link(land)

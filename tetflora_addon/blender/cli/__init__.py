@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line and bundles for render farms."""
+"""The command line."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``blender scene.blend --command tetflora refine|render|stats|farm``: TetFlora for scripts and render farms.
+"""``blender scene.blend --command tetflora refine|render|stats``: TetFlora for scripts and render farms.
 
 Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An error is one line on stderr. With
 ``--json`` the last line on stdout is a JSON object, after Blender's own output.
@@ -27,22 +27,20 @@ from ..properties import TetFloraScene
 from ..runtime import failed_frames
 from ..saved_files import damaged, write_blend
 from ..scene.camera import read_camera
-from .farm import LIMIT_GB, write_bundle
-from .farm_template import LAST_FRAME, Run, frame_numbers, frame_runs
+from .frames import LAST_FRAME, Run, frame_numbers, frame_runs
 
 NAME = "tetflora"
 #: Largest number of samples in Cycles.
 _MAX = 1 << 24
-#: Warnings of a kind that are printed one by one.
-_WARNINGS = 20
 
 _command: Any = None
 
 
-class _Parser(argparse.ArgumentParser):
+class Parser(argparse.ArgumentParser):
     """Reports errors in one line, like all others."""
 
     def error(self, message: str) -> None:
+        """End with the message and the exit code of wrong arguments."""
         raise SystemExit(_fail(f"{message}; see --help", 2))
 
 
@@ -59,8 +57,13 @@ def main(arguments: Sequence[str]) -> int:
     int
         Exit code, see above.
     """
+    return run(_parser(), arguments)
+
+
+def run(parser: Parser, arguments: Sequence[str]) -> int:
+    """Run what the option ``run`` of a parser names, and print its figures; returns the exit code."""
     try:
-        options = _parser().parse_args(list(arguments))
+        options = parser.parse_args(list(arguments))
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 0
     try:
@@ -86,14 +89,14 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = Parser(
         prog=f"blender FILE --command {NAME}",
         description="Refine and render the plants of a scene, in the file that Blender has opened.",
     )
-    commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats|farm")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats")
 
     refining = commands.add_parser("refine", help="create meshes of the plants for the scene camera")
-    refining.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="override the Cutoff of the scene")
+    refining.add_argument("--cutoff", type=positive, metavar="PIXELS", help="override the Cutoff of the scene")
     refining.add_argument("--save", metavar="PATH", help="save a copy of the file with the results")
     refining.set_defaults(run=_refine)
 
@@ -102,9 +105,9 @@ def _parser() -> argparse.ArgumentParser:
     which.add_argument(
         "--frame", type=_frame, metavar="N", help="frame to render (default: current frame of the scene)"
     )
-    which.add_argument("--frames", type=_frames, metavar="A-B", help="frames to render, like 1-24, 1-99:2 or 3,7-9")
+    which.add_argument("--frames", type=frames, metavar="A-B", help="frames to render, like 1-24, 1-99:2 or 3,7-9")
     render.add_argument("--engine", choices=("cycles", "eevee"), help="override the render engine of the scene")
-    render.add_argument("--samples", type=_whole, metavar="N", help="override the number of samples per pixel")
+    render.add_argument("--samples", type=whole, metavar="N", help="override the number of samples per pixel")
     render.add_argument("--output", metavar="PATH", help="output folder or file name; #### is the frame")
     about = "render existing images again, even if Overwrite is off in the scene"
     render.add_argument("--overwrite", action="store_true", help=about)
@@ -115,22 +118,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     stats.set_defaults(run=_stats)
 
-    farm = commands.add_parser("farm", help="write a job for a render farm (Open Job Description)")
-    farm.add_argument("folder", type=Path, metavar="OUT_DIR", help="new or empty folder for the job")
-    farm.add_argument("--chunk", type=_whole, default=1, metavar="N", help="frames that a worker renders per task")
-    farm.add_argument("--frames", type=_frames, metavar="A-B", help="frames of the job (default: those of the scene)")
-    farm.add_argument("--copy", action="store_true", help="copy the file and its assets into the job")
-    about = "include files that lie outside the folder of the .blend"
-    farm.add_argument("--outside", action="store_true", help=about)
-    about = "refuse a job whose files are larger together (default: %(default)g)"
-    farm.add_argument("--max-size", type=_positive, default=LIMIT_GB, metavar="GB", help=about)
-    farm.set_defaults(run=_farm)
-
     for command in (refining, render):
         command.add_argument("--form", choices=_choices("proxy_form"), help="override the proxy form of the scene")
         about = "override the Lighting of the scene"
         command.add_argument("--baked-light", choices=_choices("baked_light"), help=about)
-    for command in (refining, render, stats, farm):
+    for command in (refining, render, stats):
         command.add_argument("--json", action="store_true", help="print statistics as a JSON object in the last line")
     return parser
 
@@ -202,34 +194,6 @@ def _stats(_options: argparse.Namespace) -> dict:
     return {name: getattr(statistics, name) for name in ("plants", "polygons_full", "instances")}
 
 
-def _farm(options: argparse.Namespace) -> dict:
-    written = write_bundle(
-        bpy.context.scene,
-        options.folder,
-        options.chunk,
-        options.frames,
-        options.copy,
-        options.outside,
-        options.max_size * 1e9,
-        lambda text: print(text, flush=True),
-    )
-    for key, what, remedy in (
-        ("missing", "missing file", ""),
-        ("skipped", "not a file that Blender reads, so not in the job", ""),
-        (
-            "absolute_paths",
-            "absolute path",
-            "; use File > External Data > Make Paths Relative if other machines cannot access it",
-        ),
-    ):
-        for number, path in enumerate(written[key]):
-            if number == _WARNINGS:
-                print(f"tetflora: warning: {what}: {len(written[key]) - number:,} more", file=sys.stderr, flush=True)
-                break
-            print(f"tetflora: warning: {what}: {path}{remedy}", file=sys.stderr, flush=True)
-    return written
-
-
 def _check_file() -> None:
     """Refuse to go on where Blender could not open the file, and would render its default cube instead.
 
@@ -238,7 +202,11 @@ def _check_file() -> None:
     SceneError
         The command line names a file, and none is open.
     """
-    named = [text for text in takewhile(lambda text: text != "--command", sys.argv) if re.search(r"\.blend\d*$", text)]
+    named = [
+        text
+        for text in takewhile(lambda text: text not in ("--command", "--"), sys.argv)
+        if re.search(r"\.blend\d*$", text)
+    ]
     if named and not bpy.data.filepath:
         raise SceneError(f"{named[-1]} cannot be opened; see Blender's message above")
 
@@ -298,14 +266,16 @@ def _choices(name: str) -> list[str]:
     return [item.identifier.lower() for item in TetFloraScene.bl_rna.properties[name].enum_items]
 
 
-def _positive(text: str) -> float:
+def positive(text: str) -> float:
+    """A number greater than 0 of an option."""
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not a number greater than 0")
     return value
 
 
-def _whole(text: str) -> int:
+def whole(text: str) -> int:
+    """A whole number from 1 of an option."""
     value = int(text)
     if not 1 <= value <= _MAX:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to {_MAX:,}")
@@ -319,7 +289,8 @@ def _frame(text: str) -> int:
     return value
 
 
-def _frames(text: str) -> list[Run]:
+def frames(text: str) -> list[Run]:
+    """Runs of frames of an option."""
     try:
         return frame_runs(text)
     except ValueError as error:

@@ -16,18 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...assets import kept
-from ...assets.asset import Asset, AssetTable, Instances
+from ...assets.asset import Asset, AssetSource, AssetTable, Instances
 from ...assets.compiled import compile_steps
-from ...assets.source import AssetSource
 from ...camera.camera import Camera
 from ...emission.asset_costs import AssetCosts
 from ...emission.asset_plan import Keeping
 from ...errors import SceneError, TetFloraError
-from ...jobs import Progress
+from ...jobs import Progress, at_once, mapped
 from ...refinement.asset_parts import PlacedAssets
 from ..assets.geometry import read_source_steps
+from ..assets.parts import Target, digest_of
 from ..assets.places import Places
-from ..assets.target import Target, digest_of
 from ..results.hiding import hidden_originals, originals_shown
 from ..worker import steps_in_thread
 
@@ -178,7 +177,8 @@ def _compiled(
         asset = kept.find(digest)
         if asset is None and hidden:
             # While results hide what shows the asset, it is evaluated in here only.
-            source = _read(read_source_steps(target, depsgraph, bake=bake), warnings)
+            source, told = at_once(read_source_steps(target, depsgraph, bake=bake))
+            warnings += told
     if asset is not None:
         return asset
     if source is None:
@@ -192,29 +192,11 @@ def _compiled(
                 break
             yield Progress(progress.fraction, f'Reading "{target.name}": {done:.0%}')
             depsgraph.update()  # reading what was deleted since the last step would crash Blender
+    fraction = progress.fraction
+    compiling = mapped(compile_steps(source), lambda done: Progress(fraction, f'Compiling "{source.name}": {done:.0%}'))
     try:
-        asset = yield from steps_in_thread(_compiling(source, progress.fraction), progress)
+        asset = yield from steps_in_thread(compiling, progress)
     except TetFloraError as error:
         raise SceneError(str(error)) from None
     kept.keep(asset)
     return asset
-
-
-def _read(steps: Generator[float, None, tuple[AssetSource, tuple[str, ...]]], warnings: list[str]) -> AssetSource:
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            source, told = stop.value
-            warnings += told
-            return source
-
-
-def _compiling(source: AssetSource, fraction: float) -> Generator[Progress, None, Asset]:
-    steps = compile_steps(source)
-    while True:
-        try:
-            done = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield Progress(fraction, f'Compiling "{source.name}": {done:.0%}')

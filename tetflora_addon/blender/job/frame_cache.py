@@ -20,7 +20,7 @@ from ...camera.view_cells import Around, ViewCells, cell_camera
 from ...growth.crown_forms import farthest
 from ...species.species import Species
 from ..assets.measures import reach_of
-from ..assets.target import digest_of
+from ..assets.parts import digest_of
 from ..compat import drawn_disc
 from ..materials.snow import has_snow
 from ..results.hiding import hidden_originals, hide_originals, name_of, object_named, show_originals

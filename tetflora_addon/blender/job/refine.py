@@ -45,11 +45,10 @@ from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..worker import at_once, call_in_thread, nobody_waits, steps_in_thread
-from .asset_writing import write_assets, write_plain
+from .asset_writing import bake_light, write_assets, write_blocks, write_plain, write_polygons
 from .assets import Bound, asset_warnings, bind_steps, is_plain
 from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
 from .limits import check_expanded, use_machine
-from .writing import bake_light, write_blocks, write_polygons
 
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_FRACTION = 0.6

@@ -19,8 +19,6 @@ import bpy
 from ...light.scattering import GLOSS, THROUGH_TINT
 from .nodes import LEAF_GREEN, Graph, find_socket, shader_group, smooth_step
 
-BLADE = "TetFlora Leaf Blade"
-
 # Raise this when nodes or numbers change; `blade_version` then makes new materials as well.
 _VERSION = 2
 

@@ -6,25 +6,291 @@ A triangle is divided into smaller ones of equal size, as many as it covers texe
 each, shaders and nodes are evaluated (`surface_shaders`, `node_values`), and images are means over a piece as large as
 it (`image_pyramids`). Triangles with the same texture coordinates, as those of a leaf that was copied thousands of
 times, are evaluated once.
+
+Where on the triangles of a mesh a material is evaluated, and how many points that takes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterable
+from dataclasses import dataclass, field
+from functools import cache
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...growth.hashing import mix
 from ..attributes import read, values_of
 from ..compat import tree_in_use
-from .colour_maths import luminance
-from .look_points import Known, MeshLayers, Plan, find_out
-from .means import GREY, Look
-from .node_values import Notes
+from .colour_maths import Values, luminance
+from .image_pyramids import Pyramid, Pyramids
+from .means import GREY, Look, Looks
+from .node_values import NodeValues, Notes, NotUnderstood
 from .nodes import active_output, find_socket, upstream
 from .surface_shaders import SurfaceShaders
+
+Shade = tuple[Values, Values, Values]
+
+#: Parts along an edge, at most; texels of the finest image along an edge of a part, about. Where steps, or several
+#: images, make the mean of what nodes get something else than the mean of what comes out, single texels are looked at.
+_MOST_PARTS, _MOST_PARTS_UNEVEN = 32, 64
+_TEXELS, _TEXELS_UNEVEN = 8.0, 3.0
+#: Texture coordinates and colours that differ by less are the same.
+_SAME = 1.0 / (1 << 14)
+
+
+@dataclass
+class Known:
+    """What is kept from one material to the next: images, means, and tables of ramps."""
+
+    pyramids: Pyramids = field(default_factory=Pyramids)
+    looks: Looks = field(default_factory=Looks)
+    curves: dict[int, NDArray[np.float32]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class MeshLayers:
+    """Attributes of a mesh: the UV map that renders first, '' if there is none, and types by name."""
+
+    first: str
+    types: dict[str, str]
+
+    def map_named(self, name: str) -> str:
+        """The UV map that a name stands for: the first one if there is no such map."""
+        return name if self.types.get(name) == 'FLOAT2' else self.first
+
+
+@dataclass
+class Plan:
+    """How one material is evaluated on one mesh.
+
+    Attributes
+    ----------
+    name : str
+        Of the material, for messages.
+    notes : Notes
+    constant : (5,) float32
+        Cover, colour times cover, and the lightness of what goes through; of where all has its mean, if it varies.
+    shade : callable, optional
+        What its shaders do with light at some points: cover, colour times cover, lightness of what goes through;
+        None if it has none.
+    known : bool
+        Whether its transmission is.
+    maps, colours : list of str
+        UV maps and other attributes that it depends on.
+    texels : float
+        Of the finest image, along a unit of texture coordinates.
+    uneven : bool
+        Whether it is not the mean that comes out for the mean.
+    """
+
+    name: str
+    notes: Notes
+    constant: NDArray[np.float32]
+    shade: Callable[[NodeValues], Shade | None] | None = None
+    known: bool = True
+    maps: list[str] = field(default_factory=list)
+    colours: list[str] = field(default_factory=list)
+    texels: float = 1.0
+    uneven: bool = False
+
+    @property
+    def names(self) -> list[str]:
+        """Attributes that it depends on; none where it is the same everywhere."""
+        return [*self.maps, *(name for name in self.colours if name not in self.maps)]
+
+    def sampled(self, corners: dict[str, NDArray], layers: MeshLayers, known: Known, most: int) -> NDArray:
+        """Means over some triangles (t, 5) float32, as `constant`.
+
+        Parameters
+        ----------
+        corners : mapping of str to (t, 3, width) float32
+            Of each attribute in `names`, at the corners of the triangles.
+        layers : MeshLayers
+        known : Known
+        most : int
+            Points of all distinct triangles, about.
+        """
+        one, which = _distinct([corners[name] for name in self.names])
+        corners = {name: values[one] for name, values in corners.items()}
+        extents = {name: _extents(corners[name]) for name in self.maps}
+        parts = self._parts([length for length, _ in extents.values()], len(one), most)
+        found = np.zeros((len(one), 5), np.float32)
+        for n in np.unique(parts).tolist():
+            rows = np.flatnonzero(parts == n)
+            step = max(1, _BATCH // (n * n))
+            for start in range(0, len(rows), step):
+                some = rows[start : start + step]
+                part = np.float32(0 if self.uneven else 1 / n)
+                sizes = {name: height[None, some] * part for name, (_, height) in extents.items()}
+                points = _Sampled(self, layers, known, {name: corners[name][some] for name in self.names}, sizes, n)
+                found[some] = _means_of(self.shade(NodeValues(points, known.curves)))
+        return found[which]
+
+    def _parts(self, lengths: list[NDArray[np.float32]], count: int, most: int) -> NDArray[np.int32]:
+        """Parts along an edge of each triangle: a power of two that follows its texels, and fewer if they are many."""
+        texels = np.max(lengths, axis=0) * self.texels if lengths else np.zeros(count, np.float32)
+        limit, each = (_MOST_PARTS_UNEVEN, _TEXELS_UNEVEN) if self.uneven else (_MOST_PARTS, _TEXELS)
+        wanted = np.clip(texels / each, 1 if self.maps else 2, limit)
+        parts = (1 << np.ceil(np.log2(wanted)).astype(np.int32)).astype(np.int32)
+        while limit > 2 and (parts.astype(np.int64) ** 2).sum() > most:
+            limit //= 2
+            parts = np.minimum(parts, limit)
+        return parts
+
+
+_BATCH = 1 << 15  # points that are evaluated at once, so that they stay in the processor's cache
+
+
+class _Probe:
+    """A point where everything has its mean; remembers what evaluating a material asks for."""
+
+    def __init__(self, plan: Plan, layers: MeshLayers, known: Known) -> None:
+        self._plan, self._layers, self._known = plan, layers, known
+        self.images: set[bpy.types.Image] = set()
+
+    def uv(self, name: str) -> tuple[Values, Values, Values]:
+        name = self._layers.map_named(name)
+        if name and name not in self._plan.maps:
+            self._plan.maps.append(name)
+        half = np.full((1, 1), 0.5, np.float32)
+        return half, half, np.ones((1, 1), np.float32)
+
+    def is_map(self, name: str) -> bool:
+        return self._layers.types.get(name) == 'FLOAT2'
+
+    def attribute(self, name: str) -> Values:
+        exists = name in self._layers.types
+        if exists and name not in self._plan.colours:
+            self._plan.colours.append(name)
+        return np.full((4, 1, 1), 0.5 if exists else 0.0, np.float32)
+
+    def pyramid(self, node: bpy.types.Node, scale: float) -> Pyramid:
+        material, image = self._plan.name, node.image
+        if image is None:
+            raise NotUnderstood(
+                f'An image of material "{material}" is missing; its viewport color stands for it. Choose an image in '
+                f'the node "{node.label or node.name}"'
+            )
+        pyramid = self._known.pyramids.of(image, node.outputs["Alpha"].is_linked)
+        if pyramid is None:
+            raise NotUnderstood(
+                f'The image "{image.name}" of material "{material}" cannot be read; the viewport color stands for it. '
+                "Find it with File > External Data > Find Missing Files"
+            )
+        if image.source == 'TILED':
+            self._plan.notes.tell(
+                f'The image "{image.name}" of material "{material}" has several tiles; the first stands for all'
+            )
+        self.images.add(image)
+        self._plan.texels = max(self._plan.texels, pyramid.side * scale)
+        return pyramid
+
+    def uneven(self) -> None:
+        self._plan.uneven = True
+
+
+class _Sampled:
+    """Points (p, k) of k triangles: the middles of n × n parts of each."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        layers: MeshLayers,
+        known: Known,
+        corners: dict[str, NDArray[np.float32]],
+        sizes: dict[str, NDArray[np.float32]],
+        n: int,
+    ) -> None:
+        self._plan, self._layers, self._known = plan, layers, known
+        self._corners, self._sizes, self._weights = corners, sizes, _middles(n)
+
+    def uv(self, name: str) -> tuple[Values, Values, Values]:
+        name = self._layers.map_named(name)
+        if not name:
+            half = np.full((1, 1), 0.5, np.float32)
+            return half, half, np.ones((1, 1), np.float32)
+        u, v = (self._weights @ self._corners[name][:, :, i].T for i in range(2))
+        return u, v, self._sizes[name]
+
+    def is_map(self, name: str) -> bool:
+        return self._layers.types.get(name) == 'FLOAT2'
+
+    def attribute(self, name: str) -> Values:
+        if name not in self._corners:
+            return np.zeros((4, 1, 1), np.float32)
+        corners = self._corners[name]
+        parts = [self._weights @ corners[:, :, i].T for i in range(corners.shape[2])]
+        if len(parts) == 1:
+            parts *= 3
+        while len(parts) < 3:
+            parts.append(np.zeros_like(parts[0]))
+        return np.stack([*parts[:3], parts[3] if len(parts) > 3 else np.ones_like(parts[0])])
+
+    def pyramid(self, node: bpy.types.Node, _scale: float) -> Pyramid:
+        pyramid = None
+        if node.image is not None:
+            pyramid = self._known.pyramids.of(node.image, node.outputs["Alpha"].is_linked)
+        if pyramid is None:
+            raise NotUnderstood("missing")  # the probe has told about it
+        return pyramid
+
+    def uneven(self) -> None:
+        pass
+
+
+def find_out(plan: Plan, layers: MeshLayers, known: Known) -> None:
+    """Evaluate a plan once where everything has its mean, and note what that takes."""
+    probe = _Probe(plan, layers, known)
+    found = plan.shade(NodeValues(probe, known.curves))
+    plan.known = found is not None
+    if found is not None:
+        plan.constant = _means_of(found)[0]
+        plan.uneven |= len(probe.images) > 1
+
+
+def _means_of(shade: Shade) -> NDArray[np.float32]:
+    """Means over the points of each triangle (k, 5); (1, 5) where all are the same."""
+    parts = [part.mean(axis=0) for part in (shade[0], *shade[1], shade[2])]
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+
+def _distinct(corners: list[NDArray[np.float32]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """One of each kind of triangle, by the values (t, 3, width) at its corners; and the kind of each."""
+    count = len(corners[0])
+    key = np.zeros(count, np.uint64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for values in corners:
+            whole = np.rint(np.clip(values.reshape(count, -1), -1e12, 1e12) * np.float32(1 / _SAME)).astype(np.int64)
+            for column in whole.view(np.uint64).T:
+                key = mix(key ^ column)
+    order = np.argsort(key)
+    key = key[order]
+    new = np.ones(count, bool)
+    new[1:] = key[1:] != key[:-1]
+    which = np.zeros(count, np.int64)
+    which[order] = np.cumsum(new) - 1
+    return order[new], which
+
+
+def _extents(uv: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Longest edge of triangles (t, 3, 2), and the height above it."""
+    edges = np.roll(uv, -1, axis=1) - uv
+    longest = np.sqrt((edges**2).sum(axis=2).max(axis=1))
+    area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    return longest, np.divide(area, longest, out=np.zeros_like(area), where=longest > 0)
+
+
+@cache
+def _middles(n: int) -> NDArray[np.float32]:
+    """Barycentric coordinates (n², 3) of the middles of equal parts of a triangle, n along each edge."""
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    up, down = i + j < n, i + j < n - 1
+    a = np.concatenate([i[up] + 1 / 3, i[down] + 2 / 3]) / n
+    b = np.concatenate([j[up] + 1 / 3, j[down] + 2 / 3]) / n
+    return np.stack([1 - a - b, a, b], axis=1).astype(np.float32)
+
 
 #: Triangles that are worked on at once.
 _TRIANGLES = 1 << 16

@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import srgb_of
 from ..compat import shader_tree
 from .nodes import Graph, find_socket
 
@@ -99,8 +100,7 @@ def _image(name: str, colours: NDArray[np.float64], green: NDArray[np.float64]) 
     image = bpy.data.images.new(name, columns, rows, alpha=True)
     image[MARK] = True
     image.alpha_mode = 'CHANNEL_PACKED'
-    linear = np.clip(colours, 0.0, 1.0)
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    encoded = srgb_of(np.clip(colours, 0.0, 1.0))
     pixels = np.concatenate([encoded, np.clip(green, 0.0, 1.0)[..., None]], axis=2)
     image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).reshape(-1))
     image.pack()

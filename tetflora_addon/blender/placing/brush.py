@@ -23,7 +23,7 @@ from ..runtime import JobData
 from ..scene.fields import fields_of, read_field
 from ..settings import check_limits
 from .canopy import not_of_covers
-from .distances import SQUARE, choose, distance_of, follows_species, painted_weights
+from .distances import SQUARE, distance_of, painted_weights
 from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
 from .plant_objects import add_field, add_plants, plants_of
@@ -175,7 +175,6 @@ class Stroke:
         self.ground = Ground(view_layer, depsgraph)
         self._data.add_objects(self.ground.objects)
         self.key = strokes.stroke_key(settings.seed, settings.strokes)
-        choose(settings, follows_species(settings))  # noted before the first stroke: old files have strokes and no note
         settings.strokes += 1
         self.dabs = self.added = self.removed = 0
         self._new: list[tuple[NDArray[np.float64], NDArray[np.uint64]]] = []

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError, TetFloraError
 from ...files import is_identifier
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress
+from ...jobs import Progress, mapped
 from ...planting.canopy import Canopy
 from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
 from ...species.fallen import KIND, leaves_page
@@ -179,21 +179,12 @@ def again(
 
 def _told(steps: Generator[float, object, Floor]) -> Generator[Progress, object, Floor]:
     """The maps, with their progress as a part of the whole."""
-    while True:
-        try:
-            yield Progress(0.05 + (_PLANTING - 0.05) * next(steps), UNDER)
-        except StopIteration as stop:
-            return stop.value
+    return mapped(steps, lambda done: Progress(0.05 + (_PLANTING - 0.05) * done, UNDER))
 
 
 def _scaled(steps: Generator[Progress, object, Made], begin: float) -> Generator[Progress, object, Made]:
     """Steps that are the last part of others."""
-    while True:
-        try:
-            step = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield replace(step, fraction=begin + (1.0 - begin) * step.fraction)
+    return mapped(steps, lambda step: replace(step, fraction=begin + (1.0 - begin) * step.fraction))
 
 
 @contextmanager

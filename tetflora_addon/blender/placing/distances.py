@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far apart plants of a population or of the brush stand: as their species need, until the artist says otherwise.
 
-``min_distance`` is the artist's own. ``distance_from`` says whether it counts; where that is not set, nobody has chosen
-anything yet, or the file is older than this choice and keeps what it meant.
+``min_distance`` is the artist's own, and ``distance_from`` says whether it counts.
 """
 
 from __future__ import annotations
@@ -27,9 +26,8 @@ HECTARE = 10_000.0
 SQUARE = 100.0
 #: Whence the distance comes, as stored.
 SOURCES = (
-    ('UNSET', "Unset", "Not chosen yet", 0),
-    ('SPECIES', "Species", "From the crowns of the species", 1),
-    ('OWN', "Own", "Set by the artist", 2),
+    ('SPECIES', "Species", "From the crowns of the species", 0),
+    ('OWN', "Own", "Set by the artist", 1),
 )
 
 
@@ -42,19 +40,6 @@ class Mixture:
     density: float | None = None
 
 
-def empty_means(settings: bpy.types.PropertyGroup) -> str:
-    """The species of a population or brush that names none: what the catalogue offers first.
-
-    In older files it is bamboo, the first by name of those days.
-
-    Raises
-    ------
-    SpeciesError
-        The catalogue is empty.
-    """
-    return default_species(before=settings.distance_from == 'UNSET' and not follows_species(settings))
-
-
 def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
     """Relative frequency of each species of a population, at least one.
 
@@ -65,9 +50,9 @@ def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
     """
     weights: dict[str, float] = {}
     for entry in population.mix:
-        identifier = entry.species or empty_means(population)
+        identifier = entry.species or default_species()
         weights[identifier] = weights.get(identifier, 0.0) + entry.weight
-    return weights or {empty_means(population): 1.0}
+    return weights or {default_species(): 1.0}
 
 
 def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
@@ -85,15 +70,12 @@ def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
     for entry in scene.tetflora.populate.mix if brush.source == 'MIX' else ():
         if entry.species:
             weights[entry.species] = weights.get(entry.species, 0.0) + entry.weight
-    return weights or {empty_means(brush): 1.0}
+    return weights or {default_species(): 1.0}
 
 
 def follows_species(settings: bpy.types.PropertyGroup) -> bool:
     """Whether a population or brush takes its distance from its species; cheap."""
-    if settings.distance_from != 'UNSET':
-        return settings.distance_from == 'SPECIES'
-    used = settings.strokes if _is_brush(settings) else settings.uid
-    return not used and not settings.is_property_set("min_distance")
+    return settings.distance_from == 'SPECIES'
 
 
 def distance_of(settings: bpy.types.PropertyGroup) -> float:

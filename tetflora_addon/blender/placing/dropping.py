@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...jobs import Progress
+from ...jobs import Progress, mapped
 from ..attributes import read, write
 from ..runtime import JobData, guarded
-from .field_edits import own_mesh
+from .field_edits import own_mesh, positions
 from .ground import Ground
 
 _STAYS = 1e-6  # metres: a smaller gap counts as standing on the ground
@@ -72,17 +72,10 @@ def _drop_steps(
         raise SceneError("No mesh is visible below or above the plants; add a ground mesh, or show it")
     data.add_objects(ground.objects)
     groups = [np.array([o.matrix_world.translation for o in plants], dtype=np.float64).reshape(-1, 3)]
-    groups += [_places(field) for field in fields]
+    groups += [positions(field) for field in fields]
     ends = np.cumsum([len(own) for own in groups])
     every = np.concatenate(groups)
-    search = ground.nearest_heights(every)
-    while True:
-        try:
-            fraction = next(search)
-        except StopIteration as stop:
-            heights = stop.value
-            break
-        yield Progress(fraction, _LOOKING)
+    heights = yield from mapped(ground.nearest_heights(every), lambda fraction: Progress(fraction, _LOOKING))
     of_plants, *of_fields = np.split(heights, ends[:-1])
     moved = _drop_plants(view_layer, plants, of_plants)
     moved += sum(_drop_field(field, own) for field, own in zip(fields, of_fields, strict=True))
@@ -110,23 +103,17 @@ def _depth(obj: bpy.types.Object) -> int:
     return 0 if obj.parent is None else 1 + _depth(obj.parent)
 
 
-def _places(field: bpy.types.Object) -> NDArray[np.float64]:
-    """Where the points (n, 3) of an editable field are in world space."""
-    world = np.array(field.matrix_world, dtype=np.float64)
-    return read(field.data, "position").astype(np.float64) @ world[:3, :3].T + world[:3, 3]
-
-
 def _drop_field(field: bpy.types.Object, heights: NDArray[np.float64]) -> int:
     """Move the points of an editable field to heights (n,); how many moved."""
-    positions, places = read(field.data, "position"), _places(field)
+    stored, places = read(field.data, "position"), positions(field)
     world = np.array(field.matrix_world, dtype=np.float64)
     # Positions are stored in single precision.
     fall = np.abs(heights - places[:, 2]) > np.maximum(_STAYS, 1e-6 * np.abs(places).max(axis=1, initial=0.0))
     if fall.any():
         places[fall, 2] = heights[fall]
         inverse = np.linalg.inv(world)
-        positions[fall] = places[fall] @ inverse[:3, :3].T + inverse[:3, 3]
+        stored[fall] = places[fall] @ inverse[:3, :3].T + inverse[:3, 3]
         mesh = own_mesh(field)
-        write(mesh, "position", positions)
+        write(mesh, "position", stored)
         mesh.update()
     return int(fall.sum())

@@ -20,7 +20,7 @@ from ..scene.field_sizes import has_history
 from ..scene.fields import FIELD_ATTRIBUTES, field_kinds, quaternions
 from ..scene.skeletons import kind_of_choice
 
-FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made, see `plant_objects`
+FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made and may remove
 
 Points = dict[str, tuple[str, NDArray]]
 

@@ -26,6 +26,7 @@ from ..species.edits import catalogue
 from ..worker import at_once
 from .cover import cover_steps
 from .plant_objects import add_plants
+from .terrain import grid_mesh
 
 Stops = tuple[tuple[float, tuple[float, float, float]], ...]
 
@@ -237,12 +238,8 @@ def _scene_for(context: bpy.types.Context) -> tuple[bpy.types.Scene, str]:
 def _ground() -> bpy.types.Object:
     xs, ys = np.arange(_WEST, _EAST + 0.1, _STEP), np.arange(_SOUTH, _NORTH + 0.1, _STEP)
     x, y = np.meshgrid(xs, ys)
-    points = np.stack([x, y, height(x, y)], axis=2).reshape(-1, 3)
-    first = (np.arange(len(ys) - 1)[:, None] * len(xs) + np.arange(len(xs) - 1)).reshape(-1)
-    faces = np.stack([first, first + 1, first + len(xs) + 1, first + len(xs)], axis=1)
-    mesh = bpy.data.meshes.new("Forest ground")
-    mesh.from_pydata(points.tolist(), [], faces.tolist(), shade_flat=False)
-    aside = np.abs(points[:, 0] - path(points[:, 1])).astype(np.float32)
+    mesh = grid_mesh("Forest ground", np.stack([x, y, height(x, y)], axis=2))
+    aside = np.abs(x - path(y)).astype(np.float32).ravel()
     write(mesh, "aside", aside)
     write(mesh, OFF_PATH, np.clip((aside - 1.2) / 2.0, 0.0, 1.0))
     ground = bpy.data.objects.new("Forest ground", mesh)

@@ -22,13 +22,13 @@ from ..scene.own_ages import stored_ages
 from ..scene.plants import single_plants
 from ..scene.skeletons import form_of, species_of
 from ..species.edits import catalogue, display_height
+from .field_edits import FIELD_MARK
 
 COLLECTION = "TetFlora plants"
 FIELD = "Field of plants"
 #: Up to this many become empties by default; with more, Blender becomes slow.
 EMPTIES_UNASKED = 10_000
 POPULATION_MARK = "tetflora_population"  # on the collection of a population's plants
-_FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made and may remove
 _MARK = "tetflora_plants"  # on the collection, so that it may be renamed
 _AT_ONCE = 300  # empties of one step, ten milliseconds
 _FEW = 1000  # plants that may get their names the way Blender does it
@@ -301,7 +301,7 @@ def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int
     number = sum(stored_size(field) for field in fields)
     for field in fields:
         field.tetflora.is_field = False
-    ours = [field for field in fields if field.get(_FIELD_MARK)]
+    ours = [field for field in fields if field.get(FIELD_MARK)]
     meshes = {field.data for field in ours}
     bpy.data.batch_remove(ours)
     bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])
@@ -314,7 +314,7 @@ def link_field(
     scene: bpy.types.Scene, field: bpy.types.Object, collection: bpy.types.Collection | None = None
 ) -> bpy.types.Object:
     """Put a field that TetFlora made into a collection; the scene's for plants if not given."""
-    field.tetflora.version, field[_FIELD_MARK] = VERSION, True
+    field.tetflora.version, field[FIELD_MARK] = VERSION, True
     (collection or plant_collection(scene)).objects.link(field)
     prepare_scene(scene)
     return field

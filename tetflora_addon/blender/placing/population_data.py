@@ -9,7 +9,6 @@ from math import radians
 from typing import Any
 
 import bpy
-import numpy as np
 
 from ...errors import shown
 from ...files import IDENTIFIER_RULE, is_identifier
@@ -19,16 +18,6 @@ from .rules import set_grounds, settings_of
 
 #: Keys of a species.
 MIX = ("species", "weight", "companion", "companion_strength", "companion_distance", "habitat", "shed_by")
-#: Keys that are written only where they say something: earlier versions do not know them.
-_RARE = {
-    "habitat": 'ANYWHERE',
-    "shed_by": "",
-    "age": 0.0,
-    "age_spread": 0.0,
-    "wetness_min": 0.0,
-    "wetness_max": 1.0,
-    "wetness_softness": float(np.float32(0.2)),
-}
 #: Settings that hold identifiers of species.
 _IDENTIFIERS = ("species", "companion", "shed_by")
 
@@ -38,17 +27,11 @@ def population_data(population: TetFloraPopulation) -> dict[str, Any]:
     data: dict[str, Any] = {"name": population.name}
     data["grounds"] = [entry.object.name for entry in population.grounds if entry.object is not None]
     data["species"] = [
-        {
-            name: value_for(entry.bl_rna.properties[name], getattr(entry, name))
-            for name in MIX
-            if getattr(entry, name) != _RARE.get(name)
-        }
+        {name: value_for(entry.bl_rna.properties[name], getattr(entry, name)) for name in MIX}
         for entry in population.mix
     ]
     for prop in simple_settings(population):
         value = getattr(population, prop.identifier)
-        if value == _RARE.get(prop.identifier, ...):
-            continue
         data[prop.identifier] = (
             (value.name if value is not None else None) if is_pointer(prop) else value_for(prop, value)
         )

@@ -100,7 +100,7 @@ def add_population(
     population = group.populations.add()
     group.populations_index = len(group.populations) - 1
     population.uid = uuid.uuid4().hex
-    population.name = _free_name(scene, name)
+    population.name = free_name(group.populations, name)
     copy_settings(settings or group.populate, population)
     set_grounds(population, grounds)
     return population
@@ -343,7 +343,8 @@ def _dissolve(scene: bpy.types.Scene, collection: bpy.types.Collection | None) -
     bpy.data.collections.remove(collection)
 
 
-def _free_name(scene: bpy.types.Scene, name: str) -> str:
-    taken = {p.name for p in scene.tetflora.populations}
-    numbered = (f"{name}.{i:03d}" for i in np.arange(1, len(taken) + 2))
+def free_name(group: Iterable[bpy.types.PropertyGroup], name: str) -> str:
+    """A name, with a number as Blender's where another of the group has it."""
+    taken = {one.name for one in group if one.name}
+    numbered = (f"{name}.{i:03d}" for i in range(1, len(taken) + 2))
     return name if name not in taken else next(n for n in numbered if n not in taken)

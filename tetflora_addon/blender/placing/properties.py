@@ -19,9 +19,8 @@ from ...setting import LENGTH
 from ..runtime import Listeners
 from ..scene.own_ages import AGE_PROPERTY
 from ..settings import properties_of
-from ..species.catalogue import NO_SPECIES, SpeciesChoice, items_for, number_of
-from ..species.edits import catalogue
-from .distances import SOURCES, choose, empty_means, follows_species
+from ..species.catalogue import SpeciesChoice, items_for, number_of
+from .distances import SOURCES, choose, follows_species
 from .plant_objects import EMPTIES_UNASKED
 
 #: Most plants that Populate creates as objects.
@@ -79,7 +78,7 @@ _BY_SPECIES = {
     "options": {'SKIP_SAVE'},
 }
 _AGE = "Age of the plants in years, half of them younger and half older; 0 is full-grown, as the species describes it"
-_SOURCE = {"name": "Distance From", "items": SOURCES, "default": 'UNSET', "options": {'HIDDEN'}}
+_SOURCE = {"name": "Distance From", "items": SOURCES, "default": 'SPECIES', "options": {'HIDDEN'}}
 
 
 def _companion_items(entry: "TetFloraMixEntry", _context: bpy.types.Context | None) -> list:
@@ -349,10 +348,6 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
         min=0,
         options={'HIDDEN'},
     )
-
-    def species_if_empty(self) -> str:
-        """What the brush paints then, in older files as well."""
-        return empty_means(self) if catalogue() else NO_SPECIES
 
 
 CLASSES = (

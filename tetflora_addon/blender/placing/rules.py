@@ -32,9 +32,10 @@ from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
 from ..settings import check_limits
+from ..species.catalogue import default_species
 from ..species.edits import catalogue, unknown_text
 from .canopy import not_of_covers, read_suits
-from .distances import HECTARE, distance_of, empty_means, weights_of
+from .distances import HECTARE, distance_of, weights_of
 from .plant_objects import EMPTIES_UNASKED, plants_of
 from .terrain import MASKS, read_ground
 from .zones import read_zones, zone_values
@@ -134,7 +135,7 @@ def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, .
 
     Companions that are not in the mixture follow it with a weight of 0.
     """
-    mix = [(e.species or empty_means(population), e) for e in population.mix]
+    mix = [(e.species or default_species(), e) for e in population.mix]
     weights = weights_of(population)
     for _, entry in mix:
         if entry.companion:

@@ -26,6 +26,16 @@ MASKS = (
 )
 
 
+def grid_mesh(name: str, points: NDArray[np.float64]) -> bpy.types.Mesh:
+    """A smooth mesh of the quadrilaterals between rows of points (rows, columns, 3)."""
+    rows, columns = points.shape[:2]
+    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1)
+    faces = np.stack([first, first + 1, first + columns + 1, first + columns], axis=1)
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points.reshape(-1, 3).tolist(), [], faces.tolist(), shade_flat=False)
+    return mesh
+
+
 @dataclass(frozen=True)
 class Line:
     """One curve.

@@ -23,7 +23,7 @@ from ..compat import set_node_input
 from ..main_thread import in_main_thread
 from ..materials.nodes import Graph, find_socket, get_or_create
 from .collection import Results
-from .looks import look_like
+from .output import look_like
 
 #: Attributes of points: where each instance stands, and which of several objects it shows.
 MATRIX, PICK = "tf_matrix", "tf_pick"

@@ -14,14 +14,13 @@ import bpy
 from ..materials.nodes import Graph, find_socket, get_or_create
 from .collection import Results
 from .hiding import artists_flags, forget_marks
-from .looks import look_like
-from .output import STAND_IN
+from .output import STAND_IN, look_like
 
 _VERSION = 1
 _NAME = "TetFlora Without Instances"
 _SIMULATED = {'CLOTH', 'SOFT_BODY', 'FLUID', 'DYNAMIC_PAINT'}
 _INSTANCED = {'OBJECT', 'COLLECTION'}
-_TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder", "is_asset")
+_TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder")
 
 
 def add_stand_in(

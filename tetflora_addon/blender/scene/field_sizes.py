@@ -92,11 +92,6 @@ class History:
         return a, b, (now - self.year[a]) / np.maximum(self.year[b] - self.year[a], 1e-9)
 
 
-def has_sizes(points: Points) -> bool:
-    """Whether points have any recorded size, or are records of a history; cheap."""
-    return any(name in points.attributes for name in SIZE_ATTRIBUTES)
-
-
 def has_history(obj: bpy.types.Object) -> bool:
     """Whether the points that a field stores are records of a history; cheap."""
     return isinstance(obj.data, Points) and YEAR in obj.data.attributes

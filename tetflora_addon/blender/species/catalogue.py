@@ -21,7 +21,7 @@ from bpy.utils import previews
 
 from ...errors import NAME, SpeciesError, readable
 from ...files import inside, is_identifier, is_regular, write_whole
-from ...species.catalogue import FIRST_BEFORE, SpeciesInfo, builtin_folder, checked_identifier
+from ...species.catalogue import SpeciesInfo, builtin_folder, checked_identifier
 from ...species.schema import species_file, species_from_json
 from ..preferences import own_species_folder, species_folders
 from ..settings import season_name, season_of
@@ -171,13 +171,8 @@ def operator_items(_operator: bpy.types.OperatorProperties, _context: bpy.types.
     return items_for()
 
 
-def default_species(before: bool = False) -> str:
+def default_species() -> str:
     """The species that the catalogue offers first.
-
-    Parameters
-    ----------
-    before : bool
-        What an empty choice meant in files that were saved before lists had this order.
 
     Raises
     ------
@@ -187,7 +182,7 @@ def default_species(before: bool = False) -> str:
     known = catalogue()
     if not known:
         raise SpeciesError("The catalog has no species; reinstall TetFlora, or set a Species Folder in the preferences")
-    return FIRST_BEFORE if before and FIRST_BEFORE in known else next(iter(known))
+    return next(iter(known))
 
 
 class SpeciesChoice:
@@ -214,13 +209,9 @@ class SpeciesChoice:
         options={'SKIP_SAVE'},
     )
 
-    def species_if_empty(self) -> str:
-        """What counts where no species is stored; a group may know better."""
-        return items_for(assets=self.takes_assets)[0][0]
-
 
 def _chosen(group: SpeciesChoice) -> int:
-    identifier = group.species or group.species_if_empty()
+    identifier = group.species or items_for(assets=group.takes_assets)[0][0]
     return 0 if identifier == NO_SPECIES else number_of(identifier)
 
 

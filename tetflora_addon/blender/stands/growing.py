@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, fields, replace
 
 import bpy
@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError, SpeciesError, TetFloraError
-from ...jobs import Progress
+from ...jobs import Progress, mapped
 from ...species.species import Species
 from ...stands.grow import StandSettings, grow
 from ...stands.guilds import Guild
-from ...stands.records import Records
+from ...stands.plants import Records
 from ...stands.site import StandSite
 from ..attributes import write
 from ..placing.plant_objects import link_field
@@ -209,14 +209,8 @@ def _again_steps(
 
 def _growing(site: StandSite, guilds: list[Guild], settings: StandSettings) -> Generator[Progress, object, Records]:
     steps, (begin, part) = steps_in_thread(grow(site, guilds, settings), Progress(0.0, "Growing the stand")), _GROWING
-    try:
-        while True:
-            progress = next(steps)
-            yield replace(progress, fraction=begin + part * progress.fraction)
-    except StopIteration as stop:
-        return stop.value
-    finally:
-        steps.close()
+    with closing(steps):
+        return (yield from mapped(steps, lambda step: replace(step, fraction=begin + part * step.fraction)))
 
 
 def _measuring(species: list[Species], records: Records) -> Generator[Progress, object, None]:

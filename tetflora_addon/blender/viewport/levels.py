@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator
 from dataclasses import replace
+from itertools import count
 
 import bpy
 import numpy as np
@@ -17,10 +18,9 @@ import numpy as np
 from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
-from ...jobs import Progress
+from ...jobs import Progress, mapped
 from ...preview.levels import Level, Levels, gather
-from ...preview.light_plants import MOST_PLANTS, Shapes, bounds_of_plants, light_plants
-from ...preview.simple_crowns import joined, simple_crowns
+from ...preview.light_plants import MOST_PLANTS, Shapes, bounds_of_plants, joined, light_plants, simple_crowns
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
 from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
@@ -91,14 +91,9 @@ def _level_steps(
 
 def _shown(levels: Generator[Level, None, Levels]) -> Generator[Progress, object, Levels]:
     """Levels as progress."""
-    fraction = 0.05
-    while True:
-        try:
-            level = next(levels)
-        except StopIteration as stop:
-            return stop.value
-        fraction += 0.15 * (1.0 - fraction)  # nobody knows how many passes will follow
-        yield Progress(fraction, f"Level {level.number}: {len(level):,} tetrahedra")
+    # Nobody knows how many passes will follow.
+    fractions = (1.0 - 0.95 * 0.85**number for number in count(1))
+    return mapped(levels, lambda one: Progress(next(fractions), f"Level {one.number}: {len(one):,} tetrahedra"))
 
 
 def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shapes | None:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import bpy
 
-from ...errors import SceneError, readable
+from .extension import SceneError, readable
 
 #: Most files of a job.
 MOST_FILES = 100_000

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``--command tetflora farm``: the open file as a job bundle for schedulers of Open Job Description.
+"""The open file as a job bundle for schedulers of Open Job Description.
 
-A bundle is a folder with the three files of `farm_template`, a folder with the extension's zip, its installer and the
+A bundle is a folder with the three files of `template`, a folder with the extension's zip, its installer and the
 user's own species, and optionally a copy of the .blend with its `assets`. Copies keep their relative places, so that
 paths that begin with // stay valid, in linked libraries as well. The open file is only read.
 """
@@ -21,17 +21,20 @@ from typing import Any
 
 import bpy
 
-from ...errors import SceneError, readable
-from ..job.contents import estimate
-from ..preferences import species_folders
-from ..scene.camera import read_camera
-from ..scene.plants import NoPlantsError
-from . import farm_template
+from . import template
 from .assets import approve, copy_files, places_of, used_files
-from .farm_template import Run
+from .extension import (
+    EXTENSION,
+    NoPlantsError,
+    Run,
+    SceneError,
+    estimate,
+    frame_numbers,
+    read_camera,
+    readable,
+    species_folders,
+)
 
-#: Root of the extension as it is installed, or of the source tree.
-EXTENSION = Path(__file__).resolve().parents[3]
 #: What all files of a job may have together unless the artist says otherwise.
 LIMIT_GB = 20.0
 MANIFEST = "blender_manifest.toml"
@@ -89,7 +92,7 @@ def write_bundle(
     blend = _saved_file()
     _check_output(scene)
     runs = runs or [(scene.frame_start, scene.frame_end, scene.frame_step)]
-    frames = farm_template.frame_expression(runs)
+    frames = template.frame_expression(runs)
     plants = _plants(scene)
     assets = used_files(blend)
     approve(blend, assets, outside, limit, tell)
@@ -99,16 +102,14 @@ def write_bundle(
     name = os.path.basename(scene.render.filepath.replace("\\", "/")) or "frame_####"
     inside = places[blend].as_posix() if copy else None
     texts = {
-        "template": farm_template.template(farm_template.Job(blend.stem, frames, chunk, name, inside)),
-        "parameter_values": farm_template.parameter_values(None if copy else str(blend)),
-        "asset_references": farm_template.asset_references(
-            [] if copy else [str(path) for path in (blend, *assets.files)]
-        ),
+        "template": template.template(template.Job(blend.stem, frames, chunk, name, inside)),
+        "parameter_values": template.parameter_values(None if copy else str(blend)),
+        "asset_references": template.asset_references([] if copy else [str(path) for path in (blend, *assets.files)]),
     }
     try:
-        _write_files(folder / farm_template.FILES)
+        _write_files(folder / template.FILES)
         if copy:
-            inner = folder / farm_template.SCENE_FOLDER
+            inner = folder / template.SCENE_FOLDER
             sizes = {blend: blend.stat().st_size, **assets.files}
             copy_files({path: inner / place for path, place in places.items()}, sizes, tell)
         for title, content in texts.items():
@@ -119,7 +120,7 @@ def write_bundle(
         if isinstance(error, OSError):
             raise SceneError(f"Cannot write the job {folder}: {_reason(error)}. Choose another folder") from None
         raise
-    numbers = farm_template.frame_numbers(runs)
+    numbers = frame_numbers(runs)
     return {
         "bundle": str(folder),
         "plants": plants,
@@ -235,7 +236,7 @@ def _reason(error: OSError) -> str:
 
 def _take_away(folder: Path, made: bool) -> None:
     """Remove what was written, and the folder itself if it was made."""
-    for name in (farm_template.FILES, farm_template.SCENE_FOLDER):
+    for name in (template.FILES, template.SCENE_FOLDER):
         shutil.rmtree(folder / name, ignore_errors=True)
     for path in folder.glob("*.json"):
         path.unlink(missing_ok=True)
@@ -247,7 +248,7 @@ def _write_files(folder: Path) -> None:
     folder.mkdir()
     version = _manifest(EXTENSION)["version"]
     write_zip(folder / f"tetflora-{version}.zip")
-    shutil.copyfile(Path(__file__).with_name("farm_installer.py"), folder / farm_template.INSTALLER)
+    shutil.copyfile(Path(__file__).with_name("installer.py"), folder / template.INSTALLER)
     for own in species_folders():
         for path in sorted(p for p in own.glob("*.json") if p.is_file() and p.stat().st_size <= _LARGEST_SPECIES):
             (folder / "species").mkdir(exist_ok=True)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Installs TetFlora on a worker of a farm; `farm` copies this file into each job, beside the extension's zip.
+"""Installs TetFlora on a worker of a farm; `bundle` copies this file into each job, beside the extension's zip.
 
     BLENDER_USER_RESOURCES=/new/folder blender --background --python-exit-code 1 --python install_tetflora.py
 
