@@ -101,8 +101,11 @@ def known_systems() -> dict[int, Definition]:
     found = {}
     for method, ellipsoid, shift, meridian, unit, rows in data["systems"]:
         own = Definition(method, ellipsoids[ellipsoid], shifts[shift], meridian, data["units"][unit])
-        for parameters, codes in rows:
-            found.update(dict.fromkeys(codes, replace(own, parameters=tuple(parameters))))
+        for parameters, codes, *run in rows:
+            number, step = run or (1, [0.0] * len(parameters))
+            for k in range(number):
+                figures = tuple(round(a + k * b, 9) for a, b in zip(parameters, step, strict=True))
+                found.update(dict.fromkeys([code + k for code in codes], replace(own, parameters=figures)))
     return found | {code: found[flat] for code, flat in _HEIGHTS.items()}
 
 
