@@ -14,14 +14,15 @@ LTS_VERSIONS = 3.11
 export PYTHON
 export PYTHONDONTWRITEBYTECODE = 1
 
-.PHONY: help environment demo results test test-lts lint build bench docs-images clean
+.PHONY: help environment demo results test quick test-lts lint build bench docs-images clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo 'make demo         a forest of eighty trees: out/demo/{cycles,eevee,top}.png, demo.blend, stats.json'
 	@echo 'make results      the figures and tables of the paper, made anew: docs/results.md, docs/images, out/paper'
 	@echo 'make test         all tests that need no full Blender, on bpy'
-	@echo 'make test-lts     the add-on's tests, and the engine's of plants, on Blender 4.5 LTS'
+	@echo 'make quick        the tests that took little time when they were last run, in about a minute'
+	@echo 'make test-lts     tests of what depends on the version of Blender, on Blender 4.5 LTS'
 	@echo 'make lint         style, and the rules of the house'
 	@echo 'make build        the extension for Blender: dist/tetflora-VERSION.zip'
 	@echo 'make bench        benchmarks against their targets'
@@ -43,21 +44,35 @@ results: environment
 	$(PY) -m examples.paper
 
 # Two runs: the first never has Blender in its process, as the engine should not need it.
-# The second also runs when the first has failed.
-ENGINE_TESTS = tests/engine tests/attack/engine
+# The second also runs when the first has failed. A file's tests share scenes, so each file is one process's; the files
+# that take longest begin.
+BY_FILE = --dist loadfile --no-loadscope-reorder
+ENGINE_TESTS = tests/engine/emission tests/engine tests/attack/engine
 
 BLENDER_TESTS = tests/blender tests/attack/blender tests/packaging tests/examples
 
 test: environment
 	@code=0; \
-	$(PY) -m pytest -q -n 2 $(ENGINE_TESTS) || code=1; \
-	$(PY) -m pytest -q -n 2 --dist loadfile $(BLENDER_TESTS) || code=1; \
+	$(PY) -m pytest -q -n 2 $(BY_FILE) $(ENGINE_TESTS) || code=1; \
+	$(PY) -m pytest -q -n 2 $(BY_FILE) $(BLENDER_TESTS) || code=1; \
 	exit $$code
 
-# The engine never meets Blender, whatever its version: of its tests, those of what must come out the same on every
-# Python and numpy, plants and what is made of them. Attacks and examples meet nothing that the add-on's tests do not.
-LTS_ENGINE_TESTS = tests/engine/growth tests/engine/subplants tests/engine/emission
-LTS_BLENDER_TESTS = tests/blender tests/packaging
+# While editing: what has not taken long in the last run, of the rules, the engine and the add-on. About a minute.
+quick: environment
+	@code=0; \
+	$(PY) -m devtools.house || code=1; \
+	$(PY) -m pytest -q -n 2 $(BY_FILE) --quick $(ENGINE_TESTS) || code=1; \
+	$(PY) -m pytest -q -n 2 $(BY_FILE) --quick $(BLENDER_TESTS) || code=1; \
+	exit $$code
+
+# On 4.5 again: what depends on Blender's version. That is rendering, materials, nodes, files, undo, handlers,
+# properties, packaging, and each button once (operators/test_undo.py). It is not where plants stand, nor what a
+# refinement makes of them: both are numpy on numbers that Blender gives. Of the engine, plants themselves, which have
+# to come out the same on every Python and numpy.
+LTS_ENGINE_TESTS = tests/engine/growth tests/engine/subplants tests/engine/emission/test_emission.py
+LTS_LEFT_OUT = placing biomes places stands species test_asset_trees.py test_full_disk.py test_manual.py \
+	$(addprefix job/test_,cycles.py far.py first_look.py forecast.py frame_cache.py long_animation.py view_cells.py)
+LTS_BLENDER_TESTS = tests/blender tests/packaging $(addprefix --ignore=tests/blender/,$(LTS_LEFT_OUT))
 
 test-lts:
 	@$(MAKE) --no-print-directory test VENV='$(LTS_VENV)' VERSIONS='$(LTS_VERSIONS)' ENGINE_TESTS='$(LTS_ENGINE_TESTS)' \

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """House rules that ruff does not know: ``python -m devtools.house`` lists what breaks them.
 
-Each source file names its licence and stays short, and no file names the machine that it was written on. The same
-check runs in ``make lint`` and as a test. Rules about rooms, imports and sizes are in `devtools.rooms`.
+Each source file names its licence and stays short, and no file names the machine that it was written on. The check
+runs in ``make lint``. Rules about rooms, imports and sizes are in `devtools.rooms`.
 """
 
 from __future__ import annotations

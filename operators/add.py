@@ -13,7 +13,7 @@ from ..tetflora_addon.blender.placing.first_forest import build
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.placing.populations import Made, add_population, forget_population, make_plants_steps
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES, STORAGE_ITEMS
-from ..tetflora_addon.blender.placing.rules import copy_companion
+from ..tetflora_addon.blender.placing.rules import copy_entry
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES, read_skeleton, upright_turn
 from ..tetflora_addon.blender.settings import properties_of
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, operator_items
@@ -154,7 +154,7 @@ def _activate_ground(scene: bpy.types.Scene) -> None:
 # What is not given comes from the panel's settings: defaults do not matter here.
 _RULES = properties_of(Rules, options={'SKIP_SAVE'})
 # Names that the operator shares with the scene's settings for populating.
-_SHARED = ("count", "as_field", "seed", "slope_max", "min_distance", "scale_min", "scale_max")
+_SHARED = ("by_density", "count", "as_field", "seed", "slope_max", "min_distance", "scale_min", "scale_max")
 
 
 class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
@@ -167,6 +167,7 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
     bl_label = "Populate"
     needs = (in_object_mode, ground_selected)
 
+    by_density: _RULES.by_density
     count: _RULES.count
     as_field: EnumProperty(
         name="Create As",
@@ -230,14 +231,13 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
             follows = self.min_distance == self.suited
         for name in _SHARED:
             setattr(population, name, getattr(self, name))
-        population.by_density = False
         population.mix.clear()
         known = {entry.species: entry for entry in settings.mix}
         for identifier, weight in weights.items():
             entry = population.mix.add()
-            entry.species, entry.weight = identifier, weight
             if identifier in known:
-                copy_companion(known[identifier], entry)
+                copy_entry(known[identifier], entry)
+            entry.species, entry.weight = identifier, weight
         population.distance_by_species = follows
         if follows:  # the redo panel shows it, and tells by it whether the artist has changed it
             self.min_distance = self.suited = distance_of(population)
@@ -246,6 +246,8 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
     def _complete_from(self, scene: bpy.types.Scene) -> None:
         """Take what was not given from the panel; the redo panel then shows what was really used."""
         settings = scene.tetflora.populate
+        if self.properties.is_property_set("count") and not self.properties.is_property_set("by_density"):
+            self.by_density = False  # a script asks for so many
         for name in _SHARED:
             if not self.properties.is_property_set(name) and name != "min_distance":
                 setattr(self, name, getattr(settings, name))

@@ -154,7 +154,7 @@ class TETFLORA_OT_refine_scatter(Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any(may_scatter(o) or is_scatter(o) for o in context.selected_objects):
+        if cls._found(context):
             return True
         cls.poll_message_set(
             "Select an object that scatters others first, by geometry nodes, particles, instancing or as a collection "
@@ -162,8 +162,16 @@ class TETFLORA_OT_refine_scatter(Reporting, bpy.types.Operator):
         )
         return False
 
+    @staticmethod
+    def _found(context: bpy.types.Context) -> list[bpy.types.Object]:
+        """Selected objects that scatter, or else the active one: results hide it, and nobody can select it then."""
+        for objects in (context.selected_objects, [context.view_layer.objects.active]):
+            if found := [o for o in objects if o is not None and (may_scatter(o) or is_scatter(o))]:
+                return found
+        return []
+
     def run(self, context: bpy.types.Context) -> set[str]:
-        found = [o for o in context.selected_objects if may_scatter(o) or is_scatter(o)]
+        found = self._found(context)
         marked = all(is_scatter(o) for o in found)
         if self.action == 'UNMARK' or (self.action == 'TOGGLE' and marked):
             for obj in found:

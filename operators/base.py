@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators share: tooltips, conditions, reports, the selection, and work in steps between redraws."""
 
-import time
 from collections.abc import Callable, Generator
 from typing import Any
 
@@ -12,7 +11,7 @@ from ..tetflora_addon.blender.placing.plant_objects import plants_of
 from ..tetflora_addon.blender.runtime import remember
 from ..tetflora_addon.blender.worker import at_once
 from ..tetflora_addon.errors import TetFloraError, readable
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Pace, Progress
 
 LINKED = (
     "The plants are linked from another file; use Object > Relations > Make Local, or Object > Library Override > Make"
@@ -108,6 +107,12 @@ def selected_plants(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in plants_of(context.selected_objects) if obj.library is None]
 
 
+def show_shapes(scene: bpy.types.Scene) -> None:
+    """Show plants as simple shapes where nothing is shown of them: points of fields are no picture of plants."""
+    if scene.tetflora.preview.plants == 'NONE':
+        scene.tetflora.preview.plants = 'LIGHT'
+
+
 def select_only(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
     """Select these objects and no others, as far as the view layer has them; the first becomes active."""
     for obj in context.selected_objects:
@@ -155,7 +160,7 @@ class ModalJob(Reporting):
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        self._steps = self.steps(context)
+        self._steps, self._pace = self.steps(context), Pace(_SLICE)
         try:
             # The scene is read in the second step: its errors are reported at once, while the artist still looks here.
             for _ in range(2):
@@ -182,10 +187,10 @@ class ModalJob(Reporting):
         if event.type != 'TIMER':
             # Everything else waits: the scene must not change under the job.
             return {'RUNNING_MODAL'}
-        end = time.monotonic() + _SLICE
+        self._pace.begin()
         try:
             progress = self._next()
-            while time.monotonic() < end and not progress.waiting:
+            while self._pace.goes_on(progress):
                 progress = self._next()
         except StopIteration as stop:
             self._leave(context)

@@ -25,7 +25,7 @@ from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only
+from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
 from .populations import selected_grounds
 
 _biome_exists = need(lambda context: active_biome(context.scene), "Add a biome first")
@@ -36,12 +36,14 @@ class _Planting(ModalJob):
 
     def finish(self, context: bpy.types.Context, result: Added) -> set[str]:
         points.schedule()
+        show_shapes(context.scene)
         number = sum(number for _, number in result.layers)
         text = f'"{result.name}": {counted(number, "plant")} in {counted(len(result.layers), "layer")}'
         if result.kept:
             text += f'; "{result.kept[0]}" keeps its own material'
         if result.bare:
-            self.report({'WARNING'}, f"{text}; without plants: {result.bare[0]}")
+            more = f"; and {counted(len(result.bare) - 1, 'other layer')}" if len(result.bare) > 1 else ""
+            self.report({'WARNING'}, f"{text}; without plants: {result.bare[0]}{more}")
             return {'FINISHED'}
         return self.done(f"{text}{self.next_step(context)}")
 

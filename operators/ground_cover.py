@@ -13,7 +13,7 @@ from ..tetflora_addon.blender.placing.ground_snow import cover_with_snow
 from ..tetflora_addon.blender.placing.rules import active_population
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, counted, in_object_mode, need
+from .base import ModalJob, Reporting, counted, in_object_mode, need, show_shapes
 
 
 class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
@@ -52,6 +52,7 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: Covered) -> set[str]:
         points.schedule()
+        show_shapes(context.scene)
         kept = ""
         if result.bare:
             kept = f'; "{result.bare[0]}" keeps its own material'

@@ -10,6 +10,7 @@ from ..tetflora_addon import storage
 from ..tetflora_addon.assets import kept
 from ..tetflora_addon.blender.job import refine
 from ..tetflora_addon.blender.job.assets import asset_warnings
+from ..tetflora_addon.blender.job.forecast import forecast, learn
 from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
 from ..tetflora_addon.blender.job.render import forget_render_errors
 from ..tetflora_addon.blender.placing.plant_objects import plants_of, prepare_scene
@@ -52,11 +53,15 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Statistics]:
         scene, nothing = context.scene, not has_results(context.scene)
+        made_for, expected = auto.results_made_for(scene), forecast(scene, context.view_layer)
         with auto.paused():
             depsgraph = context.evaluated_depsgraph_get()
             job = refine.refine_steps(scene, depsgraph, view_layer=context.view_layer, first_look=nothing)
             try:
-                return (yield from job)
+                statistics = yield from job
+                auto.note_results(scene, made_for)
+                learn(expected, sum(statistics.seconds.values()))
+                return statistics
             except BaseException:
                 job.close()
                 if nothing and is_there(scene):

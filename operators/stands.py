@@ -16,7 +16,7 @@ from ..tetflora_addon.blender.stands.growing import (
     new_stand_steps,
 )
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only
+from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
 from .populations import ground_selected, selected_grounds
 
 _ACTIVE = (
@@ -34,9 +34,7 @@ class _Growing(ModalJob):
 
     def finish(self, context: bpy.types.Context, result: GrownStand) -> set[str]:
         select_only(context, [result.field])
-        preview = context.scene.tetflora.preview
-        if preview.plants == 'NONE':  # its points are no picture of it
-            preview.plants = 'LIGHT'
+        show_shapes(context.scene)
         context.scene.update_tag()
         return self.done(f"{counted(result.plants, 'plant')} after {counted(result.years, 'year')}")
 
@@ -95,7 +93,8 @@ class TETFLORA_OT_animate_growth(Reporting, bpy.types.Operator):
 
 
 class TETFLORA_OT_keep_year(Reporting, bpy.types.Operator):
-    """Keep the active stand as it is in its present year, as an ordinary field of plants, and forget all other years.
+    """Keep the active stand as it is in its present year, as an ordinary field of plants, and forget all other years
+    and their keys.
 
     The brush and other tools can then change it. Grow Again brings the years back.
     """
@@ -103,6 +102,10 @@ class TETFLORA_OT_keep_year(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.keep_year"
     bl_label = "Keep Year"
     needs = _ACTIVE
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        text = "All other years of the stand and their keys are removed. Grow Again brings the years back"
+        return context.window_manager.invoke_confirm(self, event, message=text, confirm_text=self.bl_label)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         number = keep_year(context.active_object)

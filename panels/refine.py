@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Refine: buttons, state and settings of refinement; and First Forest, while the scene has no plants."""
 
+from math import isclose
+
 import bpy
 
 from ..operators.add import TETFLORA_OT_first_forest
@@ -23,6 +25,7 @@ from .base import (
     draw_below,
     draw_message,
     draw_properties,
+    shown_length,
     split_layout,
 )
 from .results import made_of
@@ -63,8 +66,16 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
             draw_message(context, layout, auto.message() or "Refine Automatically is on", 'SORTTIME')
         for error in render_errors()[-1:]:
             draw_message(context, layout, error)
+        units = context.scene.unit_settings
+        if units.system != 'NONE' and not isclose(units.scale_length, 1.0, rel_tol=1e-3):
+            text = f"One unit is 1 m for plants, whatever Unit Scale says: a tree of 20 m shows as {shown_length(20.0)}"
+            draw_message(context, layout, text)
+            layout.prop(units, "scale_length")
         if context.scene.camera is None:
             draw_message(context, layout, "The scene has no camera; add one, and make it active with Ctrl Numpad 0")
+        elif changed := [] if settings.auto_refine else auto.changed_since(context.scene):
+            text = f"Results are out of date: {', '.join(changed)} changed since. Click Refine"
+            draw_message(context, layout, text, 'FILE_REFRESH')
         elif text := hint(context.scene) or made_of(settings.statistics):
             draw_message(context, layout, text, 'INFO')
         expected = forecast_text(context.scene, context.view_layer)
@@ -76,7 +87,7 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         names = ("quality", "cutoff", "shadow_cutoff", "proxy_form", "baked_light", "max_polygons")
         draw_properties(column, settings, *names)
         _draw_memory(column, context.scene)
-        active = context.active_object
+        active = context.view_layer.objects.active  # and not the context's, which is None while results hide it
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
             layout.prop(active.tetflora, "is_explicit")
         if active is not None and (may_scatter(active) or is_scatter(active)):

@@ -36,7 +36,9 @@ class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
             if has_history(active):
                 column = layout.column()
                 column.scale_y = 1.4
-                column.prop(active.tetflora, "stand_year", text="Year", slider=True)
+                last = active.tetflora.stand.last_year
+                text = f"Year of {last:g}" if last else "Year"
+                column.prop(active.tetflora, "stand_year", text=text, slider=True)
                 layout.prop(active.tetflora, "stand_smooth")
                 row = layout.row(align=True)
                 Button(TETFLORA_OT_animate_growth, 'KEYFRAME').draw(row)

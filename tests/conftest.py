@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from devtools import build, session
+from tests.durations import Durations
 
 # Nothing is timed in a test: by itself an example may take 200 ms, which it exceeds where other processes are at work.
 # Examples are drawn at random on a desk; what CI says follows from the commit alone.
@@ -24,6 +25,16 @@ settings.load_profile("untimed")
 # Tests that run beside others have a core each, and start no other processes unless they are about these.
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("TETFLORA_THREADS", "1")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--quick``: only what has not taken long the last time."""
+    parser.addoption("--quick", action="store_true", help="leave out tests that took long in the last run")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Say at the end what tests cost."""
+    config.pluginmanager.register(Durations(config.rootpath / "out"))
 
 
 @pytest.fixture(scope="session")

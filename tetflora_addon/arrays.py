@@ -23,8 +23,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from .parallel import blocks
 
-#: Steps of `spiral` that spread directions evenly: the golden section twice, and the golden angle over π.
-GOLDEN_TURN, GOLDEN_ANGLE = 1.0 + np.sqrt(5.0), 3.0 - np.sqrt(5.0)
+#: Steps in radians that spread directions evenly about an axis: full turns by the golden section, and the golden angle.
+GOLDEN_TURN, GOLDEN_ANGLE = np.pi * (1.0 + np.sqrt(5.0)), np.pi * (3.0 - np.sqrt(5.0))
 #: Room to spare where columns of `Growing` are made larger: one part in so many of what is there.
 _SPARE = 3
 #: Indices that are looked at at a time: numpy makes 64 bit of each, which stays in the cache. Threads gain nothing.
@@ -229,8 +229,8 @@ def perpendicular(axis: NDArray) -> NDArray:
 
 
 def spiral(z: NDArray, index: NDArray, step: float) -> NDArray:
-    """Unit vectors (n, 3) of a Fibonacci lattice: heights z (n,), turned by ``index`` (n,) × π × ``step``."""
-    turn, level = np.pi * step * index, np.sqrt(1.0 - z * z)
+    """Unit vectors (n, 3) of a Fibonacci lattice: heights z (n,), turned by ``index`` (n,) × ``step`` radians."""
+    turn, level = step * index, np.sqrt(1.0 - z * z)
     return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)
 
 

@@ -35,6 +35,8 @@ class MeshBuffers:
         Whether faces are shaded smooth.
     species : int or None
         The species all of it is of, if that is known; −1 for assets.
+    look : str
+        Of the surfaces or assets that it stands for, where it is of no species.
     """
 
     positions: NDArray[np.float32]
@@ -45,6 +47,7 @@ class MeshBuffers:
     attributes: Mapping[str, tuple[str, NDArray]] = field(default_factory=dict)
     smooth: bool = False
     species: int | None = None
+    look: str = ""
 
     @property
     def polygons(self) -> int:
@@ -70,7 +73,7 @@ class PointBuffers:
         Metres.
     attributes : mapping of str to ndarray
         Name to values of the points: ``(n,)`` or ``(n, 3)`` float32.
-    species : int or None
+    species, look : int or None, str
         As of meshes.
     """
 
@@ -78,6 +81,7 @@ class PointBuffers:
     radius: NDArray[np.float32]
     attributes: Mapping[str, NDArray] = field(default_factory=dict)
     species: int | None = None
+    look: str = ""
 
     @property
     def polygons(self) -> int:

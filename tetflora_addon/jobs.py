@@ -4,11 +4,16 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 _Item, _Step, _Result = TypeVar("_Item"), TypeVar("_Step"), TypeVar("_Result")
+#: What a job works between two redraws, in times of what the last redraw took, and at most, seconds: Esc waits for it.
+_REDRAWS, _LONGEST = 3.0, 1.0
+_SLOW = 0.03  # seconds of a redraw from which on waiting for a thread is no reason for another
+_MOMENT = 0.005  # seconds of sleep while a thread computes
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,36 @@ def mapped(
         except StopIteration as stop:
             return stop.value
         yield change(step)
+
+
+class Pace:
+    """How long a job works between two redraws: a window that takes long to draw is drawn less often.
+
+    Parameters
+    ----------
+    least : float
+        Seconds of work where drawing takes no time.
+    """
+
+    def __init__(self, least: float) -> None:
+        self._least, self._left = least, time.monotonic()
+        self._end, self._slow = self._left, False
+
+    def begin(self) -> None:
+        """Work begins; what has passed since it was left is what a redraw takes."""
+        now = time.monotonic()
+        seconds = min(_REDRAWS * (now - self._left), _LONGEST)
+        self._end, self._slow = now + max(self._least, seconds), seconds > _REDRAWS * _SLOW
+
+    def goes_on(self, progress: Progress) -> bool:
+        """Whether to take another step now, after one; else the window has its turn."""
+        now = time.monotonic()
+        if now < self._end and (self._slow or not progress.waiting):
+            if progress.waiting:
+                time.sleep(_MOMENT)
+            return True
+        self._left = now
+        return False
 
 
 def at_once(steps: Generator[object, object, _Result]) -> _Result:

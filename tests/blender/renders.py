@@ -34,6 +34,7 @@ def small_scene(
     scene.cycles.transparent_max_bounces = 64
     scene.cycles.seed = 1
     world = bpy.data.worlds.new("sky")
+    world.probe_resolution = '128'  # of EEVEE, which draws the sky so large for each picture
     scene.world = world
     tree = compat.shader_tree(world)
     tree.nodes["Background"].inputs["Color"].default_value = (sky, sky, sky, 1.0)

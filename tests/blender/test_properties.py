@@ -7,11 +7,13 @@ from __future__ import annotations
 from dataclasses import fields
 
 import bpy
+import numpy as np
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant
 from tetflora_addon import blender
 from tetflora_addon.blender import preferences, properties, saved_files
+from tetflora_addon.blender.biomes import library
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraPopulation
 from tetflora_addon.blender.results import leaf_objects
@@ -150,6 +152,11 @@ def test_items_keep_their_numbers_when_the_catalogue_grows(tmp_path):
     assert len(set(numbers.values())) == len(numbers)
     assert numbers["gone"] == catalogue.number_of("gone")
     assert {i[0]: i[4] for i in catalogue.items_for()} == {k: v for k, v in numbers.items() if k != "gone"}
+
+
+def test_numbers_of_items_survive_popups_which_keep_floats():
+    numbers = [item[4] for item in (*catalogue.items_for(), *library.items())]
+    assert np.array(numbers, np.float32).astype(int).tolist() == numbers
 
 
 def test_species_of_the_users_own_folder(tmp_path):

@@ -52,7 +52,7 @@ def test_texts_that_are_no_text_are_emptied_and_told(tmp_path, capfd):
     assert "oak" in edits.catalogue()
     assert catalogue.items_for(bpy.data.objects["plant"].tetflora.species)
     bpy.ops.tetflora.export_populations(filepath=str(tmp_path / "p.json"))
-    with pytest.raises(RuntimeError, match='"plant": unknown species ""'):
+    with pytest.raises(RuntimeError, match='"plant", "field": unknown species ""'):
         bpy.ops.tetflora.refine()
     select(bpy.data.objects["ground"])
     bpy.data.objects.remove(bpy.data.objects["field"])

@@ -82,7 +82,7 @@ def steps(ui):
     refine.loop.refine = original
     go.set()
 
-    odd = add_plant("odd", "quercus")
+    odd = add_plant("odd", scale=(1.0, 1.0, 0.0))
     bare = datablocks()
     try:
         begin(ui)

@@ -42,7 +42,7 @@ def test_return_stops_refining_and_makes_what_there_is(seen: dict) -> None:
 
 
 def test_what_is_wrong_is_said_before_the_window_waits(seen: dict) -> None:
-    assert "quercus" in seen["refused"]
+    assert '"odd": zero scale' in seen["refused"]
     assert not seen["running_refused"]
 
 

@@ -21,7 +21,7 @@ from ..files import inside, read_whole, write_whole
 from .asset import COUNTS, Asset, AssetKites, Clusters, SurfaceSamples
 
 #: Raise it when assets are compiled in another way.
-METHOD = 7
+METHOD = 8
 #: Bytes of a file at most, of all files of a user, and of what is kept in memory.
 _MOST, _MOST_FILES, _MOST_MEMORY = 1 << 30, 4 << 30, 768 << 20
 _NAMES = re.compile(r"tetflora-compiled-\d+-[0-9a-f]+\.npz")

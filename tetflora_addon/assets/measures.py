@@ -168,6 +168,8 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
         through = shown.transmission[of_face].astype(np.float32)
         unknown = np.where(solid[at], np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
         transmission[at] = np.where(np.isnan(through), unknown, through)
+        both = at[solid[at] & ~woody[at]]  # a facet or a kite is one sheet in place of the two sides of a closed leaf
+        colour[both], transmission[both] = through_both_sides(colour[both], transmission[both])
         width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
     new_face = (np.diff(face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0)
     return Run(
@@ -310,3 +312,19 @@ def _samples(
         order.append(cluster)
     cluster = np.concatenate(order)
     return SurfaceSamples.concatenate(made).take(np.argsort(cluster, kind="stable")), counts
+
+
+def through_both_sides(
+    colour: NDArray[np.floating], transmission: NDArray[np.floating]
+) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    """Colours (n, 3) and transmissions (n,) of closed leaves as one sheet, from those of their sides.
+
+    Light that passes the first side meets the second from within, again and again: with r and t of a side, the whole
+    reflects r + t² r / (1 − r²), and t² / (1 − r²) goes through (Stokes 1862).
+    """
+    through = colour * transmission[:, None]
+    back = colour - through
+    again = 1.0 / np.maximum(1.0 - back**2, 1e-6)
+    passed = through**2 * again
+    whole = back + through**2 * back * again + passed
+    return whole, passed.sum(axis=1) / np.maximum(whole.sum(axis=1), 1e-12)

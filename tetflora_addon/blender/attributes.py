@@ -9,7 +9,7 @@ empty, it still returns what there was when the mode was entered.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -130,7 +130,18 @@ def _empty(kind: Kind, size: int) -> NDArray:
     return np.zeros(size if kind.width == 1 else (size, kind.width), kind.dtype)
 
 
+#: While somebody asks for another moment: matrices (4, 4) that take objects from where they are now to where they are
+#: then, see `scene.motion`.
+elsewhere: Callable[[bpy.types.Object, bpy.types.Depsgraph], NDArray[np.float64]] | None = None
+
+
 def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+    """As `matrix_now`, or at another moment while somebody asks for that."""
+    matrix = matrix_now(obj, depsgraph)
+    return matrix if elsewhere is None else elsewhere(obj, depsgraph) @ matrix
+
+
+def matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
     """An object's evaluated matrix in world space, (4, 4); float32 in some versions of Blender.
 
     Objects that are disabled in viewports but render are not evaluated, and their stored matrix may be old. Then it
@@ -142,7 +153,7 @@ def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArr
     own = np.array(obj.matrix_basis)
     if obj.parent is None:
         return own
-    return world_matrix(obj.parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
+    return matrix_now(obj.parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
 
 
 def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:

@@ -56,6 +56,9 @@ def _on_age(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
 
 
 def _on_year(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    last = self.id_data.tetflora.stand.last_year
+    if 0.0 < last < self.stand_year:  # all plants are gone after their last records
+        self.stand_year = last
     self.id_data.update_tag()
     state.listeners.notify()
 

@@ -25,6 +25,7 @@ from ..errors import SceneError, readable
 from ..processes import pool
 from .main_thread import in_main_thread, later, on_main_thread
 
+_Datablock = TypeVar("_Datablock", bound=bpy.types.ID)
 #: Letters of a line in a popup.
 _LINE = 100
 #: Errors of the last render: a text for each frame that was rendered without its plants.
@@ -94,6 +95,11 @@ def is_there(datablock: bpy.types.ID | None) -> bool:
         return datablock is not None and bool(datablock.session_uid)
     except ReferenceError:
         return False
+
+
+def with_uid(datablocks: Iterable[_Datablock], uid: int) -> _Datablock | None:
+    """The datablock of this file with a ``session_uid``, which undo leaves alone; None where it is gone."""
+    return next((d for d in datablocks if d.session_uid == uid and d.library is None), None)
 
 
 class GoneError(SceneError):

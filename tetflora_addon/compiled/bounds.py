@@ -19,6 +19,7 @@ from ..growth.grown_rows import NOW
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..growth.wind import widest_sway
 from ..species.species import crown_ratio
+from .limbs import LIMB
 from .samples import Points
 
 _SLABS = 48
@@ -103,12 +104,14 @@ def _tilted(bound: NDArray, angle: NDArray, scale: NDArray) -> tuple[NDArray, ND
     return scale * (far.max(1) + slack), scale * (bottom.min(1) - slack), scale * (top.max(1) + slack)
 
 
-def unit_bounds(rows: NDArray[np.void]) -> NDArray[np.float64]:
+def unit_bounds(rows: NDArray[np.void], raised: bool = False) -> NDArray[np.float64]:
     """Cylinders that hold every axis of every sub-plant whose branch has unit length.
 
     Parameters
     ----------
     rows : (r,) table of `rows.build_rows`
+    raised : bool
+        Also if plants have crown bases (see `growth.formed`), so that any limb may be anywhere above where they begin.
 
     Returns
     -------
@@ -118,7 +121,7 @@ def unit_bounds(rows: NDArray[np.void]) -> NDArray[np.float64]:
     """
     bounds = np.zeros((len(rows), 3))
     for index in range(len(rows) - 1, -1, -1):
-        bounds[index] = _unit_bound(rows, index, bounds)
+        bounds[index] = _unit_bound(rows, index, bounds, raised and rows["order"][index] == 0)
     return bounds
 
 
@@ -162,7 +165,7 @@ def leaf_reaches(
     return reach
 
 
-def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64], raised: bool) -> NDArray[np.float64]:
     row = rows[index]
     radius, low, high, turn = _axis_envelope(row)
     solid = float(reaches(row))
@@ -174,15 +177,21 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
             continue
         child = rows[row["next"][sort]]
         fraction = np.linspace(0, 1, _SLABS + 1)
-        start, end = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0), 1.0
+        start, latest, end = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0), row["start"][sort].sum(), 1.0
         if sort == DEAD:
-            start, end = row["start"][sort]
+            start, latest, end = row["start"][sort][[0, 0, 1]]
+            end = 1.0 if raised and end > start else end
         t = start + (end - start) * fraction
-        fraction = row["fraction"][sort, 0] + np.ptp(row["fraction"][sort]) * fraction
-        growing = row["growing"][sort, NOW] > 0
-        first_fraction, last_fraction = fraction[:-1], fraction[1:]
-        if growing:  # any child may be anywhere
-            first_fraction, last_fraction = np.tile(row["fraction"][sort][:, None], (1, _SLABS))
+        # Of branches whose bare part is longer, earlier children are at the same place.
+        later = np.clip((latest - start) / np.maximum(end - start, 1e-9), 0.0, 0.99)
+        earlier = np.maximum((fraction - later) / (1 - later), 0.0)
+        first_fraction, last_fraction = (
+            row["fraction"][sort, 0] + np.ptp(row["fraction"][sort]) * one for one in (earlier[:-1], fraction[1:])
+        )
+        anywhere = raised or row["growing"][sort, NOW] > 0
+        if anywhere:
+            among = (0.0, 1.0) if raised else row["fraction"][sort]
+            first_fraction, last_fraction = np.tile(np.reshape(among, (2, 1)), _SLABS)
         r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
         first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
         last = np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)
@@ -197,10 +206,10 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
             least[:] = 0.0  # a single stem goes straight on
         elif sort == DEAD:
             pass  # no crown's shape makes them shorter
-        elif row["start"][sort, 1] > 0 or growing:
+        elif row["start"][sort, 1] > 0 or anywhere:
             longest *= _crown_most(row, np.zeros(1), np.ones(1))[0]  # where children sit is not known
         else:
-            longest *= _crown_most(row, fraction[:-1], fraction[1:])
+            longest *= _crown_most(row, first_fraction, last_fraction)
         angle = np.linspace(least, most, _ANGLES, axis=1)
         far, bottom, top = _tilted(bounds[row["next"][sort]], angle, longest)
         # Between a slab's ends nothing sticks out: radius and height grow along the axis, the lowest height is concave.
@@ -218,14 +227,19 @@ def _crown_most(row: NDArray[np.void], low: NDArray[np.float64], high: NDArray[n
 
 
 def sampled_bounds(parts: Sequence[Points], rows: int) -> NDArray[np.float64]:
-    """Radius across the branch, and lowest and highest place along it (r, 3), that hold the samples of each row."""
-    out = np.zeros((rows, 3))
+    """Cylinders (r, 6) that hold the samples of each row.
+
+    Radius across the branch, and lowest and highest place along it. Then how far across the limbs leave that they are
+    on, and how far along it, down and up, they are from there.
+    """
+    out = np.zeros((rows, 6))
     for points in parts:
-        across, along = np.hypot(points.position[:, 0], points.position[:, 1]), points.position[:, 2]
+        root = np.where((points.limbs.kind >= LIMB)[:, None], points.limbs.root, points.position)
+        along, way = points.position[:, 2], points.position[:, 2] - root[:, 2]
+        across, leaves = (np.hypot(place[:, 0], place[:, 1]) for place in (points.position, root))
+        found = np.stack([across, -along, along, leaves, -way, way], axis=1)
         for row, (first, number) in enumerate(zip(points.first, points.number, strict=True)):
             some = slice(int(first.min()), int((first + number).max()))  # the runs of a row follow one another
-            if some.stop > some.start:
-                out[row, 0] = max(out[row, 0], across[some].max())
-                out[row, 1] = min(out[row, 1], along[some].min())
-                out[row, 2] = max(out[row, 2], along[some].max())
+            out[row] = np.maximum(out[row], found[some].max(axis=0, initial=0.0))
+    out[:, [1, 4]] *= -1
     return out

@@ -134,8 +134,8 @@ class Flora:
         return _on_day(self.in_leaf, replace(season, snow=0.0))
 
     def in_wind(self, wind: Wind) -> Flora:
-        """The flora in a wind; bounds hold at all times."""
-        if wind.speed == 0:
+        """The flora in a wind; bounds hold at all times. Without speed plants may still move as a whole."""
+        if wind.speed == 0 and not wind.moving:
             return self.at_rest
         windy = _windy(self.at_rest, replace(wind, time=0.0))
         rows = windy.rows.copy()
@@ -158,7 +158,7 @@ class Flora:
 
     @cached_property
     def sampled_bound(self) -> NDArray[np.float64]:
-        """Radius, and lowest and highest place along the branch (r, 3), of all samples; unit is the branch's length."""
+        """`bounds.sampled_bounds` of all samples (r, 6); unit is the branch's length."""
         if self.in_leaf is not self:
             return self.in_leaf.sampled_bound
         parts = (self.samples.leaves, self.samples.wood)
@@ -181,6 +181,11 @@ class Flora:
         wood = _wood_totals(totals) * (totals.length * totals.radius)[:, None]
         area = totals.leaf_area[:, 1] + wood / 2
         return fit_clumping(self.rows, self.forms, area, self.polygons, self.leaf_width, totals.length)
+
+    @cached_property
+    def raised_bound(self) -> NDArray[np.float64]:
+        """`bound` of plants with crown bases."""
+        return unit_bounds(self.rows, raised=True)
 
     @cached_property
     def limb_reach(self) -> NDArray[np.float64]:

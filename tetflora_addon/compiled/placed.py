@@ -194,19 +194,30 @@ def _shares(
     return np.where(are_stools(flora.rows, own.row)[which], 1.0, many[which, on.kind] * bearing)
 
 
-def extents(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
-    """`Flora.sampled_bound` of sub-plants (n, 3), in units of their lengths."""
+def extents(flora: Flora, subplants: Branches, farthest: bool = True) -> NDArray[np.float64]:
+    """Radius, lowest and highest place (n, 3) that hold the samples of sub-plants, in units of their lengths.
+
+    Without ``farthest``, the radius of crowns that lean is about the mean of all sides.
+    """
     bound = flora.sampled_bound[subplants.row]
     some = formed_subplants(flora.rows, subplants)
     if len(some):
         own, rows = subplants.take(some), flora.rows
-        width, stretch = own.crown[:, WIDTH].astype(np.float64), along(rows, own.row, own.crown)
-        forks = rows["next"][own.row, FORK] >= 0
-        radius, low, high = bound[some].T
-        # Limbs reach over the top as far as they are long; where trunks fork, who knows what does.
-        over = np.where(forks, 0.0, np.maximum(high - 1.0, 0.0) * (width - 1.0))
-        bound[some] = np.stack([radius * width, low, high + over], axis=1) / stretch[:, None]
-    return bound
+        crown, stool = own.crown.astype(np.float64), are_stools(rows, own.row)
+        stretch = along(rows, own.row, own.crown)
+        lean = np.hypot(*crown[:, LIGHT].T[:2]) if farthest else 0.0
+        reach = crown[:, WIDTH] * (1 + lean)
+        reach = np.where(stool, np.sqrt(np.minimum(reach, MOST_LEANING)), reach)
+        radius, low, high, root, down, up = bound[some].T
+        start = rows["start"][own.row, LATERAL, 0]
+        left = (1 - np.maximum(start, bare_part(rows, own.row, crown[:, BASE]))) / np.maximum(1 - start, 1e-9)
+        longer = np.where(stool, 0.0, np.maximum(reach - 1, 0.0))
+        top = high + longer * up
+        top += (1 - left) * np.maximum(1 + reach * up - top, 0.0) + np.maximum(stretch - 1, 0.0)
+        top = np.where(stool & (reach < 1), np.hypot(radius, high), top)
+        radius = reach * radius + np.where(farthest, np.abs(reach - 1) * root, 0.0)
+        bound[some, :3] = np.stack([radius, low + longer * down, top], axis=1) / stretch[:, None]
+    return bound[:, :3]
 
 
 def outlines(
@@ -242,10 +253,12 @@ def bounds(flora: Flora, subplants: Branches) -> tuple[NDArray[np.float64], NDAr
     if len(some):
         own, rows = subplants.take(some), flora.rows
         crown = own.crown.astype(np.float64)
+        raised = crown[:, BASE] > 0
+        bound[some[raised]] = flora.raised_bound[own.row[raised]] * own.length[raised, None]
         stretch = along(rows, own.row, own.crown)
         longer = crown[:, WIDTH] * (1 + np.linalg.norm(crown[:, LIGHT], axis=1))
         longer = np.where(are_stools(rows, own.row), np.minimum(longer, MOST_LEANING), longer)
-        # Nothing on a limb moves farther than that is longer, and nothing else than the trunk is to its fork.
+        # Nothing on a limb moves farther than that is longer, and forks move as far as the trunk is to them.
         reach = flora.limb_reach[own.row] * np.maximum(longer - 1, 0.0)
         out[some] += (reach + 3 * np.abs(stretch - 1)) * own.length / stretch
         bound[some] /= stretch[:, None]

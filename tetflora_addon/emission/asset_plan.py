@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..growth.hashing import Draw, uniform
 from ..proxies.asset_facets import asset_facet_sizes, facets_of_assets
-from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes
+from ..proxies.facet_sizes import FacetPixels, FacetSizes
 from ..proxies.microsurfaces import Facets, kept_out_of_view
 from ..refinement.asset_parts import AssetParts
 from ..refinement.decisions import real_fraction
@@ -183,6 +183,6 @@ def _facets_of(sight: AssetSight, portions: AssetPortions, pixels: FacetPixels) 
                 left_out = np.where(seen[some], 0.0, 1.0 - own.enough(pixels))
                 made = facets_of_assets(sight.placed, portions.parts.take(some), own, pixels, left_out)
                 if not seen[some[0]]:
-                    made = kept_out_of_view(made, sight.camera.clearance, HIDDEN_LEAVES**-0.5, not beside)
+                    made = kept_out_of_view(made, sight.camera.clearance, not beside)
                 yield made, bool(seen[some[0]] or not beside)
         portions, _ = sight.opened(portions.take(opening))

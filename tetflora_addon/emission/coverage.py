@@ -4,8 +4,9 @@
 
 The paper renders front to back and keeps an alpha buffer (sections 6.3 and 7). What is drawn here is opaque, so that a
 depth for each pixel says the same: a pixel is full from the depth of what covers its centre on. Parts are tested by
-their bounds against the farthest depth in the rectangle of pixels that they may touch (Greene, Kass and Miller,
-"Hierarchical Z-buffer visibility", SIGGRAPH 1993); a part is hidden only where all of that is full before it begins.
+their bounds against the farthest depth in the rectangle of pixels that they touch, as by Greene, Kass and Miller
+("Hierarchical Z-buffer visibility", SIGGRAPH 1993), but from maxima of overlapping squares; a part is hidden only where
+all of that is full before it begins.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ from ..camera.camera import Camera, circle_of_confusion
 
 #: Pixels around the image that count as part of it: the filter of a renderer reaches there.
 MARGIN = 2
+#: Side of the cells of the image, pixels, each of which goes its own way from front to back.
+CELL = 24
 #: Pairs of a triangle and a pixel of its box that are tested together: some 100 bytes each.
 PAIRS_BATCH = 1 << 20
 #: How much nearer than what it hides something is, over the depth of that: as far as several eyes count.
 _NEARER = 1.0
-#: Rectangles are read from a level of the pyramid in which they span at most so many cells on each side.
-_CELLS = 4
+#: Part of a pixel that something reaches into before it counts as touched.
+EDGE = 0.0
 
 
 @dataclass(frozen=True)
@@ -67,13 +70,20 @@ class Coverage:
         first, end = (0, wide.width) if tile is None else tile
         self.first, self.end = max(first, 0), min(end, wide.width)
         self.depth = np.full((wide.height, self.end - self.first), np.inf, np.float32)
-        self._pyramid: list[NDArray[np.float32]] = []
+        self._maxima: list[NDArray[np.float32]] = []
         left, right, bottom, top = wide.window
         self._scale = np.array([wide.width / (right - left), wide.height / (top - bottom)])
 
     def project(self, points: NDArray[np.floating]) -> tuple[NDArray, NDArray, NDArray]:
         """Columns and rows (n,) in pixels, and depths (n,) in metres, of points (n, 3)."""
         return _projected(self.camera, points, self._scale)
+
+    def cells(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> NDArray[np.int64]:
+        """Cells (n,) of the image that columns and rows (n,) lie in, or come nearest to."""
+        height, width = self.depth.shape
+        across = np.clip(np.nan_to_num(column - self.first), 0, width - 1).astype(np.int64) // CELL
+        up = np.clip(np.nan_to_num(row), 0, height - 1).astype(np.int64) // CELL
+        return up * (width // CELL + 1) + across
 
     def of_spheres(self, centre: NDArray[np.float64], radius: NDArray[np.float64]) -> Footprints:
         """Footprints of spheres around points (n, 3), radii (n,) in metres.
@@ -155,27 +165,27 @@ class Coverage:
 
     def hidden(self, prints: Footprints) -> NDArray[np.bool_]:
         """Things (n,) behind full pixels wherever they are in the image; those outside are."""
-        if not self._pyramid:
-            self._pyramid = _maxima(self.depth)
+        if not self._maxima:
+            self._maxima = _maxima(self.depth)
         size, first = np.array([self.end - self.first, self.height]), np.array([self.first, 0])
         # Pixels that this buffer does not know of, and those of what reaches around the eye, may all be empty.
         known = np.isfinite(prints.near) & ~((prints.low[:, 0] < self.first) & (self.first > 0))
         known &= ~((prints.high[:, 0] > self.end) & (self.end < self.width)) & np.isfinite(prints.high[:, 0])
-        low = np.clip(np.floor(np.clip(prints.low, -1.0, 1e9)) - first, 0, size - 1).astype(np.int64)
-        high = np.clip(np.floor(np.clip(prints.high, -1.0, 1e9)) - first, 0, size - 1).astype(np.int64)
-        span = np.maximum((high - low).max(axis=1) + 1, 1)
-        level = np.ceil(np.log2(span / (_CELLS - 1)).clip(0)).astype(np.int64)
-        level = np.minimum(level, len(self._pyramid) - 1)
+        low, high = (
+            np.clip(np.floor(np.clip(of, -1.0, 1e9)) - first, 0, size - 1).astype(np.int64)
+            for of in (prints.low + EDGE, prints.high - EDGE)
+        )
+        high = np.maximum(high, low)
+        level = np.log2((high - low).max(axis=1) + 1).astype(np.int64)
         out = np.zeros(len(low), bool)
         for number in np.unique(level):
-            some, table = np.flatnonzero(level == number), self._pyramid[number]
-            first, last = low[some] >> number, high[some] >> number
+            some, table = np.flatnonzero(level == number), self._maxima[number].ravel()
+            # Four overlapping squares cover a rectangle, and more where one side is much longer.
+            low_, last = low[some], np.maximum(high[some] - (1 << number) + 1, low[some])
             farthest = np.zeros(len(some), np.float32)
-            wide, tall = (last - first).max(axis=0) + 1
-            for i in range(int(tall)):
-                r = np.minimum(first[:, 1] + i, last[:, 1]) * table.shape[1]
-                for j in range(int(wide)):
-                    np.maximum(farthest, np.take(table, r + np.minimum(first[:, 0] + j, last[:, 0])), out=farthest)
+            for row in (low_[:, 1], last[:, 1]):
+                for column in (low_[:, 0], last[:, 0]):
+                    np.maximum(farthest, np.take(table, row * size[0] + column), out=farthest)
             out[some] = farthest < prints.near[some]
         return (out & known) | self.outside(prints)
 
@@ -196,7 +206,7 @@ class Coverage:
         some = np.flatnonzero(ok & (count > 0))
         if not len(some):
             return
-        self._pyramid = []
+        self._maxima = []
         flat = self.depth.reshape(-1)
         ends = np.cumsum(count[some])
         start = 0
@@ -250,16 +260,14 @@ def _covered(
 
 
 def _maxima(depth: NDArray[np.float32]) -> list[NDArray[np.float32]]:
-    """Pyramid of the largest of four depths each, from the image to one cell."""
-    levels = [depth]
-    while max(levels[-1].shape) > 1:
+    """Largest depths of squares of 1, 2, 4, ... pixels whose lower left is each pixel; beyond the image nothing is."""
+    levels, side = [depth], 1
+    while 2 * side <= max(depth.shape):
         last = levels[-1]
-        height, width = last.shape
-        padded = np.zeros((height + height % 2, width + width % 2), np.float32)
-        padded[:height, :width] = last
-        levels.append(
-            np.maximum(
-                np.maximum(padded[::2, ::2], padded[1::2, ::2]), np.maximum(padded[::2, 1::2], padded[1::2, 1::2])
-            )
-        )
+        new = last.copy()
+        np.maximum(new[:-side], last[side:], out=new[:-side])
+        wide = new.copy()
+        np.maximum(wide[:, :-side], new[:, side:], out=wide[:, :-side])
+        levels.append(wide)
+        side *= 2
     return levels

@@ -44,7 +44,7 @@ from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import Pieces, whole_pieces
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
-from .coverage import Coverage
+from .coverage import Coverage, Footprints
 from .frontier import DETAIL, FEW, Frontier, Waiting
 from .plants import Block, Transition
 from .shade import Shade
@@ -54,7 +54,7 @@ TILE, AROUND = 240, 64
 #: Pixels from which on a branch that nothing else grows on has a line of its own; smaller ones are as straight.
 LINES = 6.0
 #: Batches, front to back, in which what was made between two depths is tested and covers the image.
-_BATCHES = 12
+_BATCHES = 4
 #: Width in pixels up to which wood is thin triangles; tubes take their place up to `decisions.BAND` times that.
 TUBES = 0.8
 #: Pixels that the axis of a branch may be off a straight line; ribbons follow those that bend more.
@@ -64,10 +64,12 @@ BROAD, SIDES = 4.0, 4
 #: Fraction of a facet's area from which on each branch has a triangle; of smaller ones fewer have a wider one.
 TWIG = 0.6
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
-MERGED = (24.0, 6.0)
+MERGED = (64.0, 16.0, 4.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
 #: the shade over which it grows by e; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
+#: Optical depth in the shade from which on hidden facets shrink instead of being divided.
+DARK = 1.0
 #: Facets of hidden parts, and of those outside, for each pixel of the image, at most.
 HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.6, 0.3
 #: So many of each are never too many.
@@ -95,10 +97,14 @@ Form = Callable[[Facets, bool], Any]
 
 @dataclass(frozen=True)
 class Parts:
-    """Facets of one species, of assets, or of other meshes where that is None; and whether the camera sees them."""
+    """Facets of one species, of assets, or of other meshes where that is None; and whether the camera sees them.
+
+    ``look`` is that of assets and of the surfaces of other meshes.
+    """
 
     species: int | None
     facets: tuple[tuple[Drawn, bool], ...]
+    look: str = ""
 
     def __iter__(self) -> Iterator[tuple[Drawn, bool]]:
         return iter(self.facets)
@@ -436,19 +442,25 @@ class _Tile:
     def _cover(self) -> None:
         """Test what was made, front to back, and let what is seen cover the image; few stand for the rest."""
         waiting, self._waiting = self._waiting, []
-        tested = [self.coverage.of_corners(corners) for _, _, corners in waiting]
-        hidden = [np.zeros(len(corners), bool) for _, _, corners in waiting]
-        near = np.concatenate([np.zeros(0, np.float32), *(prints.near for prints, *_ in tested)])
-        ends = np.quantile(near, np.linspace(0.0, 1.0, _BATCHES + 1)[1:]) if len(near) else []
-        before = -np.inf
-        for end in ends:
-            for (prints, *corners), gone in zip(tested, hidden, strict=True):
-                some = np.flatnonzero((prints.near > before) & (prints.near <= end))
-                gone[some] = self.coverage.hidden(prints.take(some))
-                seen = some[~gone[some]]
-                self._fill(*(of[seen] for of in corners))
-            before = end
-        for (what, made, corners), gone in zip(waiting, hidden, strict=True):
+        groups = sorted({corners.shape[1] for _, _, corners in waiting})
+        tested = [
+            self.coverage.of_corners(np.concatenate([of for _, _, of in waiting if of.shape[1] == group]))
+            for group in groups
+        ]
+        ends = np.cumsum([0, *(len(prints) for prints, *_ in tested)])
+        hidden = np.zeros(ends[-1], bool)
+        for batch in self._batches(tested):
+            seen = []
+            for first, end, (prints, *corners) in zip(ends, ends[1:], tested, strict=False):
+                some = batch[(batch >= first) & (batch < end)] - first
+                gone = self.coverage.hidden(prints.take(some))
+                hidden[first + some[gone]] = True
+                seen.append([of[some[~gone]] for of in corners])
+            for corners in seen:
+                self._fill(*corners)
+        flags = dict(zip(groups, np.split(hidden, ends[1:-1]), strict=True)) if waiting else {}
+        for what, made, corners in waiting:
+            gone, flags[corners.shape[1]] = np.split(flags[corners.shape[1]], [len(corners)])
             species = what if isinstance(made, Facets) else what[2]
             lost = np.flatnonzero(gone)
             if isinstance(made, Facets):
@@ -462,6 +474,19 @@ class _Tile:
             if made.polygons:
                 self.number += made.polygons
                 self._meshes.setdefault(what, []).append(made)
+
+    def _batches(self, tested: list[tuple[Footprints, NDArray, NDArray, NDArray]]) -> list[NDArray[np.intp]]:
+        """Numbers of what was tested in batches: in each cell of the image the nearest come first."""
+        if not tested:
+            return []
+        near = np.concatenate([prints.near for prints, *_ in tested])
+        cell = self.coverage.cells(*(np.concatenate([of[k][:, 0] for of in tested]) for k in (1, 2)))
+        order = np.lexsort((near, cell))
+        count = np.bincount(cell)
+        own = cell[order]
+        place = np.arange(len(near)) - (np.cumsum(count) - count)[own]
+        batch = _BATCHES * place // np.maximum(count[own], 1)
+        return [order[batch == number] for number in range(_BATCHES)]
 
     def _few(self, a_pixel: float, share: float, most: float) -> float:
         """Facets that nobody sees, for each pixel of a share of the image, of the few that are left of so many.
@@ -477,15 +502,18 @@ class _Tile:
     def _merge(self, facets: Facets, species: int) -> None:
         """Few large facets for many that are hidden; each lies behind full pixels as a whole, or is as it was."""
         number = uniform(_keys_of(facets.centre), _MERGE)
+        # Where there are few, all of the last are kept; where there are many, as if they had been merged as well.
+        likely = 1.0 / (MERGED[-1] * self.given.hidden**2)
+        some = np.flatnonzero(number < max(1.0 / MERGED[-1], likely))
+        facets, number = facets.take(some), number[some]
         for times in MERGED:
             larger = replace(facets, side=facets.side * np.sqrt(times))
             hidden = self._hidden(larger)
             self._keep(larger.take(np.flatnonzero(hidden & (number < 1.0 / times))), False, species)
             rest = np.flatnonzero(~hidden)
             facets, number = facets.take(rest), number[rest]
-        # Where there are few, all of these are kept; where there are many, as if they had been merged as well.
-        likely = 1.0 / (MERGED[-1] * self.given.hidden**2)
-        self._keep(facets.take(np.flatnonzero(number < likely)), False, species)
+        # A facet has another outline than the face for which it stands.
+        self._keep(facets.take(np.flatnonzero((number < likely) & self._hidden(facets))), False, species)
 
     def _hidden(self, facets: Facets) -> NDArray[np.bool_]:
         """Facets (n,) behind full pixels."""
@@ -501,12 +529,19 @@ class _Tile:
         self._draw_unseen(pool, side, most, self._add_hidden)
 
     def _add_hidden(self, facets: Facets, species: int) -> None:
-        """Facets of hidden parts, divided until they lie behind full pixels; what would show even so is left out."""
+        """Facets of hidden parts, smaller until they lie behind full pixels; what would show even so is left out.
+
+        Where light reaches them they are divided; in the shade each shrinks: what lies before it keeps the light out.
+        """
+        dark = self.given.shade.depth(facets.centre) > DARK
         while len(facets):
             hidden = self._hidden(facets)
             self._keep(facets.take(np.flatnonzero(hidden)), False, species)
             large = facets.side > self.given.facet * self.given.camera.extent_around(facets.centre)
-            facets = quarters(facets.take(np.flatnonzero(~hidden & large)))
+            lit, rest = (np.flatnonzero(~hidden & large & own) for own in (~dark, dark))
+            smaller = facets.take(rest)
+            facets = Facets.concatenate([quarters(facets.take(lit)), replace(smaller, side=0.5 * smaller.side)])
+            dark = np.repeat([False, True], [4 * len(lit), len(rest)])
 
     def _draw_outside(self, pool: Waiting, most: float) -> None:
         """Parts out of view: facets as large as their distance and the shadows that they throw allow."""
@@ -514,7 +549,7 @@ class _Tile:
             return
 
         def add(facets: Facets, species: int) -> None:
-            self._keep(kept_out_of_view(facets, self.coverage.camera.clearance, 0.0), False, species)
+            self._keep(kept_out_of_view(facets, self.coverage.camera.clearance), False, species)
 
         if self.given.shadow > 0.0:
             fine, pool = self._for_shadows(pool)
@@ -537,6 +572,7 @@ class _Tile:
         """Parts that throw shadows which are to be fine, opened as far as these show, and all others."""
         given, fine, left = self.given, [Waiting.empty()], [Waiting.empty()]
         frontier = Frontier(self.flora, self.coverage, given.transition, given.shadow)
+        pool = frontier.pool(pool.parts)
         while len(pool):
             away = given.camera.clearance(pool.centre)
             lit = given.shade.depth(pool.centre, pool.radius) < LIT
@@ -544,7 +580,7 @@ class _Tile:
             left.append(pool.take(np.flatnonzero(~lit)))
             pool = pool.take(np.flatnonzero(lit))
             pixels = 2.0 * pool.radius / given.camera.extent_around(pool.centre)
-            large = pool.parts.can_open(self.flora) & (pixels > DETAIL * given.shadow) & (frontier.count(pool) > FEW)
+            large = pool.parts.can_open(self.flora) & (pixels > DETAIL * given.shadow) & (pool.count > FEW)
             fine.append(pool.take(np.flatnonzero(~large)))
             some = opened(self.flora, pool.parts.take(np.flatnonzero(large)))
             pool = frontier.pool(PlantParts.concatenate([new for new, _, _ in some]))
@@ -609,8 +645,11 @@ def _facets_of_faces(
 ) -> Facets:
     """Facets in the place of faces (n,) with corners (n, k, 3), the last of which repeats beyond their size (n,)."""
     corners = corners.astype(np.float64)
-    centre = corners.sum(axis=1) - (corners.shape[1] - size)[:, None] * corners[:, -1]
-    centre /= size[:, None]
+
+    def middle(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (values.sum(axis=1) - (values.shape[1] - size)[:, None] * values[:, -1]) / size[:, None]
+
+    centre = middle(corners)
     along = unit(corners[:, 1] - corners[:, 0])
     vector = np.zeros_like(centre)
     for k in range(1, corners.shape[1] - 1):
@@ -622,5 +661,6 @@ def _facets_of_faces(
     velocity = None
     if "velocity" in buffers.attributes:
         moving = buffers.attributes["velocity"][1].astype(np.float64)
-        velocity = moving[buffers.corner_verts[buffers.face_offsets[faces]]]
+        every = np.minimum(np.arange(corners.shape[1]), size[:, None] - 1) + buffers.face_offsets[faces, None]
+        velocity = middle(moving[buffers.corner_verts[every]])
     return Facets(centre, across, along, np.sqrt(area), colour, through, velocity, stretch=np.ones(len(area)))

@@ -66,6 +66,8 @@ class Refined:
         What instances of assets are drawn as; None where there are none.
     disc : float
         Area that the renderer draws of a sphere of radius 1.
+    asset_looks : (i,) str
+        Of instances of assets; what stands for different ones is kept apart.
     """
 
     flora: Flora
@@ -76,6 +78,7 @@ class Refined:
     tolerance: float = TOLERANCE
     assets: tuple[AssetSight, AssetPlan] | None = None
     disc: float = np.pi
+    asset_looks: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, str))
     _waiting: list[Parts] = field(default_factory=list, compare=False)
 
     @property
@@ -108,14 +111,18 @@ class Refined:
         form = self.drawing.form
         more = []
         if self.assets is not None:
-            more = [(ASSETS, made) for made in planned_facets(*self.assets, self.pixels, form)]
+            sight, plan = self.assets
+            looks = self.asset_looks[plan.facets.parts.instance]
+            for look in np.unique(looks).tolist():
+                some = replace(plan, facets=plan.facets.take(looks == look))
+                more += [((ASSETS, look), made) for made in planned_facets(sight, some, self.pixels, form)]
         polygons = hidden_polygon_facets(self.refinement, self.camera, self.pixels.seen, FACETS_AT_ONCE)
-        for facets, seen in polygons:
-            more.append((None, (facets if form is None else form(facets, seen), seen)))
-        for species in (ASSETS, None):
-            made = [(some, seen) for of, (some, seen) in more if of == species and len(some)]
+        for look, facets, seen in polygons:
+            more.append(((None, look), (facets if form is None else form(facets, seen), seen)))
+        for species, look in dict.fromkeys(of for of, _ in more):
+            made = [(some, seen) for of, (some, seen) in more if of == (species, look) and len(some)]
             if made:
-                yield Parts(species, tuple(made))
+                yield Parts(species, tuple(made), look)
 
 
 @dataclass(frozen=True)
@@ -195,9 +202,9 @@ def facet_blocks(refined: Refined) -> Iterator[Buffers]:
         triangles = [some for some, _ in parts if isinstance(some, Triangles)]
         spheres = [some for some, _ in parts if isinstance(some, Spheres)]
         if triangles:
-            yield replace(triangle_mesh(joined(triangles)), species=parts.species)
+            yield replace(triangle_mesh(joined(triangles)), species=parts.species, look=parts.look)
         if spheres:
-            yield replace(sphere_points(joined(spheres)), species=parts.species)
+            yield replace(sphere_points(joined(spheres)), species=parts.species, look=parts.look)
 
 
 def shell_blocks(refined: Refined, light: BakedLight | None = None, _first_sheet: int = 0) -> Iterator[MeshBuffers]:
@@ -218,7 +225,7 @@ def _numbered(refined: Refined, first_sheet: int) -> Iterator[tuple[Parts, Facet
 def _baked_facets(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[MeshBuffers]:
     for parts, facets, sheets in _numbered(refined, first_sheet):
         made, values = facet_mesh(facets), baked_attributes('FACE', *light.of_facets(facets, sheets))
-        yield replace(made, attributes={**made.attributes, **values}, species=parts.species)
+        yield replace(made, attributes={**made.attributes, **values}, species=parts.species, look=parts.look)
 
 
 def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[PointBuffers]:
@@ -227,7 +234,7 @@ def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Ite
         drawn = [spheres_of(some, camera if seen else None, refined.disc) for some, seen in parts]
         made, values = sphere_points(joined(drawn)), light.of_spheres(facets, sheets)
         baked = {name: array for name, (_, array) in baked_attributes('POINT', values).items()}
-        yield replace(made, attributes={**made.attributes, **baked}, species=parts.species)
+        yield replace(made, attributes={**made.attributes, **baked}, species=parts.species, look=parts.look)
 
 
 MICROSURFACES = EmissionForm(facet_blocks, _triangles_everywhere, _baked_facets)

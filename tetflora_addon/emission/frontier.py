@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The frontier: parts of plants, opened front to back until what becomes of each is known.
 
-Parts wait in a pool. Those that begin before a depth are tested against the coverage of all that was drawn before:
-what is hidden or outside stays whole, what is seen and large is opened, what is seen and small is to be drawn, and
-covers the image in its turn. Then the next depths follow. Each part is opened once, and everything that is made follows
-from it. The loop's tetrahedra say what to open before anything is drawn (`refinement`); what is hidden is decided here.
+Parts wait in a pool. In each cell of the image the nearest ones are tested against the coverage of all that was drawn
+before: what is hidden or outside stays whole, what is seen and large is opened, what is seen and small is to be drawn,
+and covers the image in its turn. Then the next ones follow. Each part is opened once, and everything that is made
+follows from it. The loop's tetrahedra say what to open before anything is drawn (`refinement`); what is hidden is
+decided here.
 """
 
 from __future__ import annotations
@@ -21,16 +22,14 @@ from ..compiled.flora import Flora
 from ..compiled.placed import extents
 from ..refinement.contents import PlantParts
 from ..refinement.shares import opened
-from .coverage import Coverage
+from .coverage import CELL, Coverage
 from .plants import Transition
 
 #: Pixels, and facets, down to which parts that are seen are opened: smaller ones are drawn at their samples.
 DETAIL, FEW = 3.0, 3.0
-#: Facets for each pixel that lie between two depths, about, and how many are made at least: what these hide of each
-#: other is not known when they are made.
-SLAB, LEAST = 0.5, 20_000.0
-#: Depths that a pool is divided into at first.
-_SLABS = 200
+#: Facets for each pixel of a cell that are made at a time, about, and how many are made at least in all cells: what
+#: these hide of each other is not known when they are made.
+SLAB, LEAST = 0.4, 20_000.0
 
 
 @dataclass(frozen=True)
@@ -45,12 +44,18 @@ class Waiting(Arrays):
         Metres.
     near : (n,) float64
         Least depth of the sphere, metres.
+    cell : (n,) int64
+        Cell of the image that its middle is in.
+    count : (n,) float64
+        Facets that they would have, all of them.
     """
 
     parts: PlantParts = field(metadata=nested(PlantParts))
     centre: NDArray[np.float64] = field(metadata=column(3))
     radius: NDArray[np.float64]
     near: NDArray[np.float64]
+    cell: NDArray[np.int64]
+    count: NDArray[np.float64]
 
 
 class Frontier:
@@ -85,29 +90,47 @@ class Frontier:
         across = np.where(alone, 0.5 * parts.extent / np.maximum(branches.length, 1e-12), across)
         centre = branches.position + middle[:, None] * branches.frame[:, :, 2]
         radius = branches.length * np.hypot(across, half) + branches.radius
-        return Waiting(parts, centre, radius, self.coverage.project(centre)[2] - radius)
+        column, row, depth = self.coverage.project(centre)
+        side = self.facet * self.coverage.camera.extent_around(centre)
+        count = parts.totals.optical_area / np.maximum(side**2, 1e-12)
+        return Waiting(parts, centre, radius, depth - radius, self.coverage.cells(column, row), count)
 
     def slabs(self, parts: PlantParts, most: float = np.inf) -> Iterator[Waiting]:
         """Parts that are to be drawn, some at a time; what they cover is to be drawn before more are asked for.
 
-        Each time they have no more than about so many facets.
+        In each cell of the image these are the nearest ones, which have no more than about so many facets in all.
         """
-        pool, step = self.pool(parts), 0.0
-        wanted = min(max(SLAB * self.coverage.depth.size, LEAST), max(most, 1.0))
+        pool, dense = self.pool(parts), SLAB * CELL**2
         while len(pool):
-            first = float(pool.near.min())
-            step = step or max((float(pool.near.max()) - first) / _SLABS, 1e-3)
-            depth = max(first, 0.0) + step
-            ready, later = self._decided(pool.take(np.flatnonzero(pool.near <= depth)), depth)
+            depth, cells = self._depths(pool, dense)
+            ready, later = self._decided(pool.take(np.flatnonzero(pool.near <= depth)), depth[pool.near <= depth])
             pool = Waiting.concatenate([pool.take(np.flatnonzero(pool.near > depth)), *later])
-            # The next slab is as much deeper as this one had fewer facets than it should.
-            number = float(self.count(ready).sum()) if len(ready) else 0.0
-            step *= float(np.clip(wanted / max(number, 1.0), 0.5, 2.0))
+            # Where much was hidden, or little is left, the next ones are so many more.
+            wanted = min(max(SLAB * CELL**2 * cells, LEAST), max(most, 1.0))
+            number = float(ready.count.sum())
+            dense *= float(np.clip(wanted / max(number, 1.0), 0.5, 2.0))
             if len(ready):
                 yield ready
 
-    def _decided(self, slab: Waiting, depth: float) -> tuple[Waiting, list[Waiting]]:
-        """What is to be drawn of parts that begin before a depth, and what of theirs begins beyond."""
+    def _depths(self, pool: Waiting, number: float) -> tuple[NDArray[np.float64], int]:
+        """Depths (n,) for parts, before which these have so many facets in each cell, about; and how many cells."""
+        deepest = float(np.ptp(pool.near)) + 1.0
+        order = np.argsort(pool.cell * deepest + (pool.near - pool.near.min()), kind="stable")
+        cells, near = pool.cell[order], pool.near[order]
+        first = np.flatnonzero(np.diff(cells, prepend=-1))
+        count = pool.count[order]
+        before = np.cumsum(count) - count
+        group = np.repeat(np.arange(len(first)), np.diff(first, append=len(cells)))
+        left = number - (before - before[first][group])
+        # The part that the number ends in counts by the share of its depth; that is the last with any left.
+        last = np.maximum.reduceat(np.where(left > 0.0, np.arange(len(cells)), -1), first)
+        end = near[last] + 2.0 * pool.radius[order][last] * np.minimum(left[last] / np.maximum(count[last], 1e-12), 1.0)
+        depth = np.empty(len(cells))
+        depth[order] = end[group]
+        return depth, len(first)
+
+    def _decided(self, slab: Waiting, depth: NDArray[np.float64]) -> tuple[Waiting, list[Waiting]]:
+        """What is to be drawn of parts that begin before depths (n,), and what of theirs begins beyond."""
         ready, later = [Waiting.empty()], []
         while len(slab):
             prints = self.coverage.of_spheres(slab.centre, slab.radius)
@@ -115,22 +138,21 @@ class Frontier:
             hidden = ~outside & self.coverage.hidden(prints)
             self.outside.append(slab.take(np.flatnonzero(outside)))
             self.hidden.append(slab.take(np.flatnonzero(hidden)))
-            slab = slab.take(np.flatnonzero(~outside & ~hidden))
+            seen = np.flatnonzero(~outside & ~hidden)
+            slab, depth = slab.take(seen), depth[seen]
             large = self.large(slab)
             ready.append(slab.take(np.flatnonzero(~large)))
-            some = slab.parts.take(np.flatnonzero(large))
-            new = self.pool(PlantParts.concatenate([made for made, _, _ in opened(self.flora, some)]))
+            some = np.flatnonzero(large)
+            made = list(opened(self.flora, slab.parts.take(some)))
+            new = self.pool(PlantParts.concatenate([parts for parts, _, _ in made]))
+            depth = depth[some][np.concatenate([np.zeros(0, np.int64), *(owner for _, owner, _ in made)])]
             later.append(new.take(np.flatnonzero(new.near > depth)))
-            slab = new.take(np.flatnonzero(new.near <= depth))
+            soon = np.flatnonzero(new.near <= depth)
+            slab, depth = new.take(soon), depth[soon]
         return Waiting.concatenate(ready), later
-
-    def count(self, pool: Waiting) -> NDArray[np.float64]:
-        """Facets (n,) that parts would have, all of them."""
-        side = self.facet * self.coverage.camera.extent_around(pool.centre)
-        return pool.parts.totals.optical_area / np.maximum(side**2, 1e-12)
 
     def large(self, pool: Waiting) -> NDArray[np.bool_]:
         """Parts (n,) that are to be opened: more of them shows than their samples tell."""
         pixels = 2.0 * pool.radius / self.coverage.camera.extent_around(pool.centre)
-        shows = (pixels > DETAIL) & (self.count(pool) > FEW)
+        shows = (pixels > DETAIL) & (pool.count > FEW)
         return pool.parts.can_open(self.flora) & (shows | (self.transition.of_branches(pool.parts.branches) > 0.0))

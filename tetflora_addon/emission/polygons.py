@@ -23,7 +23,7 @@ from ..arrays import spread, unit
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..growth.hashing import child_key, key_of_seed, mix, stepped, uniform
-from ..proxies.facet_sizes import HIDDEN_FACES, polygon_facet_sizes
+from ..proxies.facet_sizes import polygon_facet_sizes
 from ..proxies.microsurfaces import Facets, kept_out_of_view
 from ..refinement.contents import Held
 from ..refinement.decisions import Decision
@@ -203,12 +203,17 @@ def _at_corners(
 
 def hidden_polygon_facets(
     result: Refinement, camera: Camera, facet_pixels: float, at_once: float
-) -> Iterator[tuple[Facets, bool]]:
-    """`polygon_facets` of all polygons in proxies, hidden or not."""
+) -> Iterator[tuple[str, Facets, bool]]:
+    """`polygon_facets` of all polygons in proxies, hidden or not, each with the look of their surfaces before."""
     held = result.holdings.polygons
     proxies = held.take(result.chosen(Decision.PROXY, Decision.HIDDEN)[held.cell])
-    if len(proxies):
-        yield from polygon_facets(proxies, result, camera, facet_pixels, at_once)
+    if not len(proxies):
+        return
+    meshes = proxies.items.meshes
+    looks = np.array([surface.look for surface in meshes.surfaces])[meshes.surface[proxies.items.instance]]
+    for look in np.unique(looks).tolist():
+        for made in polygon_facets(proxies.take(looks == look), result, camera, facet_pixels, at_once):
+            yield look, *made
 
 
 def polygon_facets(
@@ -230,7 +235,7 @@ def polygon_facets(
         for run in chunks(expected[chosen], at_once):
             some = chosen[run]
             made = chosen_facets(held.items.take(some), sizes.optical[some], side[some])
-            yield kept_out_of_view(made, camera.clearance, HIDDEN_FACES**-0.5) if beside else made, seen
+            yield kept_out_of_view(made, camera.clearance) if beside else made, seen
 
 
 def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:

@@ -87,7 +87,7 @@ class SeenNodes:
             self.close &= result.in_view
 
     def _fill_empty(self, result: Refinement) -> None:
-        """Give nodes that hold no point what the nearest ones that do have on average, where they are in the view.
+        """Give nodes that hold no point what the nearest ones that do have on average, or most of them, in the view.
 
         A plant has a few points in the loop, so that parts of it lie in nodes of which the loop knows nothing. They are
         no more hidden than what is around them.
@@ -109,7 +109,7 @@ class SeenNodes:
         within = tree.inside if tree.inside.any() else sums[:, 1] > 0.5 * sums[:, 0]
         empty = np.flatnonzero((tree.children[:, 0] < 0) & ~known & within & (sums[:, 1] > 0.0))
         mean = sums[empty, 2:] / sums[empty, 1:2]
-        self.visibility[empty], self.explicit[empty], self.coarse[empty] = mean[:, 0], mean[:, 1] > 0.0, mean[:, 2]
+        self.visibility[empty], self.explicit[empty], self.coarse[empty] = mean[:, 0], mean[:, 1] > 0.5, mean[:, 2]
         self.inside[empty] = True
 
     def of(self, points: SharePoints, count: int, close: NDArray[np.intp]) -> Seen:

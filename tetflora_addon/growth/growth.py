@@ -38,7 +38,7 @@ from .nodes import Grown, child_number, grown_nodes
 from .rows import DEAD, FORK, LATERAL, SPUR, flare_rings, ranged, varied
 from .seasons import plant_years
 from .seeds import Seeds
-from .wind import is_windy, moment
+from .wind import axis_and_angle, is_windy, moment, turned_by, turned_vectors
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
 # Each sort of children has child indices of its own, below those of leaves.
@@ -94,12 +94,21 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     scale = np.asarray(seeds.scale, dtype=np.float64)
     one, none = np.ones(len(seeds)), np.zeros(len(seeds))
     sky = by_component(np.tile(_SKY, (len(seeds), 1))) if is_windy(rows) else None
-    later = Pose(seeds.position, frame, sky) if moment(rows) else None  # the foot of a plant stands still
+    later = _later(seeds, frame, sky, moment(rows)) if moment(rows) else None
     year, crown = plant_years(rows, row, key), None
     if seeds.crown is not None:
         crown, girth = formed_trunks(rows, row, frame, seeds.crown)
         length, radius = length * along(rows, row, crown), radius * girth
     return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later, year, crown)
+
+
+def _later(seeds: Seeds, frame: NDArray[np.float64], sky: NDArray[np.float64], seconds: float) -> Pose:
+    """Trunks so many seconds later: the foot of a plant stands still unless the whole plant moves."""
+    if seeds.motion is None:
+        return Pose(seeds.position, frame, sky)
+    step = seconds * seeds.motion
+    turn = axis_and_angle(step[:, 3:])
+    return Pose(seeds.position + step[:, :3], turned_by(frame, *turn), turned_vectors(sky, *turn))
 
 
 def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
@@ -116,8 +125,12 @@ def chosen_drawn(
     plant = plants.take(owner)
     row = (rows["drawn_rows"][plant.row, 0] + index).astype(np.int32)
     length, radius, vigour, outward = rows["size"][row].T
-    start = np.einsum("nij,nj->ni", plant.frame, rows["knots"][row, 0]) * plant.scale[:, None]
-    position, frame = plant.position + start, plant.frame @ rows["frames"][row, 0]
+
+    def begun(at: Branches | Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        start = np.einsum("nij,nj->ni", at.frame, rows["knots"][row, 0]) * plant.scale[:, None]
+        return at.position + start, at.frame @ rows["frames"][row, 0]
+
+    position, frame = begun(plant)
     return Branches(
         row,
         plant.plant,
@@ -131,7 +144,7 @@ def chosen_drawn(
         outward,
         plant.sky,
         # The drawing is bent when its lines are asked for.
-        None if plant.later is None else Pose(position, frame, plant.sky),
+        None if plant.later is None else Pose(*begun(plant.later), plant.later.sky),
         plant.year,
         plant.crown,
     )

@@ -58,7 +58,7 @@ class Draw(IntEnum):
     LEAF_PLANE = 30
     TWIG_TURN = 31
     BEND = 32  # one for each segment and axis from here on
-    LEAF_LEVEL = 226  # beyond those of all segments; 224 is that of `emission.budget`
+    LEAF_LEVEL = 226  # beyond those of all segments
     LEAF_VARIANT = 227
     DEAD = 228
     DEAD_ROUND = 229

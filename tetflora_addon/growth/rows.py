@@ -3,9 +3,9 @@
 """Parameters of all species as one table: the same array operations grow branches of every kind.
 
 A row describes one kind of branch: an order of a species, a part of it between forks, or the short shoot. It names the
-rows of its children, of three sorts: laterals of the next order, the stems that continue beyond a fork, short shoots.
-Children follow their parents in the table. Each branch drawn by hand has a row too: a line of even segments with
-frames. Angles are in radians.
+rows of its children, of four sorts: laterals of the next order, the stems that continue beyond a fork, short shoots,
+dead branches. Children follow their parents in the table. Each branch drawn by hand has a row too: a line of even
+segments with frames. Angles are in radians.
 """
 
 from __future__ import annotations

@@ -32,6 +32,9 @@ class Seeds(Arrays):
         Uniform scale, greater than zero.
     crown : (n, 5) float64 or None
         Crown forms, see `crown_forms`; None where all plants are as described.
+    motion : (n, 6) float64 or None
+        How plants move as a whole: metres a second, then the rotation vector about their foot, radians a second. None
+        where all stand still.
     """
 
     identifiers: tuple[str, ...]
@@ -41,6 +44,7 @@ class Seeds(Arrays):
     frame: NDArray[np.float64]
     scale: NDArray[np.float64]
     crown: NDArray[np.float64] | None = None
+    motion: NDArray[np.float64] | None = None
 
     def counted_from(self, origin: NDArray[np.float64]) -> Seeds:
         """The same plants in coordinates that begin at a place (3,) of the present ones."""

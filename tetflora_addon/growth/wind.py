@@ -171,7 +171,7 @@ def windy_rows(
     )
     c, s = np.cos(wind.direction), np.sin(wind.direction)
     air = out["air"]
-    air["time"], air["loop"], air["speed"], air["gusts"] = wind.time, wind.loop, wind.speed, wind.gusts
+    air["time"], air["loop"], air["speed"], air["gusts"] = wind.time, wind.loop, max(wind.speed, 0.1), wind.gusts
     air["moment"] = _MOMENT if wind.moving else 0.0
     air["axes"] = [[c, s, 0], [-s, c, 0], [0, 0, 1]]
     air["origin"] = wind.origin
@@ -277,6 +277,15 @@ def axis_and_angle(turn: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
     """Unit vectors (n, 3) and lengths (n,) of rotation vectors (n, 3); any axis for no turn."""
     angle = np.sqrt(dot(turn, turn))
     return turn / np.maximum(angle, 1e-300), angle[:, 0]
+
+
+def rotation_vectors(turn: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation vectors (n, 3) of rotations (n, 3, 3) by less than half a turn."""
+    skew = turn - turn.transpose(0, 2, 1)
+    vector = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1) / 2.0
+    sine = np.linalg.norm(vector, axis=1)
+    angle = np.arctan2(sine, (np.trace(turn, axis1=1, axis2=2) - 1.0) / 2.0)
+    return vector * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 1.0)[:, None]
 
 
 def leant(points: NDArray[np.float64], up: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:

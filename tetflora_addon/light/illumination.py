@@ -4,7 +4,7 @@
 
 Every lamp sees the scene through a buffer, and so does the sky from 24 directions, whose samples become harmonics.
 Light that tetrahedra scatter to others is gathered in the same 24 buffers, order by order. Further orders are the sum
-of the geometric series that the last ones begin. There is no factor to tune.
+of the geometric series that the last ones begin. No factor scales any of it.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def _grid_points(span: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
 def _disk_points() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points that stand for equal parts of a disk (Vogel, "A better way to construct the sunflower head", 1979)."""
     index = np.arange(AREA_POINTS**2) + 0.5
-    radius, turn = np.sqrt(index / len(index)), np.pi * GOLDEN_ANGLE * index
+    radius, turn = np.sqrt(index / len(index)), GOLDEN_ANGLE * index
     return radius * np.cos(turn), radius * np.sin(turn)
 
 

@@ -79,9 +79,10 @@ class Floor:
         """
         size, keeps = habitat.value
         key = child_key(key_of_seed(seed), _PATCHES + list(Habitat).index(habitat))
+        values = self.map_of(habitat, species)
 
         def suitable(points: NDArray[np.float64]) -> NDArray[np.float64]:
-            found = self.sheet.at(self.map_of(habitat, species), points)
+            found = self.sheet.at(values, points)
             return found * clumps(points, size, keeps, key) if keeps else found
 
         return suitable

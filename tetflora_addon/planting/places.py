@@ -277,6 +277,11 @@ class _Sowing:
         if rules.by_density and self.suitable:
             del passed["suitable"]  # these were never wanted
         least = min(passed, key=passed.__getitem__)
+        if least == "distance" and rules.by_density:  # places are drawn once, so that there may be room between them
+            return (
+                f"the others would stand closer than the Min Distance of {rules.min_distance:.3g} m to a plant; "
+                "lower Min Distance, or raise the density where there is room"
+            )
         if least == "distance":
             return (
                 f"no room for more plants at a Min Distance of {rules.min_distance:.3g} m; "

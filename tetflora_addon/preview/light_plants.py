@@ -25,7 +25,7 @@ from ..growth.growth import trunks
 from ..growth.seeds import Seeds
 from .levels import as_shown
 
-#: Plants that a preview shows; of more, every second, third and so on is shown.
+#: Plants that a preview shows; of more, `thinned` chooses.
 MOST_PLANTS = 50_000
 #: Corners of each of a crown's rings.
 SIDES = 4
@@ -131,10 +131,30 @@ def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Sha
     return Shapes(positions.reshape(-1, 3).astype(np.float32), colours, indices, len(trunk), of, origin)
 
 
+def thinned(seeds: Seeds, heights: NDArray[np.float64], most: int = MOST_PLANTS) -> Seeds:
+    """At most so many plants, in proportion to how large they look: of a meadow under trees the grass is thinned.
+
+    Parameters
+    ----------
+    heights : (s,) float64
+        Of each kind, metres.
+    """
+    if len(seeds) <= most:
+        return seeds
+    order = np.argsort(seeds.species, kind="stable")  # so that each kind is thinned evenly
+    size = (heights[seeds.species] * seeds.scale)[order] ** 2
+    falling = np.sort(size)[::-1]
+    rest = np.cumsum(falling[::-1])[::-1]
+    whole = int(np.argmax((most - np.arange(most)) * falling[:most] <= rest[:most]))  # so many are all shown
+    share = np.minimum(size * ((most - whole) / rest[whole]), 1.0)
+    places = np.floor(np.cumsum(share))
+    return seeds.take(np.sort(order[np.diff(places, prepend=0.0) > 0.0]))
+
+
 def _shown(flora: Flora, seeds: Seeds, most: int) -> tuple[int, NDArray[np.float64], Branches]:
     """How many plants there are, where coordinates begin (3,), and the trunks of at most so many."""
     origin = origin_near(seeds.position)
-    some = seeds.take(slice(None, None, max(-(-len(seeds) // most), 1))).counted_from(origin)
+    some = thinned(seeds, flora.rows["length"][flora.first_row, 0], most).counted_from(origin)
     return len(seeds), origin, trunks(flora.rows, some)
 
 

@@ -145,9 +145,9 @@ class FacetSizes(Arrays):
         shard = _SHARD * max(pixels.seen, 1.0) * np.where(self.hidden, min(over, _GIVES_WAY), 1.0) * self.extent
         wood = np.minimum(side, shard)
         side = np.where(self.hidden, unseen, side)
-        # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
-        # thin twigs would become blots.
-        least = np.minimum(self.least_wood, np.where(beside, thrown, np.maximum(most, several)))
+        # Out of view wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side
+        # requires, or thin twigs would become blots.
+        least = np.minimum(self.least_wood, np.where(beside, thrown, shard))
         finest = np.where(beside, side, np.minimum(side, shard))
         wood = np.where(self.hidden, np.maximum(finest, least), wood)
         return np.maximum(side, np.sqrt(self.one_leaf)), wood
@@ -252,6 +252,6 @@ def opaque_fractions(flora: Flora, own: Branches, totals: Totals) -> NDArray[np.
 
     A spruce has twenty layers of needles across its crown. Where it is hidden, the first of them cast its shadow.
     """
-    bound = extents(flora, own)
+    bound = extents(flora, own, farthest=False)
     silhouette = _FILLED * 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * own.length**2
     return np.minimum(_LAYERS * silhouette / np.maximum(totals.optical_area, 1e-300), 1.0)

@@ -106,7 +106,7 @@ def light_ratios(
     The sky has no hotspot. Where there are lamps, it is taken for little.
     """
     place = subplants.position + 0.5 * subplants.length[:, None] * subplants.frame[:, :, 2]
-    radius, low, high = extents(flora, subplants).T
+    radius, low, high = extents(flora, subplants, farthest=False).T
     volume = _FILLED * np.pi * radius**2 * (high - low) * subplants.length**3
     extinction = 0.5 * flora.leaf_areas(subplants) / np.maximum(volume, 1e-300)
     leaf, eye = np.sqrt(flora.one_leaf_area(subplants)), _towards_eye(camera, place)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, gathered, perpendicular, products, spread
+from ..arrays import GOLDEN_ANGLE, Arrays, gathered, perpendicular, products, spread
 from ..compiled.flora import Flora
 from ..compiled.placed import placed_samples
 from ..compiled.samples import Points
@@ -35,7 +35,6 @@ _WOOD_PATH = 1 << 41
 _LEAF_COUNT, _WOOD_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204, 205
 _MOVE = 211  # three draws from here on
 _FACE = 214
-_GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 _GOLDEN = (np.sqrt(5) - 1) / 2
 _MOVED = 0.04  # of the length of a sub-plant's branch
 _SKY = np.array([0.0, 0.0, 1.0])
@@ -149,14 +148,11 @@ def _joined(parts: list[Facets]) -> Facets:
     return Facets.concatenate([p if p.stretch is not None else replace(p, stretch=np.ones(len(p))) for p in parts])
 
 
-def kept_out_of_view(
-    facets: Facets, clearance: Callable[[NDArray], NDArray], smallest: float, within: bool = False
-) -> Facets:
+def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], within: bool = False) -> Facets:
     """Facets that are out of view, moved away from it where they would reach into it, so that they keep their area.
 
-    Where there is no room beside it, they are shrunk, but to no less than a fraction of their side. ``clearance`` gives
-    the distance (n,) of points (n, 3) from the view in metres. With ``within``, facets whose middle is in the view stay
-    as they are.
+    Where there is no room beside it, they are shrunk, or left out. ``clearance`` gives the distance (n,) of
+    points (n, 3) from the view in metres. With ``within``, facets whose middle is in the view stay as they are.
     """
     reach, centre = CIRCUMRADIUS * facets.side, facets.centre
     away = clearance(centre)
@@ -169,8 +165,8 @@ def kept_out_of_view(
         steep = np.maximum(np.einsum("ni,ni->n", slope, slope), _LEAST_SLOPE)
         centre = centre.copy()
         centre[some] += (short[some] / steep)[:, None] * slope
-    fraction = np.where(stay, 1.0, np.clip(clearance(centre) / np.maximum(reach, 1e-12), smallest, 1.0))
-    return replace(facets, centre=centre, side=facets.side * fraction)
+    fraction = np.where(stay, 1.0, np.clip(clearance(centre) / np.maximum(reach, 1e-12), 0.0, 1.0))
+    return replace(facets, centre=centre, side=facets.side * fraction).take(np.flatnonzero(fraction > 0.0))
 
 
 def facet_numbers(
@@ -220,7 +216,7 @@ def _picked(
     base = gathered(subplants.frame, owner)
     again = index // number[owner]
     whole = ((flora.rows["order"] == 0) & ~flora.rows["phantom"])[subplants.row]
-    turn = None if subplants.crown is None else again * whole[owner] * _GOLDEN_ANGLE
+    turn = None if subplants.crown is None else again * whole[owner] * GOLDEN_ANGLE
     place, share = placed_samples(flora, points, subplants, owner, pick, turn)
     place = place.astype(np.float64)
     if again.any():
@@ -234,7 +230,7 @@ def _picked(
 
 def _turned(base: NDArray[np.float64], again: NDArray[np.int64], some: NDArray[np.intp]) -> None:
     """Turn some of rotations (m, 3, 3) about their third axes, in place, by as many golden angles as numbers (m,)."""
-    angle = again[some] * _GOLDEN_ANGLE
+    angle = again[some] * GOLDEN_ANGLE
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y = base[some, :, 0], base[some, :, 1]
     base[some, :, 0], base[some, :, 1] = c * x + s * y, c * y - s * x

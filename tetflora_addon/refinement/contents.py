@@ -158,7 +158,7 @@ class PlantParts(Arrays):
     @classmethod
     def of_subplants(cls, flora: Flora, branches: Branches) -> PlantParts:
         """Whole sub-plants (n,)."""
-        bound = extents(flora, branches)
+        bound = extents(flora, branches, farthest=False)
         extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * branches.length
         # Leaves of a solid have places of their own, however few of them are asked for.
         alone = are_solids(flora.rows)[branches.row]

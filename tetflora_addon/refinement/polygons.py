@@ -63,6 +63,8 @@ class Surface:
         Interpolated across faces: texture coordinates (k = 2), colours and vectors (k = 3), numbers (k = 1).
     normals : (c, 3) float32 or None
         Of corners where any face is smooth, in the mesh's own space.
+    look : str
+        What stands for surfaces with different ones is kept apart.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Surface:
     width: NDArray[np.float64]
     attributes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     normals: NDArray[np.float32] | None = None
+    look: str = ""
 
 
 class Meshes:

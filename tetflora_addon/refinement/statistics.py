@@ -81,6 +81,8 @@ class Statistics:
     strays : dict of str to float
         Objects that were left out at least in part, because they are far beyond all others, and how far from the camera
         that is, metres.
+    unknown : str
+        Tells of plants that were left out because nobody has their species.
     """
 
     plants: int = 0
@@ -101,12 +103,13 @@ class Statistics:
     memory_mb: float = 0.0
     steps: list[Step] = field(default_factory=list)
     strays: dict[str, float] = field(default_factory=dict)
+    unknown: str = ""
 
     @property
     def left_out(self) -> str:
-        """A warning about strays; empty where there are none."""
-        if not self.strays:
-            return ""
+        """A warning about what is unknown, or about strays; empty where there are none."""
+        if not self.strays or self.unknown:
+            return self.unknown
         names = ", ".join(f'"{name}"' for name in sorted(self.strays)[:_NAMED])
         more = f" and {len(self.strays) - _NAMED:,} more" if len(self.strays) > _NAMED else ""
         away = f"{min(self.strays.values()) / 1e3:,.0f} km from the camera, far beyond all else"

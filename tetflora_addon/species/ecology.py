@@ -9,10 +9,7 @@ hemisphere trees and shrubs", Ecological Monographs 76, 2006), from 0, none, to 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from typing import Any
-
-import numpy as np
 
 
 @dataclass(frozen=True)
@@ -115,42 +112,3 @@ def read_ecology(reader: Any, data: Any) -> Ecology | None:
         else:
             values[key] = reader.number(value, name, *_LIMITS[key])
     return Ecology(**values)
-
-
-@lru_cache(maxsize=256)
-def ecology_of(species: Any) -> Ecology:
-    """That of a `species.Species`; without a description, as plants of its size are.
-
-    Heights and girths follow from its orders: what is described is taken to be three quarters as tall as the largest.
-    """
-    if species.ecology is not None:
-        return species.ecology
-    lengths = np.cumprod([order.length.mean for order in species.orders])
-    first = species.orders[0]
-    # Stems of a stool are longer than it; leaves stand up beyond stems that are next to nothing.
-    stool = len(lengths) > 1 and lengths[1] > lengths[0]
-    leaf = max((order.leaf_size.mean for order in species.orders if order.leaves.high > 0), default=0.0)
-    tall = float(lengths[0] + (lengths[1] if stool else 0.0))
-    height = 1.33 * max(tall, leaf)
-    if height < 3.0:
-        # Herbs and low shrubs: the crown is as wide as two thirds of the height, whatever the diameter is.
-        thick = 0.01 * height
-        return Ecology(
-            shade=3.0, seeds=200.0, dispersal=5.0, height=height, diameter=thick, slenderness=(2.0 / thick, 1.0),
-            crown=(0.35 * height, 0.35 * height / thick), top=0.0, leaves=2.5, wood=300.0, yields=0.3,
-            thickening=thick / 3.0, source="Not published: as plants of this size are",
-        )  # fmt: skip
-    thick = 2.0 * first.thickness.mean * lengths[0] if not stool else 0.02 * height
-    largest = float(np.clip(2.2 * thick, 0.01 * height, 0.06 * height))
-    shrub = height < 9.0
-    lifespan = 60.0 + 8.0 * height if species.ages is None else species.ages.lifespan
-    return Ecology(
-        height=height,
-        diameter=largest,
-        slenderness=(2.2 / (0.5 * largest), 0.9),
-        crown=(0.3 + 0.02 * height, min(20.0, 0.8 * height / largest)),
-        thickening=min(largest / (0.35 * lifespan), 0.02),
-        yields=0.5 if shrub else 0.9,
-        leaves=4.0 if shrub else 6.0,
-        source="Not published: as plants of this size are",
-    )

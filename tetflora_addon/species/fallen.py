@@ -90,6 +90,7 @@ def _year(species: Species, leaf: LeafYear) -> dict[str, Any]:
         # These days lie around midwinter: what comes before the middle of their life goes by the autumn of the trees.
         "spring": species.year.autumn,
         "autumn": 3,
+        "fallen": True,
         "leaf": {
             "appear": leaf.fall,
             "appear_spread": spread,

@@ -28,7 +28,7 @@ LEAF_YEAR_KEYS = (
     "appear", "appear_spread", "growth", "fresh", "turn", "turn_spread", "turning", "autumn", "fall", "fall_spread",
     "dry", "kept", "turnover",
 )  # fmt: skip
-YEAR_KEYS = ("latitude", "spring", "autumn", "leaf", "blossom", "source")
+YEAR_KEYS = ("latitude", "spring", "autumn", "leaf", "blossom", "fallen", "source")
 #: Of dead leaves that hang on, linear RGB.
 _DRY = (0.21, 0.115, 0.052)
 
@@ -97,6 +97,8 @@ class Year:
         Days by which plants of one place are earlier or later than the mean, at most.
     leaf, blossom : LeafYear, optional
         Without one, leaves or blossoms are there all year.
+    fallen : bool
+        Nothing but leaves that have fallen: its plants are gone while there are none, and in a summer without days.
     source : str
         Where the dates are from.
     """
@@ -106,6 +108,7 @@ class Year:
     autumn: float = 7.0
     leaf: LeafYear | None = None
     blossom: LeafYear | None = None
+    fallen: bool = False
     source: str = ""
 
     def of_kind(self, kind: int) -> LeafYear | None:
@@ -162,6 +165,7 @@ def read_year(reader: Any, data: Any) -> Year | None:
         latitude=reader.number(data.get("latitude", 50.0), "year.latitude", 0, 70),
         spring=reader.number(data.get("spring", 5.0), "year.spring", 0, 40),
         autumn=reader.number(data.get("autumn", 7.0), "year.autumn", 0, 40),
+        fallen=reader.truth(data.get("fallen", False), "year.fallen"),
         source=reader.text(data.get("source", ""), "year.source", least=0),
         **kinds,
     )

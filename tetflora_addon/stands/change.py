@@ -158,8 +158,7 @@ def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells:
     lies = np.floor((_LIES[0] + (_LIES[1] - _LIES[0]) * uniform(plants.key, StandDraw.LIE)) * lasts) + 1.0
     turn = uniform(plants.key, StandDraw.LEAN)
     # Directions on a square, which needs no sine: rounded to a circle by its own length.
-    across, along = 4.0 * turn - 2.0, 0.0 * turn
-    along = 1.0 - np.abs((across % 2.0) - 1.0) * 2.0
+    along = 1.0 - np.abs(((4.0 * turn - 2.0) % 2.0) - 1.0) * 2.0
     across = np.where(turn < 0.5, 1.0, -1.0) * (1.0 - np.abs(along))
     east, north = across - 3.0 * slope[0][cells], along - 3.0 * slope[1][cells]
     length = np.maximum(np.sqrt(east**2 + north**2), 1e-6)
@@ -228,7 +227,7 @@ class SeedRain:
     def __init__(
         self, site: StandSite, guilds: Guilds, suits: NDArray[np.float64], most: float, outside: float
     ) -> None:
-        """Prepare.
+        """Of a site, for guilds that grow so well on its cells.
 
         Parameters
         ----------
@@ -256,9 +255,10 @@ class SeedRain:
         for guild in range(len(self.outside)):
             own = plants.guild == guild
             sums = np.bincount(place[own], crown[own], self.rows * self.columns).reshape(self.rows, self.columns)
-            reach = self.guilds.dispersal[guild] / np.sqrt(area)
+            # About a normal distribution, whose mean distance is √(π / 2) standard deviations.
+            width = np.sqrt(1.0 + 12.0 / np.pi * self.guilds.dispersal[guild] ** 2 / area)
             for axis in (0, 1, 0, 1):
-                sums = _smoothed(sums, max(round(0.6 * reach), 0), axis)
+                sums = _smoothed(sums, round((width - 1.0) / 2.0), axis)
             out[guild] = sums * (0.01 * self.guilds.seeds[guild] / area) + self.outside[guild]
         return out.reshape(len(self.outside), -1)
 

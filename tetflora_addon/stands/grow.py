@@ -249,5 +249,5 @@ class GrowingStand:
             np.append(True, (first.plant[1:] != first.plant[:-1]) | (first.year[1:] != first.year[:-1]))
         )
         first = first.take(again)
-        new = np.append(True, first.plant[1:] != first.plant[:-1]) if len(first) else np.zeros(0, bool)
+        new = np.append(True, first.plant[1:] != first.plant[:-1])
         return replace(first, plant=(np.cumsum(new) - 1).astype(np.int32))

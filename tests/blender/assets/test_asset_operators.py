@@ -51,6 +51,19 @@ def test_refine_scatter_says_what_it_found_and_refuses_with_a_reason(capfd):
     assert not ground.tetflora.is_scatter
 
 
+def test_a_scatter_that_results_hide_can_be_left_plain_again():
+    ground, child = add_mesh("ground"), add_mesh("child")
+    child.parent, ground.instance_type, ground.tetflora.is_scatter = ground, 'VERTS', True
+    select(ground)
+    ground.hide_viewport = True  # as results do; nobody can select it then
+    ground.select_set(False)
+    bpy.context.view_layer.update()
+    layout = _drawn(refine.TETFLORA_PT_refine, active_object=None)  # so it is in a window
+    assert "is_scatter" in layout.names("prop", 1)
+    assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
+    assert not ground.tetflora.is_scatter
+
+
 def test_instances_of_a_scatterer_are_not_explicit_as_well():
     ground, child = add_mesh("ground"), add_mesh("child")
     child.parent, ground.instance_type = ground, 'VERTS'
@@ -86,11 +99,12 @@ def test_operators_take_collections_by_name_and_many_objects():
     assert len(scene().tetflora.asset_species) == 0
 
 
-def _drawn(panel, obj):
-    select(obj)
+def _drawn(panel, obj=None, **given):
+    if obj is not None:
+        select(obj)
     layout, context = Layout(), bpy.context
     names = ("scene", "view_layer", "preferences", "active_object", "mode")
-    known = {name: getattr(context, name) for name in names}
+    known = {name: getattr(context, name) for name in names} | given
     panel.draw(SimpleNamespace(layout=layout), SimpleNamespace(region=SimpleNamespace(width=300), **known))
     return layout
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import copy
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -174,6 +175,27 @@ def test_what_is_saved_comes_back():
         library.delete("meadow")
 
 
+def test_a_biome_whose_picture_another_program_has_open_stays(monkeypatch):
+    """As Windows has it, where what is open cannot be deleted: it is there as a whole, or gone."""
+    add(small(), add_mesh("ground", size=6.0))
+    path = saving.save_biome(scene(), "Small", "", picture=False, replace=False)
+    picture, unlink = path.with_suffix(".png"), Path.unlink
+    picture.write_bytes(b"")
+
+    def held(self, missing_ok=False):
+        if self == picture:
+            raise PermissionError(13, "The process cannot access the file because it is being used by another process")
+        unlink(self, missing_ok)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", held)
+        with pytest.raises(SceneError, match=r"Cannot delete small\.json: .* used by another process"):
+            library.delete("small")
+    assert path.exists() and library.biomes()["small"].is_own
+    library.delete("small")
+    assert not path.exists() and not picture.exists() and "small" not in library.biomes()
+
+
 def test_a_stand_is_a_layer():
     """It grows before the others, keeps to the limits, comes back from a file, and goes with the biome."""
     land = add_mesh("ground", size=10.0)
@@ -232,6 +254,13 @@ def test_a_stand_that_cannot_grow_keeps_no_other_layer_from_its_plants():
     assert [name for name, _ in updated.layers] == ["Bushes"] and field.data == mesh
     (said,) = updated.bare
     assert "Birches" in said and "no ground" in said
+
+
+def test_a_layer_without_a_place_is_told():
+    rare = {**SMALL["layers"][0], "name": "Rare", "density": 1e-6}
+    added = add(small(layers=[rare, SMALL["layers"][0]]), add_mesh("ground", size=10.0))
+    assert [name for name, _ in added.layers] == ["Bushes"]
+    assert [text[:19] for text in added.bare] == ["Rare: a density of "]
 
 
 def test_neighbours_blend():

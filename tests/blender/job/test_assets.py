@@ -54,6 +54,7 @@ def forest(engine='CYCLES', detail='REFINE', away=25.0, **options):
     ground.location.x = -COUNT / 2
     add_camera(location=(0.0, -away, 3.0))
     scene = bpy.context.scene
+    scene.camera.data.clip_end = 10_000.0
     scene.render.engine = engine
     scene.render.resolution_x, scene.render.resolution_y = 200, 100
     scene.tetflora.asset_detail = detail
@@ -330,3 +331,29 @@ def test_undo_brings_the_scatterer_back_and_redo_the_results():
     ground = bpy.context.scene.objects["ground"]
     assert not ground.hide_render and not ground.hide_viewport
     assert len(shown()) == COUNT
+
+
+def test_what_a_layer_collection_says_of_a_scatterer_holds_for_its_instances_each_time():
+    scene, ground, tree = forest()
+    tree.hide_viewport = True  # as sources of scatters often are
+    home = bpy.data.collections.new("scattered")
+    scene.collection.children.link(home)
+    scene.collection.objects.unlink(ground)
+    home.objects.link(ground)
+    bpy.context.view_layer.layer_collection.children["scattered"].holdout = True
+    for _ in range(2):
+        run(scene)
+        made = [o for o in scene.objects if o.get("tetflora_kind") in ("asset", "asset clusters", "stand-in")]
+        assert made and all(o.is_holdout and not o.hide_viewport for o in made)
+        assert shown()
+
+
+def test_facets_of_scatterers_that_look_otherwise_are_apart():
+    scene, ground, tree = forest(away=2500.0)
+    other = scattered(tree, COUNT)
+    other.location = ground.location
+    other.location.y += 20.0
+    other.is_holdout, other.pass_index = True, 5
+    run(scene)
+    made = [o for o in scene.objects if o.get("tetflora_kind") == "proxy"]
+    assert {(o.is_holdout, o.pass_index) for o in made} == {(True, 5), (False, 0)}

@@ -47,6 +47,20 @@ def test_without_camera_or_plants_there_is_nothing_to_tell():
     assert _forecast() is None
 
 
+def test_the_last_run_teaches_the_next_estimate():
+    add_camera()
+    add_plant(species="birch")
+    found = _forecast()
+    shown = bpy.context.scene, bpy.context.view_layer
+    forecast.learn(found, 50.0 * found.seconds + 100.0)
+    assert forecast.seconds_text(50.0 * found.seconds + 100.0) in forecast.forecast_text(*shown)
+    forecast.learn(found, 0.01)  # too short to tell
+    forecast.learn(None, 1000.0)
+    assert forecast.seconds_text(50.0 * found.seconds + 100.0) in forecast.forecast_text(*shown)
+    forecast._on_load()
+    assert forecast.seconds_text(found.seconds) in forecast.forecast_text(*shown)
+
+
 @pytest.mark.parametrize("as_field", ["EMPTIES", "FIELD"])
 def test_plants_of_both_kinds_count_alike(as_field):
     add_camera()

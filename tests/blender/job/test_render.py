@@ -274,7 +274,7 @@ def test_a_scene_that_is_deleted_in_the_middle_of_a_render_stops_neither_saving_
     render.on_save_pre("")
     render.on_save_post("")
     render.on_render_end(other)
-    render._rendering.outer = ""
+    render._rendering.outer = 0
     render.on_load_post("")
 
 
@@ -400,3 +400,15 @@ def test_baked_light_is_made_for_each_render_and_outlives_the_file(stage, tmp_pa
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
     assert bpy.context.scene.tetflora.baked_light == 'ALL'
+
+
+def test_a_scene_that_is_renamed_in_the_middle_of_a_render_is_left_as_it_was(stage, stub):
+    stage.render.engine = 'CYCLES'
+    stage.tetflora.proxy_form = 'SHELLS'
+    stage.cycles.transparent_max_bounces = 10
+    render.on_render_pre(stage)
+    assert stage.cycles.transparent_max_bounces > 10
+    stage.name = "renamed"
+    render.on_render_end(stage)
+    assert stage.cycles.transparent_max_bounces == 10
+    assert not render._rendering.outer and not collection.result_collections(stage, 'RENDER')

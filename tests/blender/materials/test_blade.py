@@ -25,8 +25,10 @@ WIDTH = 2.0
 
 def half_sky(below):
     """Light of radiance 1 from above only, or from below only."""
-    tree = compat.shader_tree(bpy.context.scene.world)
-    graph = nodes.Graph(tree)
+    world = bpy.context.scene.world
+    # Half a sky is known from few points; by itself Cycles looks at half a million, for longer than it renders.
+    world.cycles.sampling_method, world.cycles.sample_map_resolution = 'MANUAL', 64
+    graph = nodes.Graph(compat.shader_tree(world))
     up = graph.node("ShaderNodeSeparateXYZ", {"Vector": graph.node("ShaderNodeTexCoord").outputs["Generated"]})
     lit = graph.math('LESS_THAN' if below else 'GREATER_THAN', up.outputs["Z"], 0.0)
     graph.node("ShaderNodeOutputWorld", {"Surface": graph.node("ShaderNodeBackground", {"Strength": lit})})

@@ -239,7 +239,6 @@ def _bare_leaf():
     ("break_it", "says"),
     [
         (lambda: _ops().remove_plants(which='ALL'), "No plants to render"),
-        (lambda: add_plant("Odd", "quercus"), 'unknown species "quercus"'),
         (lambda: add_plant("Flat", scale=(0.0, 0.0, 0.0)), '"Flat": zero scale'),
         (lambda: setattr(add_mesh("Bare", faces=()).tetflora, "is_occluder", True), '"Bare" has no faces'),
         (_bare_leaf, "Bald.*no faces"),  # found when the work has begun

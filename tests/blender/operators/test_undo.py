@@ -313,7 +313,7 @@ def test_a_refusal_changes_nothing_and_is_no_step(history, case):
     ground_active()
     options: dict = {}
     if case == "refine":
-        bpy.data.objects["bush"].tetflora.species = "quercus"
+        bpy.data.objects["bush"].scale.z = 0.0
     elif case == "populate":
         options = {"count": 12, "species": "quercus"}
     elif case == "make_field":

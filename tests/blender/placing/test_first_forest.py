@@ -183,3 +183,28 @@ def test_the_tab_says_what_comes_next_and_stops_when_it_is_done():
     assert hint(scene) == "Nothing is refined, so renders show no plants"
     bpy.ops.tetflora.remove_plants(which='ALL')
     assert hint(scene) == ""
+
+
+def test_settings_that_are_not_those_of_a_new_scene_are_kept():
+    scene = bpy.context.scene
+    scene.render.engine = 'BLENDER_WORKBENCH'
+    scene.render.resolution_x, scene.view_settings.exposure, scene.cycles.samples = 4000, -1.0, 7
+    assert _plant() == scene
+    assert (scene.render.engine, scene.render.resolution_x, scene.cycles.samples) == ('BLENDER_WORKBENCH', 4000, 7)
+    assert scene.view_settings.exposure == -1.0
+    assert (scene.render.resolution_y, scene.render.resolution_percentage) == (720, 50)
+    assert len(bpy.data.scenes) == 1
+
+
+def test_a_scene_with_a_camera_alone_keeps_all_of_its_settings():
+    scene = bpy.context.scene
+    add_camera()
+
+    def settings():
+        render, cycles = scene.render, scene.cycles
+        size = render.resolution_x, render.resolution_y, render.resolution_percentage
+        return render.engine, *size, cycles.samples, cycles.max_bounces, scene.view_settings.exposure
+
+    before = settings()
+    assert _plant() != scene
+    assert settings() == before

@@ -114,6 +114,13 @@ def test_a_full_terrain_takes_no_more_and_says_why():
     assert gaps.max() < 1.35
 
 
+def test_by_density_chance_brings_some_too_close_and_no_room_is_not_the_reason():
+    placed = _place(SQUARE * 10.0, by_density=True, density=0.03, min_distance=1.8)
+    assert 0 < len(placed) < placed.wanted
+    assert "no room" not in placed.reason
+    assert "closer than the Min Distance of 1.8 m" in placed.reason
+
+
 def test_plants_that_stand_already_keep_others_away():
     standing = np.array([[5.0, 5.0], [5.0, 5.0], [0.0, 0.0]])
     placed = _place(count=200, min_distance=2.0, occupied=standing)
@@ -167,6 +174,27 @@ def test_the_panels_settings_serve_where_nothing_is_given():
     select(add_mesh("ground", size=10.0))
     bpy.ops.tetflora.populate()
     assert [o.tetflora.species for o in bpy.data.objects if o.tetflora.is_plant] == ["conifer"] * 7
+
+
+def test_the_panels_density_and_habitats_count():
+    settings = bpy.context.scene.tetflora.populate
+    settings.count, settings.by_density, settings.density, settings.min_distance = 7, True, 500.0, 0.0
+    entry = settings.mix.add()
+    entry.species, entry.habitat = "conifer", 'LIGHT'
+    select(add_mesh("ground", size=10.0))  # 20 m to a side: .04 ha
+    bpy.ops.tetflora.populate()
+    population = bpy.context.scene.tetflora.populations[0]
+    assert (population.by_density, population.density) == (True, 500.0)
+    assert 10 <= population.made <= 20
+    assert population.mix[0].habitat == 'LIGHT'
+
+
+def test_a_script_that_gives_a_number_gets_it_whatever_the_panel_says():
+    settings = bpy.context.scene.tetflora.populate
+    settings.by_density, settings.density = True, 500.0
+    select(add_mesh("ground", size=10.0))
+    bpy.ops.tetflora.populate(count=3, min_distance=0.0, species="conifer")
+    assert bpy.context.scene.tetflora.populations[0].made == 3
 
 
 def test_populate_twice_leaves_the_first_plants_their_room():

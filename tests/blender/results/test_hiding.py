@@ -10,8 +10,9 @@ import pytest
 
 from devtools import session
 from tests.blender.renders import picture, small_scene
-from tests.blender.scenes import add_mesh, datablocks, depsgraph
+from tests.blender.scenes import add_camera, add_mesh, datablocks, depsgraph, tiny_render
 from tetflora_addon.blender import compat
+from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results import hiding, instances
 from tetflora_addon.blender.results.collection import Results
 from tetflora_addon.blender.results.stand_ins import add_stand_in
@@ -289,3 +290,46 @@ def test_what_was_simulated_is_copied_as_it_is(clean_file):
     assert made.matrix_world.translation.x == 3.0 and made.data.materials[0] == ground.data.materials[0]
     hiding.remove_results(bpy.context.scene)
     assert datablocks() == before
+
+
+@pytest.mark.parametrize("how", ["keyed", "driven", "by the NLA"])
+def test_an_original_whose_visibility_is_animated_is_not_rendered_beside_its_results(clean_file, tmp_path, how):
+    scene = tiny_render()
+    add_camera(location=(0.0, -6.0, 1.0))
+    rock = add_mesh("rock", size=0.6)
+    rock.location.z, rock.rotation_euler.x = 1.0, np.pi / 2
+    rock.tetflora.is_explicit = True
+    if how == "driven":
+        rock.driver_add("hide_render").driver.expression = "frame > 2"
+    else:
+        for frame, hidden in ((1, False), (3, True)):
+            rock.hide_render = hidden
+            rock.keyframe_insert("hide_render", frame=frame)
+        rock.hide_render = False
+        if how == "by the NLA":
+            action = rock.animation_data.action
+            rock.animation_data.nla_tracks.new().strips.new("hide", 1, action)
+            rock.animation_data.action = None
+    scene.render.film_transparent = True
+    scene.render.image_settings.color_mode = 'RGBA'
+    scene.frame_start, scene.frame_end = 1, 3
+    scene.render.filepath = str(tmp_path / "frame")
+
+    def seen():
+        bpy.ops.render.render(animation=True)
+        for frame in (1, 2, 3):
+            image = bpy.data.images.load(str(tmp_path / f"frame{frame:04d}.png"))
+            yield float(np.array(image.pixels).reshape(-1, 4)[:, 3].sum())
+            bpy.data.images.remove(image)
+
+    shown = list(seen())
+    assert shown[0] > 1.0 and shown[1] == pytest.approx(shown[0], rel=0.1) and shown[2] == 0.0
+    scene.tetflora.output.camera = False  # of results: what is seen now is the original
+    assert list(seen()) == [0.0, 0.0, 0.0]
+    assert rock.name in scene.collection.objects
+    scene.frame_set(1)
+    refine.refine(scene, depsgraph())
+    scene.frame_set(2)
+    assert rock.name not in scene.collection.objects
+    refine.clear(scene)
+    assert rock.name in scene.collection.objects and not rock.hide_render

@@ -163,6 +163,33 @@ def test_kept_results_are_the_artists(scene, tmp_path):
     assert bpy.data.collections["TetFlora kept"].objects
 
 
+def test_renamed_and_moved_results_are_replaced_and_cleared(scene):
+    bare = datablocks()
+    refined(scene)
+    collection = result_collections(scene)[0]
+    folder = bpy.data.collections.new("folder")
+    scene.collection.children.link(folder)
+    scene.collection.children.unlink(collection)
+    folder.children.link(collection)
+    collection.name = "my forest"
+    refined(scene)
+    assert [c.name for c in result_collections(scene)] == ["my forest"]
+    assert sorted(c.name for c in bpy.data.collections) == ["folder", "my forest"]
+    refine.clear(scene)
+    bpy.data.collections.remove(folder)
+    assert datablocks() == bare
+
+
+def test_copies_of_results_are_the_artists_when_these_are_gone(scene):
+    refined(scene)
+    copied = result_collections(scene)[0].copy()
+    scene.collection.children.link(copied)
+    assert [c.name for c in result_collections(scene)] == ["TetFlora"]
+    refine.clear(scene)
+    assert result_collections(scene) == []
+    assert list(scene.collection.children) == [copied]
+
+
 def test_there_is_nothing_to_keep_without_results(scene):
     assert not bpy.ops.tetflora.keep_results.poll()
 

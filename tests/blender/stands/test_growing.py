@@ -4,14 +4,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
 
+from operators.stands import TETFLORA_OT_keep_year
 from tests.blender.scenes import add_mesh, depsgraph, select
 from tetflora_addon import errors
 from tetflora_addon.blender.placing.brush import Standing
-from tetflora_addon.blender.scene.field_sizes import has_history, stored_now
+from tetflora_addon.blender.scene.field_sizes import has_history, stored_now, year_curves
 from tetflora_addon.blender.scene.fields import read_aged_field
 from tetflora_addon.blender.stands import growing
 
@@ -74,6 +77,24 @@ def test_masks_keep_the_stand_away():
     assert (west < 0.0).mean() > 0.65
 
 
+@pytest.mark.parametrize(
+    ("size", "settings", "says"),
+    [
+        (0.4, {"relief": 0.0}, "too small for a stand: no square of 1 m"),
+        (0.5, {"years": 100, "density": 2500.0}, "too small for a stand of 2,500 plants per hectare"),
+        (20.0, {"slope_max": 0.1}, "steeper than Max Slope"),
+        (20.0, {"vertex_group": "none"}, "Vertex Group, Areas, Paths"),
+    ],
+)
+def test_what_leaves_no_ground_is_what_is_told(size, settings, says):
+    ground = add_mesh("ground", size=size)
+    ground.vertex_groups.new(name="none")
+    ground.location.x = ground.location.y = 0.0 if size < 0.5 else 0.3
+    ground.rotation_euler.x = 0.0 if size < 1.0 or "vertex_group" in settings else 0.5
+    with pytest.raises(RuntimeError, match=says):
+        stand_on(ground, **settings)
+
+
 def test_a_year_is_kept_as_a_plain_field():
     field = stand_on(add_mesh("ground", size=12.0))
     seeds, _, sizes = plants_of(field, 6.5)
@@ -117,6 +138,35 @@ def test_what_cannot_grow_is_told_and_changes_nothing(settings, message):
     with pytest.raises((errors.TetFloraError, RuntimeError), match=message):
         stand_on(ground, **settings)
     assert (len(bpy.data.objects), len(bpy.data.meshes)) == before
+
+
+def test_the_slider_ends_with_the_stand_and_keys_go_with_its_years():
+    field = stand_on(add_mesh("ground", size=10.0))
+    group = field.tetflora
+    there = len(plants_of(field, 12.0)[0])
+    group.stand_year = 150.0
+    assert group.stand_year == 12.0
+    assert len(plants_of(field, 150.0)[0]) == there > 0
+    group.stand.years = 8
+    assert bpy.ops.tetflora.grow_again() == {'FINISHED'}
+    assert group.stand_year == 8.0
+    assert bpy.ops.tetflora.animate_growth(first=1, last=9) == {'FINISHED'}
+    field.keyframe_insert("location", frame=3)
+    bpy.context.scene.frame_set(9)
+    assert year_curves(field)
+    assert bpy.ops.tetflora.keep_year() == {'FINISHED'}
+    assert not year_curves(field)
+    assert len(field.animation_data.action.layers[0].strips[0].channelbags[0].fcurves) == 3  # those of the location
+
+
+def test_keeping_a_year_asks_first():
+    """With its button, which invokes it; scripts and Adjust Last Operation are not asked."""
+    asked = []
+    manager = SimpleNamespace(invoke_confirm=lambda *_, message, **__: asked.append(message) or {'RUNNING_MODAL'})
+    context = SimpleNamespace(window_manager=manager)
+    tool = SimpleNamespace(bl_label="Keep Year")
+    assert TETFLORA_OT_keep_year.invoke(tool, context, None) == {'RUNNING_MODAL'}
+    assert "years" in asked[0]
 
 
 def test_leaving_early_changes_nothing():

@@ -170,7 +170,7 @@ def test_what_cannot_be_refined_is_said(scene, monkeypatch):
     scene.tetflora.auto_refine = True
     settle(monkeypatch)
     assert "quercus" in auto.message()
-    assert not results(scene)
+    assert results(scene)  # of the others
     bpy.data.objects["tree 0"].tetflora.species = "bush"
     auto.schedule(scene)
     settle(monkeypatch)
@@ -368,3 +368,18 @@ def test_without_refine_automatically_nobody_looks_at_the_viewport(scene, monkey
     monkeypatch.setattr(auto, "view_camera", lambda _: pytest.fail("looked"))
     scene.tetflora.follow_viewport = True
     assert auto.watch() is None
+
+
+def test_a_scene_that_is_renamed_is_still_refined_and_not_once_more(scene, monkeypatch):
+    scene.tetflora.auto_refine = True
+    monkeypatch.setattr(auto, "QUIET", 0.0)
+    monkeypatch.setattr(auto, "SLICE", 0.0)
+    auto._state.due = 0.0
+    assert auto.tick() is not None and auto._state.steps is not None  # it is at work
+    scene.name = "renamed"
+    bpy.data.scenes.new("Scene")  # another takes its name
+    assert settle(monkeypatch) > 0
+    assert results(scene) and not results(bpy.data.scenes["Scene"])
+    scene.name = "renamed again"
+    auto.schedule(scene)
+    assert settle(monkeypatch) == 0

@@ -4,14 +4,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
 
+from panels.refine import TETFLORA_PT_refine
+from tests.blender.layouts import Layout
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.viewport import overlay, state
+from tetflora_addon.blender.viewport import auto, overlay, state
 from tetflora_addon.blender.viewport.levels import _on_timer, level_steps, read_shapes
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -132,12 +136,15 @@ def test_without_a_camera_the_button_says_so():
 
 def test_what_is_wrong_is_told():
     scene, _, plants = scene_of_plants()
-    plants[0].tetflora.species = "gone"
+    for plant in plants:
+        plant.tetflora.species = "gone"
     with pytest.raises(errors.SceneError, match="gone"):
         list(level_steps(scene, depsgraph()))
+    plants[1].tetflora.species = "bush"
     scene.tetflora.preview.plants = 'LIGHT'
     read_shapes(scene, depsgraph())
     assert "gone" in state.find(scene).message
+    assert state.find(scene).shapes.plants == 1
 
 
 def test_levels_can_be_forgotten():
@@ -238,3 +245,49 @@ def test_every_setting_has_a_name_of_its_own():
     properties = state.TetFloraPreview.bl_rna.properties
     names = [p.name for p in properties if p.identifier not in {"rna_type", "name"}]
     assert len(names) == len(set(names)) == 8
+
+
+def test_simple_shapes_make_way_for_refined_plants_where_these_are_seen(monkeypatch):
+    scene, _, _ = scene_of_plants(1)
+    scene.tetflora.preview.plants = 'LIGHT'
+    read_shapes(scene, depsgraph())
+    drawn = []
+    monkeypatch.setattr(overlay, "_draw_plants", drawn.append)
+
+    def is_drawn():
+        drawn.clear()
+        bpy.context.view_layer.update()
+        overlay._in_space(bpy.context, state.find(scene))
+        return bool(drawn)
+
+    assert is_drawn()
+    bpy.ops.tetflora.refine()
+    assert not is_drawn()
+    scene.tetflora.output.show_viewport = False
+    assert is_drawn()
+    scene.tetflora.output.show_viewport = True
+    assert not is_drawn()
+    bpy.context.view_layer.layer_collection.children["TetFlora"].hide_viewport = True  # the eye in the Outliner
+    assert is_drawn()
+
+
+def test_results_say_what_has_changed_since_they_were_made():
+    scene, camera, _ = scene_of_plants(1)
+    assert auto.changed_since(scene) == []
+    bpy.ops.tetflora.refine()
+    assert auto.changed_since(scene) == []
+    camera.location.x += 1.0
+    bpy.context.view_layer.update()
+    assert auto.changed_since(scene) == ["the camera"]
+    scene.tetflora.year.enabled = True
+    scene.tetflora.cutoff *= 2.0
+    assert auto.changed_since(scene) == ["the camera", "the day or year", "settings"]
+    layout = Layout()
+    region = SimpleNamespace(width=3000)
+    names = ("scene", "view_layer", "preferences", "active_object", "mode")
+    context = SimpleNamespace(region=region, **{name: getattr(bpy.context, name) for name in names})
+    TETFLORA_PT_refine.draw(SimpleNamespace(layout=layout), context)
+    said = " ".join(options.get("text", "") for name, _, options in layout.drawn if name == "label")
+    assert "out of date: the camera, the day or year, settings changed" in said
+    bpy.ops.tetflora.refine()
+    assert auto.changed_since(scene) == []

@@ -11,7 +11,7 @@ import pytest
 from devtools import session
 from tests.blender.scenes import add_camera, add_plant, datablocks, select
 from tetflora_addon.blender.scene import objects
-from tetflora_addon.blender.viewport import species
+from tetflora_addon.blender.viewport import points, species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -174,3 +174,13 @@ def test_loading_another_file_ends_it(preview):
     assert not preview.shown_in(bpy.context.scene)
     preview.refresh()
     assert _objects() == []
+
+
+def test_previews_stay_with_a_scene_that_is_renamed(clean_file):
+    scene, other = bpy.context.scene, bpy.data.scenes.new("other")
+    for preview in (species, points):
+        preview.show(scene, True)
+        scene.name, other.name = "renamed", "Scene"
+        assert preview.shown_in(scene) and not preview.shown_in(other)
+        preview.show(scene, False)
+        other.name, scene.name = "other", "Scene"

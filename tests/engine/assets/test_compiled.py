@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tests.engine.assets import trees
 from tetflora_addon.assets.asset import MESH_FACES, Asset, AssetSource
 from tetflora_addon.assets.compiled import compile_asset
+from tetflora_addon.assets.measures import through_both_sides
 from tetflora_addon.errors import TetFloraError
 
 KINDS = sorted(trees.SOURCES)
@@ -191,6 +192,37 @@ def test_closed_leaves_are_bodies_and_trunks_are_wood() -> None:
     kinds = whole.take(whole.parent == 0)
     assert len(kinds) == 2 and ((kinds.body_area == 0) ^ (kinds.body_area == kinds.wood_area)).all()
     assert not asset.leaves_of(int(np.flatnonzero((whole.parent == 0) & (whole.body_area == 0))[0]))
+
+
+def test_closed_leaves_are_as_dark_as_both_of_their_sides_together() -> None:
+    """A facet in their place is one sheet: light that passes has met two walls, and walls swallow some each time."""
+    whole = trees.compiled("closed").clusters
+    leaves = whole.take((whole.parent == 0) & (whole.body_area > 0))
+    wall = np.array(trees.GREEN)
+    back, through = 0.6 * wall, 0.4 * wall
+    inner = 1.0 / (1.0 - back**2)
+    passed = through**2 * inner
+    sheet = back + through**2 * back * inner + passed
+    assert leaves.colour[0] == pytest.approx(sheet, rel=2e-3)
+    assert leaves.transmission[0] == pytest.approx(passed.sum() / sheet.sum(), rel=2e-3)
+    trunk = whole.take((whole.parent == 0) & (whole.body_area == 0))
+    assert trunk.colour[0] == pytest.approx(trees.BROWN, rel=2e-3)
+
+
+@given(st.floats(0, 1), st.floats(0, 1))
+def test_light_through_both_sides_is_the_sum_of_all_ways(albedo: float, through: float) -> None:
+    """Nothing is gained, and the series is summed by hand."""
+    colour, out = through_both_sides(np.full((1, 3), albedo), np.array([through]))
+    r, t = albedo * (1 - through), albedo * through
+    back, passed, light = r, 0.0, t
+    for _ in range(400):
+        passed += light * t
+        light *= r
+        back += light * t
+        light *= r
+    assert colour[0] == pytest.approx(back + passed, abs=1e-3)
+    assert (out * colour[:, 0])[0] == pytest.approx(passed, abs=1e-3)
+    assert 0.0 <= colour[0, 0] <= 1.0 + 1e-6 and 0.0 <= out[0] <= 1.0 + 1e-6
 
 
 @given(st.integers(0, 2**31))

@@ -152,6 +152,26 @@ def test_bounds_hold_for_any_species(first: dict, second: dict, leans: list[dict
         assert outside(flora, some) < _FLOAT32
 
 
+@pytest.mark.parametrize("variation", [0.0, 0.3])
+@pytest.mark.parametrize(("angle", "tip"), [(10, 90), (90, 10), (150, 20)])
+def test_limbs_whose_first_is_not_known_where_it_is_are_inside_the_bound(
+    variation: float, angle: float, tip: float
+) -> None:
+    """The bare part of a trunk varies: at the same height one bears its first limb, another one of its last."""
+    flora = support.compiled(
+        support.small(
+            order0={
+                "branches": [20, 0],
+                "branch_start": [0.35, variation],
+                "crown": "cylindrical",
+                "curvature": [0, 0],
+            },
+            order1={"length": [0.8, 0], "angle": [angle, 0], "angle_tip": tip, "branches": [0, 0], "leaves": [0, 0]},
+        )
+    )
+    assert outside(flora, support.trunks(flora.rows, support.plants(np.arange(4)))) < _FLOAT32
+
+
 @pytest.mark.parametrize("whorl", [2, 3])
 def test_whorls_are_inside_the_bound(whorl: int) -> None:
     """Branches and leaves that share their places."""

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from tests.engine.support import RICH, compiled, expanded, leaves_of, meshes, plants, small_flora, whole_of
+from tests.engine.support import RICH, compiled, expanded, leaves_of, meshes, plants, small, small_flora, whole_of
 from tetflora_addon.arrays import spread
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.compiled.measured import fitted, measured
@@ -91,7 +91,27 @@ def test_plain_forms_have_the_same_totals_and_samples(kind: str) -> None:
 def test_all_vertices_are_within_the_bounds(seed: int, part: tuple[float, ...], kind: str) -> None:
     flora = small_flora() if kind == "small" else flora_of(kind, 0.001)
     form = LEAST + np.array(part) * (MOST - LEAST)
-    whole = trunks(flora.rows, replace(plants(seed), crown=form[None]))
+    within_bounds(flora, trunks(flora.rows, replace(plants(seed), crown=form[None])))
+
+
+@pytest.mark.parametrize("base", [0.3, 0.5, 0.95])
+@pytest.mark.parametrize("forks", [0, 2])
+@pytest.mark.parametrize("tip", [10, 90])
+def test_long_limbs_that_sit_high_are_within_the_bounds(base: float, forks: int, tip: float) -> None:
+    """The crown begins farther up and keeps its shape: limbs that are described near the ground are near the top."""
+    flora = compiled(
+        small(
+            order0={
+                "length": [10, 0], "curvature": [0, 0], "angle": [0, 0], "branches": [40, 0], "branch_start": 0.05,
+                "crown": "conical", "forks": [forks, 0], "fork_at": 0.4, "fork_angle": [30, 0],
+            },
+            order1={"length": [0.8, 0], "curvature": [0, 0], "angle": [10, 0], "angle_tip": tip, "branches": [0, 0]},
+        )
+    )  # fmt: skip
+    within_bounds(flora, trunks(flora.rows, formed(1, base=base)))
+
+
+def within_bounds(flora: Flora, whole: Branches) -> None:
     tubes, leaves = meshes(flora, expanded(flora, whole))
     centre, radius, half = bounding_cylinders(flora, whole)
     axis = whole.frame[0, :, 2]
@@ -131,6 +151,23 @@ def test_samples_are_where_leaves_grow(kind: str, form: dict[str, float]) -> Non
         np.average(place[:, :2], axis=0, weights=size**2),
         atol=0.12 * spread_,
     )
+
+
+@pytest.mark.parametrize(
+    "form", [*FORMS, {"width": 3.0, "east": 0.5, "north": 0.5}, {"width": 0.3}, {"base": 0.8}], ids=str
+)
+@pytest.mark.parametrize("kind", [*KINDS, "willow", "hazel"])
+def test_samples_are_within_the_extents(kind: str, form: dict[str, float]) -> None:
+    """What is looked for where samples are finds all of them, on the side to which a crown leans too."""
+    flora = flora_of(kind)
+    own = trunks(flora.rows, formed(2, **form))
+    radius, low, high = extents(flora, own).T * 1.001
+    for points in (flora.samples.leaves, flora.samples.wood):
+        first, number = points.runs(own)
+        owner, index = spread(number)
+        place, _ = placed_samples(flora, points, own, owner, first[owner] + index)
+        assert (np.hypot(place[:, 0], place[:, 1]) <= radius[owner]).all()
+        assert (place[:, 2] <= high[owner]).all() and (place[:, 2] >= low[owner] - 1e-6).all()
 
 
 def test_turned_samples_reach_to_the_light_as_others_do() -> None:

@@ -22,7 +22,7 @@ from tetflora_addon.emission.asset_costs import NEVER
 from tetflora_addon.emission.asset_expected import SHARED, AssetExpected
 from tetflora_addon.emission.asset_plan import FARTHER, AssetPlan, Keeping, plan_of, planned_facets
 from tetflora_addon.emission.asset_sight import AssetPortions, AssetSight
-from tetflora_addon.emission.seen import SOME
+from tetflora_addon.emission.seen import SOME, SeenNodes
 from tetflora_addon.proxies import asset_facets
 from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.refinement.asset_parts import AssetParts, PlacedAssets, SharedAssets
@@ -109,6 +109,16 @@ def test_every_part_of_every_instance_is_drawn_once(seed: int, limit: float | No
     assert np.isin(np.flatnonzero(np.array(always)[placed.instances.asset]), plan.whole).all()
     if fraction == NEVER:
         assert np.array(always)[placed.instances.asset[plan.whole]].all()
+
+
+def test_what_is_empty_is_explicit_where_most_around_it_is() -> None:
+    """One explicit tetrahedron after the other: no region without points follows more than one of them."""
+    _, result = scene()
+    follows = np.zeros(len(result.tree), int)
+    for one in range(40):
+        alone = np.where(np.arange(len(result.nodes)) == one, EXPLICIT, PROXY)
+        follows += SeenNodes(with_decision(result, alone, 1.0), True).explicit
+    assert follows.max() == 1 and follows.sum() > 40
 
 
 def test_originals_are_those_of_which_most_is_real() -> None:

@@ -13,7 +13,6 @@ import pytest
 from tests.engine import support
 from tests.engine.emission.test_emission import scene
 from tests.engine.refinement.test_loop import run
-from tetflora_addon import parallel
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission import drawing as subject
 from tetflora_addon.emission.budget import afford
@@ -24,7 +23,6 @@ from tetflora_addon.emission.shade import Shade
 from tetflora_addon.proxies.drawn import triangle_corners
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.refinement.lights import Light
-from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.refinement.settings import RefinementSettings
 
 WIDTH = 96
@@ -98,17 +96,47 @@ def test_what_is_hidden_never_shows() -> None:
     assert (facets.side[~seen][~cover.hidden(prints)] ** 2).sum() < 0.02 * (facets.side[~seen] ** 2).sum()
 
 
-def test_no_facet_of_what_is_outside_is_in_the_image() -> None:
-    """A plant of which a little is in the corner of the image: what is large lies beyond it as a whole."""
+@pytest.mark.parametrize("lens", [0.0, 0.1, 0.4])
+def test_no_facet_of_what_is_outside_is_in_the_image(lens: float) -> None:
+    """A plant of which a little is in the corner of the image: what is large lies beyond it and its blur as a whole."""
     flora = support.flora()
     seeds = support.plants([3], support.SPECIES.index("birch"), [(11.2, 0, 0)])
     camera = support.camera((0, -30, 8), (0, 0, 8), pixels=WIDTH, view=0.7)
+    camera = replace(camera, lens_radius=lens, focus=10.0)
     _, facets, seen = support.drawn(flora, run(flora, seeds, camera)[1], camera, 1.2, 0.6)
     cover = Coverage(camera)
     inside = ~cover.outside(cover.of_corners(triangle_corners(facets))[0])
     assert inside.any() and (~seen).any()
     assert pixels_of(facets, camera)[inside & ~seen].max(initial=0.0) < 6.0
     assert (inside & ~seen & (pixels_of(facets, camera) > 1.5)).sum() < 0.02 * inside.sum()
+
+
+@pytest.mark.parametrize(("name", "away", "hidden"), [("birch", 2.5, 1.0), ("birch", 6.0, 16.0), ("beech", 6.0, 1.0)])
+def test_no_facet_near_the_eye_is_as_large_as_a_leaf(name: str, away: float, hidden: float) -> None:
+    """Leaves that are many pixels wide are leaves; next to nothing shows of the facets for what is behind them."""
+    flora = support.flora()
+    seeds = support.plants([3], support.SPECIES.index(name))
+    high = 0.7 * support.trunks(flora.rows, seeds).length[0]
+    camera = support.camera((0, -away, high), (0, 0, high), pixels=200, view=0.7)
+    blocks, facets, seen = support.drawn(flora, run(flora, seeds, camera)[1], camera, 1.2, 0.6, hidden=hidden)
+    cover = coverage_of(blocks, facets, seen, camera)
+    assert np.isfinite(cover.depth).mean() > 0.1
+    shown, pixels = showing(facets, cover), pixels_of(facets, camera)
+    trunk = support.trunks(flora.rows, seeds)
+    leaf = np.sqrt(flora.one_leaf_area(trunk)) / camera.extent_around(np.array([[0.0, 0.0, high]]))
+    assert pixels[shown > 0.05].max(initial=0.0) < leaf[0]
+    assert (shown * pixels**2).sum() < 1e-3 * camera.width * camera.height
+
+
+def showing(facets: Facets, cover: Coverage) -> np.ndarray:
+    """Fraction of each facet, by points on it, that is in the image and behind no pixel that is full."""
+    weights = np.random.default_rng(0).dirichlet([1, 1, 1], 48)
+    points = np.einsum("kc,ncd->nkd", weights, triangle_corners(facets).astype(float))
+    column, row, depth = (v.reshape(points.shape[:2]) for v in cover.project(points.reshape(-1, 3)))
+    i, j = (np.floor(v).astype(int) for v in (row, column))
+    inside = (np.clip(i, MARGIN, cover.height - 1 - MARGIN) == i) & (np.clip(j, MARGIN, cover.width - 1 - MARGIN) == j)
+    full = cover.depth[np.clip(i, 0, cover.height - 1), np.clip(j, 0, cover.width - 1)]
+    return (inside & (depth > cover.camera.near) & (depth < full * (1 - 1e-5) - 1e-4)).mean(axis=1)
 
 
 def test_primitives_follow_the_image_however_deep_the_wood_is() -> None:
@@ -180,17 +208,6 @@ def test_the_order_of_plants_changes_nothing() -> None:
     assert made[0] == made[1] == made[2]
 
 
-def test_processes_and_batches_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tiles follow from the image alone: one process or two, one tile after the other."""
-    flora, _, camera, result = scene()
-    wide = replace(camera, width=2 * subject.TILE, height=160)
-    made = []
-    for threads in (1, 2):
-        monkeypatch.setattr(parallel, "_wanted", threads)
-        made.append(digest(support.drawn(flora, result, wide, 1.5, 0.6)))
-    assert made[0] == made[1]
-
-
 def test_equal_seeds_are_ordinary() -> None:
     """Plants that are copies of one have facets as large as plants that are all different."""
     flora, seeds, camera, _ = wood()
@@ -211,8 +228,11 @@ def test_what_was_off_screen_comes_back_identical() -> None:
     assert made[0] == made[2] != made[1]
 
 
-def number_of(result: Refinement, settings: RefinementSettings) -> int:
-    flora, _, camera, _ = wood()
+@cache
+def number_of(most: int | None = None) -> int:
+    """Primitives of the wood, as many as it has or as somebody allows."""
+    flora, _, camera, result = wood()
+    settings = RefinementSettings() if most is None else RefinementSettings(max_polygons=most)
     detail = afford(result, camera, settings)
     sizes = detail.pixels
     options = {"hidden": sizes.hidden, "most": detail.most}
@@ -223,11 +243,8 @@ def number_of(result: Refinement, settings: RefinementSettings) -> int:
 @pytest.mark.parametrize("share", [0.8, 0.6, 0.3, 0.1, 0.05])
 def test_a_budget_holds(share: float) -> None:
     """To the last primitive, however tight it is; and most of it is used."""
-    _, _, _, result = wood()
-    free = number_of(result, RefinementSettings())
-    most = int(share * free)
-    made = number_of(result, RefinementSettings(max_polygons=most))
-    assert 0.5 * most < made <= most
+    most = int(share * number_of())
+    assert 0.5 * most < number_of(most) <= most
 
 
 def test_less_memory_is_coarser_everywhere() -> None:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.growth.fallen import is_fallen, is_gone
+from tetflora_addon.growth.fallen import is_gone
 from tetflora_addon.growth.seasons import Season
 from tetflora_addon.species.catalogue import builtin_folder, load_species
 from tetflora_addon.species.fallen import leaves_page
@@ -26,13 +26,20 @@ OAK = species_from_dict(
 
 @pytest.mark.parametrize("name", support.SPECIES)
 def test_no_living_species_is_taken_for_fallen_leaves(name):
-    assert not is_fallen(load_species(name))
     assert not is_gone(load_species(name), None)
 
 
 def test_without_seasons_it_is_summer():
-    assert is_fallen(OAK)
     assert is_gone(OAK, None)
+
+
+@given(st.floats(0, 364))
+def test_leaves_of_winter_only_make_no_fallen_leaves_of_a_living_plant(day):
+    """Arum and some orchids are green from autumn to spring, and stand without leaves in summer."""
+    winter = support.small(year={"leaf": {"appear": 300, "turn": 470, "fall": 485, "growth": 0}})
+    species = species_from_dict(winter, "arum", "arum.json")
+    assert not is_gone(species, None)
+    assert not is_gone(species, Season(day, 50.0))
 
 
 @given(st.floats(0, 364), st.floats(30, 60), st.floats(0, 2))

@@ -55,6 +55,28 @@ def test_spines_stand_out_and_apart() -> None:
     assert away.min() > 0.7 * model.spines.distance
 
 
+@pytest.mark.parametrize("number", [2, 3, 5])
+def test_spines_of_an_areole_stand_all_around_it(number: int) -> None:
+    """No gap between neighbours is much wider than if they were spread evenly."""
+    model = species(**BODY, spines={"number": number, "length": 0.02}).leaf[0]
+    last = leaf_levels(model)[-1]
+    faces = last.model.positions[
+        last.model.corner_verts[last.model.face_offsets[-1] - 3 * (last.tint != 1).any(axis=1).sum() :]
+    ]
+    felt, needles = np.split(faces.reshape(-1, 3, 3), [len(faces) // 3 * 5 // (5 + 3 * number)])
+    felt, needles = felt.reshape(-1, 5, 3, 3), needles.reshape(-1, number, 3, 3, 3)
+    normal = felt[:, 0, 2] - felt[:, :, 0].mean(axis=1)
+    x = felt[:, 0, 0] - felt[:, :, 0].mean(axis=1)
+    x -= (x * normal).sum(axis=1, keepdims=True) / (normal**2).sum(axis=1, keepdims=True) * normal
+    y = np.cross(normal, x) / np.linalg.norm(normal, axis=1, keepdims=True)
+    way = needles[:, :, 0, 2] - needles[:, :, :, 0].mean(axis=2)
+    turn = np.sort(np.arctan2((way * y[:, None]).sum(axis=2), (way * x[:, None]).sum(axis=2)), axis=1)
+    gap = np.diff(turn, append=turn[:, :1] + 2 * np.pi, axis=1)
+    inner = np.linalg.norm(needles[:, :, 0, 2], axis=-1).max(axis=1) < 0.98 * model.reach  # others are cut there
+    assert inner.sum() > 20
+    assert gap[inner].max() < 1.4 * 2 * np.pi / number
+
+
 @pytest.mark.parametrize(
     ("leaf", "part"),
     [

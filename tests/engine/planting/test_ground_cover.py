@@ -98,6 +98,15 @@ def test_a_sheet_reads_between_cells_and_has_not_too_many():
     assert line.columns * line.rows <= 601_000
 
 
+def test_a_map_is_made_once_however_many_places_ask(monkeypatch):
+    made, floor = [], _floor(_wood())
+    monkeypatch.setattr(Floor, "map_of", lambda own, *kind: made.append(kind) or own.light)
+    suits = floor.suits(Habitat.SHADE, None, 1)
+    for _ in range(3):
+        suits(SHEET.middles())
+    assert made == [(Habitat.SHADE, None)]
+
+
 def _covered(floor: Floor, seed: int = 3, ground: Terrain | None = None) -> tuple:
     """Plants of five kinds, and which are which."""
     kinds = [

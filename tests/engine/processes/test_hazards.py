@@ -32,6 +32,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     texts: list[str] = []
     monkeypatch.setattr(parallel, "threads", lambda: 2)
     monkeypatch.setattr(pool, "tell", texts.append)
+    monkeypatch.setattr(pool._pool, "largest", pool._BYTES_EACH)  # whatever earlier work has needed
     pool.stop()
     pool.resume()
     yield texts

@@ -52,6 +52,17 @@ def sizes(
     return FacetSizes(*view, totals, every, opaque_fractions(flora, own, totals)), own
 
 
+@given(st.floats(1e-4, 0.1), st.floats(COARSE, COARSEST))
+@examples(deadline=None, max_examples=20)
+def test_hidden_wood_in_the_view_has_facets_no_larger_than_seen_wood(extent: float, coarse: float) -> None:
+    """A trunk has few faces: as few facets of it would be white shards in each gap of the leaves before it."""
+    seen = sizes(-1.0, 1.0, extent, 0.1)[0].sides(PIXELS)[1]
+    hidden = sizes(-1.0, coarse, extent)[0]
+    hidden = replace(hidden, least_wood=np.full(PLANTS, 0.5))
+    assert (hidden.sides(PIXELS)[1] <= 1.7 * extent * (1 + 1e-9)).all()
+    assert (seen <= 1.7 * extent * (1 + 1e-9)).all()
+
+
 @given(st.floats(-100.0, 1e5), st.floats(1e-4, 10.0))
 @examples(deadline=None, max_examples=20)
 def test_what_is_seen_is_as_fine_as_asked_for(clearance: float, extent: float) -> None:

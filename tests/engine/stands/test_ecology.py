@@ -12,8 +12,9 @@ import pytest
 from tests.engine import support
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import SpeciesError
+from tetflora_addon.species.ages import ages_of
 from tetflora_addon.species.catalogue import load_species
-from tetflora_addon.species.ecology import Ecology, ecology_of
+from tetflora_addon.species.ecology import Ecology
 from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.stands.guilds import Guild, Guilds
 
@@ -35,14 +36,14 @@ def test_mistakes_are_named(ecology: object, words: str) -> None:
 
 def test_a_file_may_say_some_of_it() -> None:
     species = species_from_dict(support.small(ecology={"shade": 1, "crown": [1, 20]}), "small", "small.json")
-    assert species.ecology == Ecology(shade=1.0, crown=(1.0, 20.0)) == ecology_of(species)
+    assert species.ecology == Ecology(shade=1.0, crown=(1.0, 20.0)) == Guild(species).needs
     assert species_from_dict(support.small(), "small", "small.json").ecology is None
 
 
 @pytest.mark.parametrize("name", support.SPECIES)
 def test_every_species_can_grow_in_a_stand(name: str) -> None:
     species = load_species(name)
-    needs, guilds = ecology_of(species), Guilds([Guild(species)])
+    needs, guilds = Guild(species).needs, Guilds([Guild(species)])
     girth = np.linspace(0.0, 1.2 * needs.diameter, 200)
     zero = np.zeros(200, np.int64)
     heights, radii = guilds.heights(zero, girth), guilds.radii(zero, girth)
@@ -51,6 +52,13 @@ def test_every_species_can_grow_in_a_stand(name: str) -> None:
     assert guilds.free[0] > 0.1
     # What is described is no larger than the largest, where the file says more than its size.
     assert species.ecology is None or needs.source
+
+
+@pytest.mark.parametrize("name", ["oak", "hazel", "palm", "ash"])
+def test_what_is_not_described_follows_from_one_lifespan(name: str) -> None:
+    """A trunk thickens in a stand within the years after which the same plant, as it grows by its age, dies."""
+    plain = replace(load_species(name), ages=None, ecology=None)
+    assert Guild(replace(plain, ages=ages_of(plain))).needs == Guild(plain).needs
 
 
 def test_it_changes_no_plant() -> None:

@@ -211,7 +211,10 @@ def _plant(
         except SceneError as error:
             bare.append(f"{title}: {error}")
             continue
-        layers.append((title, made.number))
+        if made.number or not made.reason:
+            layers.append((title, made.number))
+        else:
+            bare.append(f"{title}: {made.reason}")
     if bare and not layers:
         raise SceneError(bare[0])
     yield Progress(1.0 - _SOIL, "Soil")

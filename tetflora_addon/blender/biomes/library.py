@@ -199,9 +199,9 @@ def delete(identifier: str) -> Path:
         raise SceneError(f'"{name}" has no file in your folder of biomes; built-in biomes cannot be deleted')
     path = own_place(identifier)
     try:
-        path.unlink()
         for ending in PICTURES:
             path.with_suffix(ending).unlink(missing_ok=True)
+        path.unlink()
     except OSError as error:
         raise SceneError(f"Cannot delete {path.name}: {error.strerror}") from None
     look_again()

@@ -29,7 +29,11 @@ def _properties() -> Any:
 def _settings() -> dict[str, bpy.types.Property]:
     """Settings of stands that mean something in any file."""
     found = {p.identifier: p for p in _properties() if p.type in {'INT', 'FLOAT', 'BOOLEAN'}}
-    return {name: prop for name, prop in found.items() if name not in ("is_grown", "species_index", "path_distance")}
+    return {
+        name: prop
+        for name, prop in found.items()
+        if name not in ("is_grown", "last_year", "species_index", "path_distance")
+    }
 
 
 def check_stand(where: str, layer: dict[str, Any]) -> None:

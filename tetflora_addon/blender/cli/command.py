@@ -139,6 +139,8 @@ def _refine(options: argparse.Namespace) -> dict:
     if target is not None:
         scene.tetflora.output.save_results = True
         write_blend(target, lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))
+    if statistics.unknown:
+        raise SceneError(statistics.unknown)
     return asdict(statistics)
 
 

@@ -225,17 +225,19 @@ def write_blocks(
                 materials[what] = yield from material_steps(results.scene, species, block.kind, block.form)
         name = f"{species.name} {block.kind} {block.number:03d}"
         yield
-        obj = yield from results.add(name, block.kind, block.buffers, materials[what], species)
+        look = results.look_of(block.species)
+        obj = yield from results.add(name, block.kind, block.buffers, materials[what], species, look)
         _made(obj, block.buffers, statistics, baking, lit=True)
         return Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
 
-    yield from _written(_of_all_ages(flora, blocks), write, Progress(start, "Making polygons"))
+    yield from _written(_of_all_ages(results, flora, blocks), write, Progress(start, "Making polygons"))
 
 
-def _of_all_ages(flora: Flora, blocks: Iterator[Block]) -> Iterator[Block]:
-    """Blocks of which those of one species at several ages are one mesh: each object costs a renderer time."""
-    first: dict[str, int] = {}
-    same = [first.setdefault(one.identifier, n) if one.form is None else n for n, one in enumerate(flora.species)]
+def _of_all_ages(results: Results, flora: Flora, blocks: Iterator[Block]) -> Iterator[Block]:
+    """Blocks of which those of one species and look at several ages are one mesh: each object costs a renderer time."""
+    first: dict[tuple[str, str], int] = {}
+    named = [(one.identifier, results.look_of(n)) for n, one in enumerate(flora.species)]
+    same = [first.setdefault(named[n], n) if one.form is None else n for n, one in enumerate(flora.species)]
     if same == list(range(len(same))):
         yield from blocks
         return
@@ -259,7 +261,9 @@ def write_polygons(
     def write(block: PolygonBlock) -> Generator[None, None, Progress]:
         name = explicit.meshes.surfaces[block.surface].name
         materials = explicit.materials[block.surface]
-        obj = yield from results.add(f"{name} {block.number:03d}", "explicit", block.buffers, materials)
+        look = explicit.meshes.surfaces[block.surface].look
+        name = f"{name} {block.number:03d}"
+        obj = yield from results.add(name, "explicit", block.buffers, materials, look=look)
         _made(obj, block.buffers, statistics, baking, lit=False)
         return Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
 

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 
 import bpy
 import numpy as np
@@ -13,8 +14,10 @@ from ... import memory
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
 from ...emission.light import Sources
+from ...errors import SceneError
 from ...growth.growth import trunks
 from ...growth.seeds import Seeds
+from ...growth.wind import Wind
 from ...processes import pool
 from ...refinement.lights import Light
 from ...refinement.polygons import Polygons
@@ -30,6 +33,7 @@ from ..results.leaf_objects import resolved_species
 from ..scene.ages import grown_species
 from ..scene.explicit import Explicit, read_explicit
 from ..scene.lights import read_lights, read_sources, sky_suns
+from ..scene.looks import LayerLooks
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants_of
 from ..scene.skeletons import plain_kind
@@ -41,7 +45,8 @@ class Given:
     """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
 
     ``owners`` are the objects of the plants in their order, each with the number of its own; ``places`` are those of
-    assets.
+    assets, ``looks`` those of the objects that show these; ``unknown`` tells of plants that were left out because
+    nobody has their species.
     """
 
     seeds: Seeds
@@ -51,6 +56,8 @@ class Given:
     sources: Sources | None = None
     owners: tuple[tuple[str, int], ...] = ()
     places: tuple[Places, ...] = ()
+    looks: Mapping[bpy.types.Object, str] = field(default_factory=dict)
+    unknown: str = ""
 
     @property
     def species(self) -> tuple[str, ...]:
@@ -120,17 +127,21 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
         explicit = read_explicit(depsgraph, view_layer)
         places = tuple(read_places(scene, depsgraph, view_layer))
         try:
-            seeds, owners = read_plants_of(scene, depsgraph, view_layer)
+            seeds, owners, unknown = read_plants_of(scene, depsgraph, view_layer)
         except NoPlantsError:
             if explicit is None and not places:
                 raise
             none = np.zeros(0)
             frames = none.reshape(0, 3), none.reshape(0, 3, 3)
             seeds, owners = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none), ()
+            unknown = ""
         lights = (*read_lights(depsgraph, view_layer), *sky_suns(scene))
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners, places)
+        looks = LayerLooks(view_layer)
+        worn = {owner: looks.of(owner) for owner in dict.fromkeys(one.owner for one in places)}
+        occluders = read_occluders(depsgraph, view_layer)
+        return Given(seeds, explicit, occluders, lights, sources, owners, places, worn, unknown)
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
@@ -162,9 +173,9 @@ def in_year(scene: bpy.types.Scene, flora: Flora) -> Flora:
     return flora if season is None else flora.in_year(season)
 
 
-def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera) -> Flora:
-    """A flora on the scene's day, in its wind at its frame, in the coordinates of a camera."""
-    flora, wind = in_year(scene, flora), wind_of(scene)
+def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera, moving: bool = False) -> Flora:
+    """A flora on the scene's day, in its wind at its frame, in the coordinates of a camera; its plants may move."""
+    flora, wind = in_year(scene, flora), wind_of(scene) or (Wind(0.0, moving=True) if moving else None)
     return flora if wind is None else flora.in_wind(replace(wind, origin=tuple(camera.origin.tolist())))
 
 
@@ -177,6 +188,8 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
         As `read_scene` and `compile_for`.
     """
     given = read_scene(scene, depsgraph, depsgraph.view_layer)
+    if given.unknown:  # who counts in advance wants to know it
+        raise SceneError(given.unknown)
     flora = in_year(scene, compile_for(given.species, scene, depsgraph))
     instances = sum(len(one) for one in given.places)
     return Statistics(plants=len(given.seeds), polygons_full=given.polygons_full(flora), instances=instances)

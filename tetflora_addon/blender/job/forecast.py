@@ -57,6 +57,7 @@ class _Counted:
 
 
 _counted = _Counted()
+_learned = 1.0  # what refining took here last over what was expected
 
 
 def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimate | None:
@@ -84,12 +85,20 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     )
 
 
+def learn(expected: Estimate | None, seconds: float) -> None:
+    """Refining took so long: this machine, its window, and the scene as it is now take as long the next time."""
+    global _learned
+    if expected is not None and seconds > 1.0:  # of less, half is chance
+        _learned = float(np.clip(seconds / max(expected.seconds, 0.1), 0.1, 100.0))
+
+
 def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing is known."""
     found = forecast(scene, view_layer)
     if found is None:
         return ""
-    text = f"About {seconds_text(found.seconds)}, {polygons_text(found.primitives)}, {found.memory / _GIGA:.1f} GB"
+    seconds = seconds_text(found.seconds * _learned)
+    text = f"About {seconds}, {polygons_text(found.primitives)}, {found.memory / _GIGA:.1f} GB"
     if not found.limited:
         return text
     most = scene.tetflora.max_polygons
@@ -119,7 +128,7 @@ def polygons_text(number: float) -> str:
 
 
 def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
-    layer, now = (scene.name, view_layer.name), time.perf_counter()
+    layer, now = (scene.session_uid, view_layer.name), time.perf_counter()
     waits = now - _counted.at < _PATIENCE * _counted.took
     if _counted.stand is None or _counted.layer != layer or (_counted.stale and not waits):
         _counted.stand, _counted.layer, _counted.stale = _count(scene, view_layer), layer, False
@@ -269,7 +278,8 @@ def _on_change(*_: object) -> None:
 
 
 def _on_load(*_: object) -> None:
-    _counted.stand = None
+    global _learned
+    _counted.stand, _learned = None, 1.0
 
 
 _HANDLERS = Handlers(depsgraph_update_post=_on_change, undo_post=_on_change, redo_post=_on_change, load_post=_on_load)

@@ -109,7 +109,10 @@ def scene_digest(
         given.lights,
         given.sources,
         explicit,
-        [(targets[one.target], _names(one.owners), one.matrices, one.keys) for one in given.places],
+        [
+            (targets[one.target], _names(one.owners), one.matrices, one.keys, given.looks[one.owner])
+            for one in given.places
+        ],
         choices(scene),
         [_digest_of_species(one) for one in species],
         [brought_materials(scene, identifier) for identifier in given.species],

@@ -44,6 +44,7 @@ from ..results.proxies import Baking, write_proxies
 from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
+from ..scene.skeletons import look_of
 from ..worker import at_once, call_in_thread, nobody_waits, steps_in_thread
 from .asset_writing import bake_light, write_assets, write_blocks, write_plain, write_polygons
 from .assets import Bound, asset_warnings, bind_steps, is_plain
@@ -133,17 +134,18 @@ def _refine_steps(
     if scene.tetflora.expand_everything:  # for no camera: exports, and others' renderers
         camera = camera.counted_from(origin_near(given.seeds.position))
     given = given.counted_from(camera.origin)
-    results.origin = camera.origin
+    results.origin, results.owners = camera.origin, given.looks
+    results.looks = [look_of(kind) for kind in given.species]
     clock.lap("read")
     progress = Progress(0.02, "Compiling species")
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
-    flora = in_wind(scene, flora, camera)
+    flora = in_wind(scene, flora, camera, given.seeds.motion is not None)
     clock.lap("compile")
     full = yield from call_in_thread(progress, given.polygons_full, flora)
     if full > _MANY:
         pool.start()
-    statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
+    statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds, unknown=given.unknown)
     refined = not scene.tetflora.expand_everything
     statistics.instances = sum(len(one) for one in given.places)
     asset_warnings.clear()
@@ -201,7 +203,8 @@ def _first_look(
 ) -> Generator[Progress, bool | None, None]:
     """A coarse result in place of earlier ones, without baked light."""
     first = Results(results.scene, results.purpose, "", data)
-    first.origin, given = results.origin, replace(given, sources=None)
+    first.origin, first.owners, first.looks = results.origin, results.owners, results.looks
+    given = replace(given, sources=None)
     settings, camera = refinement_settings(results.scene).first_look(), camera.smaller(FIRST_LOOK)
     try:
         work = _write_refined(first, flora, given, bound, depsgraph, camera, Statistics(), Stopwatch(), settings)
@@ -345,7 +348,8 @@ def _refined(
         detail.most,
         settings.shadow_cutoff,
     )
-    return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc)
+    looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner] if bound else np.zeros(0, str)
+    return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc, looks)
 
 
 def _write_refined(

@@ -25,6 +25,7 @@ from ..main_thread import in_main_thread, window_draws
 from ..results.collection import has_results, leave_out_of_file, result_collections
 from ..results.forms import raise_settings, restore_settings
 from ..results.hiding import (
+    hidden_originals,
     lift_marks,
     originals_shown,
     pack_override_marks,
@@ -33,7 +34,7 @@ from ..results.hiding import (
     unpack_override_marks,
 )
 from ..results.output import KIND, adopt_materials, release_materials
-from ..runtime import Handlers, Listeners, complain, failed_frames, remember
+from ..runtime import Handlers, Listeners, complain, failed_frames, remember, with_uid
 from ..saved_files import clear_unreadable, migrate
 from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
 from ..scene.plants import NoPlantsError
@@ -45,14 +46,14 @@ from .contents import read_scene
 
 @dataclass
 class _Rendering:
-    """What to undo when a render ends; names, because references are invalid after a file is loaded."""
+    """What to undo when a render ends; each `session_uid`, because references are invalid after a file is loaded."""
 
     busy: bool = False
-    hidden: list[str] = field(default_factory=list)
+    hidden: list[int] = field(default_factory=list)
     lifted: dict[tuple[str, str], str] = field(default_factory=dict)  # marks of originals, while a file is written
-    raised: dict[str, dict[tuple[str, str], int]] = field(default_factory=dict)  # as they were, by name of the scene
-    outer: str = ""  # scene that is rendered; those that its sequencer shows begin and end renders of their own
-    scenes: list[str] = field(default_factory=list)  # all of these
+    raised: dict[int, dict[tuple[str, str], int]] = field(default_factory=dict)  # as they were, by scene
+    outer: int = 0  # scene that is rendered; those that its sequencer shows begin and end renders of their own
+    scenes: list[int] = field(default_factory=list)  # all of these
     warnings: list[str] = field(default_factory=list)
 
 
@@ -73,7 +74,7 @@ def forget_render_errors() -> None:
 
 def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """When a render starts: clear earlier errors, unless it is part of another render."""
-    if _rendering.outer not in {"", scene.name}:
+    if _rendering.outer not in {0, scene.session_uid}:
         return
     failed_frames.clear()
     _rendering.warnings.clear()
@@ -84,13 +85,13 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     if _rendering.busy:
         return
     _rendering.busy = True
-    _rendering.outer = _rendering.outer or scene.name
-    if scene.name not in _rendering.scenes:
-        _rendering.scenes.append(scene.name)
+    _rendering.outer = _rendering.outer or scene.session_uid
+    if scene.session_uid not in _rendering.scenes:
+        _rendering.scenes.append(scene.session_uid)
     made = False
     try:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
-        if wanted and has_contents(scene):
+        if wanted and (has_contents(scene) or hidden_originals(scene)):  # those may be in no collection meanwhile
             make = partial(_make, scene)
             with looked_at_once():
                 if window_draws():
@@ -104,12 +105,12 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     except NoPlantsError:
         pass  # the artist has disabled or hidden all of them
     except TetFloraError as error:
-        _complain(scene, str(error))
+        _complain(scene, f"without plants: {error}")
     except Exception as error:
         # Blender would only print it and go on.
         traceback.print_exc()
         text = f"unexpected error, please report it as a bug: {error!r}"
-        _complain(scene, text)
+        _complain(scene, f"without plants: {text}")
         remember(text, error)
     finally:
         if not made:
@@ -124,24 +125,24 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 
     Not yet after a scene of a sequencer: Blender 5.2 crashes if its objects are gone before the outer render ends.
     """
-    if _rendering.busy or _rendering.outer not in {"", scene.name}:
+    if _rendering.busy or _rendering.outer not in {0, scene.session_uid}:
         return
     _rendering.busy = True
-    rendered = {*_rendering.scenes, scene.name}
+    rendered = {*_rendering.scenes, scene.session_uid}
     try:
         for other in bpy.data.scenes:
-            if other.name in rendered and other.library is None:
+            if other.session_uid in rendered and other.library is None:
                 in_main_thread(partial(_take_back, other))
     finally:
-        _rendering.busy, _rendering.outer = False, ""
+        _rendering.busy, _rendering.outer = False, 0
         _rendering.scenes.clear()
 
 
 def on_save_pre(_path: object, _other: object = None) -> None:
     """Before a file is written: undo what is hidden or raised for a render."""
     _show_hidden()
-    for name in _rendering.raised:
-        _lower(name)
+    for uid in _rendering.raised:
+        _lower(uid)
     leave_out_of_file()
     _rendering.lifted = lift_marks()
     pack_override_marks()
@@ -149,10 +150,10 @@ def on_save_pre(_path: object, _other: object = None) -> None:
 
 def on_save_post(_path: object, _other: object = None) -> None:
     """After a file was written: hide and raise it again for a render that goes on."""
-    for collection in _named(_rendering.hidden):
+    for collection in _there(_rendering.hidden):
         collection.hide_render = True
-    for name in _rendering.raised:
-        if (scene := bpy.data.scenes.get((name, None))) is not None:
+    for uid in _rendering.raised:
+        if (scene := with_uid(bpy.data.scenes, uid)) is not None:
             raise_settings(scene)
     unpack_override_marks()
     restore_marks(_rendering.lifted)
@@ -163,7 +164,7 @@ def on_save_post(_path: object, _other: object = None) -> None:
 def on_load_post(_path: object, _other: object = None) -> None:
     """After a file was read: forget earlier renders, show objects whose results it lacks, migrate properties."""
     clear_unreadable()
-    _rendering.busy, _rendering.outer = False, ""
+    _rendering.busy, _rendering.outer = False, 0
     _rendering.scenes.clear()
     _rendering.raised.clear()
     _rendering.hidden.clear()
@@ -198,7 +199,9 @@ def _make(scene: bpy.types.Scene) -> None:
             options = {"view_layer": layer, "for_render": True, "camera": camera, "given": given, "mark": key[:8]}
             before = result_collections(scene, 'RENDER')
             statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
-            if statistics.left_out:
+            if statistics.unknown:
+                _complain(scene, f"without some plants: {statistics.unknown}")
+            elif statistics.left_out:
                 _warn(statistics.left_out, " ".join(sorted(statistics.strays)))
             for text in asset_warnings:
                 _warn(text, text)
@@ -207,7 +210,7 @@ def _make(scene: bpy.types.Scene) -> None:
                 in_main_thread(partial(frame_cache.store, scene, key, collection, statistics.memory_mb))
         in_main_thread(partial(show_in, scene, new, layers))
     in_main_thread(partial(_hide, scene, [key for key, *_ in wanted]))
-    if len(scene.view_layers) > 1 or _rendering.outer != scene.name:
+    if len(scene.view_layers) > 1 or _rendering.outer != scene.session_uid:
         # Otherwise Blender crashes when it renders new objects in a layer that is not the window's, or for a sequencer.
         for layer in scene.view_layers:
             layer.update()
@@ -225,37 +228,37 @@ def _layers_of(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
 def _hide(scene: bpy.types.Scene, keys: list[str]) -> None:
     """Hide what results of a render replace, and the artist's own: not before they are made, or there might be none."""
     frame_cache.hide_for(scene, keys)
-    _rendering.hidden += [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
-    for collection in _named(_rendering.hidden):
+    _rendering.hidden += [c.session_uid for c in result_collections(scene, 'VIEW') if not c.hide_render]
+    for collection in _there(_rendering.hidden):
         collection.hide_render = True
 
 
 def _take_back(scene: bpy.types.Scene) -> None:
     _show_hidden()
     _rendering.hidden.clear()
-    _lower(scene.name)
-    _rendering.raised.pop(scene.name, None)
+    _lower(scene.session_uid)
+    _rendering.raised.pop(scene.session_uid, None)
     frame_cache.clear(scene)
     refine.clear(scene, for_render=True)
 
 
 def _raise(scene: bpy.types.Scene) -> None:
-    _rendering.raised.setdefault(scene.name, {}).update(raise_settings(scene))
+    _rendering.raised.setdefault(scene.session_uid, {}).update(raise_settings(scene))
 
 
-def _lower(scene: str) -> None:
-    found = bpy.data.scenes.get((scene, None))  # a script may delete or rename it between two frames
+def _lower(scene: int) -> None:
+    found = with_uid(bpy.data.scenes, scene)  # a script may delete it between two frames
     if found is not None:
         restore_settings(found, _rendering.raised.get(scene, {}))
 
 
 def _show_hidden() -> None:
-    for collection in _named(_rendering.hidden):
+    for collection in _there(_rendering.hidden):
         collection.hide_render = False
 
 
-def _named(names: list[str]) -> list[bpy.types.Collection]:
-    return [found for name in names if (found := bpy.data.collections.get((name, None))) is not None]
+def _there(uids: list[int]) -> list[bpy.types.Collection]:
+    return [found for uid in uids if (found := with_uid(bpy.data.collections, uid)) is not None]
 
 
 def _has_meshes(scene: bpy.types.Scene) -> bool:
@@ -269,7 +272,7 @@ def _warn_of_nothing() -> None:
 
 
 def _warn_of_unlocked(scene: bpy.types.Scene) -> None:
-    name = _rendering.outer or scene.name
+    name = (with_uid(bpy.data.scenes, _rendering.outer) or scene).name
     _warn(f'Lock Interface of the scene "{name}" is off, so the window stands still while frames are refined', "lock")
 
 
@@ -283,7 +286,7 @@ def _warn(text: str, about: str) -> bool:
 
 
 def _complain(scene: bpy.types.Scene, message: str) -> None:
-    text = f"frame {scene.frame_current} was rendered without plants: {message}"
+    text = f"frame {scene.frame_current} was rendered {message}"
     failed_frames.append(text)
     complain(text)
 

@@ -100,12 +100,6 @@ def parts(graph: Graph, vector: Socket) -> tuple[Socket, Socket, Socket]:
     return outputs["X"], outputs["Y"], outputs["Z"]
 
 
-def edges(graph: Graph, place: Socket) -> Socket:
-    """Distance to the nearest border between cells."""
-    inputs = {"Vector": place, "Scale": 1.0, "Randomness": 1.0}
-    return graph.node("ShaderNodeTexVoronoi", inputs, feature='DISTANCE_TO_EDGE').outputs["Distance"]
-
-
 def points(graph: Graph, place: Socket, metric: str = 'EUCLIDEAN', feature: str = 'F1') -> Any:
     """Outputs Distance, Color and Position of the nearest point, or with 'F2' of the second nearest."""
     inputs = {"Vector": place, "Scale": 1.0, "Randomness": 1.0}

@@ -318,12 +318,17 @@ def _settings(scene: bpy.types.Scene) -> None:
         if layer.species in known_species:
             entry = mix.add()
             entry.species, entry.weight = layer.species, 0.1 * layer.number
-    render = scene.render
-    known = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
-    if 'CYCLES' in known or hasattr(scene, "cycles"):
-        render.engine = 'CYCLES'
-        scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
-        scene.cycles.use_adaptive_sampling, scene.cycles.adaptive_threshold = True, 0.1
-        scene.cycles.max_bounces = 4
-    render.resolution_x, render.resolution_y, render.resolution_percentage = 1280, 720, 50
-    scene.view_settings.exposure = 0.9
+    # Only what is as in new scenes: all else is the artist's choice.
+    new = bpy.data.scenes.new("")
+    wanted = {"render": {"resolution_x": 1280, "resolution_y": 720, "resolution_percentage": 50}}
+    wanted["view_settings"] = {"exposure": 0.9}
+    if hasattr(scene, "cycles"):
+        wanted["render"]["engine"] = 'CYCLES'
+        wanted["cycles"] = {"samples": SAMPLES, "use_denoising": True, "use_adaptive_sampling": True}
+        wanted["cycles"] |= {"adaptive_threshold": 0.1, "max_bounces": 4}
+    for group, values in wanted.items():
+        own, fresh = getattr(scene, group), getattr(new, group)
+        for name, value in values.items():
+            if getattr(own, name) == getattr(fresh, name):
+                setattr(own, name, value)
+    bpy.data.scenes.remove(new)

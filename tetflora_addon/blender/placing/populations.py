@@ -171,6 +171,8 @@ def _make_plants_steps(
     collection = collection_of(scene, population)
     if field:
         made = [add_field(scene, placement, search.species, collection, ages)]
+        if is_cover(population):
+            made[0].display_type = 'BOUNDS'  # its points would turn the ground black
     elif own:
         made = add_plants(scene, placement, search.species, collection, ages)
     for number, obj in enumerate(made):

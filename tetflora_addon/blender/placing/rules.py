@@ -45,9 +45,8 @@ IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
     *("mix_index", "distance_from", "covers", "biome"),
 }
-_COMPANION = ("companion", "companion_strength", "companion_distance")
 _DIGITS = 4  # of erased places: tenths of a millimetre
-_ENTRY = ("species", "weight", *_COMPANION)
+_ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance")
 _HABITAT = ("habitat", "shed_by")
 
 
@@ -105,16 +104,12 @@ def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGro
             setattr(target, prop.identifier, getattr(source, prop.identifier))
     target.mix.clear()
     for entry in source.mix:
-        new = target.mix.add()
-        new.species, new.weight = entry.species, entry.weight
-        copy_companion(entry, new)
-        for name in _HABITAT:
-            setattr(new, name, getattr(entry, name))
+        copy_entry(entry, target.mix.add())
 
 
-def copy_companion(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
-    """Give an entry the companion of another."""
-    for name in _COMPANION:
+def copy_entry(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+    """Let an entry of a mixture be as another."""
+    for name in (*_ENTRY, *_HABITAT):
         setattr(target, name, getattr(source, name))
 
 

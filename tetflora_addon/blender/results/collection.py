@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Hashable, Sequence
+from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from typing import TypeVar
 
 import bpy
@@ -14,6 +14,7 @@ from ...species.species import Species
 from ..materials import snow
 from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
+from ..scene.looks import LIKE
 from .meshes import mesh_steps, point_object
 from .output import (
     KIND,
@@ -58,6 +59,10 @@ class Results:
     ----------
     origin : (3,) float
         Where in the world positions in buffers are counted from, metres: objects are placed there.
+    owners : mapping of bpy.types.Object to str
+        Looks of objects that show instances, where more than they themselves say counts.
+    looks : sequence of str
+        Of plants of each kind, see `scene.looks`; empty where there are none.
     """
 
     def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "", data: JobData | None = None) -> None:
@@ -65,6 +70,8 @@ class Results:
         self.data = data
         self.purpose = purpose
         self.origin: Sequence[float] = (0.0, 0.0, 0.0)
+        self.owners: Mapping[bpy.types.Object | None, str] = {}
+        self.looks: Sequence[str] = ()
         self.mark = f" {mark}" if mark else ""
         self.collection: bpy.types.Collection | None = None
         self._made: list[bpy.types.ID] = []
@@ -75,7 +82,8 @@ class Results:
 
     def open(self) -> None:
         """Make the collection."""
-        name = NAMES[self.purpose] + self.mark
+        earlier = result_collections(self.scene, 'VIEW') if self.purpose == 'VIEW' else []
+        name = earlier[0].name if earlier else NAMES[self.purpose] + self.mark  # the artist may have renamed it
         snow.fit_soils()
         self.collection = bpy.data.collections.new(name)
         self._names.append((self.collection, name))
@@ -94,13 +102,14 @@ class Results:
         buffers: MeshBuffers,
         materials: list[bpy.types.Material],
         species: Species | None = None,
+        look: str = "",
     ) -> Generator[None, None, bpy.types.Object]:
-        """Write one mesh as an object of the collection, step by step; of one species, or of None."""
+        """Write one mesh as an object of the collection, step by step; of one species, or of None, and of a look."""
         self.use(materials)
         name = self.name_for(name)
         mesh = yield from mesh_steps(name, buffers, materials)
         self._made.append(mesh)
-        return self._link(name, bpy.data.objects.new(name, mesh), kind, species)
+        return self._link(name, bpy.data.objects.new(name, mesh), kind, species, look)
 
     def add_points(
         self,
@@ -109,11 +118,12 @@ class Results:
         buffers: PointBuffers,
         materials: list[bpy.types.Material],
         species: Species | None = None,
+        look: str = "",
     ) -> bpy.types.Object:
         """Write one cloud of points, which has one material, as an object of the collection."""
         self.use(materials)
         name = self.name_for(name)
-        return self._link(name, point_object(name, buffers, *materials), kind, species)
+        return self._link(name, point_object(name, buffers, *materials), kind, species, look)
 
     def name_for(self, name: str) -> str:
         """A name that ends in a number, with the mark; shortened so that Blender does not cut off the end."""
@@ -122,6 +132,10 @@ class Results:
         stem, _, number = name.rpartition(" ")
         end = f" {number}{self.mark}"
         return stem.encode()[: _LONGEST - len(end)].decode(errors="ignore") + end
+
+    def look_of(self, number: int | None) -> str:
+        """Look of plants of a kind, by its number; empty for others."""
+        return self.looks[number] if number is not None and 0 <= number < len(self.looks) else ""
 
     def hold(self, made: bpy.types.ID, name: str = "") -> None:
         """Take over a datablock that is in no scene, with an object's data: it goes with the results that show it."""
@@ -166,10 +180,16 @@ class Results:
         for source in sources:
             if is_own(source):
                 made[SOURCE] = source
-        return self._link(name, made, kind, None, placed)
+        return self._link(name, made, kind, None, placed=placed)
 
     def _link(
-        self, name: str, made: bpy.types.Object, kind: str, species: Species | None, placed: bool = False
+        self,
+        name: str,
+        made: bpy.types.Object,
+        kind: str,
+        species: Species | None,
+        look: str = "",
+        placed: bool = False,
     ) -> bpy.types.Object:
         own = [made] if placed else [made, made.data]
         self._made += own
@@ -179,6 +199,8 @@ class Results:
         if not placed:
             made.location = self.origin
         made[KIND] = kind
+        if look:
+            made[LIKE] = look
         for datablock in own:
             tag(datablock)
         if self.purpose == 'VIEW':

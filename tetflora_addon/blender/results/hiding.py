@@ -15,8 +15,17 @@ from contextlib import contextmanager
 import bpy
 
 from ..materials.nodes import is_own, untag
-from .hiding_linked import hide_linked, leave_hidden, linked_hidden, scenes_hiding, show_linked
-from .output import KIND, PARENT, PURPOSE, mark_runtime, remove_collection, result_collections, sources_of
+from .hiding_linked import hide_linked, is_switched, leave_hidden, linked_hidden, scenes_hiding, show_linked
+from .output import (
+    KIND,
+    PARENT,
+    PURPOSE,
+    mark_runtime,
+    release_copies,
+    remove_collection,
+    result_collections,
+    sources_of,
+)
 
 #: Custom properties of hidden objects, as JSON: hide_render and hide_viewport before ("flags"), and the names of the
 #: scenes with the results ("scenes"). Results of a render come last and go first.
@@ -33,9 +42,10 @@ def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy
     SceneError
         One is linked in such a way that it cannot be hidden: see `hiding_linked.check_linked`. None is hidden then.
     """
-    hide_linked(scene, purpose, [original for original in originals if original.library is not None])
+    apart = [original for original in originals if original.library is not None or is_switched(original)]
+    hide_linked(scene, purpose, apart)
     for original in originals:
-        if original.library is not None:
+        if original in apart:
             continue
         # Where it is hidden for another scene already, its current visibility is not the artist's.
         flags, scenes = _marker(original, purpose) or ([original.hide_render, original.hide_viewport], [])
@@ -149,6 +159,7 @@ def keep_results(scene: bpy.types.Scene) -> int:
                 for datablock in (obj, obj.data):
                     if datablock is not None:
                         untag(datablock)
+        release_copies(collection)
         del collection[PURPOSE]
         untag(collection)
         collection.name = "TetFlora kept"

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Linked objects that results replace: hidden and shown again without a change to what is linked.
 
-Their own switches belong to the library. What belongs to this file is which collections hold them: an object is taken
-out of collections of this file, and collections of the library are excluded from the view layers. What else these
-hold is shown by a collection of this file meanwhile. The scene remembers all of it in a custom property.
+Their own switches belong to the library, or to an animation, which sets them again in each frame. What belongs to this
+file is which collections hold them: an object is taken out of collections of this file, and collections of the library
+are excluded from the view layers. What else these hold is shown by a collection of this file meanwhile. The scene
+remembers all of it in a custom property.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import bpy
 
 from ...errors import SceneError
 from ..materials.nodes import tag, untag
+from ..scene.motion import curves_of
 
 #: Custom properties of scenes: one entry for what is hidden.
 HIDDEN = {'VIEW': "tetflora_hidden_linked", 'RENDER': "tetflora_hidden_linked_for_render"}
@@ -27,6 +29,17 @@ def linked_hidden(scene: bpy.types.Scene, purpose: str) -> list[bpy.types.Object
     """Linked objects that are hidden for a scene's results."""
     record = scene.get(HIDDEN[purpose])
     return [] if record is None else [e["object"] for e in record["objects"] if e["object"] is not None]
+
+
+def is_switched(obj: bpy.types.Object) -> bool:
+    """Whether an animation sets the visibility of an object."""
+    animation = obj.animation_data
+    if animation is None:
+        return False
+    actions = [strip.action for track in animation.nla_tracks for strip in track.strips if strip.action is not None]
+    bags = [bag for action in actions for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+    curves = (*curves_of(obj), *animation.drivers, *(curve for bag in bags for curve in bag.fcurves))
+    return any(curve.data_path in _FLAGS for curve in curves)
 
 
 def check_linked(scene: bpy.types.Scene, originals: Sequence[bpy.types.Object]) -> None:

@@ -22,8 +22,8 @@ from ..attributes import read, write
 from ..compat import set_node_input
 from ..main_thread import in_main_thread
 from ..materials.nodes import Graph, find_socket, get_or_create
+from ..scene.looks import look_like
 from .collection import Results
-from .output import look_like
 
 #: Attributes of points: where each instance stands, and which of several objects it shows.
 MATRIX, PICK = "tf_matrix", "tf_pick"
@@ -74,7 +74,7 @@ def add_instances(
     kind = 'COLLECTION' if isinstance(source, bpy.types.Collection) else 'OBJECT'
     name = results.name_for(name)
     made = _instancer(name, kind, source, matrices, ids)
-    look_like(made, like)
+    look_like(made, like, results.owners.get(like))
     return results.add_object(name, made, KIND_WHOLE, [source])
 
 
@@ -106,7 +106,7 @@ def add_cluster_instances(
     place[order] = np.arange(len(objects), dtype=np.int32)
     name = results.name_for(name)
     made = _instancer(name, 'CHILDREN', collection, matrices, ids, place[pick])
-    look_like(made, like)
+    look_like(made, like, results.owners.get(like))
     return results.add_object(name, made, KIND_CLUSTERS, [collection])
 
 
@@ -128,7 +128,7 @@ def add_cluster(
     """
     name = results.name_for(f"{stem} {number:06d}")
     made = bpy.data.objects.new(name, mesh)
-    look_like(made, like)
+    look_like(made, like, results.owners.get(like))
     results.hold(made, name)
     return made
 

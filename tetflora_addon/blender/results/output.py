@@ -4,62 +4,18 @@
 
 All objects of a species have one parent, an empty with the species' name, which is the asset of Cryptomatte's third
 layer. Results of a render and the artist's results share it, so that its name, and thus the matte, is the same in both.
-
-What results that stand for an object of the artist take over from it: who sees it, what lights it, its passes.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from typing import Any
 
 import bpy
 
-from ..materials.nodes import is_ours, is_own, tag
+from ..materials.nodes import MADE, is_ours, is_own, tag, untag
 from ..runtime import is_there
-
-#: Custom property of result objects, as JSON: which rays do not see what they stand for, and its light group.
-LIKE = "tetflora_like"
-#: Ends of the names of properties that begin with ``visible_``; the last is there from 5.1 on.
-RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow", "raycast")
-_OWN = ("is_holdout", "is_shadow_catcher", "pass_index", "color", "display_type", "show_bounds")
-_LINKING = ("receiver_collection", "blocker_collection")
-
-
-def look_like(made: bpy.types.Object, like: bpy.types.Object | None) -> None:
-    """Give a result the visibility, passes, light linking and settings of Cycles of an object; nothing for None.
-
-    Output settings may hide it from more rays, but show it to none that the object is hidden from.
-    """
-    if like is None:
-        return
-    off = [ray for ray in RAYS if not getattr(like, f"visible_{ray}", True)]
-    _copy([f"visible_{ray}" for ray in off] + [*_OWN, "lightgroup"], like, made)
-    _copy(_LINKING, like.light_linking, made.light_linking)
-    own, others = getattr(made, "cycles", None), getattr(like, "cycles", None)
-    if own is not None and others is not None:
-        _copy(
-            [p.identifier for p in own.bl_rna.properties if not p.is_readonly and p.identifier != "name"], others, own
-        )
-    made[LIKE] = json.dumps({"off": off, "light_group": like.lightgroup})
-
-
-def _copy(names: Iterable[str], source: bpy.types.bpy_struct, target: bpy.types.bpy_struct) -> None:
-    """Copy what differs: each change makes Blender look at all that depends on it."""
-    for name in names:
-        value = getattr(source, name)
-        value = tuple(value) if getattr(source.bl_rna.properties[name], "is_array", False) else value
-        now = getattr(target, name)
-        if (tuple(now) if isinstance(value, tuple) else now) != value:
-            setattr(target, name, value)
-
-
-def likeness(made: bpy.types.Object) -> dict[str, Any] | None:
-    """What `look_like` stored: ``off``, the rays that do not see it, and ``light_group``; None for other results."""
-    stored = made.get(LIKE)
-    return None if stored is None else json.loads(stored)
-
+from ..scene.looks import wear
 
 #: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy', or the parent of a species.
 KIND = "tetflora_kind"
@@ -106,15 +62,16 @@ def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> No
     """Apply a scene's output settings to a result object; ``identifier`` is empty where species are mixed."""
     if made.get(KIND) == STAND_IN:
         return
-    output, entry, like = scene.tetflora.output, entry_of(scene, identifier), likeness(made)
+    output, entry, look = scene.tetflora.output, entry_of(scene, identifier), wear(made)
     for name in SWITCHES:
-        shown = getattr(output, name) and (like is None or name not in like["off"])
+        shown = getattr(output, name) and name not in look.get("off", ())
         if getattr(made, f"visible_{name}") != shown:  # after each, Blender lists all objects anew
             setattr(made, f"visible_{name}", shown)
-    if like is None:
-        made.pass_index = output.pass_index if entry is None else entry.pass_index
-    own = (entry.light_group if entry is not None else "") if like is None else like["light_group"]
-    made.lightgroup = own or output.light_group
+    own = output if entry is None else entry
+    if "pass_index" not in look:
+        made.pass_index = own.pass_index
+    if "lightgroup" not in look:
+        made.lightgroup = own.light_group or output.light_group
     made[SPECIES] = identifier
     first = made.material_slots[0].material if made.material_slots else None
     made[MATERIAL] = first.name if first is not None else ""
@@ -219,9 +176,26 @@ def release_materials() -> None:
 
 
 def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
-    """Result collections of a scene and this file, of one purpose or of all."""
-    made = [c for c in scene.collection.children if is_own(c) and PURPOSE in c]
-    return [c for c in made if purpose is None or c[PURPOSE] == purpose]
+    """Result collections of a scene and this file, of one purpose or of all, wherever the artist has moved them.
+
+    One that was renamed still is: only where another one bears the name under which it was made, it is a copy of that.
+    """
+    return [
+        c
+        for c in scene.collection.children_recursive
+        if PURPOSE in c
+        and (purpose is None or c[PURPOSE] == purpose)
+        and c.library is None
+        and c.override_library is None
+        and (is_ours(c) or (c.get(MADE, c.name), None) not in bpy.data.collections)
+    ]
+
+
+def release_copies(collection: bpy.types.Collection) -> None:
+    """Hand copies of a result collection over to the artist, before it is gone and they count as the renamed one."""
+    for other in bpy.data.collections:
+        if other != collection and other.library is None and other.get(MADE) == collection.get(MADE):
+            untag(other)
 
 
 def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Collection) -> int:
@@ -244,6 +218,7 @@ def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Colle
     groups = _groups(every)
     materials = {m for o in every if o.data is not None and is_own(o.data) for m in o.data.materials}
     removed = [*own, *(d for d in data if d.users <= 1), collection]
+    release_copies(collection)
     bpy.data.batch_remove(removed)
     unused = {m for m in materials if m is not None and is_own(m)}
     return len(removed) + remove_sources(sources) + _remove_unused(unused, groups)

@@ -148,6 +148,7 @@ def _added(
     """Write one block of proxies, of one of some species, step by step."""
     points, of_assets = isinstance(buffers, PointBuffers), buffers.species == ASSETS
     species = None if buffers.species is None or of_assets else every[buffers.species]
+    look = buffers.look or results.look_of(buffers.species)
     if baked:
         material = form.baked_material()
     else:
@@ -156,9 +157,9 @@ def _added(
         set_sockets(material, results.scene, form.sockets)
     name = f"{'TetFlora' if species is None else species.name} proxies {number:03d}"
     if points:
-        results.add_points(name, "proxy", buffers, [material], species)
+        results.add_points(name, "proxy", buffers, [material], species, look)
     else:
-        yield from results.add(name, "proxy", buffers, [material], species)
+        yield from results.add(name, "proxy", buffers, [material], species, look)
 
 
 def set_sockets(material: bpy.types.Material, scene: bpy.types.Scene, sockets: Mapping[str, str]) -> None:

@@ -12,9 +12,10 @@ from __future__ import annotations
 import bpy
 
 from ..materials.nodes import Graph, find_socket, get_or_create
+from ..scene.looks import look_like
 from .collection import Results
 from .hiding import artists_flags, forget_marks
-from .output import STAND_IN, look_like
+from .output import STAND_IN
 
 _VERSION = 1
 _NAME = "TetFlora Without Instances"
@@ -62,7 +63,7 @@ def add_stand_in(
             if getattr(made.tetflora, switch, False):
                 setattr(made.tetflora, switch, False)
         _drop_instances(made)
-    look_like(made, original)
+    look_like(made, original, results.owners.get(original))
     return results.add_object(name, made, STAND_IN, placed=True)
 
 

@@ -9,22 +9,14 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
-from mathutils import Euler, Matrix, Quaternion
 from numpy.typing import NDArray
 
 from ...camera.camera import Camera
 from ...errors import SceneError
 from ..attributes import frames_of, world_matrix
+from .motion import exposure, moment, moves
 
 _NARROW = 1e-9  # of windows that single precision turns into nothing
-#: Paths of animation that place an object, and how many values each has.
-_CHANNELS = {
-    "location": 3,
-    "rotation_euler": 3,
-    "rotation_quaternion": 4,
-    "rotation_axis_angle": 4,
-    "scale": 3,
-}
 
 
 def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_only: bool = False) -> Camera:
@@ -95,7 +87,7 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
     )
     if camera is None:
         raise SceneError(f'The camera "{name}" has zero scale or an invalid position; clear them with Alt S and Alt G')
-    others = (*_while_open(scene, camera, window, matrix), *_stereo_views(scene, camera, depsgraph))
+    others = (*_while_open(scene, depsgraph, camera, window), *_stereo_views(scene, camera, depsgraph))
     return replace(camera, shutter=others)
 
 
@@ -168,31 +160,17 @@ def _lens(data: bpy.types.Camera, matrix: NDArray[np.float64], depsgraph: bpy.ty
 
 
 def _while_open(
-    scene: bpy.types.Scene,
-    camera: Camera,
-    window: tuple[float, float, float, float],
-    matrix: NDArray[np.float64],
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, camera: Camera, window: tuple[float, float, float, float]
 ) -> tuple[Camera, ...]:
-    """The camera when the shutter opens and closes, if motion blur is on and it is animated.
-
-    Nothing is evaluated and the scene does not change: only curves of the camera's own action are read at other times,
-    not constraints, drivers, the NLA, animated parents and lenses.
-    """
-    if not scene.render.use_motion_blur:
+    """The camera when the shutter opens and closes, if motion blur is on and it is animated; see `motion`."""
+    if not scene.render.use_motion_blur or not moves(scene.camera):
         return ()
-    before, after = {'START': (0.0, 1.0), 'CENTER': (-0.5, 0.5), 'END': (-1.0, 0.0)}[scene.render.motion_blur_position]
-    now = scene.frame_current_final
-    here = _animated_basis(scene.camera, now)
-    if here is None or abs(here.determinant()) < 1e-12:
-        return ()
-    # What parents and constraints make of the camera's own transform, as it is now.
-    carried = matrix @ np.array(here.inverted(), np.float64)
     found = []
-    for offset in (before, after):
-        basis = _animated_basis(scene.camera, now + offset * scene.render.motion_blur_shutter)
-        if basis is None or offset == 0.0:
+    for frame in exposure(scene):
+        if math.isclose(frame, scene.frame_current_final, abs_tol=1e-6):
             continue
-        other = _placed(camera, carried @ np.array(basis, np.float64), window)
+        with moment(frame):
+            other = _placed(camera, world_matrix(scene.camera, depsgraph).astype(np.float64), window)
         if other is not None:
             found.append(other)
     moving = any(
@@ -200,34 +178,6 @@ def _while_open(
         for o in found
     )
     return tuple(found) if moving else ()
-
-
-def _animated_basis(obj: bpy.types.Object, frame: float) -> Matrix | None:
-    """An object's own transform at a time, from the curves of its action; None if it has none."""
-    animation = obj.animation_data
-    if animation is None or animation.action is None or animation.action_slot is None:
-        return None
-    values = {path: list(getattr(obj, path)) for path in _CHANNELS}
-    curves = 0
-    for layer in animation.action.layers:
-        for strip in layer.strips:
-            bag = strip.channelbag(animation.action_slot)
-            for curve in [] if bag is None else bag.fcurves:
-                if not curve.mute and curve.array_index < _CHANNELS.get(curve.data_path, 0):
-                    values[curve.data_path][curve.array_index] = curve.evaluate(frame)
-                    curves += 1
-    if not curves:
-        return None
-    return Matrix.LocRotScale(values["location"], _rotation(obj, values), values["scale"])
-
-
-def _rotation(obj: bpy.types.Object, values: dict[str, list[float]]) -> Quaternion:
-    if obj.rotation_mode == 'QUATERNION':
-        return Quaternion(values["rotation_quaternion"]).normalized()
-    if obj.rotation_mode == 'AXIS_ANGLE':
-        angle, *axis = values["rotation_axis_angle"]
-        return Quaternion(axis, angle)
-    return Euler(values["rotation_euler"], obj.rotation_mode).to_quaternion()
 
 
 def _stereo_views(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, ...]:

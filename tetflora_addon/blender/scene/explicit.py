@@ -10,7 +10,7 @@ whose scatter is refined counts as assets instead.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -22,6 +22,7 @@ from ...refinement.polygons import Meshes, Surface
 from ..attributes import face_offsets, members, read, values_of, world_matrix
 from ..materials.means import Looks
 from ..materials.nodes import is_ours
+from .looks import LayerLooks
 from .objects import SURFACE_TYPES, may_instance, renderable_objects
 from .scatterers import scatters
 
@@ -74,19 +75,20 @@ def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLaye
     wanted = marked | _instancers_of_marked(rendered, depsgraph)
     if not wanted:
         return None
-    reader, found = _Reader(), set()
+    reader, looks, found = _Reader(), LayerLooks(view_layer), set()
     for instance in depsgraph.object_instances:
         owner = instance.parent.original if instance.is_instance else instance.object.original
         if owner not in wanted or not instance.show_self or instance.object.type not in SURFACE_TYPES:
             continue
         if instance.is_instance and (_unseen(instance) or scatters(owner)):
             continue
-        if reader.add(instance.object, np.array(instance.matrix_world, dtype=np.float64)):
+        look = looks.of(instance.object.original, owner) if instance.is_instance else looks.of(owner)
+        if reader.add(instance.object, np.array(instance.matrix_world, dtype=np.float64), look):
             found.add(owner)
     # Objects that are switched off in viewports but render are not evaluated: they come without modifiers.
     for obj in sorted(marked - found, key=lambda o: o.name_full):
         unseen = obj.type in SURFACE_TYPES and not obj.evaluated_get(depsgraph).is_evaluated
-        if unseen and reader.add(obj, world_matrix(obj, depsgraph)):
+        if unseen and reader.add(obj, world_matrix(obj, depsgraph), looks.of(obj)):
             found.add(obj)
         else:
             raise SceneError(
@@ -137,12 +139,12 @@ class _Reader:
         self._known: dict[tuple, int | None] = {}
         self._looks = Looks()
 
-    def add(self, obj: bpy.types.Object, matrix: NDArray[np.float64]) -> bool:
+    def add(self, obj: bpy.types.Object, matrix: NDArray[np.float64], look: str) -> bool:
         """Take an evaluated object, or an original that is not evaluated; False if it has no faces."""
         own = tuple(slot.material.name_full for slot in obj.material_slots if slot.link == 'OBJECT' and slot.material)
-        key = obj.data.as_pointer(), obj.type, own, obj.original.as_pointer() if obj.type != 'MESH' else 0
+        key = obj.data.as_pointer(), obj.type, own, obj.original.as_pointer() if obj.type != 'MESH' else 0, look
         if key not in self._known:
-            self._known[key] = self._read(obj)
+            self._known[key] = self._read(obj, look)
         number = self._known[key]
         if number is None or is_ours(obj.original):
             return False
@@ -150,7 +152,7 @@ class _Reader:
         self.matrices.append(matrix)
         return True
 
-    def _read(self, obj: bpy.types.Object) -> int | None:
+    def _read(self, obj: bpy.types.Object, look: str) -> int | None:
         mesh = obj.to_mesh()
         try:
             if mesh is None or not len(mesh.polygons):
@@ -159,7 +161,7 @@ class _Reader:
             for i, slot in enumerate(obj.material_slots):
                 if slot.link == 'OBJECT' and i < len(materials):
                     materials[i] = slot.material.original if slot.material else None
-            self.surfaces.append(_surface(obj.original.name, mesh, materials, self._looks))
+            self.surfaces.append(replace(_surface(obj.original.name, mesh, materials, self._looks), look=look))
         finally:
             obj.to_mesh_clear()
         self.materials.append(materials)

@@ -11,13 +11,13 @@ import bpy
 from ...errors import TetFloraError
 from ...growth.fallen import is_gone
 from ..settings import season_of
-from ..species.edits import species_for
+from ..species.edits import edited_infos, species_for
 
 
 def gone_species(scene: bpy.types.Scene) -> set[str]:
     """Identifiers of those that populations of the scene strew, or that its file holds."""
     group, season = scene.tetflora, season_of(scene)
-    names = {edit.identifier for edit in group.species_edits}
+    names = set(edited_infos())
     names |= {e.species for p in group.populations for e in p.mix if e.habitat == 'FALLEN'}
     found = set()
     for name in names:

@@ -20,6 +20,7 @@ from ...growth.hashing import child_key, key_of_seed
 from ..attributes import evaluated_mesh, members, read, world_matrix
 from ..species.asset_species import asset_species
 from .instances import name_keys, references_of
+from .looks import LayerLooks
 from .scatterers import scatters
 
 #: Types of objects that have faces, or may have some by nodes.
@@ -36,16 +37,20 @@ _OCCLUDER_REMEDY = (
 def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
     """Rendered view layers with something to refine, together where it is the same; at least one group.
 
-    Layers that render the same plants share a refinement; where each has plants of its own, each gets one.
+    Layers that render the same plants in the same way share a refinement; each gets one where it has plants of its own,
+    or has them as a holdout.
     """
     layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
     if len(layers) == 1:
         return [layers]  # at no cost: animations of ten thousand objects mostly have one
-    groups: dict[frozenset[int], list[bpy.types.ViewLayer]] = {}
+    groups: dict[frozenset[tuple[int, str]], list[bpy.types.ViewLayer]] = {}
     for layer in layers:
         rendered = list(renderable_objects(layer))
         if any(may_take_part(o) for o in rendered):
-            held = frozenset(o.session_uid for o in rendered if may_take_part(o) or o.tetflora.is_occluder)
+            looks = LayerLooks(layer)
+            held = frozenset(
+                (o.session_uid, looks.of(o)) for o in rendered if may_take_part(o) or o.tetflora.is_occluder
+            )
             groups.setdefault(held, []).append(layer)
     return list(groups.values()) or [layers[:1]]
 
@@ -158,12 +163,15 @@ class Copies:
         To world space.
     keys : (n,) uint64
         Tell individuals apart.
+    instancer : bpy.types.Object or None
+        The original object that shows all of them, or another with the same look.
     """
 
     owner: bpy.types.Object
     geometry: bpy.types.GeometrySet | None
     matrices: NDArray[np.float64]
     keys: NDArray[np.uint64]
+    instancer: bpy.types.Object | None = None
 
 
 class _OneByOne(Exception):
@@ -183,22 +191,23 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     """
     found: list[Copies] = []
     left: set[bpy.types.Object] = set()
-    groups: dict[bpy.types.Collection, list[bpy.types.Object]] = {}
+    groups: dict[tuple[bpy.types.Collection, str], list[bpy.types.Object]] = {}
+    looks = LayerLooks(depsgraph.view_layer)
     for obj in objects:
         if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
             left.add(obj)
         elif obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
-            groups.setdefault(obj.instance_collection, []).append(obj)
+            groups.setdefault((obj.instance_collection, looks.of(obj)), []).append(obj)
         elif has_nodes(obj):
             try:
-                walk = _Walk(depsgraph)
+                walk = _Walk(depsgraph, obj)
                 walk.nodes(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), name_keys([obj]))
                 found += walk.found
             except _OneByOne:
                 left.add(obj)
-    for collection, instancers in groups.items():
+    for (collection, _), instancers in groups.items():
         try:
-            walk = _Walk(depsgraph)
+            walk = _Walk(depsgraph, instancers[0])
             matrices = np.array([world_matrix(obj, depsgraph) for obj in instancers], dtype=np.float64)
             walk.collection(collection, matrices, name_keys(instancers))
             found += walk.found
@@ -242,8 +251,8 @@ def rendered_objects(collection: bpy.types.Collection) -> Iterator[bpy.types.Obj
 class _Walk:
     """Follows references down to plants and fields, with all places at once."""
 
-    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
-        self.depsgraph = depsgraph
+    def __init__(self, depsgraph: bpy.types.Depsgraph, instancer: bpy.types.Object) -> None:
+        self.depsgraph, self.instancer = depsgraph, instancer
         self.found: list[Copies] = []
         self._depth = 0
 
@@ -256,7 +265,7 @@ class _Walk:
     def _object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
         group = obj.tetflora
         if group.is_plant or group.is_field:
-            self.found.append(Copies(obj, None, matrices, keys))
+            self.found.append(Copies(obj, None, matrices, keys, self.instancer))
         if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
             raise _OneByOne
         if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
@@ -287,7 +296,7 @@ class _Walk:
             else:
                 places, names = rows.within(matrices, keys)
                 if owner.tetflora.is_field:
-                    self.found.append(Copies(owner, target, places, names))
+                    self.found.append(Copies(owner, target, places, names, self.instancer))
                 self._instances(owner, target, places, names)
 
 
@@ -300,7 +309,8 @@ def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgrap
             # Parts of an object that are of another type come once more, as objects of that type.
             if (group.is_plant or group.is_field) and not original.hide_render and obj.type == original.type:
                 key = key_of_seed(np.array([instance.random_id]))
-                yield Copies(original, None, np.array(instance.matrix_world, dtype=np.float64)[None], key)
+                matrix = np.array(instance.matrix_world, dtype=np.float64)[None]
+                yield Copies(original, None, matrix, key, instance.parent.original)
 
 
 def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:

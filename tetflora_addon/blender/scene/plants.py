@@ -8,6 +8,7 @@ Plants whose species is an asset do not grow and are read apart, with all of the
 
 from collections.abc import Container
 from dataclasses import dataclass, replace
+from functools import partial
 
 import bpy
 import numpy as np
@@ -17,6 +18,7 @@ from ...errors import SceneError
 from ...growth.crown_forms import crown_forms
 from ...growth.hashing import child_key, key_of_seed
 from ...growth.seeds import Seeds
+from ...growth.wind import rotation_vectors
 from ..attributes import frames_of, world_matrix
 from ..species.asset_species import asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalogue
@@ -24,10 +26,12 @@ from .ages import Part, classed
 from .fallen import gone_species
 from .fields import read_aged_field, read_field_matrices
 from .instances import name_keys
-from .objects import Copies, copies_of, may_instance, renderable_objects
+from .looks import LayerLooks
+from .motion import exposure, moment, moves
+from .objects import Copies, copies_of, may_instance, may_take_part, renderable_objects
 from .own_ages import stored_ages
 from .scatterers import is_drop
-from .skeletons import kind_of, kind_of_choice, species_of
+from .skeletons import kind_of, kind_of_choice, species_of, with_look
 
 _NAMED = 3  # objects that a message names before it only counts
 
@@ -50,44 +54,90 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
     NoPlantsError
         No plant is left; the message says how to get some.
     SceneError
-        A species that the catalogue does not have, a scale of 0, or a transform that is not a number; the message names
-        the objects.
+        No plant is of a species that the catalogue has, or one has a scale of 0, or a transform that is not a number;
+        the message names the objects.
     """
     return read_plants_of(scene, depsgraph, view_layer)[0]
 
 
 def read_plants_of(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> tuple[Seeds, tuple[tuple[str, int], ...]]:
-    """The same, and the names of the objects that they belong to, in their order, each with the number of its own."""
-    assets = {*asset_species(scene), *gone_species(scene)}
+) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
+    """The same, and the names of the objects that they belong to, in their order, each with the number of its own.
+
+    With motion blur they are where they are in the middle of the exposure, and have their motion. The text names plants
+    among them of which nobody has the species: they are left out, unless there are no others.
+    """
+    read = partial(_read_plants, scene, depsgraph, view_layer)
+    if not (scene.render.use_motion_blur and any(map(moves, filter(may_take_part, bpy.data.objects)))):
+        return read()
+    first, last = exposure(scene)
+    seconds = (last - first) * scene.render.fps_base / scene.render.fps
+    with moment(first):
+        before, *_ = read()
+    with moment(last):
+        after, *_ = read()
+    with moment((first + last) / 2.0):
+        seeds, owners, unknown = read()
+    turned = after.frame @ before.frame.transpose(0, 2, 1)
+    motion = np.concatenate([after.position - before.position, rotation_vectors(turned)], axis=1) / max(seconds, 1e-9)
+    return replace(seeds, motion=motion) if motion.any() else seeds, owners, unknown
+
+
+def _read_plants(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
+    known, assets = catalogue(), {*asset_species(scene), *gone_species(scene)}
+    odd: list[tuple[str, str]] = []  # names of objects, each with a species
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
     own = [o for o, _ in grouped]
     single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
-    read: list[Part] = [(single[0].name if single else "", single_plants(single, depsgraph), stored_ages(single), None)]
+    odd += [(o.name, o.tetflora.species) for o in single if o.tetflora.species not in known]
+    looks, alike = LayerLooks(view_layer), {}
+    for obj in single:
+        if obj.tetflora.species in known:
+            alike.setdefault(looks.of(obj), []).append(obj)
+    given: list[tuple[str, Part]] = [
+        (look, (some[0].name, single_plants(some, depsgraph), stored_ages(some), None)) for look, some in alike.items()
+    ]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
-    read += [(c.owner.name, *_copied_plants(c)) for c in enabled if _is_plant(c) and _species(c.owner) not in assets]
+    for c in enabled:
+        if _is_plant(c) and _species(c.owner) not in assets:
+            given.append((looks.of(c.owner, c.instancer), (c.owner.name, *_copied_plants(c))))
     for obj in own:
         if obj.tetflora.is_field and obj.tetflora.enabled:
-            read.append((obj.name, *read_aged_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])))
-    read += [
-        (c.owner.name, *read_aged_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry))
-        for c in enabled
-        if c.owner.tetflora.is_field
-    ]
-    read = [part for found in read if len((part := _grown(found, assets))[1])]
+            part = read_aged_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])
+            given.append((looks.of(obj), (obj.name, *part)))
+    for c in enabled:
+        if c.owner.tetflora.is_field:
+            part = read_aged_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry)
+            given.append((looks.of(c.owner, c.instancer), (c.owner.name, *part)))
+    given = [(look, part) for look, whole in given if len((part := _grown(whole, assets))[1])]
+    for _, (name, seeds, *_) in given:
+        kinds = [seeds.identifiers[i] for i in np.flatnonzero(np.bincount(seeds.species)).tolist()]
+        odd += [(name, own) for own in dict.fromkeys(map(species_of, kinds)) if own not in known]
+    unknown = {species for _, species in odd}
+    read = [(look, part) for look, whole in given if len((part := _grown(whole, unknown))[1])]
+    if odd and not read:
+        raise SceneError(_unknown(odd))
     if not read:
         found = own or copies
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
         hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
         raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
-    owners = [(name, len(seeds)) for name, seeds, *_ in read]
-    if single:
-        owners[:1] = [(obj.name, 1) for obj in single]
-    return _merged(classed(scene, read)), tuple(owners)
+    owners = [(part[0], len(part[1])) for _, part in read]
+    owners[: len(alike)] = [(obj.name, 1) for some in alike.values() for obj in some]
+    aged = classed(scene, [part for _, part in read])
+    seen = [(name, _seen_as(seeds, look)) for (look, _), (name, seeds) in zip(read, aged, strict=True)]
+    return _merged(seen), tuple(owners), f"Left out {_unknown(odd)}" if odd else ""
+
+
+def _seen_as(seeds: Seeds, look: str) -> Seeds:
+    """Plants with a look."""
+    return replace(seeds, identifiers=tuple(with_look(kind, look) for kind in seeds.identifiers))
 
 
 def _is_plant(copies: Copies) -> bool:
@@ -251,7 +301,6 @@ def _merged(read: list[tuple[str, Seeds]]) -> Seeds:
     for _, seeds in read:
         occurring = np.bincount(seeds.species, minlength=len(seeds.identifiers)) > 0
         tables.append({i: seeds.identifiers[i] for i in np.flatnonzero(occurring).tolist()})
-    _check_species([(name, kind) for (name, _), table in zip(read, tables, strict=True) for kind in table.values()])
     identifiers = tuple(sorted({kind for table in tables for kind in table.values()}))
     number = {kind: i for i, kind in enumerate(identifiers)}
     parts, formed = [], any(seeds.crown is not None for _, seeds in read)
@@ -269,18 +318,24 @@ def _check_species(plants: list[tuple[str, str]]) -> None:
     known = catalogue()
     bad = [(name, species) for name, kind in plants if (species := species_of(kind)) not in known]
     if bad:
-        species = bad[0][1]
-        names = _listed([name for name, other in bad if other == species])
-        if find_asset(None, species) is not None:
-            raise SceneError(
-                f'{names}: "{name_of(species)}", which was used as their species, was deleted; undo that, or choose '
-                "another species in the TetFlora tab of the sidebar"
-            )
-        raise SceneError(
-            f'{names}: unknown species "{species}"; choose '
-            "another in the TetFlora tab of the sidebar, or add "
-            f"{species or 'its file'}{'.json' if species else ''} with Load Species"
+        raise SceneError(_unknown(bad))
+
+
+def _unknown(odd: list[tuple[str, str]]) -> str:
+    """What is said of objects with the species that nobody has, of the first of these."""
+    species = odd[0][1]
+    names = _listed([name for name, other in odd if other == species])
+    if find_asset(None, species) is not None:
+        return (
+            f'{names}: "{name_of(species)}", which was used as their species, was deleted; undo that, or choose '
+            "another species in the TetFlora tab of the sidebar"
         )
+    more = len({other for _, other in odd}) - 1
+    return (
+        f'{names}: unknown species "{species}"{f" and {more} more" if more else ""}; choose '
+        "another in the TetFlora tab of the sidebar, or add "
+        f"{species or 'its file'}{'.json' if species else ''} with Load Species"
+    )
 
 
 def _listed(names: list[str]) -> str:

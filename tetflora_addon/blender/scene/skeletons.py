@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plants modelled by hand: curves, mesh edges and hair curves as skeletons, and kinds of plants.
 
-A kind is a text of the species and, if there are any, the form, the age, and years since death: plants of one kind are
-compiled once.
+A kind is a text of the species and, if there are any, the form, the age, years since death, and the look (`looks`):
+plants of one kind are compiled once, and are results of their own.
 """
 
 from __future__ import annotations
@@ -216,7 +216,7 @@ def is_aged(kind: str) -> bool:
 
 def plain_kind(kind: str) -> str:
     """The kind of full-grown plants, from that of any age."""
-    return _BREAK.join(kind.split(_BREAK)[:2]).rstrip(_BREAK) if is_aged(kind) else kind
+    return _BREAK.join(kind.split(_BREAK)[:2]).rstrip(_BREAK)
 
 
 def later(kind: str, years: float) -> str:
@@ -244,6 +244,16 @@ def age_of(kind: str) -> float:
 def dead_of(kind: str) -> float:
     """Years since plants of a kind died; 0 alive."""
     return float(_part(kind, 3) or 0.0)
+
+
+def look_of(kind: str) -> str:
+    """Look of plants of a kind; empty without one."""
+    return _part(kind, 4)
+
+
+def with_look(kind: str, look: str) -> str:
+    """The kind of plants with a look, from that of those without."""
+    return _BREAK.join([*(_part(kind, number) for number in range(4)), look]) if look else kind
 
 
 def _part(kind: str, number: int) -> str:

@@ -130,8 +130,11 @@ def unregister() -> None:
 
 
 def number_of(identifier: str) -> int:
-    """A number that stays the same when species come and go, so that a stored choice keeps its meaning."""
-    return crc32(identifier.encode(errors="backslashreplace")) & 0x7FFFFFFF
+    """A number that stays the same when species come and go, so that a stored choice keeps its meaning.
+
+    Of 24 bits: popups and galleries hand numbers on as float32, and what they say of longer ones is no item's.
+    """
+    return crc32(identifier.encode(errors="backslashreplace")) & 0xFFFFFF
 
 
 def items_for(present: str = "", assets: bool = True) -> list[Item]:

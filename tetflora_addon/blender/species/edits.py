@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,8 @@ from ..preferences import species_folders
 from ..runtime import Listeners
 from .asset_species import asset_infos, find_asset, name_of, refuse_asset
 
+#: Custom property of collections: JSON of species by their identifiers, see `travel`.
+PAGES = "tetflora_pages"
 _FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
 
 #: Called after every change of a species, without arguments; the preview listens.
@@ -108,7 +111,15 @@ def look_again() -> None:
     _seen = _assets = None
 
 
-def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpeciesEdit | None:
+@dataclass(frozen=True)
+class Page:
+    """A species that came with a collection, as `TetFloraSpeciesEdit` has it."""
+
+    identifier: str
+    text: str
+
+
+def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpeciesEdit | Page | None:
     """What this file has in place of a species.
 
     Parameters
@@ -120,8 +131,37 @@ def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpecies
     return next((edit for edit in _edits(scene) if edit.identifier == identifier), None)
 
 
-def _edits(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEdit]:
-    """Edits of this file; those whose identifiers break the rule are as good as absent, for paths are made of them."""
+def _edits(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEdit | Page]:
+    """Edits of this file, then species of linked plants, then those of others that are nowhere else."""
+    yield from edits_of_scenes(scene)
+    left: list[Page] = []
+    for collection in getattr(bpy.data, "collections", ()):
+        if PAGES in collection:
+            linked = collection.library is not None or collection.override_library is not None
+            if linked:
+                yield from pages_of(collection)
+            else:
+                left += pages_of(collection)
+    yield from (page for page in left if page.identifier not in listed())
+
+
+def pages_of(collection: bpy.types.Collection) -> tuple[Page, ...]:
+    """Species that a collection holds; none where these are not as TetFlora writes them."""
+    return _pages(str(collection.get(PAGES, "")))
+
+
+@lru_cache(maxsize=256)
+def _pages(text: str) -> tuple[Page, ...]:
+    try:
+        found = json_of(text)
+    except ValueError:
+        found = {}
+    entries = found.items() if isinstance(found, dict) else ()
+    return tuple(Page(name, page) for name, page in entries if is_identifier(name) and isinstance(page, str))
+
+
+def edits_of_scenes(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEdit]:
+    """Edits of scenes; those whose identifiers break the rule are as good as absent, for paths are made of them."""
     # While add-ons are enabled at startup bpy.data has nothing.
     others = [s for s in getattr(bpy.data, "scenes", ()) if s != scene]
     for one in ([scene] if scene is not None else []) + others:
@@ -247,7 +287,7 @@ def store_species(scene: bpy.types.Scene, identifier: str, data: dict[str, Any])
     """
     checked_identifier(identifier)
     text = json.dumps(data, ensure_ascii=False)
-    edit = find_edit(scene, identifier)
+    edit = next((edit for edit in edits_of_scenes(scene) if edit.identifier == identifier), None)
     if edit is None:
         edit = scene.tetflora.species_edits.add()
         edit.identifier = identifier
@@ -264,6 +304,10 @@ def revert_species(identifier: str) -> int:
         for index in [i for i, edit in enumerate(edits) if edit.identifier == identifier][::-1]:
             edits.remove(index)
             removed += 1
+    for collection in bpy.data.collections:  # or what was made here would come back from where it was packed
+        left = {page.identifier: page.text for page in pages_of(collection)}
+        if collection.library is None and left.pop(identifier, None) is not None:
+            collection[PAGES] = json.dumps(left, ensure_ascii=False)
     if removed:
         tell_listeners()
     return removed

@@ -33,6 +33,7 @@ from ..scene.field_sizes import (
     SIZE_ATTRIBUTES,
     YEAR,
     YEAR_PATH,
+    clear_years,
     has_history,
     in_year,
     read_records,
@@ -58,7 +59,7 @@ MIXED_WOOD = {
     "hazel": (0.5, 1.0),
 }
 #: Settings that a stand hands on; identity and state are its own.
-_OWN = {"rna_type", "name", "is_grown", "biome", "grounds", "species", "species_index"}
+_OWN = {"rna_type", "name", "is_grown", "last_year", "biome", "grounds", "species", "species_index"}
 _MASKS = ("vertex_group", "areas", "paths", "path_distance")
 _PATIENCE = 5.0  # seconds for what the viewport will ask at once
 _GROWING = (0.08, 0.85)  # fractions of the job: before, and while it grows
@@ -194,6 +195,11 @@ def _again_steps(
     except TetFloraError as error:
         raise SceneError(f'"{field.name}": {error}') from None
     if not len(records):
+        if 0.0 < site.area * settings.density < 1e5:  # square meters by plants per hectare: fewer than ten
+            raise SceneError(
+                f"{site.area:.3g} m² of ground are too small for a stand of {settings.density:,.0f} plants per "
+                "hectare; use a larger mesh, or raise Planted"
+            )
         raise SceneError(
             "Nothing is left of the stand: no plant is as tall as Min Height; grow it longer, plant more, or change "
             "the species, Warmth or Moisture"
@@ -204,6 +210,9 @@ def _again_steps(
     data.check()
     _replace(field, names, *columns)
     last = int(records.year.max())
+    group = field.tetflora
+    group.stand.last_year = last
+    group.stand_year = min(group.stand_year, last)
     return GrownStand(field, len(records.at(last)), len(records), last)
 
 
@@ -315,6 +324,7 @@ def keep_year(field: bpy.types.Object) -> int:
     if not old.users:
         bpy.data.meshes.remove(old)
     field.display_type = 'TEXTURED'
+    clear_years(field)
     field.update_tag()
     return number
 
@@ -353,8 +363,7 @@ def animate(field: bpy.types.Object, first: int, last: int) -> tuple[float, floa
     begin, end = 0.0, float(read_records(field, [field.data]).year.max())
     group = field.tetflora
     group.stand_smooth = True
-    for curve in year_curves(field):
-        curve.keyframe_points.clear()
+    clear_years(field)
     for frame, at in ((first, begin), (last, end)):
         group.stand_year = at
         field.keyframe_insert(YEAR_PATH, frame=frame)

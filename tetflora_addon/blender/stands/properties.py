@@ -46,6 +46,7 @@ class TetFloraStand(bpy.types.PropertyGroup):
     """What a stand grows from."""
 
     is_grown: BoolProperty(name="Stand", description="This field was grown as a stand", options={'HIDDEN'})
+    last_year: FloatProperty(name="Last Year", description="Year of the stand's last record", options={'HIDDEN'})
     biome: StringProperty(name="Biome", options={'HIDDEN'})  # ``uid`` of the biome of which it is a layer
     grounds: CollectionProperty(name="Grounds", description="Meshes that the stand grows on", type=TetFloraGround)
     species: CollectionProperty(

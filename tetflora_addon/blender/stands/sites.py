@@ -45,13 +45,21 @@ def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, NDArray[np.float
     triangles = ground.triangles
     grid, wetness = _grid(triangles, soil.relief)
     there = np.isfinite(grid.height)
+    if not there.any():
+        raise SceneError(
+            f"The ground is too small for a stand: no square of {grid.cell:g} m of it is seen from above; use a larger "
+            "mesh"
+        )
     height = _whole(grid.height)
     plantable = there & (_slope(height, grid.cell) <= np.tan(min(soil.slope_max, 1.57)))
-    plantable = plantable * _masks(ground, grid)
     if not plantable.any():
         raise SceneError(
-            "No ground is left for the stand: it is steeper than Max Slope, or Vertex Group, Areas or Paths leave none"
+            f"All of the ground is steeper than Max Slope ({np.degrees(soil.slope_max):.0f}°); raise Max Slope or use "
+            "another mesh"
         )
+    plantable = plantable * _masks(ground, grid)
+    if not plantable.any():
+        raise SceneError("Vertex Group, Areas, Paths or the biome's limits leave no ground for the stand; change them")
     moisture = np.full(height.shape, soil.moisture) + soil.relief * (wetness - _LEVEL)
     site = StandSite(
         0.0,

@@ -13,13 +13,14 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from hashlib import blake2b
 
 import bpy
 
 from ...camera.camera import Camera
 from ...errors import TetFloraError
-from ...jobs import Progress
+from ...jobs import Pace, Progress
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
 from ..main_thread import in_main_thread
@@ -28,8 +29,8 @@ from ..placing.plant_objects import prepare_scene
 from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
-from ..results.output import PURPOSE, remove_collection
-from ..runtime import GoneError, Handlers, call_off, call_soon, redraw
+from ..results.output import PURPOSE, remove_collection, result_collections
+from ..runtime import GoneError, Handlers, call_off, call_soon, redraw, with_uid
 from ..scene.field_sizes import stand_years
 from ..scene.view import view_camera
 from ..settings import season_of, wind_of, years_of
@@ -37,6 +38,7 @@ from .state import camera_now
 
 #: Seconds without a change before it begins, and seconds of work between two redraws.
 QUIET, SLICE = 0.6, 0.02
+_MADE_FOR = "tetflora_made_for"  # on result collections, see `results_made_for`
 _BUSY = 0.5  # seconds until it looks again whether Blender has time
 _LOOK = 0.2  # seconds between two looks at the viewport
 _CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Curve)
@@ -44,11 +46,13 @@ _CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh
 
 @dataclass
 class _State:
-    """The job of the session; names instead of datablocks, which do not outlive a load."""
+    """The job of the session; the scene by its `session_uid`, because datablocks do not outlive a load."""
 
-    scene: str = ""
+    scene: int = 0
     steps: Generator[Progress, bool | None, object] | None = None
     digest: str = ""  # of the job
+    made_for: dict[str, str] = field(default_factory=dict)
+    pace: Pace = field(default_factory=lambda: Pace(SLICE))
     due: float = 0.0
     message: str = ""
     working: bool = False  # in here right now: what changes is our own doing
@@ -59,7 +63,7 @@ class _State:
 
 
 _state = _State()
-_done: dict[str, str] = {}  # digest of the results that a scene has, by its name
+_done: dict[int, str] = {}  # digest of the results that a scene has, by its `session_uid`
 
 
 def message() -> str:
@@ -95,7 +99,7 @@ def watch() -> float | None:
 def schedule(scene: bpy.types.Scene) -> None:
     """Refine a scene when it has been quiet for a moment; stops what was begun before."""
     stop()
-    _state.scene, _state.due = scene.name, time.monotonic() + QUIET
+    _state.scene, _state.due = scene.session_uid, time.monotonic() + QUIET
     if not bpy.app.background:
         call_soon(tick, QUIET)
 
@@ -126,12 +130,12 @@ def refined(scene: bpy.types.Scene) -> None:
     if scene.tetflora.auto_refine:
         layer = _view_layer(scene)
         layer.update()
-        _done[scene.name] = scene_digest(scene, layer.depsgraph, layer)  # for the scene's camera
+        _done[scene.session_uid] = scene_digest(scene, layer.depsgraph, layer)  # for the scene's camera
 
 
 def tick() -> float | None:
     """Do a slice of what there is to do; seconds until the next, or None if nothing is left."""
-    scene = bpy.data.scenes.get((_state.scene, None))
+    scene = with_uid(bpy.data.scenes, _state.scene)
     if scene is None or not scene.tetflora.auto_refine:
         stop()
         return None
@@ -166,24 +170,26 @@ def _begin(scene: bpy.types.Scene) -> bool:
     layer.update()
     camera = _view(scene)
     digest = scene_digest(scene, layer.depsgraph, layer, camera)
-    if _done.get(scene.name) == digest and has_results(scene):
+    if _done.get(scene.session_uid) == digest and has_results(scene):
         _state.message = ""
         redraw()
         return False
     _state.digest, _state.again, _state.waiting = digest, False, False
+    _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE)
     _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer, camera=camera, first_look=True)
     return True
 
 
 def _slice(scene: bpy.types.Scene) -> bool:
-    end = time.monotonic() + SLICE
+    _state.pace.begin()
     try:
         progress = next(_state.steps)
-        while time.monotonic() < end and not progress.waiting:
+        while _state.pace.goes_on(progress):
             progress = next(_state.steps)
-    except StopIteration:
-        _state.steps, _state.message = None, ""
-        _done[scene.name] = _state.digest
+    except StopIteration as stop:
+        _state.steps, _state.message = None, stop.value.unknown
+        _done[scene.session_uid] = _state.digest
+        note_results(scene, _state.made_for)
         prepare_scene(scene)
         redraw()
         _state.due = time.monotonic() + QUIET
@@ -207,7 +213,31 @@ def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     return shown or scene.view_layers[0]
 
 
-_seen: dict[str, str] = {}  # settings of scenes as they were at the last change
+def results_made_for(scene: bpy.types.Scene) -> dict[str, str]:
+    """What decides on results and is cheap to ask, as texts that differ, by what to call it."""
+    *settings, wind, season, years, disc = choices(scene)
+    parts = {
+        "the camera": camera_now(scene),
+        "the day or year": (season, years, stand_years(scene)),
+        "the wind": wind,
+        "settings": (settings, disc),
+    }
+    return {name: blake2b(repr(part).encode(), digest_size=8).hexdigest() for name, part in parts.items()}
+
+
+def note_results(scene: bpy.types.Scene, made_for: dict[str, str]) -> None:
+    """Mark new results of a scene with what they were made for."""
+    for collection in result_collections(scene, 'VIEW'):
+        collection[_MADE_FOR] = made_for
+
+
+def changed_since(scene: bpy.types.Scene) -> list[str]:
+    """What has changed since the results of a scene were made; nothing where these do not say for what."""
+    before = next((c[_MADE_FOR].to_dict() for c in result_collections(scene, 'VIEW') if _MADE_FOR in c), {})
+    return [name for name, text in results_made_for(scene).items() if before.get(name, text) != text] if before else []
+
+
+_seen: dict[int, str] = {}  # settings of scenes as they were at the last change
 
 
 def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -215,10 +245,10 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _state.working or not scene.tetflora.auto_refine:
         return
     settings = f"{choices(scene)}{camera_now(scene)}{leaf_objects(scene)}"
-    other = _seen.get(scene.name) != settings
-    _seen[scene.name] = settings
+    other = _seen.get(scene.session_uid) != settings
+    _seen[scene.session_uid] = settings
     concerns = [update for update in depsgraph.updates if _concerns(update)]
-    at_it = _state.steps is not None and scene.name == _state.scene
+    at_it = _state.steps is not None and scene.session_uid == _state.scene
     if at_it and not other and all(_only_flags(update) for update in concerns):
         # Results that are linked have the flags of all other objects updated, and that when we are no longer at work:
         # the job would stop itself for ever. Whoever hid an object meanwhile is heard when it is done.
@@ -249,7 +279,7 @@ def _only_flags(update: bpy.types.DepsgraphUpdate) -> bool:
 
 def on_interruption(*_arguments: object) -> None:
     """Undo, load or render: datablocks that the job holds may go."""
-    scene = bpy.data.scenes.get((_state.scene, None)) if _state.steps is not None else None
+    scene = with_uid(bpy.data.scenes, _state.scene) if _state.steps is not None else None
     stop()
     if scene is not None:
         schedule(scene)

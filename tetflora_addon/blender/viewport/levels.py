@@ -20,7 +20,7 @@ from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...jobs import Progress, mapped
 from ...preview.levels import Level, Levels, gather
-from ...preview.light_plants import MOST_PLANTS, Shapes, bounds_of_plants, joined, light_plants, simple_crowns
+from ...preview.light_plants import Shapes, bounds_of_plants, joined, light_plants, simple_crowns, thinned
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
 from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
@@ -29,7 +29,7 @@ from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
 from ..scene.field_sizes import stand_years
 from ..scene.objects import taking_part
-from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
+from ..scene.plants import NoPlantsError, read_asset_plants, read_plants_of
 from ..scene.scatterers import is_drop
 from ..scene.sizes import measure_of
 from ..settings import season_of, years_of
@@ -128,7 +128,7 @@ def _shapes_of(
         size = crown.radius, crown.base, crown.height
         crowns.append(simple_crowns(plants.matrices, size, crown.colour, boxes=make is bounds_of_plants))
     try:
-        seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
+        seeds, _, of(scene).message = read_plants_of(scene, depsgraph, depsgraph.view_layer)
     except NoPlantsError:
         if not crowns:
             raise
@@ -144,8 +144,9 @@ def _grown(
     kinds = seeds.identifiers
     if len(kinds) <= _MANY_KINDS:
         return [make(in_year(scene, compile_for(kinds, scene, depsgraph)), seeds)]
-    some, out = seeds.take(slice(None, None, max(-(-len(seeds) // MOST_PLANTS), 1))), []
-    for number, species in enumerate(load_for(kinds, scene, depsgraph)):
+    loaded, out = load_for(kinds, scene, depsgraph), []
+    some = thinned(seeds, np.array([species.orders[0].length.mean for species in loaded]))
+    for number, species in enumerate(loaded):
         own = some.take(np.flatnonzero(some.species == number))
         if len(own):
             one = replace(own, identifiers=(kinds[number],), species=np.zeros(len(own), np.int32))

@@ -25,6 +25,7 @@ from ...preview.light_plants import Shapes
 from ...preview.projected import THICK, drawable, project
 from ...refinement.decisions import Decision
 from ...tetrahedra.geometry import EDGES
+from ..results.collection import UNFINISHED, result_collections
 from . import state
 from .state import Preview, TetFloraPreview
 
@@ -146,6 +147,12 @@ def _draw(made: gpu.types.GPUBatch | None, origin: NDArray[np.float64]) -> None:
         with gpu.matrix.push_pop():
             gpu.matrix.translate(origin.tolist())
             made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
+
+
+def refined_seen(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> bool:
+    """Whether viewports show refined plants, in place of which simple ones stand."""
+    done = [c for c in result_collections(scene, 'VIEW') if UNFINISHED not in c]
+    return any(obj.visible_get(view_layer=layer) for collection in done for obj in collection.objects)
 
 
 def _draw_plants(preview: Preview) -> None:
@@ -288,7 +295,7 @@ def _guarded(draw: Callable[[bpy.types.Context, Preview], None]) -> None:
 
 
 def _in_space(context: bpy.types.Context, preview: Preview) -> None:
-    if preview.shapes is not None:
+    if preview.shapes is not None and not refined_seen(context.scene, context.view_layer):
         _draw_plants(preview)
     if preview.levels is not None:
         _draw_levels(preview, context.scene.tetflora.preview, context.space_data)

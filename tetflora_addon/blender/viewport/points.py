@@ -24,7 +24,7 @@ from .. import compat
 from ..placing import properties
 from ..placing.populations import own_objects
 from ..placing.rules import awaits_update, makes_field, place_population, shown_population
-from ..runtime import Handlers, call_off, call_soon, redraw
+from ..runtime import Handlers, call_off, call_soon, redraw, with_uid
 from ..species import edits
 
 Colour = tuple[float, float, float, float]
@@ -60,7 +60,7 @@ class Dots:
 class _State:
     """The scene that shows a preview, and how the last placing went."""
 
-    scene: str | None = None
+    scene: int | None = None  # its `session_uid`
     uid: str = ""
     dots: Dots | None = None
     error: str = ""
@@ -74,12 +74,12 @@ _state = _State()
 
 def shown_in(scene: bpy.types.Scene) -> bool:
     """Whether the preview is switched on in a scene."""
-    return _state.scene == scene.name
+    return _state.scene == scene.session_uid
 
 
 def show(scene: bpy.types.Scene, on: bool) -> None:
     """Switch the preview of a scene on or off; in the window it appears a moment later, in the background never."""
-    _state.scene = scene.name if on else None
+    _state.scene = scene.session_uid if on else None
     if on:
         schedule()
     else:
@@ -160,7 +160,7 @@ def complaints(population: bpy.types.PropertyGroup) -> list[str]:
 
 
 def _on_timer() -> None:
-    scene = bpy.data.scenes.get((_state.scene, None)) if _state.scene is not None else None
+    scene = with_uid(bpy.data.scenes, _state.scene)
     if scene is None or scene != bpy.context.scene:
         _clear()
         return
@@ -180,7 +180,7 @@ def _on_timer() -> None:
 
 def _draw() -> None:
     context = bpy.context
-    if _state.dots is None or context.scene.name != _state.scene or not context.space_data.overlay.show_overlays:
+    if _state.dots is None or context.scene.session_uid != _state.scene or not context.space_data.overlay.show_overlays:
         return
     shader = gpu.shader.from_builtin(compat.dot_shader())
     if _state.batch is None:

@@ -22,7 +22,7 @@ from ..job.contents import in_year
 from ..job.plant_mesh import expected_polygons, plant_mesh, plant_parts, single_seed
 from ..materials.nodes import is_ours, tag
 from ..results.leaf_objects import resolved_species
-from ..runtime import Handlers, call_off, call_soon, redraw
+from ..runtime import Handlers, call_off, call_soon, redraw, with_uid
 from ..species import edits, values
 
 NAME = "TetFlora preview"
@@ -35,7 +35,7 @@ _SOON = 0.05  # seconds from a change to the rebuilding
 class _State:
     """The scene whose editor shows a preview, and how the last rebuilding went."""
 
-    scene: str | None = None
+    scene: int | None = None  # its `session_uid`
     message: str = ""
     failed: bool = False
     seconds: float = 0.0
@@ -46,7 +46,7 @@ _state = _State()
 
 def shown_in(scene: bpy.types.Scene) -> bool:
     """Whether the preview is switched on in a scene."""
-    return _state.scene == scene.name
+    return _state.scene == scene.session_uid
 
 
 def message() -> tuple[str, bool]:
@@ -57,7 +57,7 @@ def message() -> tuple[str, bool]:
 def show(scene: bpy.types.Scene, on: bool) -> None:
     """Switch the preview of a scene on or off; in the window it appears a moment later."""
     _remove()
-    _state.scene, _state.message, _state.failed = (scene.name, "", False) if on else (None, "", False)
+    _state.scene, _state.message, _state.failed = (scene.session_uid, "", False) if on else (None, "", False)
     if on:
         schedule()
 
@@ -79,7 +79,7 @@ def _on_timer() -> None:
 
 def refresh() -> None:
     """Build the preview anew, now; take it away if it is switched off."""
-    scene = bpy.data.scenes.get((_state.scene, None)) if _state.scene is not None else None
+    scene = with_uid(bpy.data.scenes, _state.scene)
     if scene is None:
         _state.scene = None
         _remove()

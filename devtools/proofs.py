@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether tests can fail: each that a commit adds or changes, run on the commit before.
+
+    python -m devtools.proofs              commits since the last tag; without a tag, the last one
+    python -m devtools.proofs BASE         commits since BASE
+
+A test that comes with a mend has to fail without it. The commit's ``tests`` are laid over the code of its parent, in
+a worktree beside this one, and each test gets a line: ``fails``, as it should, or ``passes``. Commits that leave the
+product alone are left out: of these the tests pass before, too. Tests of a full Blender run where ``BLENDER`` is set.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).resolve().parent.parent
+FULL = ("tests/full/", "tests/window/")
+NOT_CODE = (":!tests", ":!docs", ":!*.md", ":!.ci", ":!Makefile", ":!pyproject.toml")
+
+
+def _git(root: Path, *arguments: str) -> str:
+    return subprocess.run(("git", *arguments), cwd=root, check=True, capture_output=True, text=True).stdout
+
+
+def last_tag(root: Path) -> str:
+    """The last tag, or the commit before the last one."""
+    found = subprocess.run(("git", "describe", "--tags", "--abbrev=0"), cwd=root, capture_output=True, text=True)
+    return found.stdout.strip() or "HEAD~1"
+
+
+def functions(source: str) -> dict[str, str]:
+    """Tests in the source of a file: their text by name (``test_a``, ``TestB::test_c``), decorators included."""
+
+    def found(nodes: list[ast.stmt], prefix: str) -> Iterator[tuple[str, str]]:
+        for node in nodes:
+            if isinstance(node, ast.ClassDef):
+                yield from found(node.body, f"{prefix}{node.name}::")
+            elif isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+                yield prefix + node.name, ast.unparse(node)
+
+    return dict(found(ast.parse(source).body, ""))
+
+
+def changed_tests(root: Path, commit: str) -> list[str]:
+    """Tests that a commit adds or changes, as pytest names them: ``tests/engine/test_a.py::test_b``."""
+    files = _git(root, "diff-tree", "-r", "--diff-filter=AM", "--name-only", f"{commit}^", commit, "--", "tests")
+    names = []
+    for path in (path for path in files.splitlines() if Path(path).match("test_*.py")):
+        was_there = _git(root, "ls-tree", "--name-only", f"{commit}^", path)
+        before = functions(_git(root, "show", f"{commit}^:{path}")) if was_there else {}
+        after = functions(_git(root, "show", f"{commit}:{path}"))
+        names += [f"{path}::{name}" for name, text in after.items() if before.get(name) != text]
+    return names
+
+
+def _run(tree: Path, path: str, names: list[str]) -> dict[str, str]:
+    """Outcomes of tests of one file, by name. One of several parameters that fails is enough."""
+    report = tree / "report.xml"
+    report.unlink(missing_ok=True)
+    command = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--junitxml={report}", *names)
+    subprocess.run(command, cwd=tree, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    module = path.removesuffix(".py").replace("/", ".")
+    seen = defaultdict(set)
+    for case in ElementTree.parse(report).iter("testcase") if report.is_file() else ():
+        within = case.get("classname", "").removeprefix(module).strip(".").split(".")
+        name = "::".join((path, *filter(None, within), case.get("name", "").split("[")[0]))
+        seen[name] |= {child.tag for child in case} & {"failure", "error", "skipped"} or {"passed"}
+    if not seen.keys() & set(names):  # The parent lacks what the file, or a conftest, imports.
+        return dict.fromkeys(names, "fails (cannot be imported)")
+    worst = (("failure", "fails"), ("error", "fails"), ("passed", "passes"), ("skipped", "skipped"))
+    return {name: next((word for mark, word in worst if mark in seen[name]), "not run") for name in names}
+
+
+def proofs(root: Path, base: str) -> Iterator[tuple[str, str, str]]:
+    """For each test of each commit since ``base``: commit, test, and how it ends on the commit's parent."""
+    for commit in _git(root, "rev-list", "--no-merges", "--reverse", f"{base}..HEAD", "--", "tests").split():
+        code = _git(root, "diff-tree", "-r", "--name-only", f"{commit}^", commit, "--", ".", *NOT_CODE)
+        names = changed_tests(root, commit) if code else []
+        full = [] if "BLENDER" in os.environ else [name for name in names if name.startswith(FULL)]
+        by_file = defaultdict(list)
+        for name in names:
+            if name not in full:
+                by_file[name.split("::")[0]].append(name)
+        yield from ((commit, name, "not run: set BLENDER") for name in full)
+        if not by_file:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            tree = Path(folder, "parent")
+            _git(root, "worktree", "add", "--detach", str(tree), f"{commit}^")
+            try:
+                _git(tree, "checkout", commit, "--", "tests")
+                for path, some in by_file.items():
+                    yield from ((commit, name, outcome) for name, outcome in _run(tree, path, some).items())
+            finally:
+                _git(root, "worktree", "remove", "--force", str(tree))
+
+
+def main() -> int:
+    """Print a line for each test; 1 if any does not fail."""
+    parser = argparse.ArgumentParser(prog="python -m devtools.proofs", description=__doc__.splitlines()[0])
+    parser.add_argument("base", nargs="?", help="the commits after this one (default: the last tag)")
+    failing = total = 0
+    for commit, name, outcome in proofs(ROOT, parser.parse_args().base or last_tag(ROOT)):
+        print(f"{commit[:9]}  {outcome:6}  {name}", flush=True)
+        total += 1
+        failing += outcome.startswith("fails")
+    print(f"{failing} of {total} tests fail on the commit before theirs")
+    return int(failing < total)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The way to a forest on ground of one's own, as the README and the manual describe it, gives a picture that is lit."""
+
+from __future__ import annotations
+
+import re
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler
+
+from devtools.build import ROOT
+from tests.blender.scenes import add_mesh, select, tiny_render
+from tetflora_addon.blender.compat import shader_tree
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/manual.md"])
+def test_own_ground_is_lit(page, tmp_path):
+    text = " ".join((ROOT / page).read_text(encoding="utf-8").split())
+    (strength,) = re.findall(r"\*Sun\*[^.]*strength of (\d+)|Light > Sun\*\) with a strength of (\d+)", text)
+    hexadecimal = re.search(r"\*Background\*[^.]*hexadecimal ([0-9A-F]{6})", text)
+    scene = bpy.context.scene
+    scene.world = bpy.data.worlds.new("World")
+    tree = shader_tree(scene.world)
+    tree.nodes.clear()
+    background, output = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeOutputWorld")
+    tree.links.new(background.outputs[0], output.inputs["Surface"])
+    levels = np.full(3, 0.05)  # a new file's
+    if hexadecimal:
+        levels = np.array([int(hexadecimal[1][i : i + 2], 16) for i in (0, 2, 4)]) / 255.0
+        levels = ((levels + 0.055) / 1.055) ** 2.4
+    background.inputs["Color"].default_value = (*levels, 1.0)
+    sun = bpy.data.objects.new("Light", bpy.data.lights.new("Light", 'SUN'))
+    sun.data.energy, sun.rotation_euler = float("".join(strength)), (0.65, 0.06, 1.87)
+    scene.collection.objects.link(sun)
+    select(add_mesh("ground", size=50.0))
+    bpy.ops.tetflora.populate(count=60, species="beech")
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.rotation_euler = Euler((1.1, 0.0, 0.8))  # as a new file's view looks
+    camera.location = camera.rotation_euler.to_matrix().col[2] * 150.0
+    camera.data.clip_end = 1000.0
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.tetflora.quality = 'DRAFT'
+    tiny_render(samples=4, size=24)
+    scene.render.filepath = str(tmp_path / "picture.png")
+    bpy.ops.render.render(write_still=True)
+    picture = bpy.data.images.load(scene.render.filepath)
+    shown = np.array(picture.pixels).reshape(-1, 4)[:, :3].mean(axis=1)
+    assert np.quantile(shown, 0.25) > 0.25

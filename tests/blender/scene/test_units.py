@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One unit of Blender is one meter; the panel says where Unit Scale is something else."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import bpy
+import pytest
+
+from panels import refine as panel
+from tests.blender.layouts import Layout
+
+
+@pytest.mark.parametrize(
+    ("system", "scale", "shown"),
+    [("METRIC", 1.0, ""), ("NONE", 0.01, ""), ("METRIC", 0.01, "20 cm"), ("IMPERIAL", 0.3048, "20'")],
+)
+def test_the_panel_tells_how_large_plants_are_in_the_units_of_the_scene(clean_file, system, scale, shown):
+    units = bpy.context.scene.unit_settings
+    units.system, units.scale_length = system, scale
+    context = SimpleNamespace(
+        scene=bpy.context.scene,
+        view_layer=bpy.context.view_layer,
+        active_object=None,
+        region=SimpleNamespace(width=4000),
+        preferences=bpy.context.preferences,
+    )
+    layout = Layout()
+    panel.TETFLORA_PT_refine.draw(SimpleNamespace(layout=layout), context)
+    said = [text for *_, options in layout.drawn if "One unit" in (text := options.get("text", ""))]
+    assert bool(said) == bool(shown)
+    assert all(text.endswith(f"shows as {shown}") for text in said)

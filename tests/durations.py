@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each test costs: shown at the end of a run, and kept in out/ for who makes them faster, and for ``--quick``.
+
+The measure is CPU time, of the process and of those it waited for: beside other work, the clock says little. Nothing
+is asserted about it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections import defaultdict
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+#: Of so many tests of a run the cost is shown.
+SHOWN = 15
+#: CPU seconds that a test may have taken to be one of the quick ones: these are most, and take a minute together.
+QUICK = 0.1
+
+
+def _cpu() -> float:
+    return sum(os.times()[:4])
+
+
+class Durations:
+    """A plugin of pytest: CPU seconds of each test, its fixtures included.
+
+    folder : where they are kept, for each version of Python, as Blender's follows from that.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / f"durations-{sys.version_info.major}.{sys.version_info.minor}.json"
+        self.seconds: dict[str, float] = defaultdict(float)
+        self._last = _cpu()
+
+    def kept(self) -> dict[str, float]:
+        """Those of earlier runs; of tests that are in no run any more as well."""
+        return json.loads(self.path.read_text(encoding="utf-8")) if self.path.is_file() else {}
+
+    def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
+        """Leave out what took long the last time; what nobody has run yet is run."""
+        if not config.getoption("quick"):
+            return
+        slow = {name for name, seconds in self.kept().items() if seconds > QUICK}
+        config.hook.pytest_deselected(items=[item for item in items if item.nodeid in slow])
+        items[:] = [item for item in items if item.nodeid not in slow]
+
+    def pytest_runtest_logstart(self) -> None:
+        """Begin to count: collecting is nobody's."""
+        self._last = _cpu()
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        """Mark a report with what it cost; reports travel from the processes of xdist with all they carry."""
+        report = yield
+        now = _cpu()
+        report.cpu_seconds, self._last = now - self._last, now
+        return report
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Add up preparing, calling and tidying."""
+        self.seconds[report.nodeid] += getattr(report, "cpu_seconds", 0.0)
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Show the slowest, where there are many, and keep all."""
+        if "PYTEST_XDIST_WORKER" in os.environ or not self.seconds:
+            return
+        slowest = sorted(self.seconds.items(), key=lambda item: -item[1])
+        if len(slowest) > SHOWN:
+            total = sum(self.seconds.values())
+            terminalreporter.section(f"{total:.0f} CPU seconds in {len(slowest)} tests, most of them in", sep="-")
+            for name, seconds in slowest[:SHOWN]:
+                terminalreporter.line(f"{seconds:7.1f}  {name}")
+            terminalreporter.line(f"all of them: {self.path}")
+        known = self.kept() | {name: round(seconds, 3) for name, seconds in slowest}
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        new = self.path.with_suffix(f".{os.getpid()}")  # two runs may end at once
+        new.write_text(json.dumps(known, indent=1), encoding="utf-8")
+        new.replace(self.path)

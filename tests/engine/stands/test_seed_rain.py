@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Seeds of a stand: as many fall as its crowns bear, as far from them as the species' seeds travel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.stands.change import SeedRain, planted
+from tetflora_addon.stands.guilds import Guild, Guilds
+from tetflora_addon.stands.plants import Plants
+from tetflora_addon.stands.site import even_site
+
+SIDE = 600.0
+RADIUS = 3.0
+
+
+def fallen(dispersal: float, radius: float = RADIUS, age: float = 500.0) -> tuple[SeedRain, NDArray[np.float64]]:
+    """Seeds on a square metre (rows, columns) around one beech in the middle of the ground."""
+    beech = load_species("beech")
+    guilds = Guilds([Guild(beech, ecology=replace(Guild(beech).needs, dispersal=dispersal))])
+    site, suits = even_site(SIDE), np.ones((1, 120**2))
+    plants: Plants = planted(site, guilds, suits, 1.0, 0).take(np.array([0]))
+    one = replace(
+        plants, x=np.array([SIDE / 2]), y=np.array([SIDE / 2]), radius=np.array([radius]), age=np.array([age])
+    )
+    rain = SeedRain(site, guilds, suits, 300.0, 0.0)
+    return rain, rain.fallen(one).reshape(rain.rows, rain.columns)
+
+
+@pytest.mark.parametrize("dispersal", [1.0, 12.0, 35.0, 80.0])
+def test_as_many_seeds_fall_as_are_borne(dispersal: float) -> None:
+    rain, seeds = fallen(dispersal)
+    area = SIDE**2 / seeds.size
+    assert seeds.sum() * area == pytest.approx(rain.guilds.seeds[0] * np.pi * RADIUS**2, rel=1e-3)
+    assert (seeds >= 0).all()
+
+
+@pytest.mark.parametrize("dispersal", [12.0, 20.0, 35.0, 80.0])
+def test_seeds_travel_as_far_as_the_species_says(dispersal: float) -> None:
+    """Their mean distance from the crown, as far as cells of the ground are small."""
+    _, seeds = fallen(dispersal)
+    middle = (np.arange(len(seeds)) + 0.5) * (SIDE / len(seeds)) - SIDE / 2
+    away = np.hypot(*np.meshgrid(middle, middle))
+    assert (seeds * away).sum() / seeds.sum() == pytest.approx(dispersal, rel=0.15)
+
+
+def test_seeds_go_to_all_sides_alike_and_fewer_the_farther() -> None:
+    _, seeds = fallen(40.0)
+    row, column = np.unravel_index(np.argmax(seeds), seeds.shape)
+    np.testing.assert_allclose(seeds[row, column - 20 : column], seeds[row, column + 20 : column : -1], rtol=1e-9)
+    np.testing.assert_allclose(seeds[row - 20 : row, column], seeds[row, column - 20 : column], rtol=1e-9)
+    assert (np.diff(seeds[row, column : column + 15]) < 0).all()
+
+
+def test_young_plants_bear_none_and_wide_crowns_more() -> None:
+    assert fallen(20.0, age=2.0)[1].sum() == 0.0
+    assert fallen(20.0, radius=6.0)[1].sum() == pytest.approx(4.0 * fallen(20.0)[1].sum(), rel=1e-3)

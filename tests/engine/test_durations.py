@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What tests cost is kept from run to run, and quick runs leave out what cost much."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from tests.durations import QUICK, Durations
+
+
+def run(folder: Path, quick: bool = False, **seconds: float) -> list[str]:
+    """The tests that run, of those named, if each takes so long."""
+    plugin, left_out, said = Durations(folder), [], []
+    hook = SimpleNamespace(pytest_deselected=lambda items: left_out.extend(items))
+    config = SimpleNamespace(getoption={"quick": quick}.get, hook=hook)
+    items = [SimpleNamespace(nodeid=name) for name in seconds]
+    plugin.pytest_collection_modifyitems(config, items)
+    for item in items:
+        for part in (0.25, 0.75):
+            report = SimpleNamespace(nodeid=item.nodeid, cpu_seconds=part * seconds[item.nodeid])
+            plugin.pytest_runtest_logreport(report)
+    plugin.pytest_terminal_summary(SimpleNamespace(section=lambda *_, **__: None, line=said.append))
+    assert len(items) + len(left_out) == len(seconds)
+    return [item.nodeid for item in items]
+
+
+@pytest.fixture(autouse=True)
+def _alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
+
+
+def test_a_quick_run_leaves_out_what_was_slow(tmp_path: Path) -> None:
+    """Preparing and tidying count; what is new is run, and a run of some tests forgets no others."""
+    assert run(tmp_path, slow=1.5 * QUICK, fast=0.5 * QUICK) == ["slow", "fast"]
+    assert run(tmp_path, other=0.0) == ["other"]
+    assert run(tmp_path, quick=True, slow=0.0, fast=2 * QUICK, new=0.0) == ["fast", "new"]
+    assert run(tmp_path, quick=True, fast=0.0, slow=0.0) == []
+
+
+def test_nothing_is_left_out_by_itself(tmp_path: Path) -> None:
+    run(tmp_path, slow=1.5 * QUICK)
+    assert run(tmp_path, slow=0.0) == ["slow"]
+    assert [path.name for path in tmp_path.iterdir()] == [Durations(tmp_path).path.name]

@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``python -m devtools.proofs`` tells tests that can fail from those that cannot."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from devtools import proofs
+
+
+@pytest.fixture
+def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A commit with a fault, one that mends it, and one that only adds a test."""
+    root = tmp_path / "a house"
+    folder = root / "tests" / "engine"
+    folder.mkdir(parents=True)
+    for key in ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE"):
+        monkeypatch.delenv(key, raising=False)
+    for role in ("AUTHOR", "COMMITTER"):
+        monkeypatch.setenv(f"GIT_{role}_NAME", "nobody")
+        monkeypatch.setenv(f"GIT_{role}_EMAIL", "nobody@example.org")
+
+    def commit(subject: str, **files: str) -> None:
+        for name, text in files.items():
+            (root / f"{name}.py" if name == "code_" else folder / f"{name}.py").write_text(text, encoding="utf-8")
+        for command in (("add", "-A"), ("commit", "-qm", subject)):
+            subprocess.run(("git", *command), cwd=root, check=True, capture_output=True)
+
+    subprocess.run(("git", "init", "-q"), cwd=root, check=True)
+    (root / "conftest.py").write_text("", encoding="utf-8")  # pytest finds code_.py beside it
+    old = "import code_\ndef test_a():\n    assert code_.one\n"
+    commit("fault", code_="one = 1\n", test_a=old)
+    new = (
+        "import pytest\n"
+        "class TestTwo:\n"
+        "    @pytest.mark.parametrize('n', [0, 2])\n"
+        "    def test_b(self, n):\n"
+        "        assert n in (0, getattr(code_, 'two', 1))\n"
+        "def test_c():\n"
+        "    assert code_.one == 1\n"
+    )
+    imports = "from code_ import two\ndef test_d():\n    assert two\n"
+    commit("mend", code_="one = 1\ntwo = 2\n", test_a=old + new, test_d=imports)
+    commit("more tests", test_e="def test_e():\n    pass\n")
+    return root
+
+
+def test_tests_run_on_the_code_before_theirs(repository: Path) -> None:
+    """New tests alone, of commits with code; a parameter that fails is enough; the worktree is gone afterwards."""
+    found = {name: outcome for _, name, outcome in proofs.proofs(repository, "HEAD~2")}
+    assert found == {
+        "tests/engine/test_a.py::TestTwo::test_b": "fails",
+        "tests/engine/test_a.py::test_c": "passes",
+        "tests/engine/test_d.py::test_d": "fails (cannot be imported)",
+    }
+    listed = subprocess.run(("git", "worktree", "list"), cwd=repository, check=True, capture_output=True, text=True)
+    assert len(listed.stdout.splitlines()) == 1
+
+
+def test_a_changed_test_is_one(repository: Path) -> None:
+    """By what it says, not by how it is written or where it stands."""
+    path = repository / "tests" / "engine" / "test_a.py"
+    text = path.read_text(encoding="utf-8").replace("code_.one == 1", "code_.one == 3").replace("'n', [", "'n',  [")
+    path.write_text("# Moved.\n" + text, encoding="utf-8")
+    subprocess.run(("git", "commit", "-qam", "changed"), cwd=repository, check=True)
+    assert proofs.changed_tests(repository, "HEAD") == ["tests/engine/test_a.py::test_c"]
+
+
+def test_without_a_tag_it_is_the_last_commit(repository: Path) -> None:
+    assert proofs.last_tag(repository) == "HEAD~1"
+    subprocess.run(("git", "tag", "1.0"), cwd=repository, check=True)
+    assert proofs.last_tag(repository) == "1.0"

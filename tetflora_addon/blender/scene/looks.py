@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What results take over from the objects that they stand for: who sees them, what lights them, their passes.
+
+A look is that as JSON, which settles what of several objects may become one result; it is empty where an object and its
+collections are as new ones are.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Any
+
+import bpy
+
+#: Custom property of result objects: their look.
+LIKE = "tetflora_like"
+#: Ends of the names of properties that begin with ``visible_``; the last is there from 5.1 on.
+RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow", "raycast")
+#: Properties of objects in a look. Instances have these of who shows them as well.
+_FLAGS = ("is_holdout", "is_shadow_catcher", "hide_viewport")
+_OWN = ("pass_index", "lightgroup")
+_LINKING = ("receiver_collection", "blocker_collection")
+_OTHERS = ("color", "display_type", "show_bounds")
+
+
+class LayerLooks:
+    """LayerLooks of objects in a view layer, whose collections may say more than the objects."""
+
+    def __init__(self, layer: bpy.types.ViewLayer) -> None:
+        self._layer = layer
+        self._shown: set[int] | None = None  # where collections are hidden in viewports, what others hold
+        waiting, shown, hidden = [layer.layer_collection], set(), False
+        while waiting:
+            one = waiting.pop()
+            if one.collection.hide_viewport:
+                hidden = True
+            else:
+                waiting += one.children
+                shown.update(obj.session_uid for obj in one.collection.objects)
+        if hidden:
+            self._shown = shown
+
+    def of(self, obj: bpy.types.Object, instancer: bpy.types.Object | None = None) -> str:
+        """The look of an object, or of its instances that another shows, whose collections and holdout then count."""
+        found = self._read(instancer or obj)
+        if instancer is not None:
+            inner = _of_object(obj)
+            off = {*found.get("off", ()), *inner.pop("off", ())}
+            inner.pop("is_holdout", None)
+            found = inner | {n: v for n, v in found.items() if n not in _OWN} | ({"off": sorted(off)} if off else {})
+        return json.dumps(found, sort_keys=True) if found else ""
+
+    def _read(self, obj: bpy.types.Object) -> dict[str, Any]:
+        found = _of_object(obj)
+        if obj.indirect_only_get(view_layer=self._layer):
+            found["off"] = sorted({*found.get("off", ()), "camera"})
+        if obj.holdout_get(view_layer=self._layer):
+            found["is_holdout"] = True
+        if self._shown is not None and obj.session_uid not in self._shown:
+            found["hide_viewport"] = True
+        return found
+
+
+def _of_object(obj: bpy.types.Object) -> dict[str, Any]:
+    """What an object says itself, but for what new objects say."""
+    found = {name: value for name in (*_FLAGS, *_OWN) if (value := getattr(obj, name))}
+    if off := [ray for ray in RAYS if not getattr(obj, f"visible_{ray}", True)]:
+        found["off"] = sorted(off)
+    linking = obj.light_linking
+    found |= {name: value.name_full for name in _LINKING if (value := getattr(linking, name)) is not None}
+    return found
+
+
+def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str | None = None) -> None:
+    """Give a result the look, color and settings of Cycles of an object; nothing for None.
+
+    Without a look it is what the object says itself, but for viewports: what is instanced may be hidden there.
+
+    Output settings may hide it from more rays, but show it to none that the object is hidden from.
+    """
+    if like is None:
+        return
+    _copy(_OTHERS, like, made)
+    own, others = getattr(made, "cycles", None), getattr(like, "cycles", None)
+    if own is not None and others is not None:
+        _copy(
+            [p.identifier for p in own.bl_rna.properties if not p.is_readonly and p.identifier != "name"], others, own
+        )
+    said = json.loads(look or "{}")
+    if look is None:
+        said = _of_object(like)
+        said.pop("hide_viewport", None)
+    made[LIKE] = json.dumps({"pass_index": like.pass_index} | said)
+    wear(made)
+
+
+def wear(made: bpy.types.Object) -> dict[str, Any]:
+    """Give a result what its look says, but for what output settings have a say in; returns the look."""
+    look = json.loads(made.get(LIKE) or "{}")
+    said = {f"visible_{ray}": False for ray in look.get("off", ())} | {
+        n: look[n] for n in (*_FLAGS, *_OWN) if n in look
+    }
+    for name, value in said.items():
+        if getattr(made, name) != value:  # each change makes Blender list all objects anew
+            setattr(made, name, value)
+    for name in _LINKING:
+        if name in look and getattr(made.light_linking, name) is None:
+            found = next((c for c in bpy.data.collections if c.name_full == look[name]), None)
+            setattr(made.light_linking, name, found)
+    return look
+
+
+def _copy(names: Iterable[str], source: bpy.types.bpy_struct, target: bpy.types.bpy_struct) -> None:
+    """Copy what differs: each change makes Blender look at all that depends on it."""
+    for name in names:
+        value = getattr(source, name)
+        value = tuple(value) if getattr(source.bl_rna.properties[name], "is_array", False) else value
+        now = getattr(target, name)
+        if (tuple(now) if isinstance(value, tuple) else now) != value:
+            setattr(target, name, value)
