@@ -172,7 +172,7 @@ def _made(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 def biome(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, Any]:
     """A shipped biome on a hectare, seen at the height of the eye from the edge, in one of the qualities."""
-    chosen = files.read_biome(library.builtin_folder() / f"{spec['case']}{library.ENDING}")
+    chosen = files.read_biome(library.builtin_folder() / f"{spec['case']}.json")
     land = ground.make_land(scene, chosen.ground)
     bpy.context.view_layer.update()
     at_once(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), chosen, [land]))

@@ -11,12 +11,12 @@ from __future__ import annotations
 import datetime
 import json
 import re
-from dataclasses import fields
 
 from tetflora_addon.leaves.models import LEAF_MODELS, Spines
 from tetflora_addon.leaves.schema import OUTLINES
+from tetflora_addon.parameters import Key, keys_of
 from tetflora_addon.species.catalogue import builtin_folder, load_species
-from tetflora_addon.species.schema import CHOICES, FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
+from tetflora_addon.species.schema import LENGTH_HIGH, ORDER_KEYS
 from tetflora_addon.species.species import CROWN_SHAPES, LEAF_KINDS
 from tetflora_addon.species.year import DAYS
 
@@ -29,28 +29,25 @@ _WRITTEN = {
     "range": "`[mean, variation]`, or the mean",
     "number": "number",
     "integer": "whole number",
-    "shape": "name",
-    "kind": "name",
-    "envelope": "name",
-    "inclination": "name",
+    "choice": "name",
     "rgb": "`[r, g, b]`",
     "colour": "`[[r, g, b], [variation of each]]`",
 }
 
 
-def _limits(name: str, key: Key) -> str:
-    if key.kind == "shape":
+def _limits(key: Key) -> str:
+    if key.choices == CROWN_SHAPES:
         return "see below"
-    if key.kind in CHOICES:
-        return ", ".join(f"`{name}`" for name in CHOICES[key.kind])
+    if key.choices:
+        return ", ".join(f"`{name}`" for name in key.choices)
     limits = f"{key.low:g} to {key.high:g}"
-    return f"{limits}; {key.low:g} to {LENGTH_HIGH:g} after order 0" if name == "length" else limits
+    return f"{limits}; {key.low:g} to {LENGTH_HIGH:g} after order 0" if key is ORDER_KEYS["length"] else limits
 
 
-def _default(name: str, key: Key) -> str:
-    if name in FOLLOWS:
-        return f"mean of `{FOLLOWS[name]}`"
-    if key.default is None:
+def _default(key: Key) -> str:
+    if key.follows:
+        return f"mean of `{key.follows}`"
+    if key.needed:
         return "required"
     return f"`{json.dumps(key.default)}`"
 
@@ -59,7 +56,7 @@ def key_table() -> str:
     """Markdown table of the keys of an order."""
     lines = ["| key | written | limits | unit | default | meaning |", "|---|---|---|---|---|---|"]
     for name, key in ORDER_KEYS.items():
-        cells = (f"`{name}`", _WRITTEN[key.kind], _limits(name, key), key.unit or "–", _default(name, key), key.meaning)
+        cells = (f"`{name}`", _WRITTEN[key.kind], _limits(key), key.unit or "–", _default(key), key.meaning)
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -81,13 +78,10 @@ def outline_tables() -> str:
     blocks = []
     for kind, shape in {**OUTLINES, "spines": Spines}.items():
         lines = [f"| `{kind}` | limits | default | meaning |", "|---|---|---|---|"]
-        for f in fields(shape):
-            names = f.metadata.get("names")
-            default = "–" if f.name == "leaflet" else f"`{json.dumps(f.default)}`"
-            limits = ", ".join(f"`{n}`" for n in names) if names else "a `blade`"
-            if "low" in f.metadata:
-                limits = f"{f.metadata['low']:g} to {f.metadata['high']:g}"
-            lines.append(f"| `{f.name}` | {limits} | {default} | {f.metadata['meaning']} |")
+        for name, key in keys_of(shape).items():
+            default = "–" if name == "leaflet" else f"`{json.dumps(key.default)}`"
+            limits = "a `blade`" if name == "leaflet" else _limits(key)
+            lines.append(f"| `{name}` | {limits} | {default} | {key.meaning} |")
         blocks.append("\n".join(lines))
     return "\n\n".join(blocks)
 

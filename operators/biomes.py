@@ -18,8 +18,9 @@ from ..tetflora_addon.blender.biomes.adding import (
 from ..tetflora_addon.blender.biomes.biome import active_biome
 from ..tetflora_addon.blender.biomes.files import read_biome
 from ..tetflora_addon.blender.biomes.ground import make_land
-from ..tetflora_addon.blender.biomes.library import ENDING, NO_BIOME, biome_property, biomes, delete
+from ..tetflora_addon.blender.biomes.library import NO_BIOME, OWN_FILES, biome_property, biomes
 from ..tetflora_addon.blender.biomes.saving import import_biome, save_biome, saved_populations
+from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.viewport import points
@@ -215,7 +216,7 @@ class TETFLORA_OT_delete_biome(Reporting, bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        return self.done(f"{delete(context.scene.tetflora.new_biome).name} deleted")
+        return self.done(f"{OWN_FILES.delete(context.scene.tetflora.new_biome).name} deleted")
 
 
 CLASSES = (

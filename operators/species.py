@@ -9,11 +9,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
+from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
 from ..tetflora_addon.blender.placing.plant_objects import assign_species
 from ..tetflora_addon.blender.species.catalogue import (
-    ENDING,
-    delete_species_file,
+    OWN_FILES,
     load_species_file,
     own_file,
     save_species,
@@ -239,7 +239,7 @@ class TETFLORA_OT_delete_species(Reporting, bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        path = delete_species_file(shown(context))
+        path = OWN_FILES.delete(shown(context))
         return self.done(f"{path.name} deleted")
 
 

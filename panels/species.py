@@ -16,10 +16,11 @@ from ..operators.species import (
     TETFLORA_OT_save_species,
 )
 from ..tetflora_addon.blender.species.catalogue import own_file
-from ..tetflora_addon.blender.species.editor import VARIATION, order_keys
+from ..tetflora_addon.blender.species.editor import VARIATION
 from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skipped_files
 from ..tetflora_addon.blender.species.values import NO_LEAF, OBJECT_LEAF, orders_of, present_order, present_species
 from ..tetflora_addon.blender.viewport import species
+from ..tetflora_addon.species.schema import ORDER_KEYS
 from ..tetflora_addon.species.species import LEAF_KINDS
 from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_properties, split_layout
 
@@ -150,7 +151,7 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
     head.label(text="Mean")
     head.label(text="±")
     bare = editor.leaves + editor.leaves_variation <= 0.0
-    for name, key in order_keys().items():
+    for name, key in ORDER_KEYS.items():
         if name.startswith(_LEAVES) != leaves:
             continue
         row = column.row(align=True)

@@ -60,6 +60,18 @@ def linear_of(stored: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
 
 
+def bilinear(values: NDArray[np.floating], place: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Values (n,) of a grid (h, w) at places (n, 2) in columns and rows, linear between; beyond, of its border."""
+    rows, columns = values.shape
+    place = np.clip(place, 0.0, (columns - 1, rows - 1))
+    low = place.astype(np.int64)
+    (x, y), (right, above) = low.T, np.minimum(low + 1, (columns - 1, rows - 1)).T
+    part, rise = (place - low).T
+    bottom = values[y, x] * (1.0 - part) + values[y, right] * part
+    top = values[above, x] * (1.0 - part) + values[above, right] * part
+    return bottom * (1.0 - rise) + top * rise
+
+
 class Arrays:
     """Base of dataclasses whose fields are columns: one row for each of n things.
 

@@ -24,11 +24,12 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission.polygons import polygon_blocks
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.leaves.models import LEAF_MODELS
+from tetflora_addon.parameters import Key
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.species.catalogue import list_species, load_species, odd_files
-from tetflora_addon.species.schema import CHOICES, ORDER_KEYS, Key, read_species, species_from_dict
+from tetflora_addon.species.schema import ORDER_KEYS, read_species, species_from_dict
 
 _SETTINGS = RefinementSettings(visibility_resolution=64, max_tetrahedra=4_000)
 _FILES = (support.SMALL, support.RICH, *(support.shipped(name) for name in ("grass", "palm", "fern")))
@@ -64,8 +65,8 @@ def _to_a_limit(rng: random.Random, data: Any) -> None:
 
 def _allowed(rng: random.Random, key: Key) -> Any:
     """A value that a key may have: often one of its limits."""
-    if key.kind in CHOICES:
-        return rng.choice(CHOICES[key.kind])
+    if key.choices:
+        return rng.choice(key.choices)
     if key.kind == "colour":
         return [[rng.choice([0, 0.5, 1]) for _ in range(3)], [0, 0, 0]]
     if key.kind == "rgb":

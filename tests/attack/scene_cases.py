@@ -95,7 +95,7 @@ def brought(rng: random.Random, jail: Jail) -> None:
         _said(buttons.edit_orders, action=rng.choice(['ADD', 'REMOVE', 'SPUR']))
         _said(buttons.export_species, filepath=str(jail.inside / f"{rng.randrange(9)}.json"))
         with suppress(TetFloraError):
-            catalogue.delete_species_file(identifier)
+            catalogue.OWN_FILES.delete(identifier)
         edits.species_for(scene, identifier)
     finally:
         scene.tetflora.species_edits.clear()

@@ -18,7 +18,7 @@ _PARTS = (
     runtime,
     preferences,
     catalogue,
-    library,
+    library.pictures,
     properties,
     render,
     forecast,

@@ -22,6 +22,8 @@ from .rows import DEAD, FORK, LATERAL, SPUR
 #: Columns of ``crown`` of branches: the first two are those of crown forms, then the vector (east, north) in the
 #: branch's own axes.
 COLUMNS, LIGHT = 5, slice(2, 5)
+#: Of their length, what limbs away from the light keep, however much a crown leans.
+_SHORTEST = 0.05
 #: Stems of a stool lean at most so many times as far as described.
 MOST_LEANING = 1.5
 #: Laterals so many times as long as what bears them are the stems of a stool (see `species.ages`).
@@ -106,7 +108,8 @@ def numbers(
     """Number (n,) of children of a sort over that without crown bases (n,), by their own ``start`` (n,)."""
     if sort == DEAD:
         end = rows["start"][row, DEAD, 1]
-        return np.where(end > start, (dead_end(rows, row, base) - start) / np.maximum(end - start, 1e-9), 1.0)
+        left = np.maximum(dead_end(rows, row, base) - start, 0.0)  # none where the crown begins below all of them
+        return np.where(end > start, left / np.maximum(end - start, 1e-9), 1.0)
     if sort != LATERAL:
         return np.ones(len(row))
     whole = (1 - np.maximum(start, bare_part(rows, row, base))) / np.maximum(1 - start, 1e-9)
@@ -131,7 +134,8 @@ def reaches(
     trunk, one = rows["order"][parent.row] == 0, np.ones(len(parent))
     light = parent.crown[:, LIGHT].astype(np.float64)
     # Towards which side the child leaves is known without the wind, which turns all of the parent.
-    reach = parent.crown[:, WIDTH] * (1.0 + np.cos(azimuth) * light[:, 0] + np.sin(azimuth) * light[:, 1])
+    leant = 1.0 + np.cos(azimuth) * light[:, 0] + np.sin(azimuth) * light[:, 1]
+    reach = parent.crown[:, WIDTH] * np.maximum(leant, _SHORTEST)
     if sort == FORK:
         return np.where(trunk, np.minimum(reach, 1.0), one), one
     if sort == SPUR:

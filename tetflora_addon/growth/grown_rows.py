@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..species.growing import Nodes, faded, node_at, place_at, shortened, some_nodes
+from ..species.growing import NodeLaw, Nodes, faded, shortened, some_nodes
 from ..species.species import crown_ratio
 
 NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA, VARIES, FADES = range(11)
@@ -47,28 +47,27 @@ def grow_children(
     number = float(row["count"][sort, 0])
     if number <= 0:
         return
-    whole, below = nodes.whole * number, nodes.below * number
-    law = nodes.begin, nodes.end, nodes.power, whole, below
+    law = nodes.law(number)
     low, full = cuts[p], cuts[p + 1] - cuts[p]
     high = now if p + 2 == len(cuts) else min(cuts[p + 1], now)
     here = high - low
-    first, top = (float(node_at(place * now, *law)) for place in (start[0], nodes.until))
+    first, top = (float(law.number_at(place * now)) for place in (start[0], nodes.until))
     last = first + nodes.kept * (top - first)
-    fraction = (np.clip(node_at([low, high], *law), first, last) - first) / max(top - first, 1e-9)
+    fraction = (np.clip(law.number_at([low, high]), first, last) - first) / max(top - first, 1e-9)
     begin = float(np.clip((nodes.begin - low) / full, 0, 1))
     end = float(np.clip((nodes.end - low) / full, begin, 1))
-    whole *= full * (end - begin) / (nodes.end - nodes.begin)
-    below = float(node_at(min(nodes.begin, cuts[p + 1]), *law) - node_at(low, *law)) if low < nodes.begin else 0.0
+    whole = law.whole * (full * (end - begin) / (nodes.end - nodes.begin))
+    below = float(np.diff(law.number_at([low, min(nodes.begin, cuts[p + 1])]))[0]) if low < nodes.begin else 0.0
     power = nodes.power if p == 0 else 1.0
     inside = low < start[0] * now < high
     mean = float(np.clip((start[0] * now - low) / here, 0, 0.999))
-    ends = place_at([last - nodes.fresh * (last - first), last], *law)
+    ends = law.place_of([last - nodes.fresh * (last - first), last])
     fresh, until = np.clip((ends - low) / here, mean, 1)
     variation = min(start[1] * now / here, mean, 0.999 - mean) if inside else 0.0
     starts = mean + variation * _GAUSS  # numbers are not linear in the start, so that their mean is not that of it
     varies = start[1] / start[0] if start[0] > 0 else 0.0
     begins = varied_begin(begin, varies, _GAUSS)
-    own = begins, np.maximum(end, begins), power, whole, below
+    own = NodeLaw(begins, np.maximum(end, begins), power, whole, below)
     there = _alive(own, (starts, fresh, until), here / full, nodes.extra)
     row["fraction"][sort] = fraction
     row["count"][sort] *= there / number
@@ -80,9 +79,9 @@ def grow_children(
         )
 
 
-def _alive(law: tuple, places: tuple, now: float, extra: float) -> float:
+def _alive(law: NodeLaw, places: tuple, now: float, extra: float) -> float:
     """Mean number of living nodes, by where they begin, where those that live for a while do, and where they end."""
-    base, some, tip = (node_at(place * now, *law) for place in places)
+    base, some, tip = (law.number_at(place * now) for place in places)
     return float(_WEIGHTS @ (np.maximum(tip - base, 0) + extra * np.maximum(tip - np.maximum(some, base), 0)))
 
 
@@ -93,7 +92,7 @@ def living(row: np.void, sort: int, bare: float = 0.0, dead: float | None = None
     """
     own, number, (mean, variation) = row["growing"][sort], row["count"][sort, 0], row["start"][sort]
     begins = varied_begin(own[BEGIN], own[VARIES], _GAUSS)
-    law = begins, np.maximum(own[END], begins), own[POWER], own[WHOLE] * number, own[BELOW] * number
+    law = NodeLaw(begins, np.maximum(own[END], begins), own[POWER], own[WHOLE] * number, own[BELOW] * number)
     starts = np.maximum(mean + (0.0 if dead is not None else variation) * _GAUSS, bare)
     until = max(own[UNTIL], dead or 0.0) if own[UNTIL] > mean else own[UNTIL]
     return _alive(law, (starts, own[FRESH], until), own[NOW], own[EXTRA])
@@ -122,15 +121,15 @@ def spread_children(
         Factor on their lengths.
     """
     own, number = row["growing"][sort], row["count"][sort, 0]
-    law = own[BEGIN], own[END], own[POWER], own[WHOLE] * number, own[BELOW] * number
+    law = NodeLaw(own[BEGIN], own[END], own[POWER], own[WHOLE] * number, own[BELOW] * number)
     start = row["start"][sort, 0]
     until = max(own[UNTIL], dead) if own[UNTIL] > start else own[UNTIL]
-    base, lowest, some, tip = node_at(np.array([start, max(start, bare), own[FRESH], until]) * own[NOW], *law)
+    base, lowest, some, tip = law.number_at(np.array([start, max(start, bare), own[FRESH], until]) * own[NOW])
     node, weight, extra = some_nodes((lowest, max(some, lowest), tip), own[EXTRA])
     (low, high), described = row["fraction"][sort] if among is None else among, row["fraction"][sort]
     fraction = low + (high - low) * (node - lowest) / max(tip - lowest, 1e-9)
     own_fraction = described[0] + (described[1] - described[0]) * (node - base) / max(tip - base, 1e-9)
-    return np.clip(place_at(node, *law) / own[NOW], 0, 1), fraction, weight, faded(own_fraction, own[FADES], extra)
+    return np.clip(law.place_of(node) / own[NOW], 0, 1), fraction, weight, faded(own_fraction, own[FADES], extra)
 
 
 def lengths(rows: NDArray[np.void], row: NDArray[np.integer], fraction: NDArray[np.float64]) -> NDArray[np.float64]:

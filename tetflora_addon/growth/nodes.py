@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..species.growing import node_at, place_at
+from ..species.growing import NodeLaw
 from .branches import Branches
 from .grown_rows import BEGIN, BELOW, END, EXTRA, FRESH, NOW, POWER, UNTIL, VARIES, WHOLE, varied_begin
 from .hashing import Draw, child_key, signed
@@ -45,8 +45,7 @@ class Grown:
         Number of the lowest node, and how many there are: of those that stay, and those that live for a while.
     now : (n,) float64
         Length over that when full-grown.
-    law : tuple of (n,) float64
-        See `species.growing.node_at`.
+    law : NodeLaw of (n,) float64
     ends : (3, n) float64
         Where nodes begin, where those begin that live for a while, and where all end, in nodes.
     density : (2, n) float64
@@ -59,7 +58,7 @@ class Grown:
     first: NDArray[np.int64]
     number: NDArray[np.int64]
     now: NDArray[np.float64]
-    law: tuple[NDArray[np.float64], ...]
+    law: NodeLaw
     ends: NDArray[np.float64]
     density: NDArray[np.float64]
     described: NDArray[np.float64]
@@ -88,7 +87,7 @@ class Grown:
         own = node + within
         dense = np.where(extra, self.density[1][owner], np.where(own >= 0, self.density[0][owner], 1.0))
         own = own / np.maximum(dense, 1e-9)
-        t = place_at(own, *(one[owner] for one in self.law)) / self.now[owner]
+        t = NodeLaw(*(one[owner] for one in self.law)).place_of(own) / self.now[owner]
         high = self.ends[2][owner]
         parts = [(own - low) / np.maximum(high - low, 1e-9) for low in (self.ends[0][owner], self.described[owner])]
         return np.clip(t, 0, 1), np.clip(parts[0], 0, 1), np.clip(parts[1], 0, 1)
@@ -129,15 +128,15 @@ def grown_nodes(
     begin = varied_begin(own[:, BEGIN], own[:, VARIES], draw)
     power = np.where(on, own[:, POWER], 1.0)
     whole = wanted * own[:, WHOLE]
-    law = begin, np.maximum(own[:, END], begin), power, whole, wanted * own[:, BELOW]
+    law = NodeLaw(begin, np.maximum(own[:, END], begin), power, whole, wanted * own[:, BELOW])
     settled = rows["settled"][row]
     rounded = (1 - settled) * whole + settled * np.floor(whole + chance)
     density = np.stack([np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0), own[:, EXTRA]])
-    last, described = own[:, UNTIL], node_at(start * now, *law)
+    last, described = own[:, UNTIL], law.number_at(start * now)
     if formed is not None:
         last = np.where(last > start, np.maximum(last, formed[1]), last)
         start = np.maximum(start, formed[0])
-    ends = np.stack([node_at(place * now, *law) for place in (start, own[:, FRESH], last)])
+    ends = np.stack([law.number_at(place * now) for place in (start, own[:, FRESH], last)])
     ends = np.maximum(ends, ends[0])
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
 

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from ..parameters import described, limited
 from .blades import blade_surface
-from .outlines import Blade, limited
+from .outlines import Blade
 from .surfaces import VARIANTS, LeafSurface, drawn, joined, tube
 
 
@@ -17,7 +18,7 @@ from .surfaces import VARIANTS, LeafSurface, drawn, joined, tube
 class Compound:
     """Leaflets on a rachis; lengths are fractions of the whole leaf."""
 
-    leaflet: Blade = field(default=Blade(), metadata={"meaning": "outline of a leaflet, as of a simple leaf"})
+    leaflet: Blade = described(Blade(), "outline of a leaflet, as of a simple leaf")
     pairs: int = limited(6, 0, 40, "pairs of leaflets; 0 for leaflets around a point")
     around: int = limited(0, 0, 12, "leaflets around a point, as petals or the leaflets of a chestnut")
     circle: float = limited(360.0, 30, 360, "angle that leaflets around a point take up, degrees")

@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import perpendicular
 from ..errors import SpeciesError
+from ..parameters import limited
 from .compounds import Compound
 from .needles import Needles
-from .outlines import Blade, limited
+from .outlines import Blade
 from .shapes import LEAF_SHAPES
 
 MAX_LEAF_POLYGONS = 2000

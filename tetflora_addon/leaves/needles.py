@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .outlines import limited
+from ..parameters import limited
 from .surfaces import VARIANTS, LeafSurface, drawn, joined, surface, tube
 
 _GOLDEN_ANGLE = np.radians(137.508)

@@ -9,11 +9,12 @@ palmate ones. Lobes and teeth only move points along their rays, which never mee
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..parameters import limited, named
 
 #: Exponents p and q of the half width 1 - (1 - u)^p, to the power of q, on the way from the end to the widest place.
 BASES = {
@@ -43,16 +44,6 @@ _RISE, _DOUBLE, _SECOND = 0.8, 3, 0.45
 _PALM, _PALM_MOST = 0.61, np.radians(52)
 _START = 33  # points that a half begins with
 _ROUNDS = 12
-
-
-def limited(default: Any, low: float, high: float, meaning: str) -> Any:
-    """A field with its limits and meaning, which species files are read and documented by."""
-    return field(default=default, metadata={"low": low, "high": high, "meaning": meaning})
-
-
-def named(default: str, names: tuple[str, ...] | dict[str, Any], meaning: str) -> Any:
-    """A field that is one of some names."""
-    return field(default=default, metadata={"names": tuple(names), "meaning": meaning})
 
 
 @dataclass(frozen=True)

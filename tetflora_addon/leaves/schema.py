@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from dataclasses import Field, fields, replace
-from typing import Any, Protocol
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ..errors import SpeciesError, shown
+from ..parameters import FileReader
 from .blades import check_outline
 from .bodies import closed_parts
 from .compounds import Compound
@@ -25,26 +26,7 @@ LEAF_KEYS = ("model", "object", "vertices", "faces", "uv", "outline", "spines")
 OUTLINES: dict[str, type] = {"blade": Blade, "needles": Needles, "compound": Compound}
 
 
-class Reader(Protocol):
-    """What checks values and refuses them with the place where they stand; see `schema`."""
-
-    def keys(self, value: Any, key: str, allowed: Any) -> None:
-        """Refuse what is no object, or has other keys."""
-
-    def number(self, value: Any, key: str, low: float, high: float) -> float:
-        """A number within limits."""
-
-    def text(self, value: Any, key: str, least: int = 1) -> str:
-        """A text."""
-
-    def choice(self, value: Any, key: str, allowed: tuple[str, ...]) -> str:
-        """One of some names."""
-
-    def fail(self, key: str, problem: str) -> SpeciesError:
-        """The error that names the source and the key."""
-
-
-def read_forms(reader: Reader, data: Any, key: str) -> tuple[LeafModel | str, ...]:
+def read_forms(reader: FileReader, data: Any, key: str) -> tuple[LeafModel | str, ...]:
     """A leaf, or a list of forms among which each leaf has one by chance.
 
     Raises
@@ -59,7 +41,7 @@ def read_forms(reader: Reader, data: Any, key: str) -> tuple[LeafModel | str, ..
     return tuple(_read_leaf(reader, one, f"{key}[{i}]") for i, one in enumerate(data))
 
 
-def _read_leaf(reader: Reader, data: Any, where: str) -> LeafModel | str:
+def _read_leaf(reader: FileReader, data: Any, where: str) -> LeafModel | str:
     reader.keys(data, where, LEAF_KEYS)
     forms = [k for k in ("model", "object", "vertices") if k in data]
     if "spines" in data and "vertices" not in data:
@@ -101,11 +83,10 @@ def _read_leaf(reader: Reader, data: Any, where: str) -> LeafModel | str:
     return _with_spines(reader, made, data["spines"], f"{where}.spines") if "spines" in data else made
 
 
-def _with_spines(reader: Reader, model: LeafModel, data: Any, where: str) -> LeafModel:
+def _with_spines(reader: FileReader, model: LeafModel, data: Any, where: str) -> LeafModel:
     if not (closed_parts(model) >= 0).any():
         raise reader.fail(where, "must be left out, because the polygons have no closed part to stand on")
-    reader.keys(data, where, tuple(f.name for f in fields(Spines)))
-    return replace(model, spines=Spines(**_fields(reader, data, where, Spines)))
+    return replace(model, spines=reader.read(Spines, data, where))
 
 
 def _is_list_of_points(value: Any, size: int) -> bool:
@@ -118,7 +99,7 @@ def _is_list_of_points(value: Any, size: int) -> bool:
     )
 
 
-def read_outline(reader: Reader, data: Any, where: str) -> Blade | Needles | Compound:
+def read_outline(reader: FileReader, data: Any, where: str) -> Blade | Needles | Compound:
     """An outline from what a species file has for it.
 
     Raises
@@ -129,9 +110,9 @@ def read_outline(reader: Reader, data: Any, where: str) -> Blade | Needles | Com
     kind = "blade"
     if isinstance(data, dict) and "kind" in data:
         kind = reader.choice(data["kind"], f"{where}.kind", tuple(OUTLINES))
-    shape = OUTLINES[kind]
-    reader.keys(data, where, ("kind", *(f.name for f in fields(shape))))
-    made = shape(**_fields(reader, data, where, shape))
+    rest = {key: value for key, value in data.items() if key != "kind"} if isinstance(data, dict) else data
+    readers = {"leaflet": lambda value, path: _read_leaflet(reader, value, path)} if kind == "compound" else {}
+    made = reader.read(OUTLINES[kind], rest, where, readers)
     if isinstance(made, Blade):
         if made.palmate and 0 < made.lobes < 3:
             raise reader.fail(f"{where}.lobes", f"must be 0, or 3 to 12 with palmate lobes, not {made.lobes}")
@@ -144,25 +125,11 @@ def read_outline(reader: Reader, data: Any, where: str) -> Blade | Needles | Com
     return made
 
 
-def _fields(reader: Reader, data: dict[str, Any], where: str, kind: type) -> dict[str, Any]:
-    """The fields of an outline, or of spines, that are given."""
-    return {f.name: _field(reader, data[f.name], f"{where}.{f.name}", f) for f in fields(kind) if f.name in data}
-
-
-def _field(reader: Reader, value: Any, where: str, field: Field) -> Any:
-    if field.name == "leaflet":
-        made = read_outline(reader, value, where)
-        if not isinstance(made, Blade):
-            raise reader.fail(f"{where}.kind", "must be blade, because leaflets are simple")
-        return made
-    if "names" in field.metadata:
-        return reader.choice(value, where, field.metadata["names"])
-    number = reader.number(value, where, field.metadata["low"], field.metadata["high"])
-    if not isinstance(field.default, int):
-        return number
-    if number != int(number):
-        raise reader.fail(where, f"must be a whole number, not {number:g}")
-    return int(number)
+def _read_leaflet(reader: FileReader, data: Any, where: str) -> Blade:
+    made = read_outline(reader, data, where)
+    if not isinstance(made, Blade):
+        raise reader.fail(f"{where}.kind", "must be blade, because leaflets are simple")
+    return made
 
 
 def outlined_model(shape: Blade | Needles | Compound) -> LeafModel:

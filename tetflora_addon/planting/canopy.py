@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, spread
+from ..arrays import Arrays, bilinear, spread
 
 #: Directions of the sky that light comes from: degrees from the vertical, how many, and the weight of all of them.
 DIRECTIONS = ((0.0, 1, 0.2), (32.0, 5, 0.5), (55.0, 5, 0.3))
@@ -92,14 +92,7 @@ class Sheet:
 
     def at(self, values: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (n,) of cells (rows · columns,) at points (n, 2), linear between the middles."""
-        place = np.clip((points - self.low) / self.cell - 0.5, 0.0, (self.columns - 1, self.rows - 1))
-        first = place.astype(np.int64)
-        x, y = (place - first).T
-        right, above = (first[:, 0] + 1 < self.columns).astype(np.int64), (first[:, 1] + 1 < self.rows) * self.columns
-        corner = first[:, 1] * self.columns + first[:, 0]
-        bottom = values[corner] * (1.0 - x) + values[corner + right] * x
-        top = values[corner + above] * (1.0 - x) + values[corner + above + right] * x
-        return bottom * (1.0 - y) + top * y
+        return bilinear(values.reshape(self.rows, self.columns), (points - self.low) / self.cell - 0.5)
 
     def pairs(
         self, middle: NDArray[np.float64], reach: NDArray[np.float64]

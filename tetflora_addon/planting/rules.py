@@ -19,6 +19,8 @@ from ..setting import LENGTH, setting
 #: Most plants that are placed at once.
 MOST_PLANTS = 10_000_000
 _ANGLE = {"subtype": 'ANGLE'}
+_SLOPE = {"min": 0.0, "max": pi / 2, **_ANGLE}
+_ALTITUDE = {"soft_min": -1000.0, "soft_max": 5000.0, **LENGTH}
 _FACTOR = {"subtype": 'FACTOR', "min": 0.0, "max": 1.0}
 _SCALE = {"min": 0.01, "soft_max": 4.0}
 
@@ -59,7 +61,39 @@ class Companion:
 
 
 @dataclass(frozen=True)
-class Rules:
+class GroundLimits:
+    """Between which values of the ground something grows.
+
+    Altitudes are z in the world, meters; slopes are angles in radians.
+    """
+
+    slope_min: float = setting(0.0, "Min Slope", "Flatter ground is left out", **_SLOPE)
+    slope_max: float = setting(pi / 2, "Max Slope", "Steeper ground is left out", **_SLOPE)
+    altitude_min: float = setting(-inf, "Min Altitude", "Lower ground is left out", default=0.0, **_ALTITUDE)
+    altitude_max: float = setting(
+        inf, "Max Altitude", "Higher ground is left out, as above the tree line", default=100.0, **_ALTITUDE
+    )
+    wetness_min: float = setting(
+        0.0,
+        "Min Wetness",
+        "Drier ground is left out. 0 is the driest, as on ridges, and 1 the wettest, as at brooks and in hollows: it "
+        "follows from where water runs on the ground",
+        **_FACTOR,
+    )
+    wetness_max: float = setting(
+        1.0, "Max Wetness", "Wetter ground is left out; 1 is the wettest, as at brooks and in hollows", **_FACTOR
+    )
+    wetness_softness: float = setting(
+        0.0,
+        "Wetness Softness",
+        "Range around both limits over which plants become sparser; half of them grow at a limit. 0 for a sharp line",
+        default=0.2,
+        **_FACTOR,
+    )
+
+
+@dataclass(frozen=True)
+class Rules(GroundLimits):
     """Rules of one population; the defaults leave everything open, those of panels are for a forest.
 
     Fields with a label are properties of a population, and documented by their tooltips. Lengths are in meters,
@@ -69,7 +103,6 @@ class Rules:
     ----------
     density : float
         Plants for each square meter of the map that is wholly suitable; fewer where it is suitable in part.
-    altitude_min, altitude_max : float
     aspect : float
         Clockwise from +Y (north) on the map.
     weights : tuple of float
@@ -97,34 +130,7 @@ class Rules:
         soft_max=50.0,
         **LENGTH,
     )
-    slope_min: float = setting(0.0, "Min Slope", "Ground flatter than this stays bare", min=0.0, max=pi / 2, **_ANGLE)
-    slope_max: float = setting(
-        pi / 2,
-        "Max Slope",
-        "Ground steeper than this stays bare",
-        default=radians(40.0),
-        min=0.0,
-        max=pi / 2,
-        **_ANGLE,
-    )
-    altitude_min: float = setting(
-        -inf,
-        "Min Altitude",
-        "Ground lower than this stays bare",
-        default=0.0,
-        soft_min=-1000.0,
-        soft_max=5000.0,
-        **LENGTH,
-    )
-    altitude_max: float = setting(
-        inf,
-        "Max Altitude",
-        "Ground higher than this stays bare: the tree line",
-        default=100.0,
-        soft_min=-1000.0,
-        soft_max=5000.0,
-        **LENGTH,
-    )
+    slope_max: float = setting(pi / 2, "Max Slope", "Steeper ground is left out", default=radians(40.0), **_SLOPE)
     altitude_falloff: float = setting(
         0.0,
         "Altitude Falloff",
@@ -132,26 +138,6 @@ class Rules:
         min=0.0,
         soft_max=500.0,
         **LENGTH,
-    )
-    wetness_min: float = setting(
-        0.0,
-        "Min Wetness",
-        "Drier ground stays bare. 0 is the driest, as on ridges, and 1 the wettest, as at brooks and in hollows: it "
-        "follows from where water runs on the ground",
-        **_FACTOR,
-    )
-    wetness_max: float = setting(
-        1.0,
-        "Max Wetness",
-        "Wetter ground stays bare; 1 is the wettest, as at brooks and in hollows",
-        **_FACTOR,
-    )
-    wetness_softness: float = setting(
-        0.0,
-        "Wetness Softness",
-        "Range around both limits over which plants become sparser; half of them grow at a limit. 0 for a sharp line",
-        default=0.2,
-        **_FACTOR,
     )
     aspect: float = setting(
         0.0,

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import bilinear
 from ..errors import SceneError
 
 
@@ -109,12 +110,4 @@ def sampled(image: NDArray[np.float32], uv: NDArray[np.float64]) -> NDArray[np.f
 
     It repeats, but opposite borders do not mix: a mask that is black on one side would let plants stray to the other.
     """
-    height, width = image.shape
-    place = np.clip((uv - np.floor(uv)) * (width, height) - 0.5, 0.0, (width - 1, height - 1))
-    low = place.astype(np.int64)
-    part = place - low
-    x, y = low.T
-    right, above = np.minimum(x + 1, width - 1), np.minimum(y + 1, height - 1)
-    bottom = image[y, x] * (1.0 - part[:, 0]) + image[y, right] * part[:, 0]
-    top = image[above, x] * (1.0 - part[:, 0]) + image[above, right] * part[:, 0]
-    return bottom * (1.0 - part[:, 1]) + top * part[:, 1]
+    return bilinear(image, (uv - np.floor(uv)) * image.shape[::-1] - 0.5)

@@ -16,49 +16,25 @@ from numpy.typing import NDArray
 
 from ..setting import LENGTH, setting
 from .plane import Lines
-from .rules import Rules
+from .rules import GroundLimits
 from .terrain import sampled
 from .wetness import WetGround
 
 _ANGLE = {"subtype": 'ANGLE', "min": 0.0, "max": pi / 2}
-_FACTOR = {"subtype": 'FACTOR', "min": 0.0, "max": 1.0}
 _WIDTH = "Range around both limits over which one kind of land gives way to the next; 0 for a sharp line"
 
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(GroundLimits):
     """Between which values of the ground a zone lies; each limit is in the middle of its soft edge.
 
-    Altitudes are z in the world and distances those from lines on the map, meters; slopes are angles in radians.
+    Distances are those from lines on the map, meters.
     """
 
-    slope_min: float = setting(0.0, "Min Slope", "Flatter ground is not part of the biome", **_ANGLE)
-    slope_max: float = setting(pi / 2, "Max Slope", "Steeper ground is not part of the biome", **_ANGLE)
     slope_softness: float = setting(0.0, "Slope Softness", _WIDTH, default=radians(10.0), **_ANGLE)
-    altitude_min: float = setting(
-        -inf,
-        "Min Altitude",
-        "Lower ground is not part of the biome",
-        default=0.0,
-        soft_min=-1000.0,
-        soft_max=5000.0,
-        **LENGTH,
-    )
-    altitude_max: float = setting(
-        inf,
-        "Max Altitude",
-        "Higher ground is not part of the biome",
-        default=100.0,
-        soft_min=-1000.0,
-        soft_max=5000.0,
-        **LENGTH,
-    )
     altitude_softness: float = setting(
         0.0, "Altitude Softness", _WIDTH, default=10.0, min=0.0, soft_max=500.0, **LENGTH
     )
-    wetness_min: float = setting(0.0, "Min Wetness", "Drier ground is not part of the biome", **_FACTOR)
-    wetness_max: float = setting(1.0, "Max Wetness", "Wetter ground is not part of the biome", **_FACTOR)
-    wetness_softness: float = setting(0.0, "Wetness Softness", _WIDTH, default=0.2, **_FACTOR)
     path_min: float = setting(
         0.0, "From", "Ground nearer to the paths is not part of the biome", min=0.0, soft_max=100.0, **LENGTH
     )
@@ -168,7 +144,7 @@ def _reach(limits: Limits) -> float:
     return limits.path_max + 0.5 * limits.path_softness + 1e-3
 
 
-def by_wetness(wet: NDArray[np.float64], limits: Limits | Rules) -> NDArray[np.float64]:
+def by_wetness(wet: NDArray[np.float64], limits: GroundLimits) -> NDArray[np.float64]:
     """How well ground of a wetness (n,), 0 to 1, fits ``wetness_min``, ``wetness_max`` and ``wetness_softness``."""
     return soft_between(wet, limits.wetness_min, limits.wetness_max, limits.wetness_softness, 0.0, 1.0)
 

@@ -27,7 +27,7 @@ SECONDS_PER_PLANT = 2.5e-5
 SECONDS_PER_PRIMITIVE = 5.5e-6
 #: Facets of a covered pixel, one behind the other, if they are as large as one; numbers go with the inverse square of
 #: their size.
-FACETS_PER_PIXEL = 5.0
+FACETS_PER_PIXEL = 8.5
 #: Of what is seen, for plants that are out of view or hidden.
 UNSEEN = 0.3
 #: Bytes of each plant, and of each polygon or facet in Blender and the renderer together.

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from .extras import dead_part
-from .growing import Ages, Nodes, PartGrown, node_at, rounded_least
+from .growing import Ages, NodeLaw, Nodes, PartGrown, rounded_least
 from .habit import with_habit
 from .members import expected_leaf_area
 from .skeletons import Skeleton
@@ -300,12 +300,12 @@ class _Aged:
         """Factor on a number of children, and their nodes; with so many more of them below the crown."""
         start, now = min(start, 0.99), 1.0 if o < self.stem else self.now[o]
         power = 1.0 if start > _ROSETTE else _POWER
-        law = start, 1.0, power, 1.0, more * start / ((1 - start) * power)
-        first, top = (float(node_at(place, *law)) for place in (self._bare(o, start), until * now))
+        law = NodeLaw(start, 1.0, power, 1.0, more * start / ((1 - start) * power))
+        first, top = (float(law.number_at(place)) for place in (self._bare(o, start), until * now))
         number = kept * (top - first) * (1 + extra * fresh)
         if number <= 0:
             return 0.0, Nodes(0.0, 0.0, start)
-        return factor * number, Nodes(1 / number, law[-1] / number, start, 1.0, power, until, kept, extra, fresh)
+        return factor * number, Nodes(1 / number, law.below / number, start, 1.0, power, until, kept, extra, fresh)
 
     def _kept(self, o: int) -> float:
         """Fraction of the laterals of an order that age has left."""
@@ -386,10 +386,10 @@ class _Aged:
             return 0.0, Nodes(0.0, 0.0, 0.0)
         start, now = self.one.orders[o].branch_start.mean, 1.0 if o < self.stem else self.now[o]
         begin, end = dead_part(dead, start)
-        law = begin, end, 1.0, 1.0, begin / (end - begin)
+        law = NodeLaw(begin, end, 1.0, 1.0, begin / (end - begin))
         ends = np.array(dead_part(self._dead(), min(self._bare(o, start) / now, 0.99))) * now
-        number = float(np.diff(node_at(ends, *law))[0])
-        return number, Nodes(1 / number, law[-1] / number, begin, end)
+        number = float(np.diff(law.number_at(ends))[0])
+        return number, Nodes(1 / number, law.below / number, begin, end)
 
     def _dead(self) -> Dead:
         """Dead branches, which reach farther up, and farther out on limbs, as the plant declines."""

@@ -17,43 +17,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..parameters import described, limited
+
 _SHARP = 4.0
+#: Limits of rates, 1/year, and powers of curves.
+_CURVE = (0.0001, 0.2), (10, 5)
 
 
 @dataclass(frozen=True)
 class Ages:
-    """How a species grows; years.
+    """How a species grows; years. Curves are [rate, power], see `grown`."""
 
-    Attributes
-    ----------
-    full : float
-        Age at which it is as described.
-    height, girth : tuple of float
-        Rate k, 1/year, and power p of the curves of the height and of the trunk's diameter, see `grown`.
-    lifespan, decline : float
-        Age at which it dies, and fraction of that from which on it declines.
-    base : float
-        The bare part of the trunk grows as this power of the height.
-    spread : float
-        Limbs grow as this power of the trunk's diameter.
-    flowers : float
-        Age from which on it bears short shoots with blossoms, cones or fruit.
-    scaled : bool
-        It only grows in size, without changing its form.
-    source : str
-        Where the curves are from.
-    """
-
-    full: float
-    height: tuple[float, float] = (0.04, 1.2)
-    girth: tuple[float, float] = (0.03, 1.2)
-    lifespan: float = 200.0
-    decline: float = 0.75
-    base: float = 2.0
-    spread: float = 0.72
-    flowers: float = 10.0
-    scaled: bool = False
-    source: str = ""
+    full: float = limited(..., 0.1, 5000, "age at which it is as described")
+    height: tuple[float, float] = limited((0.04, 1.2), *_CURVE, "curve of the height")
+    girth: tuple[float, float] = limited((0.03, 1.2), *_CURVE, "curve of the diameter of the trunk")
+    lifespan: float = limited(200.0, 0.2, 20000, "age at which it dies")
+    decline: float = limited(0.75, 0.05, 0.99, "fraction of the lifespan from which on it declines")
+    base: float = limited(2.0, 1, 10, "the bare part of the trunk grows as this power of the height")
+    spread: float = limited(0.72, 0.2, 2, "limbs grow as this power of the diameter of the trunk")
+    flowers: float = limited(10.0, 0, 5000, "age from which on it bears short shoots with blossoms, cones or fruit")
+    scaled: bool = described(False, "whether it only grows in size, without changing its form")
+    source: str = described("", "where the curves are from")
 
     def heights(self, years: float) -> float:
         """Height over that at the full age; it stands still when the plant declines."""
@@ -78,8 +62,42 @@ def rounded_least(a: float, b: float, full: float) -> float:
     return ((a**-_SHARP + b**-_SHARP) / (1 + full**-_SHARP)) ** (-1 / _SHARP)
 
 
+class NodeLaw(NamedTuple):
+    """Numbers of nodes along full-grown axes (...), from where the crown begins; negative below that.
+
+    Attributes
+    ----------
+    begin, end : (...) float64
+        Fractions of the full-grown length.
+    power : (...) float64
+        The number of nodes below grows as this power of the length.
+    whole, below : (...) float64
+        Number of nodes from ``begin`` to ``end`` (and on, as densely), and from the foot to ``begin``.
+    """
+
+    begin: ArrayLike
+    end: ArrayLike
+    power: ArrayLike
+    whole: ArrayLike
+    below: ArrayLike
+
+    def number_at(self, place: ArrayLike) -> NDArray[np.float64]:
+        """Number (...) of nodes up to places (...), fractions of the full-grown length."""
+        place, begin = np.asarray(place, np.float64), np.asarray(self.begin, np.float64)
+        above = self.whole * (place - begin) / np.maximum(self.end - begin, 1e-9)
+        part = np.clip(place / np.maximum(begin, 1e-9), 0, 1)
+        return np.where(place >= begin, above, self.below * (part**self.power - 1))
+
+    def place_of(self, node: ArrayLike) -> NDArray[np.float64]:
+        """Place (...) of nodes (...), the inverse of `number_at`."""
+        node = np.asarray(node, np.float64)
+        above = self.begin + (self.end - self.begin) * node / np.maximum(self.whole, 1e-9)
+        part = np.clip(1 + node / np.maximum(self.below, 1e-9), 0, 1)
+        return np.where(node >= 0, above, self.begin * part ** (1 / np.asarray(self.power)))
+
+
 class Nodes(NamedTuple):
-    """Where children of one sort are on axes that are not full-grown, see `node_at`.
+    """Where children of one sort are on axes that are not full-grown, see `law`.
 
     Attributes
     ----------
@@ -108,6 +126,10 @@ class Nodes(NamedTuple):
     extra: float = 0.0
     fresh: float = 0.0
 
+    def law(self, number: float) -> NodeLaw:
+        """The law of nodes of which so many are alive now."""
+        return NodeLaw(self.begin, self.end, self.power, self.whole * number, self.below * number)
+
 
 @dataclass(frozen=True)
 class PartGrown:
@@ -134,33 +156,6 @@ class PartGrown:
     dead: Nodes
     conical: float = 0.0
     ramps: tuple[float, float] = (0.0, 0.0)
-
-
-def node_at(place: ArrayLike, begin: ArrayLike, end: ArrayLike, power: ArrayLike, whole: ArrayLike, below: ArrayLike):
-    """Number (...) of nodes from where the crown begins to places (...) on the full-grown axis, negative below that.
-
-    Parameters
-    ----------
-    place, begin, end : (...) float64
-        Fractions of the full-grown length.
-    power : (...) float64
-    whole, below : (...) float64
-        Number of nodes from ``begin`` to ``end`` (and on, as densely), and from the foot to ``begin``.
-    """
-    place, begin = np.asarray(place, np.float64), np.asarray(begin, np.float64)
-    above = whole * (place - begin) / np.maximum(end - begin, 1e-9)
-    part = np.clip(place / np.maximum(begin, 1e-9), 0, 1)
-    return np.where(place >= begin, above, below * (part**power - 1))
-
-
-def place_at(
-    node: ArrayLike, begin: ArrayLike, end: ArrayLike, power: ArrayLike, whole: ArrayLike, below: ArrayLike
-) -> NDArray[np.float64]:
-    """Place (...) of nodes (...), the inverse of `node_at`."""
-    node = np.asarray(node, np.float64)
-    above = begin + (end - begin) * node / np.maximum(whole, 1e-9)
-    part = np.clip(1 + node / np.maximum(below, 1e-9), 0, 1)
-    return np.where(node >= 0, above, begin * part ** (1 / np.asarray(power)))
 
 
 #: Lowest part of the children that live for a while in which they are the shorter the sooner they go.

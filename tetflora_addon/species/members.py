@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
 from .extras import dead_part
-from .growing import faded, node_at, place_at, shortened, some_nodes
+from .growing import faded, shortened, some_nodes
 from .species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts, whole_cuts
 
 _FRACTIONS = (np.arange(256) + 0.5) / 256
@@ -87,12 +87,12 @@ def _laterals(order: Order) -> tuple[NDArray[np.float64], NDArray[np.float64], N
     at = start + (1 - start) * fraction
     own = order.growing
     if own is not None and order.branches.mean > 0:
-        nodes, number = own.laterals, order.branches.mean
-        law = nodes.begin, nodes.end, nodes.power, nodes.whole * number, nodes.below * number
-        base, tip = node_at(np.array([start, nodes.until]) * own.now, *law)
+        nodes = own.laterals
+        law = nodes.law(order.branches.mean)
+        base, tip = law.number_at(np.array([start, nodes.until]) * own.now)
         tip = base + nodes.kept * (tip - base)
         node, weight, extra = some_nodes((base, tip - nodes.fresh * (tip - base), tip), nodes.extra)
-        at = np.clip(place_at(node, *law) / own.now, 0, 1)
+        at = np.clip(law.place_of(node) / own.now, 0, 1)
         fraction = nodes.kept * (node - base) / max(tip - base, 1e-9)
         shorter = faded(fraction, nodes.kept * (1 - nodes.fresh), extra) * shortened(fraction, own.conical, *own.ramps)
     return at, shorter * _ratios(order, fraction), weight

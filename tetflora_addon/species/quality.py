@@ -21,8 +21,8 @@ import numpy as np
 from ..errors import SpeciesError
 from ..leaves.models import LeafModel
 from .members import Members, expected_members, expected_polygons
-from .schema import MAX_POLYGONS, ORDER_KEYS, QUALITY_LIMITS
-from .species import LEAF_KINDS, Order, Range, Species
+from .schema import MAX_POLYGONS, ORDER_KEYS
+from .species import LEAF_KINDS, QUALITY_LIMITS, Order, Range, Species
 
 _FEW = 12.0  # a kind with no more members than this keeps them all
 _SHAPE_PACE = 1.0  # how much sooner than members a trunk's sides and segments go; of twigs, `_TWIG_PACE` more
@@ -48,7 +48,7 @@ def with_quality(species: Species, quality: float) -> Species:
     species : Species
         As described.
     quality : float
-        Within `schema.QUALITY_LIMITS`; 1 returns the species itself.
+        Within `species.QUALITY_LIMITS`; 1 returns the species itself.
 
     Returns
     -------

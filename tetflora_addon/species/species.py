@@ -8,12 +8,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
+from ..parameters import Colour, Range, Rgb, described, limited, named
 from .ecology import Ecology
 from .growing import Ages, PartGrown
 from .skeletons import Skeleton
@@ -24,231 +24,163 @@ LEAF_ENVELOPES = ("none", "sphere", "cylinder", "cone", "box")
 """Solids around a branch that leaves may fill."""
 LEAF_INCLINATIONS = ("branch", "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform")
 """How leaves stand: as the branch has it, or by a distribution of the angle between their normals and its axis."""
+CROWN_SHAPES = (
+    "conical",
+    "spherical",
+    "hemispherical",
+    "cylindrical",
+    "tapered",
+    "flame",
+    "inverse conical",
+    "tend flame",
+    "receding",
+)
+"""Names of the shapes, in the order of their numbers (Weber and Penn, SIGGRAPH 1995, section 4.3), and one more."""
 BARKS = (
     "ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed", "netted", "peeling", "scaly",
     "interlaced", "pitted", "papery",
 )  # fmt: skip
 """Characters of bark that materials know."""
+QUALITY_LIMITS = (0.001, 1000.0)
 
 
 #: A fork is there once its stems are so long, in lengths of the full-grown branch.
 _FORKS_FROM = 1e-4
 
 
-class Range(NamedTuple):
-    """A value that differs from branch to branch: uniform in mean ± variation."""
-
-    mean: float
-    variation: float = 0.0
-
-    @property
-    def low(self) -> float:
-        """Smallest possible value."""
-        return self.mean - self.variation
-
-    @property
-    def high(self) -> float:
-        """Largest possible value."""
-        return self.mean + self.variation
-
-
-class Colour(NamedTuple):
-    """A linear colour that differs from leaf to leaf: mean ± variation, all channels together."""
-
-    mean: tuple[float, float, float]
-    variation: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Order:
-    """One branch order; order 0 is the trunk.
+    """One branch order; order 0 is the trunk. Lengths of others are also times the ``crown`` shape of the parent."""
 
-    Attributes
-    ----------
-    length : Range
-        Order 0: metres. Others: fraction of the parent's length, times the parent's ``crown`` shape.
-    thickness : Range
-        Order 0: radius at the base as a fraction of the length. Others: fraction of the parent's radius at the fork.
-    taper : Range
-        Radius at the tip as a fraction of the radius at the base.
-    flare : float
-        How much thicker the very base is, as a fraction of the radius.
-    pipe : float
-        Exponent of the pipe model, which then shapes the branch and its children's radii; 0 for plain ratios.
-    segments, sides : int
-        Straight pieces along, and faces around, a branch.
-    curvature : Range
-        Degrees by which a branch bends over its length; positive bends back towards the parent's direction.
-    curvature_tip : float
-        Degrees by which it would bend over its length if all of it bent like its outer half.
-    attraction : Range
-        Degrees by which it turns to the sky over its length where it lies level; negative to the ground.
-    spray : float
-        How far branches leave their parent level, to its left and right, instead of all around.
-    whorl : int
-        Branches that leave the parent at one place: 1 alternate, 2 opposite, more a whorl.
-    angle : Range
-        Degrees between parent and branch, for branches at the parent's base.
-    angle_tip : float
-        The same for branches at the parent's tip; linear between.
-    azimuth : Range
-        Degrees around the parent from one branch to the next.
-    branches : Range
-        Number of branches of the next order on one branch of this one.
-    branch_start : Range
-        Fraction of the branch that stays bare of branches.
-    forks : Range
-        Stems into which the branch divides; 0 where it does not.
-    fork_at : float
-        Fraction of the length at which it does so first.
-    fork_angle : Range
-        Degrees by which each stem turns away.
-    fork_levels : int
-        How many times it divides, at even distances from there to the tip.
-    spurs : Range
-        Number of the species' short shoots on one branch.
-    spur_start : Range
-        Fraction of the branch that stays bare of them.
-    crown : str
-        How the length of the children varies along the branch, see `CROWN_SHAPES`.
-    count_by_length : float
-        How far the numbers of branches and leaves follow the branch's length: 0 not at all, 1 in proportion.
-    leaves : Range
-        Number of leaves on one branch of this order itself.
-    leaf_kind : str
-        Which of `LEAF_KINDS` the branch bears.
-    leaf_whorl : int
-        Leaves at one place: 2 opposite, more a whorl or a fascicle.
-    leaf_start : Range
-        Fraction of the branch that stays bare of leaves.
-    leaf_size : Range
-        Metres by which the leaf model, one unit long, is scaled.
-    leaf_angle : Range
-        Degrees between branch and leaf.
-    leaf_azimuth : Range
-        Degrees around the branch from one leaf to the next.
-    leaf_light : Range
-        0: a leaf's upper side faces the tip of its branch; 1: it faces the sky.
-    leaf_light_tip : float
-        The same of leaves at the outside of the crown.
-    leaf_spray : float
-        How far leaves stand level to the left and right of their branch, instead of all around.
-    leaf_droop : float
-        0: a leaf keeps its direction; 1: it hangs down.
-    leaf_size_tip : float
-        Size of leaves at the outside of the crown, as a factor on that of those inside.
-    leaf_size_young : float
-        Size of leaves at the end of a branch, as a factor on what it would be elsewhere.
-    branch_colour, leaf_colour : Colour
-        Linear RGB; of leaves, inside the crown.
-    leaf_colour_tip : tuple of float
-        Mean colour of leaves at the outside of the crown.
-    leaf_colour_young : tuple of float
-        Mean colour of leaves at the end of a branch, inside the crown.
-    leaf_envelope : str
-        Which of `LEAF_ENVELOPES` the leaves fill, from where they begin to the tip of the branch.
-    leaf_envelope_radius : float
-        Its radius, or half of the side of a box, as a fraction of the branch's length.
-    leaf_inclination : str
-        Which of `LEAF_INCLINATIONS` the leaves have.
-    growing : PartGrown or None
-        How far it has grown; None where it is as long as it will be.
-    """
-
-    length: Range
-    thickness: Range
-    taper: Range
-    flare: float
-    pipe: float
-    segments: int
-    sides: int
-    curvature: Range
-    curvature_tip: float
-    attraction: Range
-    angle: Range
-    angle_tip: float
-    azimuth: Range
-    spray: float
-    whorl: int
-    branches: Range
-    branch_start: Range
-    crown: str
-    count_by_length: float
-    forks: Range
-    fork_at: float
-    fork_angle: Range
-    fork_levels: int
-    spurs: Range
-    spur_start: Range
-    leaf_kind: str
-    leaves: Range
-    leaf_whorl: int
-    leaf_start: Range
-    leaf_size: Range
-    leaf_size_tip: float
-    leaf_size_young: float
-    leaf_angle: Range
-    leaf_azimuth: Range
-    leaf_light: Range
-    leaf_light_tip: float
-    leaf_spray: float
-    leaf_droop: float
-    branch_colour: Colour
-    leaf_colour: Colour
-    leaf_colour_tip: tuple[float, float, float]
-    leaf_colour_young: tuple[float, float, float]
-    leaf_envelope: str = "none"
-    leaf_envelope_radius: float = 0.5
-    leaf_inclination: str = "branch"
+    length: Range = limited(
+        ..., 0.001, 200, "length of a branch", "m for the trunk, otherwise fraction of the parent's length"
+    )
+    thickness: Range = limited(
+        ..., 0.001, 1, "radius at the base", "fraction of the trunk's length, or of the parent's radius"
+    )
+    taper: Range = limited(Range(0.3, 0), 0, 1, "radius at the tip", "fraction of the base radius")
+    flare: float = limited(0.0, 0, 4, "extra thickness at the very base", "fraction of the radius")
+    pipe: float = limited(
+        0.0,
+        0,
+        4,
+        "exponent of the pipe model, which divides the radius of a branch among its children (2 is Leonardo's rule; "
+        "values below 1 count as 1); 0 makes the thickness of a child a fraction of the parent's radius there",
+    )
+    segments: int = limited(1, 1, 32, "straight segments along a branch")
+    sides: int = limited(4, 3, 64, "faces around a branch")
+    curvature: Range = limited(
+        Range(0, 0), -360, 360, "bend along the length; positive bends towards the parent", "degrees"
+    )
+    curvature_tip: float = limited(
+        ...,
+        -360,
+        360,
+        "bend of the outer half of the branch (default: same as curvature)",
+        "degrees",
+        follows="curvature",
+    )
+    attraction: Range = limited(
+        Range(0, 0), -360, 360, "turn of a level branch towards the sky; negative turns down", "degrees"
+    )
+    angle: Range = limited(Range(0, 0), 0, 180, "angle between branch and parent, at the parent's base", "degrees")
+    angle_tip: float = limited(
+        ..., 0, 180, "the same at the parent's tip (default: same as angle)", "degrees", follows="angle"
+    )
+    azimuth: Range = limited(Range(137.5, 10), -360, 360, "rotation around the parent between branches", "degrees")
+    spray: float = limited(0.0, 0, 1, "how strongly branches spread horizontally to both sides of their parent")
+    whorl: int = limited(1, 1, 12, "branches at each node: 1 alternate, 2 opposite, 3 or more a whorl")
+    branches: Range = limited(Range(0, 0), 0, 10_000, "number of branches of the next order on each branch")
+    branch_start: Range = limited(Range(0.1, 0), 0, 0.99, "part at the base without branches", "fraction of the length")
+    crown: str = named("cylindrical", CROWN_SHAPES, "how the length of child branches varies along the branch")
+    count_by_length: float = limited(
+        0.0,
+        0,
+        1,
+        "how much the number of branches and leaves decreases on shorter branches: 0 not at all, 1 in proportion",
+    )
+    forks: Range = limited(Range(0, 0), 0, 8, "number of stems that the branch forks into; 0 disables forking")
+    fork_at: float = limited(0.5, 0.05, 0.95, "position of the first fork", "fraction of the length")
+    fork_angle: Range = limited(Range(25, 8), 0, 120, "angle by which each stem turns away", "degrees")
+    fork_levels: int = limited(1, 1, 4, "number of successive forks, evenly spaced up to the tip")
+    spurs: Range = limited(Range(0, 0), 0, 10_000, "number of short shoots on each branch, as defined by spur")
+    spur_start: Range = limited(
+        Range(0.1, 0), 0, 0.99, "part at the base without short shoots", "fraction of the length"
+    )
+    leaf_kind: str = named("leaf", LEAF_KINDS, "what grows on the branch: the leaf or the blossom of the species")
+    leaves: Range = limited(Range(0, 0), 0, 100_000, "number of leaves directly on each branch of this order")
+    leaf_envelope: str = named(
+        "none", LEAF_ENVELOPES, "solid around the branch that leaves fill evenly, instead of sitting on its axis"
+    )
+    leaf_envelope_radius: float = limited(
+        0.5, 0.001, 20, "radius of the solid; of a box half of its side", "fraction of the length"
+    )
+    leaf_inclination: str = named(
+        "branch", LEAF_INCLINATIONS, "distribution of the angle between leaf normals and the axis of the branch"
+    )
+    leaf_whorl: int = limited(1, 1, 64, "leaves at each node: 1 alternate, 2 opposite, 3 or more a whorl")
+    leaf_start: Range = limited(Range(0.1, 0), 0, 0.99, "part at the base without leaves", "fraction of the length")
+    leaf_size: Range = limited(Range(0.08, 0.02), 0.0005, 20, "length of a leaf", "m")
+    leaf_size_tip: float = limited(1.0, 0.05, 5, "size of leaves at the outside of the crown", "fraction of leaf_size")
+    leaf_size_young: float = limited(
+        1.0, 0.05, 5, "size of young leaves, those at the ends of the branches", "fraction of the size"
+    )
+    leaf_angle: Range = limited(Range(50, 15), 0, 180, "angle between branch and leaf", "degrees")
+    leaf_azimuth: Range = limited(Range(137.5, 20), -360, 360, "rotation around the branch between leaves", "degrees")
+    leaf_light: Range = limited(Range(0.5, 0), 0, 1, "how strongly leaves turn towards the sky")
+    leaf_light_tip: float = limited(
+        ...,
+        0,
+        1,
+        "how strongly leaves turn towards the sky at the outside of the crown (default: same as leaf_light)",
+        follows="leaf_light",
+    )
+    leaf_spray: float = limited(0.0, 0, 1, "how strongly leaves spread horizontally to both sides of their branch")
+    leaf_droop: float = limited(0.0, 0, 1, "how strongly leaves hang down")
+    branch_colour: Colour = described(Colour((0.16, 0.11, 0.07), (0.04, 0.03, 0.02)), "color of the bark", "linear RGB")
+    leaf_colour: Colour = described(Colour((0.08, 0.19, 0.03), (0.03, 0.06, 0.01)), "color of the leaves", "linear RGB")
+    leaf_colour_tip: Rgb = described(
+        ...,
+        "color of leaves at the outside of the crown (default: same as leaf_colour)",
+        "linear RGB",
+        follows="leaf_colour",
+    )
+    leaf_colour_young: Rgb = described(
+        ...,
+        "color of young leaves, at the ends of the branches, inside the crown; those outside differ from it as other "
+        "leaves do (default: same as leaf_colour)",
+        "linear RGB",
+        follows="leaf_colour",
+    )
+    #: How far it has grown; None where it is as long as it will be.
     growing: PartGrown | None = None
 
 
 @dataclass(frozen=True)
 class Bud:
-    """The buds of shoots with leaves: one at the end of each, others in the axils of its leaves.
+    """The buds of shoots with leaves: one at the end of each, others in the axils of its leaves."""
 
-    Attributes
-    ----------
-    length : float
-        Metres.
-    width : float
-        Fraction of the length.
-    lateral : float
-        Fraction of the leaves with a bud in their axil.
-    colour : tuple of float
-        Linear RGB.
-    """
-
-    length: float
-    width: float
-    lateral: float
-    colour: tuple[float, float, float]
+    length: float = limited(0.005, 0.0005, 0.1, "length", "m")
+    width: float = limited(0.5, 0.05, 1.5, "width, fraction of the length")
+    lateral: float = limited(1.0, 0, 1, "fraction of the leaves with a bud in their axil")
+    colour: Rgb = described((0.11, 0.06, 0.035), "color")
 
 
 @dataclass(frozen=True)
 class Dead:
     """Dead branches of a trunk below and in the lower crown: broken off or bare.
 
-    Attributes
-    ----------
-    number : Range
-        On the trunk.
-    low, high : float
-        Where they begin, as a fraction of the part that is bare of branches, and end, as a fraction of the rest.
-    on_limbs : Range
-        On each limb (branch of order 1), likewise.
-    orders : tuple of Order
-        The dead branches; then, if any, the twigs on these.
+    ``orders`` are the dead branches; then, if any, the twigs on these.
     """
 
-    number: Range
-    low: float
-    high: float
-    on_limbs: Range
-    orders: tuple[Order, ...]
+    number: Range = limited(Range(10, 4), 0, 1000, "number on the trunk")
+    low: float = limited(0.25, 0, 0.95, "where they begin, fraction of what is bare of branches", written="from")
+    high: float = limited(0.12, 0.01, 0.95, "where they end, fraction of the rest", written="into")
+    on_limbs: Range = limited(Range(0, 0), 0, 1000, "number on each limb (branch of order 1), likewise")
+    orders: tuple[Order, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Species:
     """A species as read from its file.
 
@@ -261,22 +193,10 @@ class Species:
     leaf, blossom : tuple of LeafModel or str
         Forms of the sample leaf, and of blossoms or fruit, where there are any; each leaf has one of them by chance. A
         string is the name of a Blender mesh object, which the bridge to Blender replaces by a model.
-    leaf_transmission, blossom_transmission : float
-        Fraction of the light scattered by a leaf or blossom that goes through it, 0 to 1.
     spur : Order or None
         A short shoot; its length is in metres and its thickness a fraction of that, as for a trunk.
     bud : Bud or None
     dead : Dead or None
-    bark : str
-        One of `BARKS`.
-    quality : float
-        Polygons of a plant, of those that the description gives; compiling applies it.
-    habit : float
-        How far trees, which stand free as described, are those of a dense stand, 0 to 1; compiling applies it.
-    stand_leaves : float
-        Fraction of the leaves on a twig that are left in a dense stand, 0.05 to 1.
-    exact : bool
-        Every plant is the same: ranges have their means, and seeds do not matter.
     form : Skeleton or None
         Trunk and lower orders modelled by hand; only the orders above are grown.
     aged : (Species, float) or None
@@ -290,21 +210,21 @@ class Species:
     """
 
     identifier: str
-    name: str
-    description: str
+    name: str = limited(..., 1, 1000, "name")
+    description: str = described("", "description")
     orders: tuple[Order, ...]
     leaf: tuple[LeafModel | str, ...]
-    leaf_transmission: float = 0.4
+    leaf_transmission: float = limited(0.4, 0, 1, "fraction of the light scattered by a leaf that goes through it")
     blossom: tuple[LeafModel | str, ...] = ()
-    blossom_transmission: float = 0.4
+    blossom_transmission: float = limited(0.4, 0, 1, "the same of blossoms or fruit")
     spur: Order | None = None
     bud: Bud | None = None
     dead: Dead | None = None
-    bark: str = "ridged"
-    quality: float = 1.0
-    habit: float = 0.0
-    stand_leaves: float = 1.0
-    exact: bool = False
+    bark: str = named(BARKS[0], BARKS, "character of the bark")
+    quality: float = limited(1.0, *QUALITY_LIMITS, "polygons of a plant, of those that the description gives")
+    habit: float = limited(0.0, 0, 1, "how far trees are those of a dense stand, not free ones as described")
+    stand_leaves: float = limited(1.0, 0.05, 1, "fraction of the leaves on a twig that are left in a dense stand")
+    exact: bool = described(False, "whether all plants are the same: ranges have their means, and seeds do not matter")
     form: Skeleton | None = None
     aged: tuple[Species, float] | None = None
     year: Year | None = None
@@ -335,20 +255,6 @@ def whole_cuts(order: Order) -> list[float]:
         return cuts
     reached = max(sum(cut < order.growing.now - _FORKS_FROM for cut in cuts[:-1]), 1)
     return cuts[: reached + 1]
-
-
-CROWN_SHAPES = (
-    "conical",
-    "spherical",
-    "hemispherical",
-    "cylindrical",
-    "tapered",
-    "flame",
-    "inverse conical",
-    "tend flame",
-    "receding",
-)
-"""Names of the shapes, in the order of their numbers (Weber and Penn, SIGGRAPH 1995, section 4.3), and one more."""
 
 
 def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[np.float64]:

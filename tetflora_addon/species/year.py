@@ -12,6 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..parameters import FileReader, Rgb, described, limited
+
 DAYS = 365.0
 """Length of the year; a date beyond it is one of the next year."""
 MAX_AUTUMN = 4
@@ -24,55 +26,30 @@ _SPRING_DAYS, _AUTUMN_DAYS = 2.2, 2.0
 _MIDSUMMER, _MIDWINTER = 190.0, 10.0
 #: No leaf is farther from the mean than so many standard deviations.
 _FARTHEST = 2.8
-LEAF_YEAR_KEYS = (
-    "appear", "appear_spread", "growth", "fresh", "turn", "turn_spread", "turning", "autumn", "fall", "fall_spread",
-    "dry", "kept", "turnover",
-)  # fmt: skip
-YEAR_KEYS = ("latitude", "spring", "autumn", "leaf", "blossom", "fallen", "source")
-#: Of dead leaves that hang on, linear RGB.
-_DRY = (0.21, 0.115, 0.052)
-
-Rgb = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class LeafYear:
     """The year of one kind of leaves; those of a plant differ by what their keys say.
 
-    Attributes
-    ----------
-    appear, turn, fall : float
-        Days on which half of the leaves have appeared, changed their colour, and fallen; each later than the one before
-        by less than a year. The latter two may lie in the next year.
-    appear_spread, turn_spread, fall_spread : float
-        Standard deviations among the leaves of a plant, days; of the fall, beyond that of the change of colour.
-    growth, turning : float
-        Days in which a leaf grows to its full size, and in which it changes its colour.
-    fresh : tuple of float, optional
-        Linear RGB of a leaf that has just appeared; as in summer where it is None.
-    autumn : tuple of tuple of float
-        Linear RGB of leaves that have turned, at most `MAX_AUTUMN` of them; none for leaves that fall as they are.
-    dry : tuple of float
-        Linear RGB of dead leaves that hang on.
-    kept : float
-        Fraction of the leaves that hang on, dry, until the next ones appear.
-    turnover : float
-        Fraction of the leaves that all this happens to each year; others stay as they are.
+    Days on which half of the leaves have done a thing come each later than the one before by less than a year; those
+    beyond `DAYS` lie in the next year. Spreads are standard deviations among the leaves of a plant.
     """
 
-    appear: float
-    turn: float
-    fall: float
-    appear_spread: float = 4.0
-    growth: float = 25.0
-    fresh: Rgb | None = None
-    turn_spread: float = 8.0
-    turning: float = 14.0
+    appear: float = limited(..., 1, DAYS, "day on which half of the leaves have appeared")
+    turn: float = limited(..., 1, 2 * DAYS, "day on which half of them have changed their color")
+    fall: float = limited(..., 1, 2 * DAYS, "day on which half of them have fallen")
+    appear_spread: float = limited(4.0, 0, 60, "spread of the day on which they appear", "days")
+    growth: float = limited(25.0, 0, 120, "time in which a leaf grows to its full size", "days")
+    fresh: Rgb | None = described(None, "color of a leaf that has just appeared; as in summer without", "linear RGB")
+    turn_spread: float = limited(8.0, 0, 60, "spread of the day on which they turn", "days")
+    turning: float = limited(14.0, 0, 90, "time in which a leaf changes its color", "days")
+    #: Linear RGB of leaves that have turned, at most `MAX_AUTUMN` of them; none for leaves that fall as they are.
     autumn: tuple[Rgb, ...] = ()
-    fall_spread: float = 5.0
-    dry: Rgb = _DRY
-    kept: float = 0.0
-    turnover: float = 1.0
+    fall_spread: float = limited(5.0, 0, 60, "spread of the day on which they fall beyond that of turning", "days")
+    dry: Rgb = described((0.21, 0.115, 0.052), "color of dead leaves that hang on", "linear RGB")
+    kept: float = limited(0.0, 0, 1, "fraction of the leaves that hang on, dry, until the next ones appear")
+    turnover: float = limited(1.0, 0, 1, "fraction of the leaves that all this happens to each year; others stay")
 
     @property
     def middle(self) -> float:
@@ -87,29 +64,16 @@ class LeafYear:
 
 @dataclass(frozen=True)
 class Year:
-    """The year of a species.
+    """The year of a species; where it has none for leaves or blossoms, these are there all year."""
 
-    Attributes
-    ----------
-    latitude : float
-        Degrees north at which its dates hold.
-    spring, autumn : float
-        Days by which plants of one place are earlier or later than the mean, at most.
-    leaf, blossom : LeafYear, optional
-        Without one, leaves or blossoms are there all year.
-    fallen : bool
-        Nothing but leaves that have fallen: its plants are gone while there are none, and in a summer without days.
-    source : str
-        Where the dates are from.
-    """
-
-    latitude: float = 50.0
-    spring: float = 5.0
-    autumn: float = 7.0
+    latitude: float = limited(50.0, 0, 70, "latitude at which its dates hold", "degrees north")
+    spring: float = limited(5.0, 0, 40, "time by which plants of one place are earlier or later at most", "days")
+    autumn: float = limited(7.0, 0, 40, "the same in autumn", "days")
     leaf: LeafYear | None = None
     blossom: LeafYear | None = None
-    fallen: bool = False
-    source: str = ""
+    #: Plants are gone while there are none, and in a summer without days.
+    fallen: bool = described(False, "whether it is nothing but leaves that have fallen")
+    source: str = described("", "where the dates are from")
 
     def of_kind(self, kind: int) -> LeafYear | None:
         """That of a kind of leaves, by its index in `species.LEAF_KINDS`."""
@@ -149,55 +113,28 @@ def _days_north(day: float) -> float:
     return near * (_SPRING_DAYS if spring else -_AUTUMN_DAYS)
 
 
-def read_year(reader: Any, data: Any) -> Year | None:
-    """The key ``year`` of a species; None where there is none.
+def read_year(reader: FileReader, data: Any, name: str) -> Year:
+    """The key ``year`` of a species.
 
     Raises
     ------
     SpeciesError
         Names the field and what it may be.
     """
-    if data is None:
-        return None
-    reader.keys(data, "year", YEAR_KEYS)
-    kinds = {k: _read_leaf_year(reader, data[k], f"year.{k}") for k in ("leaf", "blossom") if k in data}
-    return Year(
-        latitude=reader.number(data.get("latitude", 50.0), "year.latitude", 0, 70),
-        spring=reader.number(data.get("spring", 5.0), "year.spring", 0, 40),
-        autumn=reader.number(data.get("autumn", 7.0), "year.autumn", 0, 40),
-        fallen=reader.truth(data.get("fallen", False), "year.fallen"),
-        source=reader.text(data.get("source", ""), "year.source", least=0),
-        **kinds,
-    )
+
+    def read(data: Any, name: str) -> LeafYear:
+        return _read_leaf_year(reader, data, name)
+
+    return reader.read(Year, data, name, {"leaf": read, "blossom": read})
 
 
-def _read_leaf_year(reader: Any, data: Any, name: str) -> LeafYear:
-    reader.keys(data, name, LEAF_YEAR_KEYS)
-    for key in ("appear", "turn", "fall"):
-        if key not in data:
-            raise reader.fail(f"{name}.{key}", "missing; add this key")
+def _read_leaf_year(reader: FileReader, data: Any, name: str) -> LeafYear:
+    def colours(value: Any, name: str) -> tuple[Rgb, ...]:
+        if not isinstance(value, list) or len(value) > MAX_AUTUMN:
+            raise reader.fail(name, f"must be a list of up to {MAX_AUTUMN} colors [r, g, b]")
+        return tuple(reader.rgb(one, f"{name}[{i}]") for i, one in enumerate(value))
 
-    def number(key: str, low: float, high: float) -> float:
-        return reader.number(data.get(key, getattr(LeafYear, key, None)), f"{name}.{key}", low, high)
-
-    appear = number("appear", 1, DAYS)
-    turn = number("turn", appear, appear + DAYS)
-    fall = number("fall", turn, appear + DAYS)
-    autumn = data.get("autumn", [])
-    if not isinstance(autumn, list) or len(autumn) > MAX_AUTUMN:
-        raise reader.fail(f"{name}.autumn", f"must be a list of up to {MAX_AUTUMN} colors [r, g, b]")
-    return LeafYear(
-        appear=appear,
-        turn=turn,
-        fall=fall,
-        appear_spread=number("appear_spread", 0, 60),
-        growth=number("growth", 0, 120),
-        fresh=reader.rgb(data["fresh"], f"{name}.fresh") if "fresh" in data else None,
-        turn_spread=number("turn_spread", 0, 60),
-        turning=number("turning", 0, 90),
-        autumn=tuple(reader.rgb(one, f"{name}.autumn[{i}]") for i, one in enumerate(autumn)),
-        fall_spread=number("fall_spread", 0, 60),
-        dry=reader.rgb(data.get("dry", list(_DRY)), f"{name}.dry"),
-        kept=number("kept", 0, 1),
-        turnover=number("turnover", 0, 1),
-    )
+    year = reader.read(LeafYear, data, name, {"autumn": colours})
+    reader.number(year.turn, f"{name}.turn", year.appear, year.appear + DAYS)
+    reader.number(year.fall, f"{name}.fall", year.turn, year.appear + DAYS)
+    return year

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import bilinear
 from ..errors import TetFloraError
 from ..species.ecology import Ecology
 
@@ -108,14 +109,7 @@ class StandSite:
 
     def ground(self, x: NDArray, y: NDArray) -> NDArray[np.float64]:
         """Altitude (n,) at places (n,) in metres from the corner, bilinear between the middles of cells."""
-        rows, columns = self.height.shape
-        u = np.clip(np.asarray(x) / self.cell - 0.5, 0, columns - 1)
-        v = np.clip(np.asarray(y) / self.cell - 0.5, 0, rows - 1)
-        i, j = np.minimum(v.astype(np.intp), max(rows - 2, 0)), np.minimum(u.astype(np.intp), max(columns - 2, 0))
-        i1, j1 = np.minimum(i + 1, rows - 1), np.minimum(j + 1, columns - 1)
-        s, t = u - j, v - i
-        z = self.height
-        return (z[i, j] * (1 - s) + z[i, j1] * s) * (1 - t) + (z[i1, j] * (1 - s) + z[i1, j1] * s) * t
+        return bilinear(self.height, np.stack([x, y], axis=1) / self.cell - 0.5)
 
     def suits(self, ecology: Ecology) -> NDArray[np.float64]:
         """How well a species grows in each cell, over how it does where nothing is wanting: (h w,), 0 to 1."""

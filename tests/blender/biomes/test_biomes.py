@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
 from tetflora_addon.blender.biomes import adding, files, ground, library, saving, stands
 from tetflora_addon.blender.biomes import biome as parts
+from tetflora_addon.blender.file_library import as_text
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.preferences import preferences
 from tetflora_addon.blender.species.edits import catalogue
@@ -116,7 +117,7 @@ def test_shipped_biomes_are_sound(path):
             else:
                 assert name in known or name in pages
     assert set(pages).isdisjoint(known), "species of a biome have names of their own"
-    assert files.as_text(json.loads(path.read_text(encoding="utf-8"))) == path.read_text(encoding="utf-8")
+    assert as_text(json.loads(path.read_text(encoding="utf-8"))) == path.read_text(encoding="utf-8")
     picture = library.picture_file(path)
     assert picture is not None and picture.stat().st_size <= 20_000
     assert biome.description and library.biomes()[path.stem].name == biome.name
@@ -169,10 +170,10 @@ def test_what_is_saved_comes_back():
     assert parts.pages_of(scene(), read) == parts.pages_of(scene(), given)
     with pytest.raises(SceneError, match="already has"):
         saving.save_biome(scene(), "Small", "", picture=False, replace=False)
-    library.delete("small")
+    library.OWN_FILES.delete("small")
     assert "small" not in library.biomes()
     with pytest.raises(SceneError, match="built-in"):
-        library.delete("meadow")
+        library.OWN_FILES.delete("meadow")
 
 
 def test_a_biome_whose_picture_another_program_has_open_stays(monkeypatch):
@@ -190,9 +191,9 @@ def test_a_biome_whose_picture_another_program_has_open_stays(monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(Path, "unlink", held)
         with pytest.raises(SceneError, match=r"Cannot delete small\.json: .* used by another process"):
-            library.delete("small")
+            library.OWN_FILES.delete("small")
     assert path.exists() and library.biomes()["small"].is_own
-    library.delete("small")
+    library.OWN_FILES.delete("small")
     assert not path.exists() and not picture.exists() and "small" not in library.biomes()
 
 
@@ -397,8 +398,8 @@ def test_nothing_is_left_of_what_fails(monkeypatch):
 def test_the_button_makes_land_where_there_is_none(monkeypatch):
     """On the selected ground otherwise; the startup's cube is none."""
     monkeypatch.setattr(ground, "SIDE", 8.0)
-    path = library.own_place("small")
-    path.write_text(files.as_text(SMALL), encoding="utf-8")
+    path = library.OWN_FILES.place("small")
+    path.write_text(as_text(SMALL), encoding="utf-8")
     library.look_again()
     assert bpy.ops.tetflora.add_biome(biome="small") == {'FINISHED'}
     land = bpy.context.object

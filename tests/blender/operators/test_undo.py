@@ -23,7 +23,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, sel
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import rules
-from tetflora_addon.blender.species.catalogue import delete_species_file
+from tetflora_addon.blender.species.catalogue import OWN_FILES
 from tetflora_addon.species import catalogue
 
 # Populations of the cases below: they are small, and of species that are quick to compile.
@@ -304,7 +304,7 @@ def test_a_species_that_was_loaded_can_be_undone(history, tmp_path):
         check("load_species", {"filepath": str(path)})
         assert scene().tetflora.species_editor.species == "shrub"
     finally:  # the copy in the user's folder is no part of the file, and stays when the step is undone
-        delete_species_file("shrub")
+        OWN_FILES.delete("shrub")
 
 
 @pytest.mark.parametrize("case", ["refine", "populate", "make_field", "remove_plants"])

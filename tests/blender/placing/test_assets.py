@@ -61,7 +61,7 @@ def test_thumbnails_are_small_squares_of_known_species():
 def _loaded(identifier):
     """Names of the thumbnails that Blender has loaded for a species; their icons have numbers only in a window."""
     icon_of(identifier)
-    return [name for name in catalogue._thumbnails if Path(name.partition("|")[0]).stem == identifier]
+    return [name for name in catalogue.thumbnails.loaded if Path(name.partition("|")[0]).stem == identifier]
 
 
 def test_a_species_without_a_picture_gets_an_icon(own_folder):
@@ -76,7 +76,7 @@ def test_a_picture_is_loaded_once_and_again_when_it_changes(own_folder):
     shutil.copy(thumbnail_file("bush"), thumbnail)
     assert thumbnail_file("mine") == thumbnail
     (first,) = _loaded("mine")
-    assert tuple(catalogue._thumbnails[first].image_size) == (128, 128)
+    assert tuple(catalogue.thumbnails.loaded[first].image_size) == (128, 128)
     assert _loaded("mine") == [first]
     os.utime(thumbnail, ns=(0, 0))
     assert set(_loaded("mine")) > {first}
@@ -90,9 +90,9 @@ def test_a_season_has_a_picture_of_its_own_where_there_is_one(own_folder):
     names = {}
     for season in ('SUMMER', 'AUTUMN', 'WINTER'):
         bpy.ops.tetflora.set_season(season=season)
-        catalogue._thumbnails.clear()
+        catalogue.thumbnails.loaded.clear()
         icon_of("mine")
-        names[season] = [Path(name.partition("|")[0]).name for name in catalogue._thumbnails]
+        names[season] = [Path(name.partition("|")[0]).name for name in catalogue.thumbnails.loaded]
     assert names == {'SUMMER': ["mine.png"], 'AUTUMN': ["mine.autumn.png"], 'WINTER': ["mine.png"]}
     year.enabled = False
     assert thumbnail_file("mine", "autumn").name == "mine.autumn.png"

@@ -16,7 +16,7 @@ import pytest
 from tests.attack import material
 from tests.blender.scenes import add_plant
 from tetflora_addon import errors, files
-from tetflora_addon.blender import preferences
+from tetflora_addon.blender import file_library, preferences
 from tetflora_addon.blender.species import catalogue as menus
 from tetflora_addon.blender.species import edits
 
@@ -70,7 +70,7 @@ def test_identifiers_from_a_file_lead_nowhere(own_folder, tmp_path, way):
         with pytest.raises(errors.SpeciesError):
             do(bpy.context.scene, identifier)
     with pytest.raises(errors.SpeciesError, match="no file in your species folder"):
-        menus.delete_species_file(identifier)
+        menus.OWN_FILES.delete(identifier)
     with pytest.raises(errors.SpeciesError, match="cannot name a species"):
         edits.store_species(bpy.context.scene, identifier, {})
     with pytest.raises(errors.SpeciesError, match="cannot name a species"):
@@ -81,9 +81,9 @@ def test_identifiers_from_a_file_lead_nowhere(own_folder, tmp_path, way):
 
 def test_a_rule_that_let_it_pass_would_not_be_enough(own_folder, tmp_path, monkeypatch):
     """The path is checked besides: it lies right in the folder, or nothing is written."""
-    monkeypatch.setattr(menus, "checked_identifier", lambda text: text)
+    monkeypatch.setattr(file_library, "is_identifier", lambda text: True)
     with pytest.raises(errors.SpeciesError, match="does not lie in its folder"):
-        menus._own_place("../secret")
+        menus.OWN_FILES.place("../secret")
 
 
 def test_attack_on_identifiers_of_a_file(own_folder, tmp_path):

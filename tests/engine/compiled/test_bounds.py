@@ -236,7 +236,7 @@ def test_samples_are_inside_the_bound(species: int) -> None:
             first, number = points.runs(some)
             for i in np.flatnonzero(number):
                 local = points.position[first[i] : first[i] + number[i]].astype(float)
-                radius, low, high = tight[i] + np.array([1, -1, 1]) * 1e-6 * (1.0 + np.abs(tight[i]))
+                radius, low, high = tight[i, :3] + np.array([1, -1, 1]) * 1e-6 * (1.0 + np.abs(tight[i, :3]))
                 assert np.hypot(local[:, 0], local[:, 1]).max() <= radius
                 assert local[:, 2].min() >= low
                 assert local[:, 2].max() <= high

@@ -20,7 +20,7 @@ from tetflora_addon.growth.growth import branch_counts, children, trunks
 from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.species.ages import with_age
-from tetflora_addon.species.growing import Ages, node_at, place_at
+from tetflora_addon.species.growing import Ages, NodeLaw
 from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.species.species import Species
 from tetflora_addon.subplants.pieces import wood_areas
@@ -62,9 +62,9 @@ def limbs(flora: Flora, number: int) -> tuple[Branches, Branches]:
     below=st.floats(0.1, 200),
 )
 def test_nodes_and_places_are_inverse(place: float, begin: float, power: float, whole: float, below: float) -> None:
-    law = begin, 1.0, power, whole, below
-    assert place_at(node_at(place, *law), *law) == pytest.approx(place, abs=1e-6 + 0.01 * begin)
-    assert node_at(place + 0.01, *law) >= node_at(place, *law)
+    law = NodeLaw(begin, 1.0, power, whole, below)
+    assert law.place_of(law.number_at(place)) == pytest.approx(place, abs=1e-6 + 0.01 * begin)
+    assert law.number_at(place + 0.01) >= law.number_at(place)
 
 
 @pytest.mark.parametrize("forks", [{}, FORKED], ids=["straight", "forked"])

@@ -14,17 +14,17 @@ from hypothesis import strategies as st
 from tetflora_addon.leaves.blades import blade_surface, crossings, outline
 from tetflora_addon.leaves.outlines import Blade, distance_to_links, simplified, traced
 from tetflora_addon.leaves.shapes import LEAF_SHAPES
+from tetflora_addon.parameters import keys_of
 
 BLADES = {name: shape for name, shape in LEAF_SHAPES.items() if isinstance(shape, Blade)}
 
 
 def limits(name: str) -> st.SearchStrategy:
     """Values of a field within its limits."""
-    (field,) = (f for f in dataclasses.fields(Blade) if f.name == name)
-    if "names" in field.metadata:
-        return st.sampled_from(field.metadata["names"])
-    low, high = field.metadata["low"], field.metadata["high"]
-    return st.integers(low, high) if isinstance(field.default, int) else st.floats(low, high)
+    key = keys_of(Blade)[name]
+    if key.choices:
+        return st.sampled_from(key.choices)
+    return st.integers(key.low, key.high) if key.kind == "integer" else st.floats(key.low, key.high)
 
 
 #: Blades as plants have them; what is far from that may be refused, see `check_outline`.

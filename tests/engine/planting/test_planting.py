@@ -365,7 +365,7 @@ def test_ground_that_cannot_be_is_refused_by_name():
     ("changes", "says"),
     [
         (dict(count=1000, min_distance=1.0), "at a Min Distance of 1 m"),
-        (dict(by_density=True, density=20.0, min_distance=1.0), "at a Min Distance of 1 m"),
+        (dict(by_density=True, density=20.0, min_distance=1.0), "closer than the Min Distance of 1 m"),
         (dict(by_density=True, density=1e-4), "less than one"),
         (dict(count=5000, weights=(1.0, 1.0), companions=(Companion(0, 0, -1.0, 1.0),)), "companion rules leave"),
         (dict(weights=(1.0, 0.0), companions=(Companion(0, 1, 1.0, 1.0),)), "companion rules leave"),

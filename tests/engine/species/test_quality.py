@@ -21,8 +21,8 @@ from tetflora_addon.growth.rows import build_rows
 from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.species.quality import with_quality
-from tetflora_addon.species.schema import ORDER_KEYS, QUALITY_LIMITS, species_from_dict
-from tetflora_addon.species.species import LEAF_KINDS, Range, Species
+from tetflora_addon.species.schema import ORDER_KEYS, species_from_dict
+from tetflora_addon.species.species import LEAF_KINDS, QUALITY_LIMITS, Range, Species
 
 KINDS = st.sampled_from(support.SPECIES)
 TOLERANCE = 0.1  # how far the expected polygons may be from those asked for, as a fraction of them

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ..attributes import members, read, values_of, world_matrix
 from ..materials.nodes import is_ours
-from ..scene.instances import references_of
-from ..scene.objects import ONE_BY_ONE, SURFACE_TYPES, has_nodes, rendered_objects
+from ..scene.instances import instanced
+from ..scene.objects import SURFACE_TYPES, collected, geometry_of, has_nodes, is_listed, listed_instances, materials_of
 from .material_digests import attributes_of, material_digest
 
 Slots = list[bpy.types.Material | None]
@@ -58,7 +58,10 @@ class AssetPart:
         """The mesh as it is evaluated, and its materials, while the context lasts; None if it has no faces."""
         if isinstance(self.shown, bpy.types.GeometrySet):
             mesh = self.shown.mesh
-            yield None if mesh is None or not len(mesh.polygons) else (mesh, _originals(mesh.materials))
+            if mesh is None or not len(mesh.polygons):
+                yield None
+            else:
+                yield mesh, [m.original if m is not None else None for m in mesh.materials] or [None]
             return
         obj = _evaluated(self.shown, depsgraph)
         try:
@@ -66,11 +69,7 @@ class AssetPart:
             if mesh is None or not len(mesh.polygons):
                 yield None
                 return
-            slots = _originals(mesh.materials)
-            for i, slot in enumerate(obj.material_slots):
-                if slot.link == 'OBJECT' and i < len(slots):
-                    slots[i] = slot.material.original if slot.material else None
-            yield mesh, slots
+            yield mesh, materials_of(obj, mesh)
         finally:
             obj.to_mesh_clear()
 
@@ -86,10 +85,6 @@ def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh | None:
         return obj.to_mesh()
     except RuntimeError:  # hair, of which nodes may have made a mesh all the same
         return None
-
-
-def _originals(materials: bpy.types.IDMaterials) -> Slots:
-    return [m.original if m is not None else None for m in materials] or [None]
 
 
 def parts_of(
@@ -135,16 +130,12 @@ class _Walk:
         path = (*path, obj)
         if not obj.is_instancer or obj.show_instancer_for_render or obj.instance_type == 'COLLECTION':
             self._own(obj, matrices)
-        if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
+        if is_listed(obj):
             self._one_by_one(obj, matrices)
             return
         if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             self.collection(obj.instance_collection, matrices, path)
-        if has_nodes(obj) and (evaluated := obj.evaluated_get(self.depsgraph)).is_evaluated:
-            try:
-                geometry = evaluated.evaluated_geometry()
-            except TypeError:  # an object without geometry
-                return
+        if has_nodes(obj) and (geometry := geometry_of(obj, self.depsgraph)) is not None:
             self._instances(geometry, matrices, path)
             if obj.type == 'CURVES' and geometry.mesh is not None:
                 self._add(obj, AssetPart(obj.name, geometry), matrices)
@@ -157,10 +148,8 @@ class _Walk:
                 "out of the collection, or let it instance another one"
             )
         path = (*path, collection)
-        back = np.eye(4)
-        back[:3, 3] = -np.array(collection.instance_offset)
-        for obj in sorted(rendered_objects(collection), key=lambda o: o.name_full):
-            self.object(obj, matrices @ (back @ world_matrix(obj, self.depsgraph)), path)
+        for obj, places in collected(collection, matrices, self.depsgraph):
+            self.object(obj, places, path)
 
     def geometry(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Path) -> None:
         """Take geometry without an object, with what it instances."""
@@ -171,22 +160,19 @@ class _Walk:
 
     def _instances(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Path) -> None:
         keys = np.zeros(len(matrices), np.uint64)
-        for target, rows in references_of(geometry):
-            places, _ = rows.within(matrices, keys)
+        for target, places, _ in instanced(geometry, matrices, keys):
             if isinstance(target, bpy.types.GeometrySet):
                 self.geometry(target, places, path)
             elif isinstance(target, bpy.types.Collection):
-                self.collection(target.original, places, path)
+                self.collection(target, places, path)
             else:
-                self.object(target.original, places, path)
+                self.object(target, places, path)
 
     def _one_by_one(self, obj: bpy.types.Object, matrices: NDArray[np.float64]) -> None:
         """Instances on vertices and faces, and of particles, which only Blender's own list has."""
         back = np.linalg.pinv(world_matrix(obj, self.depsgraph).astype(np.float64))
         found: dict[bpy.types.Object, list[NDArray[np.float64]]] = {}
-        for instance in self.depsgraph.object_instances:
-            if not instance.is_instance or not instance.show_self or instance.parent.original != obj:
-                continue
+        for _, instance in listed_instances(self.depsgraph, (obj,)):
             if instance.object.original != obj:
                 place = back @ np.array(instance.matrix_world, dtype=np.float64)
                 found.setdefault(instance.object.original, []).append(place)

@@ -18,8 +18,16 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ..attributes import world_matrix
-from ..scene.instances import Reference, name_keys, references_of
-from ..scene.objects import DEEPEST, ONE_BY_ONE, SURFACE_TYPES, has_nodes, renderable_objects
+from ..scene.instances import Reference, instanced, name_keys
+from ..scene.objects import (
+    DEEPEST,
+    SURFACE_TYPES,
+    geometry_of,
+    has_nodes,
+    is_listed,
+    listed_instances,
+    renderable_objects,
+)
 from ..scene.plants import AssetPlants, read_asset_plants
 from ..scene.scatterers import is_scatter
 from ..species.asset_species import TetFloraAssetSpecies, asset_species
@@ -198,7 +206,7 @@ def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     found, slow = {}, []
     for obj in objects:
         walk = found[obj] = _Walk(obj, depsgraph)
-        if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
+        if is_listed(obj):
             slow.append(obj)
         else:
             walk.shown(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), name_keys([obj]))
@@ -224,10 +232,6 @@ def shows_faces(target: Target, depsgraph: bpy.types.Depsgraph) -> bool:
 
 def _has_surface(geometry: bpy.types.GeometrySet) -> bool:
     return geometry.mesh is not None and len(geometry.mesh.polygons) > 0
-
-
-def _original(target: Reference) -> Reference:
-    return target if isinstance(target, bpy.types.GeometrySet) else target.original
 
 
 def _target(datablock: bpy.types.Object | bpy.types.Collection) -> Target:
@@ -268,7 +272,7 @@ class _Walk:
         """Take what an object instances."""
         if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             self.take(obj.instance_collection, places, keys, depth + 1)
-        if has_nodes(obj) and (geometry := self._geometry(obj)) is not None:
+        if has_nodes(obj) and (geometry := geometry_of(obj, self.depsgraph)) is not None:
             self._instances(geometry, places, keys, depth + 1)
 
     def take(self, shown: Reference, places: NDArray[np.float64], keys: NDArray, depth: int) -> None:
@@ -294,8 +298,8 @@ class _Walk:
             self.left[target.name] = self.left.get(target.name, 0) + len(keys)
 
     def _instances(self, geometry: bpy.types.GeometrySet, places: NDArray, keys: NDArray, depth: int) -> None:
-        for target, rows in references_of(geometry):
-            self.take(_original(target), *rows.within(places, keys), depth)
+        for one in instanced(geometry, places, keys):
+            self.take(*one, depth)
 
     def _is_group(self, shown: Reference) -> bool:
         """Whether something has no surface of its own, and instances a few others."""
@@ -304,31 +308,23 @@ class _Walk:
         if isinstance(shown, bpy.types.Object):
             if shown.type not in SURFACE_TYPES:
                 return shown.instance_type == 'COLLECTION' and shown.instance_collection is not None
-            if not has_nodes(shown) or shown.type != 'MESH' or (geometry := self._geometry(shown)) is None:
+            if not has_nodes(shown) or shown.type != 'MESH' or (geometry := geometry_of(shown, self.depsgraph)) is None:
                 return False
             shown = geometry
         points = shown.instances_pointcloud()
         return points is not None and 0 < len(points.points) <= MOST_IN_GROUP and not _has_surface(shown)
 
-    def _geometry(self, obj: bpy.types.Object) -> bpy.types.GeometrySet | None:
-        evaluated = obj.evaluated_get(self.depsgraph)
-        try:
-            return evaluated.evaluated_geometry() if evaluated.is_evaluated else None
-        except TypeError:  # a type without geometry
-            return None
-
 
 def _one_by_one(walks: dict[bpy.types.Object, _Walk], depsgraph: bpy.types.Depsgraph) -> None:
     """Instances of particles and on vertices and faces, which only Blender's own list has."""
     listed: dict[tuple[bpy.types.Object, bpy.types.Object], tuple[list, list]] = {}
-    for instance in depsgraph.object_instances:
-        if instance.is_instance and instance.show_self and (owner := instance.parent.original) in walks:
-            obj = instance.object
-            original = obj.original
-            if obj.type == original.type:  # parts of another type come once more
-                matrices, numbers = listed.setdefault((owner, original), ([], []))
-                matrices.append(instance.matrix_world.copy())
-                numbers.append(instance.random_id)
+    for owner, instance in listed_instances(depsgraph, walks):
+        obj = instance.object
+        original = obj.original
+        if obj.type == original.type:  # parts of another type come once more
+            matrices, numbers = listed.setdefault((owner, original), ([], []))
+            matrices.append(instance.matrix_world.copy())
+            numbers.append(instance.random_id)
     for (owner, original), (matrices, numbers) in listed.items():
         keys = child_key(name_keys([owner]), np.array(numbers, np.int64))
         walks[owner].add(_target(original), np.array(matrices, np.float64), keys)

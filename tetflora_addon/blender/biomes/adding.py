@@ -30,7 +30,7 @@ from ..runtime import GoneError, JobData, guarded, is_there
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
 from ..stands.growing import GrownStand, again_steps, is_stand
 from .biome import Biome, find_biome, layers_of, pages_of, set_limits
-from .ground import lay_soil, make_line
+from .ground import lay_biome_soil, make_line
 from .stands import grow_layer_steps, growing_of
 
 _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
@@ -221,7 +221,7 @@ def _plant(
     depsgraph.update()
     biome = find_biome(scene, uid)
     grounds = [entry.object for entry in biome.grounds if entry.object is not None] if biome is not None else []
-    kept = lay_soil(scene, depsgraph, grounds) if grounds else []
+    kept = lay_biome_soil(scene, depsgraph, grounds) if grounds else []
     return Added(biome.name if biome is not None else "", layers, bare, kept)
 
 

@@ -8,7 +8,6 @@ the name of the file and of the key.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -20,13 +19,13 @@ from ...errors import SceneError, SpeciesError, shown
 from ...files import IDENTIFIER_RULE, is_identifier, json_of, read_whole
 from ...planting.zones import Limits
 from ...species.schema import species_from_dict
+from ..file_library import MAX_FILE_BYTES
 from ..placing.file_checks import check_format, check_keys, check_text, check_value, list_of, refuse_constant, value_for
 from ..placing.population_data import check_population, population_data
 from ..placing.properties import TetFloraPopulation
 from ..placing.zones import limits_of_zone
 from ..species.edits import find_edit, species_data
 from .biome import GROUND, Biome, data_of
-from .library import MAX_FILE_BYTES
 from .properties import TetFloraBiome
 from .stands import check_stand, stand_data, stands_of
 
@@ -89,22 +88,6 @@ def checked(data: Any, identifier: str) -> Biome:
         _check_layer(f"layer {number}", layer)
     own = {key: data[key] for key in ("name", "layers", *sorted(_MORE)) if key in data}
     return Biome(identifier, **own)
-
-
-def as_text(data: Any) -> str:
-    """JSON as a person would write it: colors, entries of species and short objects on one line."""
-    return _text(data, "") + "\n"
-
-
-def _text(data: Any, indent: str) -> str:
-    line = json.dumps(data, ensure_ascii=False)
-    if not isinstance(data, dict | list) or not data or len(indent) + len(line) <= 100:
-        return line
-    inner = indent + "  "
-    if isinstance(data, list):
-        return "[\n" + ",\n".join(inner + _text(one, inner) for one in data) + f"\n{indent}]"
-    parts = [f"{inner}{json.dumps(key)}: {_text(value, inner)}" for key, value in data.items()]
-    return "{\n" + ",\n".join(parts) + f"\n{indent}}}"
 
 
 def biome_data(

@@ -17,7 +17,7 @@ from ...growth.hashing import key_of_seed
 from ...planting.canopy import Sheet
 from ...planting.plane import gradient_noise
 from ..attributes import world_matrix
-from ..materials.soil import is_soil, may_have_soil, put_soil, soil_material
+from ..materials.soil import SHADED, lay_soil, may_have_soil
 from ..placing.populations import own_objects
 from ..placing.terrain import grid_mesh, read_ground
 from ..scene.crowns import crown_for
@@ -33,8 +33,6 @@ _WAVES = ((46.0, 0.42), (17.0, 0.1), (5.0, 0.016))
 #: Of a valley, meters: half of its level floor, and from there to where it has half of its depth left; half the width
 #: and the depth of its brook.
 _FLOOR, _BANK, _BROOK, _DEEP = 7.0, 22.0, 4.5, 0.16
-#: How bright low plants are together, of how bright one blade is: they shade each other.
-_SHADED = 0.72
 
 
 def heights(
@@ -86,7 +84,9 @@ def make_line(scene: bpy.types.Scene, name: str, grounds: Iterable[bpy.types.Obj
     return made
 
 
-def lay_soil(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.Object]) -> list[str]:
+def lay_biome_soil(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.Object]
+) -> list[str]:
     """Give ground a soil in the colors of the low plants and the litter of all biomes on it.
 
     Returns
@@ -95,9 +95,8 @@ def lay_soil(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Se
         Names of grounds that keep a material of the artist's.
     """
     fits = [obj for obj in grounds if may_have_soil(obj)]
-    kept = [obj.name for obj in grounds if obj not in fits]
     if not fits:
-        return kept
+        return [obj.name for obj in grounds]
     triangles = read_ground(fits, depsgraph).triangles
     sheet = Sheet.over(triangles.reshape(-1, 3), _CELL, _MOST)
     cells = sheet.rows * sheet.columns
@@ -122,16 +121,11 @@ def lay_soil(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Se
     earth, turf, share = earth / here[:, None], turf / here[:, None], share / here
     square = sheet.cell**2
     lying = 1.0 - np.exp(-hidden / square)
-    mean = _SHADED * colour / np.maximum(hidden, 1e-12)[:, None]
+    mean = SHADED * colour / np.maximum(hidden, 1e-12)[:, None]
     ground = earth + (lying * (1.0 - share))[:, None] * (mean - earth)
-    before = next((slot.material for obj in fits for slot in obj.material_slots if is_soil(slot.material)), None)
     shape = sheet.rows, sheet.columns
-    size = sheet.cell * np.array([sheet.columns, sheet.rows])
-    material = soil_material(
-        "Land", ground.reshape(*shape, 3), share.reshape(shape), turf.mean(axis=0), sheet.low, size, before
-    )
-    put_soil(fits, material)
-    return kept
+    earth, share = ground.reshape(*shape, 3), share.reshape(shape)
+    return lay_soil("Land", grounds, earth, share, turf.mean(axis=0), sheet.low, sheet.cell)
 
 
 def _low_plants(

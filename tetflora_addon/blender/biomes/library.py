@@ -6,7 +6,6 @@ The user's are in the folder ``biomes`` within that of the user's own species; o
 it. A picture has the file's name and lies beside it.
 """
 
-import os
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,18 +14,15 @@ from typing import Any
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
-from bpy.utils import previews
 
 from ...errors import NAME, SceneError, readable
-from ...files import inside, is_identifier, is_regular, json_of, read_whole, write_whole
+from ...files import is_identifier, is_regular, json_of, read_whole
+from ..file_library import ENDING, MAX_FILE_BYTES, OwnFiles, Pictures
 from ..preferences import own_species_folder, species_folders
 from ..species.catalogue import Item, number_of
 
 FOLDER = "biomes"
-ENDING = ".json"
 PICTURES = (".jpg", ".png")
-MAX_FILE_BYTES = 4_000_000
-MAX_PICTURE_BYTES = 4_000_000
 #: Identifier of the only item when there is nothing to choose, and the icon of what has no picture.
 NO_BIOME, FALLBACK_ICON = "NONE", 'WORLD'
 
@@ -34,7 +30,7 @@ NO_BIOME, FALLBACK_ICON = "NONE", 'WORLD'
 _TRUSTED = 0.0 if bpy.app.background else 1.0
 _seen: tuple[float, dict[str, "BiomeInfo"]] | None = None
 _kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
-_pictures: previews.ImagePreviewCollection | None = None
+pictures = Pictures()
 
 
 @dataclass(frozen=True)
@@ -69,7 +65,7 @@ def biomes() -> dict[str, BiomeInfo]:
     now = time.monotonic()
     if _seen is None or now - _seen[0] >= _TRUSTED:
         found = {}
-        for folder in (builtin_folder(), *(folder / FOLDER for folder in species_folders())):
+        for folder in (builtin_folder(), *_own_folders()):
             for path in sorted(folder.glob("*" + ENDING)) if folder.is_dir() else ():
                 if is_identifier(path.stem) and is_regular(path):
                     found[path.stem] = _info(path)
@@ -95,11 +91,7 @@ def picture_file(path: Path) -> Path | None:
 
 def icon_of(info: BiomeInfo) -> int:
     """Number of a biome's picture for items and layouts, loaded at first use; 0 where it has none."""
-    path = picture_file(info.path)
-    if path is None or _pictures is None:
-        return 0
-    name = f"{path}|{path.stat().st_mtime_ns}"  # so that a replaced file is loaded again
-    return (_pictures.get(name) or _pictures.load(name, str(path), 'IMAGE')).icon_id
+    return pictures.icon_of(picture_file(info.path))
 
 
 def items(_owner: object = None, _context: bpy.types.Context | None = None) -> list[Item]:
@@ -139,84 +131,18 @@ def _choose(group: BiomeChoice, number: int) -> None:
     group.biome_file = next((one for one in biomes() if number_of(one) == number), "")
 
 
-def own_place(identifier: str) -> Path:
-    """Where the user's own file of a biome belongs; the folder is made if it is missing.
-
-    Raises
-    ------
-    SceneError
-        It would not lie in the folder, or there is no folder.
-    SpeciesError
-        There is no folder for the user's own species.
-    """
+def _own_folder() -> Path:
     folder = own_species_folder() / FOLDER
-    if not is_identifier(identifier):
-        raise SceneError(f'"{readable(identifier, NAME)}" cannot name a biome\'s file; rename it')
     try:
         folder.mkdir(exist_ok=True)
-        return inside(folder, identifier + ENDING)
     except OSError as error:
         raise SceneError(f"{folder}: {error.strerror}") from None
+    return folder
 
 
-def store(identifier: str, content: bytes | str, picture: Path | None, replace: bool) -> Path:
-    """Put a biome, which was checked, into the user's folder, with a picture.
-
-    Raises
-    ------
-    SceneError
-        Another one of its name is there and shall not be replaced, or it cannot be written.
-    """
-    target = own_place(identifier)
-    try:
-        if os.path.lexists(target) and not replace:
-            raise SceneError(
-                f'Your folder of biomes already has "{identifier}"; turn on Replace, or choose another name'
-            )
-        data = None if picture is None else read_whole(picture, MAX_PICTURE_BYTES)
-        write_whole(target, content)
-        if data is not None:
-            for ending in PICTURES:
-                target.with_suffix(ending).unlink(missing_ok=True)
-            write_whole(target.with_suffix(picture.suffix.lower()), data)
-    except OSError as error:
-        raise SceneError(f"Cannot write {target.name}: {error.strerror}") from None
-    look_again()
-    return target
+def _own_folders() -> tuple[Path, ...]:
+    return tuple(folder / FOLDER for folder in species_folders())
 
 
-def delete(identifier: str) -> Path:
-    """Delete the user's own file of a biome with its picture; shipped ones stay.
-
-    Raises
-    ------
-    SceneError
-        There is none, or it cannot be deleted.
-    """
-    info = biomes().get(identifier)
-    if info is None or not info.is_own:
-        name = readable(info.name if info else identifier, NAME)
-        raise SceneError(f'"{name}" has no file in your folder of biomes; built-in biomes cannot be deleted')
-    path = own_place(identifier)
-    try:
-        for ending in PICTURES:
-            path.with_suffix(ending).unlink(missing_ok=True)
-        path.unlink()
-    except OSError as error:
-        raise SceneError(f"Cannot delete {path.name}: {error.strerror}") from None
-    look_again()
-    return path
-
-
-def register() -> None:
-    """Open an empty collection of pictures."""
-    global _pictures
-    _pictures = previews.new()
-
-
-def unregister() -> None:
-    """Free the pictures."""
-    global _pictures
-    if _pictures is not None:
-        previews.remove(_pictures)
-    _pictures = None
+#: The user's own biomes.
+OWN_FILES = OwnFiles("biome", "biomes", SceneError, _own_folders, _own_folder, look_again, PICTURES)

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, PointerProperty, StringProperty
 
 from ...planting.zones import Limits
-from ..placing.properties import TetFloraGround, listeners
+from ..placing.properties import GroundMask, TetFloraGround, listeners
 from ..settings import properties_of
 
 
@@ -16,10 +16,15 @@ def _notify(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> Non
 
 _LIVE = {"options": set(), "update": _notify}
 _HIDDEN = {"options": {'HIDDEN'}}
-_LIMITS = properties_of(Limits, **_LIVE)
 
 
-class TetFloraBiome(bpy.types.PropertyGroup):
+class _Limits:
+    """Mix-in: the settings of `planting.zones.Limits`."""
+
+    __annotations__ = vars(properties_of(Limits, **_LIVE))
+
+
+class TetFloraBiome(bpy.types.PropertyGroup, GroundMask, _Limits):
     """One biome of a scene."""
 
     name: StringProperty(name="Name", description="Name of the biome")
@@ -36,46 +41,15 @@ class TetFloraBiome(bpy.types.PropertyGroup):
         default=True,
         **_LIVE,
     )
-
-    vertex_group: StringProperty(
-        name="Vertex Group",
-        description="Vertex group of the ground whose weights say where the biome is: 0 is elsewhere, 1 is within",
-        **_LIVE,
-    )
-    invert_group: BoolProperty(name="Invert Vertex Group", description="Weight 1 is elsewhere, 0 is within", **_LIVE)
-    image: PointerProperty(
-        name="Image",
-        description="Image whose brightness says where the biome is: black is elsewhere, white is within",
-        type=bpy.types.Image,
-        **_LIVE,
-    )
-    invert_image: BoolProperty(name="Invert Image", description="White is elsewhere, black is within", **_LIVE)
-    uv_layer: StringProperty(
-        name="UV Map",
-        description="UV map of the ground for the image; the active one if empty",
-        **_LIVE,
-    )
-    slope_min: _LIMITS.slope_min
-    slope_max: _LIMITS.slope_max
-    slope_softness: _LIMITS.slope_softness
     use_altitude: BoolProperty(
         name="Altitude", description="The biome lies between two heights above the scene's origin", **_LIVE
     )
-    altitude_min: _LIMITS.altitude_min
-    altitude_max: _LIMITS.altitude_max
-    altitude_softness: _LIMITS.altitude_softness
-    wetness_min: _LIMITS.wetness_min
-    wetness_max: _LIMITS.wetness_max
-    wetness_softness: _LIMITS.wetness_softness
     paths: PointerProperty(
         name="Paths",
         description="Collection of curves; the biome lies at a distance from them, as seen from above",
         type=bpy.types.Collection,
         **_LIVE,
     )
-    path_min: _LIMITS.path_min
-    path_max: _LIMITS.path_max
-    path_softness: _LIMITS.path_softness
 
 
 CLASSES = (TetFloraBiome,)

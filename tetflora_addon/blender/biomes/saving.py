@@ -11,11 +11,12 @@ import bpy
 
 from ...errors import SceneError
 from ...files import read_whole
+from ..file_library import MAX_FILE_BYTES, as_text
 from ..placing.rules import active_population, grounds_of
 from ..species.edits import new_identifier
 from . import library
 from .biome import active_biome, layers_of
-from .files import as_text, biome_data, checked, read_biome
+from .files import biome_data, checked, read_biome
 
 #: Pixels of a picture, and its quality as a JPEG.
 _SIDES, _QUALITY = (320, 200), 82
@@ -63,7 +64,7 @@ def save_biome(scene: bpy.types.Scene, name: str, description: str, picture: boo
         raise SceneError(f'"{name}" cannot be saved: {error}') from None
     with tempfile.TemporaryDirectory() as folder:
         image = _last_render(scene, Path(folder)) if picture else None
-        return library.store(identifier, as_text(data), image, replace)
+        return library.OWN_FILES.store(identifier, as_text(data), replace, image)
 
 
 def import_biome(path: Path, replace: bool) -> str:
@@ -76,10 +77,10 @@ def import_biome(path: Path, replace: bool) -> str:
     """
     read_biome(path)
     try:
-        content = read_whole(path, library.MAX_FILE_BYTES)
+        content = read_whole(path, MAX_FILE_BYTES)
     except OSError as error:
         raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
-    library.store(path.stem, content, library.picture_file(path), replace)
+    library.OWN_FILES.store(path.stem, content, replace, library.picture_file(path))
     return path.stem
 
 

@@ -25,7 +25,7 @@ from ...emission.drawing import drawing
 from ...emission.forms import EmissionForm, Refined
 from ...emission.plants import Transition, expanded_blocks
 from ...emission.polygons import polygon_blocks
-from ...jobs import Progress
+from ...jobs import Progress, mapped
 from ...processes import pool
 from ...proxies.facet_weights import facet_weights, measuring, unmeasured
 from ...refinement import loop
@@ -208,13 +208,8 @@ def _first_look(
     settings, camera = refinement_settings(results.scene).first_look(), camera.smaller(FIRST_LOOK)
     try:
         work = _write_refined(first, flora, given, bound, depsgraph, camera, Statistics(), Stopwatch(), settings)
-        while True:
-            try:
-                progress = next(work)
-            except StopIteration as stop:
-                originals = [*originals, *stop.value]
-                break
-            yield Progress(0.02 + 0.03 * progress.fraction, "First look", progress.waiting)
+        more = yield from mapped(work, lambda p: Progress(0.02 + 0.03 * p.fraction, "First look", p.waiting))
+        originals = [*originals, *more]
         data.check()
     except BaseException:
         in_main_thread(first.discard)

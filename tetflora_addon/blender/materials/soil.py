@@ -9,7 +9,7 @@ fits meshes of any resolution, with or without UV maps.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -22,6 +22,8 @@ from .nodes import Graph, find_socket
 
 #: On materials and images of the soil, so that they may be renamed.
 MARK = "tetflora_soil"
+#: How bright low plants are together, of how bright one blade is: they shade each other.
+SHADED = 0.72
 _PLACE, _SIZE, _MAP, _GREEN = "Soil Corner", "Soil Size", "Soil Map", "Soil Green"
 
 
@@ -30,15 +32,28 @@ def is_soil(material: bpy.types.Material | None) -> bool:
     return material is not None and bool(material.get(MARK)) and material.library is None
 
 
-def put_soil(grounds: Iterable[bpy.types.Object], material: bpy.types.Material) -> None:
-    """Give grounds that may have it a material for their soil."""
-    for obj in grounds:
+def lay_soil(
+    name: str,
+    grounds: Sequence[bpy.types.Object],
+    colours: NDArray[np.float64],
+    green: NDArray[np.float64],
+    tint: NDArray[np.float64],
+    low: NDArray[np.float64],
+    cell: float,
+) -> list[str]:
+    """Give grounds a soil, see `soil_material`, of square cells, meters; names of those that keep the artist's own."""
+    fits = [obj for obj in grounds if may_have_soil(obj)]
+    before = next((slot.material for obj in fits for slot in obj.material_slots if is_soil(slot.material)), None)
+    material = soil_material(name, colours, green, tint, low, cell * np.array(green.shape[::-1]), before)
+    for obj in fits:
         if obj.material_slots:
-            slot = next((s for s in obj.material_slots if s.material is None or is_soil(s.material)), None)
-            if slot is not None:
-                slot.material = material
+            obj.material_slots[0].material = material
         else:
             obj.data.materials.append(material)
+    kept = [obj.name for obj in grounds if obj not in fits]
+    if kept:
+        material.use_fake_user = True  # for the artist to use
+    return kept
 
 
 def may_have_soil(obj: bpy.types.Object) -> bool:

@@ -25,7 +25,7 @@ from ...planting.canopy import Canopy
 from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
 from ...species.fallen import KIND, leaves_page
 from ...species.litter import FALLEN
-from ..materials.soil import is_soil, may_have_soil, put_soil, soil_material
+from ..materials.soil import SHADED, lay_soil
 from ..runtime import JobData, guarded, is_there
 from ..scene.crowns import crown_for, crown_steps
 from ..species.edits import catalogue, revert_species, species_data, species_for, store_species
@@ -59,8 +59,6 @@ _PLANTING, UNDER = 0.7, "Light and litter under the plants"
 _PAGES = {**FALLEN, KIND: leaves_page}
 #: Soil without anything on it, linear RGB.
 HUMUS = np.array([0.036, 0.025, 0.016])
-#: How bright low plants are together, of how bright one blade is.
-_SHADED = 0.72
 
 
 @dataclass(frozen=True)
@@ -319,30 +317,16 @@ def _lay_soil(
     area: float,
 ) -> list[str]:
     """Give the ground a soil in the colors of its cover; names of the grounds that keep a material of the artist's."""
-    fits = [obj for obj in grounds if may_have_soil(obj)]
-    before = next((slot.material for obj in fits for slot in obj.material_slots if is_soil(slot.material)), None)
     lying, growing = _strata(scene, cover, floor, above, area)
-    sheet = floor.sheet
-    shape, cells = (sheet.rows, sheet.columns), len(floor.light)
+    sheet, cells = floor.sheet, len(floor.light)
+    shape = sheet.rows, sheet.columns
     green = covered(growing, cells)
     areas = np.array([one.number * one.area * one.suits.mean() for one in growing] or [0.0])
     colours = np.stack([one.colour for one in growing] or [HUMUS])
     # Seen from above, a meadow is darker than its blades, which shade each other.
-    tint = _SHADED * (areas @ colours / max(areas.sum(), 1e-12))
-    material = soil_material(
-        f"{cover.name} soil",
-        tinted(lying, HUMUS, cells).reshape(*shape, 3),
-        green.reshape(shape),
-        tint,
-        sheet.low,
-        sheet.cell * np.array([sheet.columns, sheet.rows]),
-        before,
-    )
-    put_soil(fits, material)
-    kept = [obj.name for obj in grounds if obj not in fits]
-    if kept:
-        material.use_fake_user = True  # for the artist to use
-    return kept
+    tint = SHADED * (areas @ colours / max(areas.sum(), 1e-12))
+    earth = tinted(lying, HUMUS, cells).reshape(*shape, 3)
+    return lay_soil(f"{cover.name} soil", grounds, earth, green.reshape(shape), tint, sheet.low, sheet.cell)
 
 
 def _strata(

@@ -64,7 +64,6 @@ def _choose_distance(settings: bpy.types.PropertyGroup, by_species: bool) -> Non
 
 _LIVE = {"options": set(), "update": _notify}
 _HIDDEN = {"options": {'HIDDEN'}}
-_RULES = properties_of(Rules, **_LIVE)
 _COMPANION = properties_of(Companion, **_LIVE)
 _DISTANCE = {"options": set(), "update": _on_distance}
 _BY_SPECIES = {
@@ -144,83 +143,18 @@ class TetFloraGround(bpy.types.PropertyGroup):
     )
 
 
-class TetFloraPopulation(bpy.types.PropertyGroup):
-    """How plants are placed together."""
+class GroundMask:
+    """Mix-in: where on its grounds something grows, by a vertex group and an image."""
 
-    # Identity and state. Plants refer to ``uid``, never to the name or the place in the list.
-    name: StringProperty(name="Name", description="Name of the population, and of the collection of its plants")
-    uid: StringProperty(name="Identity", **_HIDDEN)
-    frozen: BoolProperty(name="Frozen", **_HIDDEN)
-    collection: PointerProperty(name="Collection", type=bpy.types.Collection, **_HIDDEN)
-    made: IntProperty(name="Plants Made", **_HIDDEN)
-    message: StringProperty(name="Message", **_HIDDEN)
-    placed_by: StringProperty(name="Placed By", **_HIDDEN)  # `rules.fingerprint` of when it was placed
-    erased: StringProperty(name="Erased Places", **_HIDDEN)  # as `rules.note_erased` writes it
-    covers: StringProperty(name="Covers", **_HIDDEN)  # ``uid`` of the population whose ground it covers
-
-    grounds: CollectionProperty(name="Grounds", description="Meshes that the plants grow on", type=TetFloraGround)
-    ground_collection: PointerProperty(
-        name="Ground Collection",
-        description="All meshes in this collection are ground too, including those added later",
-        type=bpy.types.Collection,
-        **_LIVE,
-    )
-    by_density: _RULES.by_density
-    count: _RULES.count
-    density: FloatProperty(
-        name="Plants per Hectare",
-        description=(
-            "Plants per hectare (10,000 m², a square of 100 m) of fully suitable ground; fewer where it is partly "
-            "suitable. Old forest: 200 to 500 trees; young forest: 2,000; shrubs: 3,000; ferns: 20,000 (2 per m²)"
-        ),
-        default=200.0,
-        min=0.0,
-        soft_max=100_000.0,
-        precision=1,
-        **_LIVE,
-    )
-    as_field: EnumProperty(
-        name="Create As",
-        description="What the plants are created as",
-        items=STORAGE_ITEMS,
-        default='AUTOMATIC',
-        **_LIVE,
-    )
-    seed: _RULES.seed
-
-    mix: CollectionProperty(
-        name="Species",
-        description="Species to choose from; if empty, the first one of the catalog",
-        type=TetFloraMixEntry,
-    )
-    mix_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
-
-    min_distance: properties_of(Rules, **_DISTANCE).min_distance
-    clumping: _RULES.clumping
-    clump_size: _RULES.clump_size
-
-    slope_min: _RULES.slope_min
-    slope_max: _RULES.slope_max
-    use_altitude: BoolProperty(
-        name="Altitude",
-        description="Plant only between two heights above the scene's origin",
-        **_LIVE,
-    )
-    altitude_min: _RULES.altitude_min
-    altitude_max: _RULES.altitude_max
-    altitude_falloff: _RULES.altitude_falloff
-    aspect: _RULES.aspect
-    aspect_spread: _RULES.aspect_spread
-    edge_falloff: _RULES.edge_falloff
     vertex_group: StringProperty(
         name="Vertex Group",
-        description="Vertex group of the ground whose weights control the density: 0 is bare, 1 is full",
+        description="Vertex group of the ground whose weights say where plants grow: 0 is bare, 1 is full",
         **_LIVE,
     )
     invert_group: BoolProperty(name="Invert Vertex Group", description="Weight 1 is bare, 0 is full", **_LIVE)
     image: PointerProperty(
         name="Image",
-        description="Image whose brightness controls the density: black is bare, white is full",
+        description="Image whose brightness says where plants grow: black is bare, white is full",
         type=bpy.types.Image,
         **_LIVE,
     )
@@ -230,6 +164,11 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
         description="UV map of the ground for the image; the active one if empty",
         **_LIVE,
     )
+
+
+class AroundPaths:
+    """Mix-in: inside which areas something grows, and how far from which paths."""
+
     areas: PointerProperty(
         name="Areas",
         description="Collection of closed curves; plants grow only inside them, as seen from above",
@@ -254,10 +193,68 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
         **_LIVE,
     )
 
-    scale_min: _RULES.scale_min
-    scale_max: _RULES.scale_max
-    scale_at_top: _RULES.scale_at_top
-    tilt: _RULES.tilt
+
+class PlacingRules:
+    """Mix-in: the settings of `planting.rules.Rules`."""
+
+    __annotations__ = vars(properties_of(Rules, **_LIVE))
+
+
+class TetFloraPopulation(bpy.types.PropertyGroup, PlacingRules, GroundMask, AroundPaths):
+    """How plants are placed together."""
+
+    # Identity and state. Plants refer to ``uid``, never to the name or the place in the list.
+    name: StringProperty(name="Name", description="Name of the population, and of the collection of its plants")
+    uid: StringProperty(name="Identity", **_HIDDEN)
+    frozen: BoolProperty(name="Frozen", **_HIDDEN)
+    collection: PointerProperty(name="Collection", type=bpy.types.Collection, **_HIDDEN)
+    made: IntProperty(name="Plants Made", **_HIDDEN)
+    message: StringProperty(name="Message", **_HIDDEN)
+    placed_by: StringProperty(name="Placed By", **_HIDDEN)  # `rules.fingerprint` of when it was placed
+    erased: StringProperty(name="Erased Places", **_HIDDEN)  # as `rules.note_erased` writes it
+    covers: StringProperty(name="Covers", **_HIDDEN)  # ``uid`` of the population whose ground it covers
+
+    grounds: CollectionProperty(name="Grounds", description="Meshes that the plants grow on", type=TetFloraGround)
+    ground_collection: PointerProperty(
+        name="Ground Collection",
+        description="All meshes in this collection are ground too, including those added later",
+        type=bpy.types.Collection,
+        **_LIVE,
+    )
+    density: FloatProperty(
+        name="Plants per Hectare",
+        description=(
+            "Plants per hectare (10,000 m², a square of 100 m) of fully suitable ground; fewer where it is partly "
+            "suitable. Old forest: 200 to 500 trees; young forest: 2,000; shrubs: 3,000; ferns: 20,000 (2 per m²)"
+        ),
+        default=200.0,
+        min=0.0,
+        soft_max=100_000.0,
+        precision=1,
+        **_LIVE,
+    )
+    as_field: EnumProperty(
+        name="Create As",
+        description="What the plants are created as",
+        items=STORAGE_ITEMS,
+        default='AUTOMATIC',
+        **_LIVE,
+    )
+
+    mix: CollectionProperty(
+        name="Species",
+        description="Species to choose from; if empty, the first one of the catalog",
+        type=TetFloraMixEntry,
+    )
+    mix_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+
+    min_distance: properties_of(Rules, **_DISTANCE).min_distance
+
+    use_altitude: BoolProperty(
+        name="Altitude",
+        description="Plant only between two heights above the scene's origin",
+        **_LIVE,
+    )
 
     distance_from: EnumProperty(**_SOURCE)
     distance_by_species: BoolProperty(**_BY_SPECIES)
@@ -275,10 +272,6 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
         subtype='FACTOR',
         **_LIVE,
     )
-
-    wetness_min: _RULES.wetness_min
-    wetness_max: _RULES.wetness_max
-    wetness_softness: _RULES.wetness_softness
 
     biome: StringProperty(name="Biome", **_HIDDEN)  # ``uid`` of the biome of which it is a layer
 

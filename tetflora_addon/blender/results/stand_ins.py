@@ -13,6 +13,7 @@ import bpy
 
 from ..materials.nodes import Graph, find_socket, get_or_create
 from ..scene.looks import look_like
+from ..scene.objects import geometry_of
 from .collection import Results
 from .hiding import artists_flags, forget_marks
 from .output import STAND_IN
@@ -72,11 +73,7 @@ def shows_itself(original: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> 
     instances = original.instance_type in {'VERTS', 'FACES', 'COLLECTION'} or len(original.particle_systems)
     if instances and not original.show_instancer_for_render:
         return any(_is_hair(system) for system in original.particle_systems)
-    evaluated = original.evaluated_get(depsgraph)
-    try:
-        geometry = evaluated.evaluated_geometry() if evaluated.is_evaluated else None
-    except TypeError:  # an empty, or anything else without geometry
-        return False
+    geometry = geometry_of(original, depsgraph)
     if geometry is None:
         return len(getattr(original.data, "polygons", ())) > 0
     mesh, curves, points = (getattr(geometry, kind) for kind in ("mesh", "curves", "pointcloud"))

@@ -23,7 +23,7 @@ from ..attributes import face_offsets, members, read, values_of, world_matrix
 from ..materials.means import Looks
 from ..materials.nodes import is_ours
 from .looks import LayerLooks
-from .objects import SURFACE_TYPES, may_instance, renderable_objects
+from .objects import SURFACE_TYPES, materials_of, may_instance, renderable_objects
 from .scatterers import scatters
 
 #: Of the property `is_explicit`.
@@ -157,10 +157,7 @@ class _Reader:
         try:
             if mesh is None or not len(mesh.polygons):
                 return None
-            materials = [m.original if m is not None else None for m in mesh.materials] or [None]
-            for i, slot in enumerate(obj.material_slots):
-                if slot.link == 'OBJECT' and i < len(materials):
-                    materials[i] = slot.material.original if slot.material else None
+            materials = materials_of(obj, mesh)
             self.surfaces.append(replace(_surface(obj.original.name, mesh, materials, self._looks), look=look))
         finally:
             obj.to_mesh_clear()

@@ -17,6 +17,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...camera.camera import origin_near
+from ...errors import SceneError
 from ...growth.seeds import Seeds
 from ..attributes import write
 from ..species.asset_species import find_asset
@@ -170,6 +171,11 @@ def _read(
 ) -> tuple[FieldPoints, Sizes | None]:
     """Points of a field that are plants, of a history those of its year, and their recorded sizes."""
     held = geometry or geometry_of(obj, depsgraph)  # it owns its parts
+    if held is None and obj.evaluated_get(depsgraph).is_evaluated:
+        raise SceneError(
+            f'"{obj.name}" is no mesh or point cloud and cannot be a field of plants; turn off Field of Plants in the '
+            "TetFlora tab of the sidebar"
+        )
     parts = parts_of(obj, depsgraph, held)
     points, sizes, records = read_points(obj, field_kinds(obj), parts), read_sizes(obj, parts), read_records(obj, parts)
     if records is not None:

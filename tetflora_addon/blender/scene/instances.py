@@ -74,6 +74,15 @@ def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, 
             yield target, Rows(transform[order[start:end]], number[order[start:end]])
 
 
+def instanced(
+    geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], keys: NDArray[np.uint64]
+) -> Iterator[tuple[Reference, NDArray[np.float64], NDArray[np.uint64]]]:
+    """As `references_of`, but originals, with places (k, 4, 4) and keys (k,) of all that stand in some places (n)."""
+    for target, rows in references_of(geometry):
+        original = target if isinstance(target, bpy.types.GeometrySet) else target.original
+        yield original, *rows.within(matrices, keys)
+
+
 def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int64]]:
     """Reference, columns of the transform (n, 4, 4) and identifier of each instance."""
     transform = read(points, "instance_transform").reshape(-1, 4, 4)

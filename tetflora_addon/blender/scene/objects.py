@@ -8,7 +8,7 @@ and all of its places are computed at once as arrays, so that a million instance
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -19,14 +19,12 @@ from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
 from ..attributes import evaluated_mesh, members, read, world_matrix
 from ..species.asset_species import asset_species
-from .instances import name_keys, references_of
+from .instances import instanced, name_keys
 from .looks import LayerLooks
 from .scatterers import scatters
 
 #: Types of objects that have faces, or may have some by nodes.
 SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES'}
-#: Ways to instance whose places only Blender knows.
-ONE_BY_ONE = {'VERTS', 'FACES'}
 #: Instances within instances that are followed, as many as Blender draws.
 DEEPEST = 8
 _OCCLUDER_REMEDY = (
@@ -194,7 +192,7 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     groups: dict[tuple[bpy.types.Collection, str], list[bpy.types.Object]] = {}
     looks = LayerLooks(depsgraph.view_layer)
     for obj in objects:
-        if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
+        if is_listed(obj):
             left.add(obj)
         elif obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             groups.setdefault((obj.instance_collection, looks.of(obj)), []).append(obj)
@@ -217,21 +215,45 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
 
 
 def geometry_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.GeometrySet | None:
-    """What an object evaluates to; None if the dependency graph does not hold it (switched off in viewports).
-
-    Raises
-    ------
-    SceneError
-        Objects of its type have no geometry.
-    """
+    """What an object evaluates to; None for types without geometry, and what the dependency graph does not hold."""
     evaluated = obj.evaluated_get(depsgraph)
     try:
         return evaluated.evaluated_geometry() if evaluated.is_evaluated else None
     except TypeError:
-        raise SceneError(
-            f'"{obj.name}" is no mesh or point cloud and cannot be a field of plants; turn off Field of Plants in the '
-            "TetFlora tab of the sidebar"
-        ) from None
+        return None
+
+
+def materials_of(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:
+    """Original materials of the slots of an object whose mesh this is; at least one slot."""
+    found = [material.original if material is not None else None for material in mesh.materials] or [None]
+    for i, slot in enumerate(obj.material_slots):
+        if slot.link == 'OBJECT' and i < len(found):
+            found[i] = slot.material.original if slot.material else None
+    return found
+
+
+def is_listed(obj: bpy.types.Object) -> bool:
+    """Whether only Blender's own list has the places of what an object instances: on vertices and faces, particles."""
+    return obj.instance_type in {'VERTS', 'FACES'} or len(obj.particle_systems) > 0
+
+
+def listed_instances(
+    depsgraph: bpy.types.Depsgraph, instancers: Collection[bpy.types.Object]
+) -> Iterator[tuple[bpy.types.Object, bpy.types.DepsgraphObjectInstance]]:
+    """Each instance in Blender's own list that original objects show, with that object."""
+    for instance in depsgraph.object_instances:
+        if instance.is_instance and instance.show_self and (owner := instance.parent.original) in instancers:
+            yield owner, instance
+
+
+def collected(
+    collection: bpy.types.Collection, matrices: NDArray[np.float64], depsgraph: bpy.types.Depsgraph
+) -> Iterator[tuple[bpy.types.Object, NDArray[np.float64]]]:
+    """What instances (n, 4, 4) of a collection show in renders, by name: each object with its places (n, 4, 4)."""
+    back = np.eye(4)
+    back[:3, 3] = -np.array(collection.instance_offset)
+    for obj in sorted(rendered_objects(collection), key=lambda o: o.name_full):
+        yield obj, matrices @ (back @ world_matrix(obj, depsgraph))
 
 
 def rendered_objects(collection: bpy.types.Collection) -> Iterator[bpy.types.Object]:
@@ -257,27 +279,23 @@ class _Walk:
         self._depth = 0
 
     def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+        if obj.hide_render or self._depth == DEEPEST:
+            return
         self._depth += 1
-        if not obj.hide_render and self._depth <= DEEPEST:
-            self._object(obj, matrices, keys)
-        self._depth -= 1
-
-    def _object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
         group = obj.tetflora
         if group.is_plant or group.is_field:
             self.found.append(Copies(obj, None, matrices, keys, self.instancer))
-        if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
+        if is_listed(obj):
             raise _OneByOne
         if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             self.collection(obj.instance_collection, matrices, keys)
         if has_nodes(obj):
             self.nodes(obj, matrices, keys)
+        self._depth -= 1
 
     def collection(self, collection: bpy.types.Collection, matrices: NDArray, keys: NDArray[np.uint64]) -> None:
-        back = np.eye(4)
-        back[:3, 3] = -np.array(collection.instance_offset)
-        for n, obj in enumerate(sorted(rendered_objects(collection), key=lambda o: o.name_full)):
-            self.object(obj, matrices @ (back @ world_matrix(obj, self.depsgraph)), child_key(keys, n))
+        for n, (obj, places) in enumerate(collected(collection, matrices, self.depsgraph)):
+            self.object(obj, places, child_key(keys, n))
 
     def nodes(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
         geometry = geometry_of(obj, self.depsgraph)
@@ -285,32 +303,26 @@ class _Walk:
             self._instances(obj, geometry, matrices, keys)
 
     def _instances(self, owner, geometry: bpy.types.GeometrySet, matrices: NDArray, keys: NDArray[np.uint64]) -> None:
-        for target, rows in references_of(geometry):
-            if isinstance(target, bpy.types.Object):
-                original = target.original
-                if may_take_part(original) or len(original.particle_systems):
-                    self.object(original, *rows.within(matrices, keys))
-            elif isinstance(target, bpy.types.Collection):
-                # Objects of evaluated collections are evaluated too; the walk works on originals.
-                self.collection(target.original, *rows.within(matrices, keys))
-            else:
-                places, names = rows.within(matrices, keys)
+        for target, places, names in instanced(geometry, matrices, keys):
+            if isinstance(target, bpy.types.Collection):
+                self.collection(target, places, names)
+            elif isinstance(target, bpy.types.GeometrySet):
                 if owner.tetflora.is_field:
                     self.found.append(Copies(owner, target, places, names, self.instancer))
                 self._instances(owner, target, places, names)
+            elif may_take_part(target) or len(target.particle_systems):
+                self.object(target, places, names)
 
 
 def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Iterator[Copies]:
     """Instances on vertices and faces, and of particles, which only Blender's own list has."""
-    for instance in depsgraph.object_instances:
-        if instance.is_instance and instance.show_self and instance.parent.original in instancers:
-            obj, original = instance.object, instance.object.original
-            group = original.tetflora
-            # Parts of an object that are of another type come once more, as objects of that type.
-            if (group.is_plant or group.is_field) and not original.hide_render and obj.type == original.type:
-                key = key_of_seed(np.array([instance.random_id]))
-                matrix = np.array(instance.matrix_world, dtype=np.float64)[None]
-                yield Copies(original, None, matrix, key, instance.parent.original)
+    for instancer, instance in listed_instances(depsgraph, instancers):
+        obj, original = instance.object, instance.object.original
+        group = original.tetflora
+        # Parts of an object that are of another type come once more, as objects of that type.
+        if (group.is_plant or group.is_field) and not original.hide_render and obj.type == original.type:
+            key = key_of_seed(np.array([instance.random_id]))
+            yield Copies(original, None, np.array(instance.matrix_world, dtype=np.float64)[None], key, instancer)
 
 
 def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:

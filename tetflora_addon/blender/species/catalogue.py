@@ -6,23 +6,20 @@ Thumbnails are PNG files beside the species; an asset has Blender's own preview 
 it became a species. Only sound species files are saved or loaded.
 """
 
-import json
-import os
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 from zlib import crc32
 
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, StringProperty
-from bpy.utils import previews
 
 from ...errors import NAME, SpeciesError, readable
-from ...files import inside, is_identifier, is_regular, write_whole
+from ...files import write_whole
 from ...species.catalogue import SpeciesInfo, builtin_folder, checked_identifier
 from ...species.schema import species_file, species_from_json
+from ..file_library import OwnFiles, Pictures, as_text, file_of
 from ..preferences import own_species_folder, species_folders
 from ..settings import season_name, season_of
 from .asset_species import PICTURE_SIDE, PREFIX, TetFloraAssetSpecies, datablock_of, find_asset, name_of, picture_of
@@ -35,8 +32,6 @@ FALLBACK_ICON = 'OUTLINER_OB_EMPTY'
 
 #: Identifier of the only item when there is nothing to choose.
 NO_SPECIES = "NONE"
-#: Ending of species files.
-ENDING = ".json"
 
 Item = tuple[str, str, str, str | int, int]
 
@@ -44,7 +39,7 @@ Item = tuple[str, str, str, str | int, int]
 _TRUSTED = 0.0 if bpy.app.background else 1.0
 _icons: dict[tuple[str, str], tuple[float, int]] = {}  # by species and season
 _kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
-_thumbnails: previews.ImagePreviewCollection | None = None
+thumbnails = Pictures()
 
 
 def thumbnail_file(identifier: str, season: str = "") -> Path | None:
@@ -54,7 +49,7 @@ def thumbnail_file(identifier: str, season: str = "") -> Path | None:
     """
     folders = [folder / FOLDER for folder in (*species_folders(), builtin_folder())]
     endings = (f".{season}{THUMBNAIL_ENDING}", THUMBNAIL_ENDING) if season else (THUMBNAIL_ENDING,)
-    return next((path for folder in folders for e in endings if (path := _found([folder], identifier, e))), None)
+    return next((path for folder in folders for e in endings if (path := file_of([folder], identifier, e))), None)
 
 
 def _season() -> str:
@@ -62,16 +57,6 @@ def _season() -> str:
     scene = getattr(bpy.context, "scene", None)  # none while add-ons are enabled
     season = season_of(scene) if scene is not None else None
     return "" if season is None else season_name(season)
-
-
-def _found(folders: Iterable[Path], identifier: str, ending: str) -> Path | None:
-    """The first file of a species in some folders, if there is one."""
-    if is_identifier(identifier):
-        for folder in folders:
-            path = folder / (identifier + ending)
-            if is_regular(path):
-                return path
-    return None
 
 
 def icon_of(identifier: str) -> int:
@@ -88,27 +73,22 @@ def _icon_of(identifier: str, season: str) -> int:
     asset = find_asset(None, identifier)
     if asset is not None:
         return _icon_of_asset(asset)
-    path = thumbnail_file(identifier, season)
-    if path is None or _thumbnails is None:
-        return 0
-    name = f"{path}|{path.stat().st_mtime_ns}"  # so that a replaced file is loaded again
-    found = _thumbnails.get(name) or _thumbnails.load(name, str(path), 'IMAGE')
-    return found.icon_id
+    return thumbnails.icon_of(thumbnail_file(identifier, season))
 
 
 def _icon_of_asset(asset: TetFloraAssetSpecies) -> int:
     datablock = datablock_of(asset)
     if datablock is not None and datablock.preview is not None and datablock.preview.image_size[0]:
         return datablock.preview.icon_id
-    if not asset.picture or _thumbnails is None:
+    if not asset.picture or thumbnails.loaded is None:
         return 0
     name = f"{asset.identifier}|{crc32(asset.picture.encode())}"
-    found = _thumbnails.get(name)
+    found = thumbnails.loaded.get(name)
     if found is None:
         pixels = picture_of(asset)
         if pixels is None:
             return 0
-        found = _thumbnails.new(name)
+        found = thumbnails.loaded.new(name)
         found.image_size = PICTURE_SIDE, PICTURE_SIDE
         found.image_pixels_float.foreach_set(pixels.astype(np.float32).ravel() / 255.0)
     return found.icon_id
@@ -116,16 +96,12 @@ def _icon_of_asset(asset: TetFloraAssetSpecies) -> int:
 
 def register() -> None:
     """Open an empty collection of thumbnails."""
-    global _thumbnails
-    _thumbnails = previews.new()
+    thumbnails.register()
 
 
 def unregister() -> None:
     """Free the thumbnails."""
-    global _thumbnails
-    if _thumbnails is not None:
-        previews.remove(_thumbnails)
-    _thumbnails = None
+    thumbnails.unregister()
     _icons.clear()
 
 
@@ -225,25 +201,13 @@ def _choose(group: SpeciesChoice, number: int) -> None:
             tell_listeners()
 
 
+#: The user's own species.
+OWN_FILES = OwnFiles("species", "species", SpeciesError, species_folders, own_species_folder, tell_listeners)
+
+
 def own_file(identifier: str) -> Path | None:
     """The user's own file of a species, if there is one."""
-    return _found(species_folders(), identifier, ENDING)
-
-
-def as_text(data: dict[str, Any]) -> str:
-    """A decoded species as a person would write it: a key a line, except within ranges and leaves."""
-
-    def line(key: str, value: Any) -> str:
-        return f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}"
-
-    parts = []
-    for key, value in data.items():
-        if key == "orders":
-            orders = [",\n     ".join(line(k, v) for k, v in order.items()) for order in value]
-            parts.append('"orders": [\n    ' + ",\n    ".join(f"{{{text}}}" for text in orders) + "\n  ]")
-        else:
-            parts.append(line(key, value))
-    return "{\n  " + ",\n  ".join(parts) + "\n}\n"
+    return file_of(species_folders(), identifier)
 
 
 def write_species(scene: bpy.types.Scene, identifier: str, path: Path) -> Path:
@@ -271,22 +235,8 @@ def save_species(scene: bpy.types.Scene, identifier: str) -> Path:
     SpeciesError
         As `write_species`; or there is no folder.
     """
-    return write_species(scene, identifier, _own_place(identifier))
-
-
-def _own_place(identifier: str) -> Path:
-    """Where the user's own file of a species belongs.
-
-    Raises
-    ------
-    SpeciesError
-        It would not lie in the folder, or there is no folder.
-    """
-    folder = own_species_folder()
-    try:
-        return inside(folder, checked_identifier(identifier) + ENDING)
-    except OSError as error:
-        raise SpeciesError(f"{folder}: {error.strerror}") from None
+    species_for(scene, identifier)
+    return OWN_FILES.store(identifier, as_text(species_data(scene, identifier)), replace=True)
 
 
 def load_species_file(path: Path, replace: bool = False) -> str:
@@ -306,37 +256,4 @@ def load_species_file(path: Path, replace: bool = False) -> str:
     """
     content = species_file(path)
     species_from_json(content, checked_identifier(path.stem), path.name)
-    target = _own_place(path.stem)
-    try:
-        if is_regular(target) and species_file(target) == content:
-            return path.stem
-        if os.path.lexists(target) and not replace:
-            raise SpeciesError(
-                f'Your species folder already has another "{path.stem}"; turn on Replace in the file browser, or '
-                "rename it"
-            )
-        write_whole(target, content)
-    except OSError as error:
-        raise SpeciesError(f"Cannot write {target.name}: {error.strerror}") from None
-    tell_listeners()
-    return path.stem
-
-
-def delete_species_file(identifier: str) -> Path:
-    """Delete the user's own file of a species; shipped ones stay.
-
-    Raises
-    ------
-    SpeciesError
-        There is none, or it cannot be deleted.
-    """
-    if own_file(identifier) is None:
-        name = readable(identifier, NAME)
-        raise SpeciesError(f'"{name}" has no file in your species folder; built-in species cannot be deleted')
-    path = _own_place(identifier)
-    try:
-        path.unlink()
-    except OSError as error:
-        raise SpeciesError(f"Cannot delete {path.name}: {error.strerror}") from None
-    tell_listeners()
-    return path
+    return OWN_FILES.store(path.stem, content, replace).stem

@@ -13,17 +13,13 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 
-from ...species.schema import CHOICES, LENGTH_HIGH, ORDER_KEYS, Key
+from ...parameters import Key
+from ...species.schema import LENGTH_HIGH, ORDER_KEYS
 from .values import WholeSpecies, number_in, rounded, value_of, write, write_range
 
 #: Added to a key's name for the property of a range's second number.
 VARIATION = "_variation"
 _VARIES = "Maximum deviation from the mean, in both directions"
-
-
-def order_keys() -> dict[str, Key]:
-    """Keys of an order that the editor shows; a key of an unknown kind can still be written by hand."""
-    return {name: key for name, key in ORDER_KEYS.items() if key.kind in _MAKERS or _choices(key)}
 
 
 def _label(name: str) -> str:
@@ -41,7 +37,7 @@ def _description(name: str, key: Key) -> str:
 
 def _soft_high(key: Key) -> float:
     """Where a slider ends: limits of files are far beyond what plants have."""
-    mean = abs(number_in(key.default, 0)) if isinstance(key.default, list) else 0.0
+    mean = abs(number_in(key.default, 0)) if isinstance(key.default, tuple) else 0.0
     if key.high > 1000:
         return 60.0
     return 10.0 * mean if 0.0 < 50.0 * mean < key.high else min(key.high, 360.0)
@@ -157,12 +153,8 @@ def _colour_part(name: str, key: Key, part: int) -> Any:
     )
 
 
-def _choices(key: Key) -> tuple[str, ...]:
-    return CHOICES.get(key.kind, ())
-
-
 def _choice(name: str, key: Key) -> dict[str, Any]:
-    choices = _choices(key)
+    choices = key.choices
     made = EnumProperty(
         name=_label(name),
         description=_description(name, key),
@@ -180,15 +172,14 @@ _MAKERS: dict[str, Callable[[str, Key], dict[str, Any]]] = {
     "integer": _integer,
     "colour": _colour,
     "rgb": _rgb,
-    "shape": _choice,
-    "kind": _choice,
+    "choice": _choice,
 }
 
 
 def _annotations() -> dict[str, Any]:
     made: dict[str, Any] = {}
-    for name, key in order_keys().items():
-        made |= _MAKERS.get(key.kind, _choice)(name, key)
+    for name, key in ORDER_KEYS.items():
+        made |= _MAKERS[key.kind](name, key)
     return made
 
 

@@ -10,9 +10,9 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ...errors import SpeciesError, readable
 from ...leaves.models import LEAF_MODELS
-from ...species.schema import ORDER_KEYS, QUALITY_LIMITS
+from ...species.schema import ORDER_KEYS
 from ...species.skeletons import MAX_ORDERS
-from ...species.species import BARKS
+from ...species.species import BARKS, QUALITY_LIMITS
 from .catalogue import SpeciesChoice
 from .edits import catalogue, change_species, species_data, species_for, tell_listeners
 

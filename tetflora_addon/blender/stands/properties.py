@@ -3,16 +3,14 @@
 """Settings of stands: of new ones (``Scene.tetflora.stand``) and of each that was grown (``Object.tetflora.stand``)."""
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, StringProperty
 
 from ...planting.rules import Rules
-from ...setting import LENGTH
 from ...stands.grow import StandSettings
-from ..placing.properties import TetFloraGround
+from ..placing.properties import AroundPaths, TetFloraGround
 from ..settings import properties_of
 from ..species.catalogue import SpeciesChoice
 
-_GROWTH = properties_of(StandSettings, options=set())
 _RULES = properties_of(Rules, options=set())
 _FACTOR = {"min": 0.0, "max": 1.0, "subtype": 'FACTOR', "options": set()}
 
@@ -42,7 +40,13 @@ class TetFloraStandEntry(bpy.types.PropertyGroup, SpeciesChoice):
     )
 
 
-class TetFloraStand(bpy.types.PropertyGroup):
+class _Growth:
+    """Mix-in: the settings of `stands.grow.StandSettings`."""
+
+    __annotations__ = vars(properties_of(StandSettings, options=set()))
+
+
+class TetFloraStand(bpy.types.PropertyGroup, _Growth, AroundPaths):
     """What a stand grows from."""
 
     is_grown: BoolProperty(name="Stand", description="This field was grown as a stand", options={'HIDDEN'})
@@ -57,13 +61,6 @@ class TetFloraStand(bpy.types.PropertyGroup):
     species_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
 
     years: properties_of(StandSettings, options=set(), default=100).years
-    density: _GROWTH.density
-    recruits: _GROWTH.recruits
-    outside: _GROWTH.outside
-    seed: _GROWTH.seed
-    interval: _GROWTH.interval
-    least_height: _GROWTH.least_height
-    cell: _GROWTH.cell
     # Woods of a scene end where their ground does.
     open_edges: properties_of(StandSettings, options=set(), default=True).open_edges
 
@@ -108,25 +105,6 @@ class TetFloraStand(bpy.types.PropertyGroup):
         name="Vertex Group",
         description="Vertex group of the ground whose weights say where plants can stand: 0 is bare",
         options=set(),
-    )
-    areas: PointerProperty(
-        name="Areas",
-        description="Collection of closed curves; the stand grows only inside them, as seen from above",
-        type=bpy.types.Collection,
-    )
-    paths: PointerProperty(
-        name="Paths",
-        description="Collection of curves along which the ground stays bare, as seen from above",
-        type=bpy.types.Collection,
-    )
-    path_distance: FloatProperty(
-        name="Path Distance",
-        description="Minimum distance from trunks to the path's centerline",
-        default=2.0,
-        min=0.0,
-        soft_max=50.0,
-        options=set(),
-        **LENGTH,
     )
 
 
