@@ -191,7 +191,6 @@ class TETFLORA_PT_assets(_PartOfRefine, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         column, settings = self.column(context), context.scene.tetflora
         column.prop(settings, "asset_detail", text="Detail")  # the panel's name is the rest of theirs
-        column.prop(settings, "bake_assets", text="Bake Materials")
 
 
 class TETFLORA_PT_visibility(_PartOfRefine, bpy.types.Panel):

@@ -43,7 +43,7 @@ def steps(ui):
     refine.clear(scene)
 
     # Objects appear early, so there is something to take back; plants enough that Esc comes before the end.
-    many = [add_plant(f"many {i}", seed=i, location=(i - 20.0, 10.0, 0.0)) for i in range(40)]
+    many = [add_plant(f"many {i}", seed=i, location=(i % 40 - 20.0, 10.0 + i // 40, 0.0)) for i in range(240)]
     bare = datablocks()
     scene.tetflora.expand_everything = True
     begin(ui)

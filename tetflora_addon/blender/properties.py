@@ -225,13 +225,6 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
         ),
         default='AUTO',
     )
-    bake_assets: BoolProperty(
-        name="Bake Materials of Assets",
-        description=(
-            "Let Cycles find the colors of materials whose nodes only a renderer knows, such as procedural textures. "
-            "Reading an asset takes some seconds longer for each such material, once. Without it, means stand for them"
-        ),
-    )
     expand_everything: BoolProperty(
         name="Expand Everything",
         description=(

@@ -54,7 +54,7 @@ TILE, AROUND = 240, 64
 #: Pixels from which on a branch that nothing else grows on has a line of its own; smaller ones are as straight.
 LINES = 6.0
 #: Batches, front to back, in which what was made between two depths is tested and covers the image.
-_BATCHES = 4
+_BATCHES = 6
 #: Width in pixels up to which wood is thin triangles; tubes take their place up to `decisions.BAND` times that.
 TUBES = 0.8
 #: Pixels that the axis of a branch may be off a straight line; ribbons follow those that bend more.

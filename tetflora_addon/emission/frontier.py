@@ -29,7 +29,7 @@ from .plants import Transition
 DETAIL, FEW = 3.0, 3.0
 #: Facets for each pixel of a cell that are made at a time, about, and how many are made at least in all cells: what
 #: these hide of each other is not known when they are made.
-SLAB, LEAST = 0.4, 20_000.0
+SLAB, LEAST = 0.8, 40_000.0
 
 
 @dataclass(frozen=True)

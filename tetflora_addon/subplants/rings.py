@@ -31,6 +31,7 @@ from .feet import (
 )
 from .wood_detail import Curve, Fineness, Pixels, curve, parts, unit_of
 
+_SHORTEST = 1e-9  # metres of a branch that has just begun to grow
 _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
 
 
@@ -145,14 +146,14 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: NDArr
     base, footed = owner[below], has_foot(rows, branches)
     deep, narrow = depths(footed[base], -index[below])
     deep *= fine.weight[base] * np.where(footed[base], branches.radius[base], radius[below])
-    t[below] = -deep / branches.length[base]
+    t[below] = -deep / np.maximum(branches.length[base], _SHORTEST)
     light[below] *= narrow.astype(np.float32)
     down = (below * t * branches.length[owner])[:, None] * branches.frame[owner, :, 2]
     last = owner[above]
     high, narrow, slant = beyond(rows, branches, last, index[above] - counts[last, segment[above]])
     high *= fine.weight[last] * radius[above]
     slant *= fine.weight[last] * radius[above] * narrow
-    t[above] += high / branches.length[last]
+    t[above] += high / np.maximum(branches.length[last], _SHORTEST)
     light[above] *= narrow.astype(np.float32)
 
     def placed(lines: Axes) -> tuple[NDArray, NDArray]:

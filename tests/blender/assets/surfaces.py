@@ -83,10 +83,10 @@ def target_of(datablock):
     return Target(datablock, None, None, datablock.name)
 
 
-def read(datablock, bake=False):
+def read(datablock):
     """The source of a datablock, and warnings."""
     bpy.context.view_layer.update()
-    steps = read_source_steps(target_of(datablock), bpy.context.evaluated_depsgraph_get(), bake=bake)
+    steps = read_source_steps(target_of(datablock), bpy.context.evaluated_depsgraph_get())
     before = 0.0
     while True:
         try:

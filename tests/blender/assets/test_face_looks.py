@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.blender.assets.surfaces import SQUARE, Paint, cards, image, linear, look, read
-from tetflora_addon.blender.materials.means import Looks
+from tetflora_addon.blender.materials.face_looks import Looks
 from tetflora_addon.blender.materials.snow import add_snow
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -275,7 +275,7 @@ def test_missing_images_and_surfaces_are_told_and_have_the_viewport_colour(tmp_p
         assert f'"{paint.material.name}"' in warning
 
 
-def test_what_only_a_renderer_knows_has_means_and_is_told():
+def test_what_only_a_renderer_knows_has_its_middle_and_is_told():
     paint, pixels = Paint("noisy"), _leaves(128)
     paint.texture(image(pixels), alpha=True)
     noise, mix = paint.node("TexNoise"), paint.node("MixRGB")
@@ -286,7 +286,7 @@ def test_what_only_a_renderer_knows_has_means_and_is_told():
     colour, _, coverage, (warning,) = look(paint, QUARTERS)
     assert "Bake" in warning
     assert '"noisy"' in warning
-    assert np.ptp(colour, axis=0).max() == 0
+    assert np.ptp(colour, axis=0).max() > 0.01  # the image that is mixed in keeps its pattern
     # What is understood counts all the same.
     assert coverage[0] == pytest.approx(_mean(pixels[:64, :64])[1], abs=0.01)
 

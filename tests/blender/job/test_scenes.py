@@ -112,7 +112,8 @@ def layers(scene, path):
     channels, about, part = {}, {}, 0
     while file.seek_subimage(part, 0):  # a part for each pass
         spec = file.spec()
-        channels |= {name: file.read_image(part, 0, 0, 4, "float")[..., n] for n, name in enumerate(spec.channelnames)}
+        pixels = file.read_image(part, 0, 0, spec.nchannels, "float")
+        channels |= {name: pixels[..., n] for n, name in enumerate(spec.channelnames)}
         about |= {one.name: one.value for one in spec.extra_attribs}
         part += 1
     file.close()

@@ -104,4 +104,4 @@ def test_the_panel_shows_the_settings_of_assets():
     layout = Layout()
     panel = SimpleNamespace(layout=layout, column=lambda _context: layout)
     refine.TETFLORA_PT_assets.draw(panel, bpy.context)
-    assert layout.names("prop", 1) == ["asset_detail", "bake_assets"]
+    assert layout.names("prop", 1) == ["asset_detail"]

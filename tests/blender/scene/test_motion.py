@@ -123,8 +123,10 @@ def test_every_part_of_a_plant_that_turns_has_the_velocity_of_its_place(scene):
         place, velocity = (read(obj.data, name).astype(np.float64) for name in ("position", "velocity"))
         expected = TURN * RATE * np.stack([-place[:, 1], place[:, 0], 0.0 * place[:, 0]], axis=1)
         off = np.abs(velocity - expected)
-        if obj["tetflora_kind"] == "proxy" and obj.type == 'MESH':  # triangles move as a whole, with their middle
-            off = np.abs((velocity - expected).reshape(-1, 3, 3).mean(axis=1))
+        if (
+            obj["tetflora_kind"] == "proxy" and obj.type == 'MESH' and obj.data.polygons
+        ):  # triangles move as a whole, with their middle
+            off = np.abs([(velocity - expected)[list(face.vertices)].mean(axis=0) for face in obj.data.polygons])
         assert off.mean() < 0.15  # a wide triangle that stands for many twigs has the speeds of its axis
         assert np.abs(velocity).max() > 4.0
 

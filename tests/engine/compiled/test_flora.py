@@ -129,9 +129,12 @@ def test_orientation_of_subplants_at_any_tilt(species: int) -> None:
         np.testing.assert_allclose(support.moment(*leaves), expected / weight.sum(), atol=0.05)
 
 
-@pytest.mark.parametrize("name", ["fern", "palm", "rowan", "willow"])
+@pytest.mark.parametrize("name", ["fern", "palm", "ash", "willow"])
 def test_orientation_of_standing_plants_to_a_hundredth(name: str) -> None:
-    """Level sprays, hanging leaves, leaves turned to the sky: boughs as they stand, all together."""
+    """Level sprays, hanging leaves, leaves turned to the sky: boughs as they stand, all together.
+
+    None bears fruit, of which less shows than its faces have.
+    """
     flora = support.flora()
     species = support.SPECIES.index(name)
     number = int(np.clip(2e6 / flora.polygons[flora.first_row[species]], 4, 60))

@@ -15,7 +15,6 @@ from ...errors import SceneError
 from ...jobs import mapped
 from ..attributes import members, read
 from ..materials.face_looks import FaceReader
-from .baked_looks import BakeInput, bake_steps
 from .parts import AssetPart, Target, digest_of_parts
 
 #: Triangles whose corners become vertices at once.
@@ -23,7 +22,7 @@ _TRIANGLES = 1 << 18
 
 
 def read_source_steps(
-    target: Target, depsgraph: bpy.types.Depsgraph, *, bake: bool = False
+    target: Target, depsgraph: bpy.types.Depsgraph
 ) -> Generator[float, None, tuple[AssetSource, tuple[str, ...]]]:
     """Read all surfaces of an asset; yields the fraction that is done.
 
@@ -32,8 +31,6 @@ def read_source_steps(
     target : Target
     depsgraph : bpy.types.Depsgraph
         Between two steps it may be evaluated again, but must be there.
-    bake : bool
-        Whether to bake materials whose nodes only Cycles knows; else means stand for these.
 
     Returns
     -------
@@ -49,11 +46,11 @@ def read_source_steps(
     parts, left = target.parts(depsgraph)
     reader = FaceReader()
     reader.warn(left)
-    digest = digest_of_parts(parts, depsgraph, bake)
+    digest = digest_of_parts(parts, depsgraph)
     surfaces: list[AssetSurface] = []
     shown: list[AssetPart] = []
     for number, part in enumerate(parts):
-        steps = _surface_steps(part, depsgraph, reader, bake)
+        steps = _surface_steps(part, depsgraph, reader)
         surface = yield from mapped(steps, lambda done, before=number: (before + done) / len(parts))
         if surface is not None:
             surfaces.append(surface)
@@ -80,10 +77,9 @@ def read_source_steps(
 
 
 def _surface_steps(
-    part: AssetPart, depsgraph: bpy.types.Depsgraph, reader: FaceReader, bake: bool
+    part: AssetPart, depsgraph: bpy.types.Depsgraph, reader: FaceReader
 ) -> Generator[float, None, AssetSurface | None]:
     """Read one mesh; None if it has no faces. Between two steps nothing of Blender's meshes is held."""
-    baking = None
     with part.opened(depsgraph) as opened:
         if opened is None:
             return None
@@ -97,21 +93,8 @@ def _surface_steps(
         face = members(mesh.loop_triangle_polygons, "value", dtype=np.int32)
         corner_verts = read(mesh, ".corner_vert")
         looks = reader.prepare(mesh, slots)
-        if bake and looks.needs_baking:
-            chosen = {slot: slots[slot] for slot in looks.needs_baking}
-            slot = looks.slots(0, faces)
-            baking = BakeInput.of(mesh, chosen, slot, looks.first_map, positions, loops, corner_verts, face)
-        else:
-            names = sorted({slots[slot].name for slot in looks.needs_baking})
-            reader.warn(
-                f'Some nodes of material "{name}" are only known to a renderer; means stand for them. Bake materials '
-                "of assets to see their patterns from afar"
-                for name in names
-            )
     yield 0.0
     found = yield from looks.steps(faces, positions, loops, corner_verts, face)
-    if baking is not None:
-        reader.warn((yield from bake_steps(baking, found.colour, found.transmission, found.coverage)))
     return AssetSurface(
         name=part.name,
         positions=positions,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...arrays import srgb_of
 from ..attributes import members, read
-from ..materials.means import GREY, Looks
+from ..materials.face_looks import GREY, Looks
 from ..species.asset_species import PICTURE_SIDE
 from .parts import Target
 

@@ -242,7 +242,7 @@ class Target:
         return parts_of(self.shown, self.name, depsgraph)
 
 
-def digest_of(target: Target, depsgraph: bpy.types.Depsgraph, *, bake: bool = False) -> str:
+def digest_of(target: Target, depsgraph: bpy.types.Depsgraph) -> str:
     """Hexadecimal digest of all that a target shows: meshes, their attributes, materials and images, and places.
 
     Names of objects do not count, and of images in files only which file it is, how long and how old.
@@ -251,8 +251,6 @@ def digest_of(target: Target, depsgraph: bpy.types.Depsgraph, *, bake: bool = Fa
     ----------
     target : Target
     depsgraph : bpy.types.Depsgraph
-    bake : bool
-        Whether materials are baked when it is read.
 
     Raises
     ------
@@ -260,12 +258,12 @@ def digest_of(target: Target, depsgraph: bpy.types.Depsgraph, *, bake: bool = Fa
         As `parts.parts_of`.
     """
     parts, _ = target.parts(depsgraph)
-    return digest_of_parts(parts, depsgraph, bake)
+    return digest_of_parts(parts, depsgraph)
 
 
-def digest_of_parts(parts: list[AssetPart], depsgraph: bpy.types.Depsgraph, bake: bool) -> str:
+def digest_of_parts(parts: list[AssetPart], depsgraph: bpy.types.Depsgraph) -> str:
     """As `digest_of`."""
-    content = hashlib.sha256(f"{_VERSION} {bake}".encode())
+    content = hashlib.sha256(str(_VERSION).encode())
     for part in parts:
         with part.opened(depsgraph) as opened:
             if opened is not None:

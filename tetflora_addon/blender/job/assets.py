@@ -169,20 +169,19 @@ def _compiled(
     warnings: list[str],
 ) -> Generator[Progress, bool | None, Asset]:
     """The compiled asset of a target, known already or made now."""
-    bake = scene.tetflora.bake_assets
     hidden = bool(hidden_originals(scene))
     source: AssetSource | None = None
     with originals_shown(scene, depsgraph):
-        digest = digest_of(target, depsgraph, bake=bake)
+        digest = digest_of(target, depsgraph)
         asset = kept.find(digest)
         if asset is None and hidden:
             # While results hide what shows the asset, it is evaluated in here only.
-            source, told = at_once(read_source_steps(target, depsgraph, bake=bake))
+            source, told = at_once(read_source_steps(target, depsgraph))
             warnings += told
     if asset is not None:
         return asset
     if source is None:
-        steps = read_source_steps(target, depsgraph, bake=bake)
+        steps = read_source_steps(target, depsgraph)
         while True:
             try:
                 done = next(steps)

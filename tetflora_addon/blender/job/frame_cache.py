@@ -36,7 +36,7 @@ from ..species.edits import species_for
 from .contents import Given, load_for, read_scene, settings_from
 
 _MAX_SPECIES = 64
-_CHOICES = ("proxy_form", "baked_light", "expand_everything", "asset_detail", "bake_assets")
+_CHOICES = ("proxy_form", "baked_light", "expand_everything", "asset_detail")
 #: Settings of a scene that results do not depend on.
 _IGNORED = {
     "statistics",

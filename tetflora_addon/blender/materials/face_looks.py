@@ -25,11 +25,12 @@ from ..attributes import read, values_of
 from ..compat import tree_in_use
 from .colour_maths import Values, luminance
 from .image_pyramids import Pyramid, Pyramids
-from .means import GREY, Look, Looks
-from .node_values import NodeValues, Notes, NotUnderstood
+from .node_values import ImageMissing, NodeValues
 from .nodes import active_output, find_socket, upstream
 from .surface_shaders import SurfaceShaders
 
+#: What Blender shows where there is no material.
+GREY = (0.8, 0.8, 0.8)
 Shade = tuple[Values, Values, Values]
 
 #: Parts along an edge, at most; texels of the finest image along an edge of a part, about. Where steps, or several
@@ -42,19 +43,19 @@ _SAME = 1.0 / (1 << 14)
 
 @dataclass
 class Known:
-    """What is kept from one material to the next: images, means, and tables of ramps."""
+    """What is kept from one material to the next: images and tables of ramps."""
 
     pyramids: Pyramids = field(default_factory=Pyramids)
-    looks: Looks = field(default_factory=Looks)
     curves: dict[int, NDArray[np.float32]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class MeshLayers:
-    """Attributes of a mesh: the UV map that renders first, '' if there is none, and types by name."""
+    """Attributes of a mesh: the UV map that renders first, '' if there is none; types, and means if known, by name."""
 
     first: str
     types: dict[str, str]
+    means: dict[str, NDArray] = field(default_factory=dict)
 
     def map_named(self, name: str) -> str:
         """The UV map that a name stands for: the first one if there is no such map."""
@@ -69,7 +70,8 @@ class Plan:
     ----------
     name : str
         Of the material, for messages.
-    notes : Notes
+    problems : list of str
+        For the artist.
     constant : (5,) float32
         Cover, colour times cover, and the lightness of what goes through; of where all has its mean, if it varies.
     shade : callable, optional
@@ -86,7 +88,7 @@ class Plan:
     """
 
     name: str
-    notes: Notes
+    problems: list[str]
     constant: NDArray[np.float32]
     shade: Callable[[NodeValues], Shade | None] | None = None
     known: bool = True
@@ -94,6 +96,11 @@ class Plan:
     colours: list[str] = field(default_factory=list)
     texels: float = 1.0
     uneven: bool = False
+
+    def tell(self, problem: str) -> None:
+        """Add a problem; those that are told already are left out."""
+        if problem not in self.problems:
+            self.problems.append(problem)
 
     @property
     def names(self) -> list[str]:
@@ -140,6 +147,8 @@ class Plan:
         return parts
 
 
+_HALF = np.full((1, 1), 0.5, np.float32)
+_ANYWHERE = _HALF, _HALF, np.full((1, 1), np.inf, np.float32)  # a point that stands for the whole image
 _BATCH = 1 << 15  # points that are evaluated at once, so that they stay in the processor's cache
 
 
@@ -154,8 +163,7 @@ class _Probe:
         name = self._layers.map_named(name)
         if name and name not in self._plan.maps:
             self._plan.maps.append(name)
-        half = np.full((1, 1), 0.5, np.float32)
-        return half, half, np.ones((1, 1), np.float32)
+        return _ANYWHERE
 
     def is_map(self, name: str) -> bool:
         return self._layers.types.get(name) == 'FLOAT2'
@@ -164,23 +172,26 @@ class _Probe:
         exists = name in self._layers.types
         if exists and name not in self._plan.colours:
             self._plan.colours.append(name)
-        return np.full((4, 1, 1), 0.5 if exists else 0.0, np.float32)
+        mean = np.full(4, 0.5 if exists else 0.0, np.float32)
+        if (known := self._layers.means.get(name)) is not None:
+            mean[: len(known)] = known if len(known) > 1 else known[0]
+        return mean.reshape(4, 1, 1)
 
     def pyramid(self, node: bpy.types.Node, scale: float) -> Pyramid:
         material, image = self._plan.name, node.image
         if image is None:
-            raise NotUnderstood(
+            raise ImageMissing(
                 f'An image of material "{material}" is missing; its viewport color stands for it. Choose an image in '
                 f'the node "{node.label or node.name}"'
             )
         pyramid = self._known.pyramids.of(image, node.outputs["Alpha"].is_linked)
         if pyramid is None:
-            raise NotUnderstood(
+            raise ImageMissing(
                 f'The image "{image.name}" of material "{material}" cannot be read; the viewport color stands for it. '
                 "Find it with File > External Data > Find Missing Files"
             )
         if image.source == 'TILED':
-            self._plan.notes.tell(
+            self._plan.tell(
                 f'The image "{image.name}" of material "{material}" has several tiles; the first stands for all'
             )
         self.images.add(image)
@@ -189,6 +200,12 @@ class _Probe:
 
     def uneven(self) -> None:
         self._plan.uneven = True
+
+    def unknown(self) -> None:
+        self._plan.tell(
+            f'Some nodes of material "{self._plan.name}" are only known to a renderer; their middle value stands for '
+            "them. Bake them to an image to see their pattern from afar"
+        )
 
 
 class _Sampled:
@@ -209,8 +226,7 @@ class _Sampled:
     def uv(self, name: str) -> tuple[Values, Values, Values]:
         name = self._layers.map_named(name)
         if not name:
-            half = np.full((1, 1), 0.5, np.float32)
-            return half, half, np.ones((1, 1), np.float32)
+            return _ANYWHERE
         u, v = (self._weights @ self._corners[name][:, :, i].T for i in range(2))
         return u, v, self._sizes[name]
 
@@ -233,21 +249,13 @@ class _Sampled:
         if node.image is not None:
             pyramid = self._known.pyramids.of(node.image, node.outputs["Alpha"].is_linked)
         if pyramid is None:
-            raise NotUnderstood("missing")  # the probe has told about it
+            raise ImageMissing  # the probe has told about it
         return pyramid
 
     def uneven(self) -> None:
         pass
 
-
-def find_out(plan: Plan, layers: MeshLayers, known: Known) -> None:
-    """Evaluate a plan once where everything has its mean, and note what that takes."""
-    probe = _Probe(plan, layers, known)
-    found = plan.shade(NodeValues(probe, known.curves))
-    plan.known = found is not None
-    if found is not None:
-        plan.constant = _means_of(found)[0]
-        plan.uneven |= len(probe.images) > 1
+    unknown = uneven
 
 
 def _means_of(shade: Shade) -> NDArray[np.float32]:
@@ -302,6 +310,7 @@ _TYPES = {'FLOAT', 'INT', 'INT8', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLOURS
 _LEAST = 1e-4  # coverage below which a face has no colour of its own
 _FAR = np.float32(1e6)  # texture coordinates and colours beyond it are no use
 _ROUGH = 0.5  # of materials that do not say
+_FEW_TEXELS = 512  # columns or rows of images of which only the mean counts
 _TINY = 1e-30  # added to areas, so that those of faces without any count alike
 
 
@@ -343,7 +352,7 @@ class FaceReader:
     def prepare(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> MeshLooks:
         """Read all that the looks of a mesh follow from, so that it need not be there any more afterwards."""
         made = MeshLooks(mesh, materials, self.known)
-        self.warn(problem for plan in made.plans for problem in plan.notes.problems)
+        self.warn(problem for plan in made.plans for problem in plan.problems)
         return made
 
     def warn(self, problems: Iterable[str]) -> None:
@@ -377,16 +386,6 @@ class MeshLooks:
             self._values[name] = attribute.domain, values.reshape(len(values), -1)
         # Without the attribute all faces are of the first slot.
         self._slot = read(mesh, "material_index") if "material_index" in types and len(materials) > 1 else None
-
-    @property
-    def first_map(self) -> str:
-        """The UV map that renders first; '' if there is none."""
-        return self._layers.first
-
-    @property
-    def needs_baking(self) -> list[int]:
-        """Slots whose materials have nodes that only a renderer knows."""
-        return [slot for slot, plan in enumerate(self.plans) if plan.notes.needs_baking]
 
     def slots(self, start: int, end: int) -> NDArray[np.int32]:
         """Slot of some faces."""
@@ -482,19 +481,54 @@ def roughness_of(material: bpy.types.Material | None) -> float:
     return _ROUGH
 
 
+@dataclass(frozen=True)
+class Look:
+    """Means over a material: linear RGB, transmission (NaN if unknown), fraction that is not transparent."""
+
+    colour: tuple[float, float, float] = GREY
+    transmission: float = 0.0
+    coverage: float = 1.0
+
+
+class Looks:
+    """Reads means of whole materials; each image is read once, and only some of its pixels."""
+
+    def __init__(self) -> None:
+        self._known = Known(Pyramids(_FEW_TEXELS))
+
+    def of(self, material: bpy.types.Material | None, attributes: dict[str, NDArray]) -> Look:
+        """Look of a material.
+
+        Parameters
+        ----------
+        material : bpy.types.Material, optional
+        attributes : mapping of str to (n, k) float32
+            Of the mesh that wears it, for those that take their colour from one.
+        """
+        if material is None:
+            return Look()
+        types = {name: 'FLOAT2' if values.shape[1] == 2 else 'FLOAT_VECTOR' for name, values in attributes.items()}
+        means = {name: values.mean(axis=0, dtype=np.float64) for name, values in attributes.items()}
+        plan = _plan_of(material, MeshLayers("", types, means), self._known)
+        cover, *colour, through = plan.constant.astype(np.float64).tolist()
+        colour = np.clip(np.array(colour) / max(cover, _LEAST), 0, 1)
+        passed = np.clip(through / max(float(luminance(colour * cover)), 1e-6), 0, 1)
+        return Look(tuple(colour.tolist()), float(passed) if plan.known else np.nan, cover)
+
+
 def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, known: Known) -> Plan:
-    """Find out how to evaluate a material."""
-    notes = Notes()
+    """Evaluate a material once where everything has its mean, and note what that takes."""
     if material is None:
-        return Plan("", notes, _constant(Look(GREY)))
-    shaders = SurfaceShaders(material, known.looks, notes)
-    plan = Plan(material.name, notes, _constant(shaders.plain), shaders.at)
-    find_out(plan, layers, known)
+        return Plan("", [], np.array([1.0, *GREY, 0.0], np.float32))
+    plan = Plan(material.name, [], np.array([1.0, *np.clip(material.diffuse_color[:3], 0, 1), 0.0], np.float32))
+    plan.shade = SurfaceShaders(material, plan.tell).at
+    probe = _Probe(plan, layers, known)
+    found = plan.shade(NodeValues(probe, known.curves))
+    plan.known = found is not None
+    if found is not None:
+        plan.constant = _means_of(found)[0]
+        plan.uneven |= len(probe.images) > 1
     return plan
-
-
-def _constant(look: Look) -> NDArray[np.float32]:
-    return np.array([look.coverage, *np.multiply(look.colour, look.coverage), 0.0], np.float32)
 
 
 def _areas(positions: NDArray[np.float32], verts: NDArray[np.int32]) -> NDArray[np.float64]:

@@ -112,7 +112,8 @@ def _columns(
 class Pyramids:
     """Pyramids of images, each read once; all are forgotten when they take too much memory."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST_TEXELS) -> None:
+        self._most = most
         self._known: dict[tuple[bpy.types.Image, bool], Pyramid | None] = {}
 
     def of(self, image: bpy.types.Image, weighted: bool) -> Pyramid | None:
@@ -121,11 +122,11 @@ class Pyramids:
         if key not in self._known:
             if sum(p.texels.nbytes for p in self._known.values() if p is not None) > _MOST_BYTES:
                 self._known.clear()
-            self._known[key] = pyramid_of(image, weighted)
+            self._known[key] = pyramid_of(image, weighted, self._most)
         return self._known[key]
 
 
-def pyramid_of(image: bpy.types.Image, weighted: bool) -> Pyramid | None:
+def pyramid_of(image: bpy.types.Image, weighted: bool, most: int = MOST_TEXELS) -> Pyramid | None:
     """The pyramid of an image; None if it has no pixels.
 
     Parameters
@@ -133,14 +134,21 @@ def pyramid_of(image: bpy.types.Image, weighted: bool) -> Pyramid | None:
     image : bpy.types.Image
     weighted : bool
         Whether its alpha counts: coarser copies then have the colour of what is not transparent.
+    most : int
+        If less than `MOST_TEXELS`, only about as many columns or rows are looked at.
     """
-    width, height, channels = *image.size, image.channels
-    if not (width and height and channels):
+    if not (all(image.size) and image.channels):
         return None
+    pixels = image_pixels(image)
+    if most < MOST_TEXELS:
+        # An odd step, so that a power of two of columns does not make a few of them stand for all.
+        step = max(1, max(image.size) // most) | 1
+        pixels = pixels[::step, ::step]
+    height, width = pixels.shape[:2]
     halvings = max(0, int(np.ceil(np.log2(max(width, height) / MOST_TEXELS))))
-    levels = [_finest(image, weighted, halvings)]
+    levels = [_finest(image, pixels, weighted, halvings)]
     widths = [np.array([width, height], np.float32) / (1 << halvings)]
-    while min(levels[-1].shape[:2]) > 1:
+    while max(levels[-1].shape[:2]) > 1:
         levels.append(_halved(levels[-1]))
         widths.append(widths[-1] / 2)
     sizes = [level.shape[0] * level.shape[1] for level in levels]
@@ -155,9 +163,8 @@ def pyramid_of(image: bpy.types.Image, weighted: bool) -> Pyramid | None:
     )
 
 
-def _finest(image: bpy.types.Image, weighted: bool, halvings: int) -> NDArray[np.float16]:
+def _finest(image: bpy.types.Image, pixels: NDArray[np.float32], weighted: bool, halvings: int) -> NDArray[np.float16]:
     """The finest copy that is kept (h, w, 4): linear RGB times alpha, and alpha."""
-    pixels = image_pixels(image)
     height, width, channels = pixels.shape
     # Eight bits have 256 values: a table is ten times as fast as a power.
     table = None if image.is_float else linear_rgb(image, np.linspace(0, 1, 256, dtype=np.float32)[:, None])[:, 0]

@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The numbers and colours that flow into a shader, at many points of a surface at once.
 
-Nodes that are not known raise `NotUnderstood`; whoever asked then has to do with a mean, or bake. What depends on the
-direction of a ray, or on which instance it is, counts with its mean.
+Nodes that only a renderer knows let the first color that feeds them pass; where none does, as in noise, they count with
+one half. What depends on the direction of a ray, or on which instance it is, counts with its mean.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Protocol
 
 import bpy
@@ -17,7 +16,7 @@ import numpy as np
 from mathutils import Euler
 from numpy.typing import NDArray
 
-from .colour_maths import BLENDS, MATHS, STEPS, Values, hue_saturation, luminance, map_range
+from .colour_maths import BLENDS, MATHS, STEPS, Values, hue_saturation, luminance
 from .image_pyramids import Pyramid
 from .nodes import find_socket
 
@@ -29,42 +28,12 @@ _MEANS = {
     ('FRESNEL', "Fac"): 0.09,
     ('LAYER_WEIGHT', "Fresnel"): 0.09,
     ('LAYER_WEIGHT', "Facing"): 0.33,
-    ('NEW_GEOMETRY', "Backfacing"): 0.5,
-    ('NEW_GEOMETRY', "Random Per Island"): 0.5,
-    ('OBJECT_INFO', "Random"): 0.5,
-    ('PARTICLE_INFO', "Random"): 0.5,
-    ('HAIR_INFO', "Random"): 0.5,
     ('LIGHT_PATH', "Is Camera Ray"): 1.0,
 }
 
 
-class NotUnderstood(Exception):
-    """Nodes that only a renderer knows; `problem` says so where the artist should know."""
-
-    def __init__(self, problem: str = "") -> None:
-        super().__init__(problem)
-        self.problem = problem
-
-
-@dataclass
-class Notes:
-    """What was not understood of a material.
-
-    Attributes
-    ----------
-    needs_baking : bool
-        Some nodes are only known to a renderer; means stand for them.
-    problems : list of str
-        For the artist.
-    """
-
-    needs_baking: bool = False
-    problems: list[str] = field(default_factory=list)
-
-    def tell(self, problem: str) -> None:
-        """Add a problem, if it is new."""
-        if problem not in self.problems:
-            self.problems.append(problem)
+class ImageMissing(Exception):
+    """An image that cannot be read; the text tells the artist."""
 
 
 class SurfacePoints(Protocol):
@@ -84,6 +53,9 @@ class SurfacePoints(Protocol):
 
     def uneven(self) -> None:
         """Say that the mean of what comes out is not what comes out for the mean."""
+
+    def unknown(self) -> None:
+        """Say that only a renderer knows what comes out of a node."""
 
 
 class NodeValues:
@@ -135,17 +107,12 @@ class NodeValues:
             return np.zeros((1, 1), np.float32)
         if node.type in {'RGB', 'VALUE'}:
             return _constant(node.outputs[0])
-        work = _NODES.get(node.type)
-        if work is None:
-            raise NotUnderstood
         with np.errstate(all="ignore"):
-            return work(self, node, socket, stack)
+            return _NODES.get(node.type, NodeValues._unknown)(self, node, socket, stack)
 
     def _image(self, node: bpy.types.Node, stack: Stack) -> tuple[Values, Values]:
         key = tuple(n.as_pointer() for n in (node, *stack))
         if key not in self._images:
-            if node.projection != 'FLAT':
-                raise NotUnderstood
             outer, self._scale = self._scale, 1.0
             vector = find_socket(node.inputs, "Vector")
             if source_of(vector, stack)[0] is None:
@@ -164,17 +131,21 @@ class NodeValues:
 
     # What nodes do, by type; each gets the node, the output that is asked for, and the groups it is in.
 
+    def _unknown(self, node, socket, stack) -> Values:
+        self._points.unknown()
+        if socket.type == 'RGBA' and (colours := [s for s in node.inputs if s.type == 'RGBA' and s.is_linked]):
+            return self.colour(node, colours[0].identifier, stack)
+        return np.full((1, 1) if socket.type == 'VALUE' else (3, 1, 1), 0.5, np.float32)
+
     def _uv_map(self, node, _socket, _stack) -> Values:
         return self._uv(node.uv_map)
 
-    def _coordinates(self, _node, socket, _stack) -> Values:
-        if socket.identifier != "UV":
-            raise NotUnderstood
-        return self._uv("")
+    def _coordinates(self, node, socket, stack) -> Values:
+        return self._uv("") if socket.identifier == "UV" else self._unknown(node, socket, stack)
 
-    def _attribute(self, node, socket, _stack) -> Values:
+    def _attribute(self, node, socket, stack) -> Values:
         if node.type == 'ATTRIBUTE' and node.attribute_type != 'GEOMETRY':
-            raise NotUnderstood
+            return self._unknown(node, socket, stack)
         name = node.attribute_name if node.type == 'ATTRIBUTE' else node.layer_name
         if self._points.is_map(name) and socket.identifier in {"Color", "Vector"}:
             return self._uv(name)
@@ -186,8 +157,7 @@ class NodeValues:
     def _mapping(self, node, _socket, stack) -> Values:
         vector = self.colour(node, "Vector", stack)
         shift, turn, scale = (self.colour(node, key, stack) for key in ("Location", "Rotation", "Scale"))
-        if max(shift.size, turn.size, scale.size) > 3:
-            raise NotUnderstood
+        shift, turn, scale = (values.mean(axis=(1, 2), keepdims=True) for values in (shift, turn, scale))
         linear = np.array(Euler(turn.ravel().tolist()).to_matrix()) @ np.diag(scale.ravel().astype(np.float64))
         move = shift if node.vector_type in {'POINT', 'TEXTURE'} else np.zeros_like(shift)
         if node.vector_type == 'TEXTURE':
@@ -199,12 +169,9 @@ class NodeValues:
     def _mix(self, node, socket, stack) -> Values:
         kind = node.data_type
         if kind not in {'FLOAT', 'VECTOR', 'RGBA'}:
-            raise NotUnderstood
+            return self._unknown(node, socket, stack)
         word = {'FLOAT': "Float", 'VECTOR': "Vector", 'RGBA': "Color"}[kind]
-        if kind == 'VECTOR' and node.factor_mode == 'NON_UNIFORM':
-            factor = self.colour(node, "Factor_Vector", stack)
-        else:
-            factor = self.number(node, "Factor_Float", stack)
+        factor = self.number(node, "Factor_Float", stack)
         factor = np.clip(factor, 0, 1) if node.clamp_factor else factor
         read = self.number if kind == 'FLOAT' else self.colour
         a, b = read(node, f"A_{word}", stack), read(node, f"B_{word}", stack)
@@ -219,7 +186,7 @@ class NodeValues:
     def _blend(self, kind: str, a: Values, b: Values, factor: Values) -> Values:
         if kind not in {'MIX', 'MULTIPLY', 'ADD', 'SUBTRACT', 'SCREEN', 'LINEAR_LIGHT'}:
             self._points.uneven()
-        return BLENDS[kind](a, b, factor)
+        return BLENDS.get(kind, BLENDS['MIX'])(a, b, factor)
 
     def _hue_saturation(self, node, _socket, stack) -> Values:
         keys = ("Hue", "Saturation", "Value", "Fac")
@@ -236,8 +203,8 @@ class NodeValues:
         colour, factor = self.colour(node, "Color", stack), self.number(node, "Fac", stack)
         return colour + factor * (1 - 2 * colour)
 
-    def _math(self, node, _socket, stack) -> Values:
-        made = self._compute(node, [s for s in node.inputs if s.enabled], stack, self.number)
+    def _math(self, node, socket, stack) -> Values:
+        made = self._compute(node, socket, [s for s in node.inputs if s.enabled], stack, self.number)
         return np.clip(made, 0, 1) if node.use_clamp else made
 
     def _vector_math(self, node, socket, stack) -> Values:
@@ -246,20 +213,15 @@ class NodeValues:
             self._scale *= abs(float(scale.mean()))
             return self.colour(node, "Vector", stack) * scale
         operands = [s for s in node.inputs if s.enabled and s.type == 'VECTOR']
-        if node.operation in {'DOT_PRODUCT', 'LENGTH', 'DISTANCE'}:
-            first, *rest = (self.colour(node, s.identifier, stack) for s in operands)
-            if node.operation == 'DOT_PRODUCT':
-                return (first * rest[0]).sum(axis=0)
-            return np.sqrt(((first - (rest[0] if rest else 0)) ** 2).sum(axis=0))
-        made = self._compute(node, operands, stack, self.colour)
+        made = self._compute(node, socket, operands, stack, self.colour)
         if node.operation == 'MULTIPLY' and not operands[1].is_linked:
             self._scale *= float(np.sqrt(abs(np.prod(operands[1].default_value[:2]))))
         return made
 
-    def _compute(self, node, operands, stack: Stack, read: Callable) -> Values:
+    def _compute(self, node, socket, operands, stack: Stack, read: Callable) -> Values:
         work = MATHS.get(node.operation)
         if work is None:
-            raise NotUnderstood
+            return self._unknown(node, socket, stack)
         if node.operation in STEPS:
             self._points.uneven()
         return work(*(read(node, socket.identifier, stack) for socket in operands))
@@ -292,15 +254,15 @@ class NodeValues:
         return self._curves[key]
 
     def _map_range(self, node, socket, stack) -> Values:
-        if node.data_type != 'FLOAT' or node.interpolation_type == 'STEPPED':
-            raise NotUnderstood
+        if node.data_type != 'FLOAT':
+            return self._unknown(node, socket, stack)
         self._points.uneven()
         keys = ("Value", "From Min", "From Max", "To Min", "To Max")
-        values = [self.number(node, key, stack) for key in keys]
-        made = map_range(*values, node.interpolation_type)
-        if node.clamp and node.interpolation_type == 'LINEAR':
-            made = np.clip(made, np.minimum(values[3], values[4]), np.maximum(values[3], values[4]))
-        return made
+        value, low, high, to_low, to_high = (self.number(node, key, stack) for key in keys)
+        x = MATHS['DIVIDE'](value - low, high - low)
+        return to_low + (np.clip(x, 0, 1) if node.clamp or node.interpolation_type != 'LINEAR' else x) * (
+            to_high - to_low
+        )
 
     def _clamp(self, node, _socket, stack) -> Values:
         value, low, high = (self.number(node, key, stack) for key in ("Value", "Min", "Max"))
@@ -312,13 +274,13 @@ class NodeValues:
 
     def _separate(self, node, socket, stack) -> Values:
         if getattr(node, "mode", 'RGB') != 'RGB':
-            raise NotUnderstood
+            return self._unknown(node, socket, stack)
         part = [s.identifier for s in node.outputs].index(socket.identifier)
         return self.colour(node, node.inputs[0].identifier, stack)[part]
 
-    def _combine(self, node, _socket, stack) -> Values:
+    def _combine(self, node, socket, stack) -> Values:
         if getattr(node, "mode", 'RGB') != 'RGB':
-            raise NotUnderstood
+            return self._unknown(node, socket, stack)
         parts = [self.number(node, s.identifier, stack) for s in node.inputs[:3]]
         return np.stack(np.broadcast_arrays(*parts))
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from ..compat import tree_in_use
 from .colour_maths import Values, luminance
-from .means import Look, Looks
-from .node_values import NodeValues, Notes, NotUnderstood, Stack, source_of
+from .node_values import ImageMissing, NodeValues, Stack, source_of
 from .nodes import SNOW, active_output, find_socket
 
 #: Shaders by what they let through of the light that they scatter, and the input of their colour.
@@ -53,7 +52,6 @@ class Scattered(NamedTuple):
 
 _ONE, _NONE = np.ones((1, 1), np.float32), np.zeros((1, 1), np.float32)
 _BLACK = np.zeros((3, 1, 1), np.float32)
-_HOLE = Scattered(_NONE, _BLACK, _NONE)
 _UNLIT = Scattered(_ONE, _BLACK, _NONE)
 
 
@@ -63,20 +61,17 @@ class SurfaceShaders:
     Parameters
     ----------
     material : bpy.types.Material
-    looks : Looks
-        For the means of what is not understood.
-    notes : Notes
-        Filled while evaluating.
+    tell : callable
+        Takes problems, for the artist.
     """
 
-    def __init__(self, material: bpy.types.Material, looks: Looks, notes: Notes) -> None:
-        self.material, self.notes = material, notes
-        self._looks, self._means = looks, None
+    def __init__(self, material: bpy.types.Material, tell: Callable[[str], None]) -> None:
+        self.material, self._tell = material, tell
         output = active_output(tree_in_use(material), 'OUTPUT_MATERIAL')
         self._surface = None if output is None else find_socket(output.inputs, "Surface")
         if self._surface is not None and source_of(self._surface, ())[0] is None:
             self._surface = None
-            notes.tell(
+            tell(
                 f'Material "{material.name}" has no surface shader; its viewport color stands for it. Link a shader to '
                 "the Surface of its Material Output"
             )
@@ -84,11 +79,6 @@ class SurfaceShaders:
     def at(self, values: NodeValues) -> Scattered | None:
         """What all points do with light; None where the material has no shaders."""
         return None if self._surface is None else self._shader(values, self._surface, ())
-
-    @property
-    def plain(self) -> Look:
-        """Of a material without shaders: its colour in viewports."""
-        return Look(tuple(np.clip(self.material.diffuse_color[:3], 0, 1)))
 
     def _shader(self, values: NodeValues, socket: bpy.types.NodeSocket, stack: Stack) -> Scattered:
         source, stack = source_of(socket, stack)
@@ -98,40 +88,30 @@ class SurfaceShaders:
         if (simple := SIMPLE.get(node.type)) is not None:
             colour = self._colour(values, node, simple[0], stack)
             if node.type == 'EMISSION':
-                colour = colour * self._number(values, node, "Strength", stack, 1.0)
+                colour = colour * self._number(values, node, "Strength", stack)
             return _solid(_ONE, colour, np.full((1, 1), simple[1], np.float32))
         work = _SHADERS.get(node.type)
-        if work is not None:
-            return work(self, values, node, stack)
-        self.notes.needs_baking = True
-        look = self._mean()
-        colour = np.array(look.colour, np.float32).reshape(3, 1, 1)
-        through = np.full((1, 1), np.nan_to_num(look.transmission), np.float32)
-        return _solid(np.full((1, 1), look.coverage, np.float32), colour, through)
+        return _UNLIT if work is None else work(self, values, node, stack)
 
     def _principled(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
         colour = self._colour(values, node, "Base Color", stack)
-        glass = self._number(values, node, "Transmission Weight", stack, 0.0)
-        inside = self._number(values, node, "Subsurface Weight", stack, 0.0)
+        glass = self._number(values, node, "Transmission Weight", stack)
+        inside = self._number(values, node, "Subsurface Weight", stack)
         through = np.clip(np.maximum(glass, inside / 2), 0, 1)
-        alpha = self._number(values, node, "Alpha", stack, None)
+        alpha = self._number(values, node, "Alpha", stack)
         return _solid(np.clip(alpha, 0, 1), colour, through)
 
     def _specular(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
-        gone = np.clip(self._number(values, node, "Transparency", stack, 0.0), 0, 1)
+        gone = np.clip(self._number(values, node, "Transparency", stack), 0, 1)
         return _solid(1 - gone, self._colour(values, node, "Base Color", stack), _NONE)
 
     def _transparent(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
-        try:
-            colour = np.clip(values.colour(node, "Color", stack), 0, 1)
-        except NotUnderstood:
-            return _HOLE
-        return Scattered(1 - luminance(colour), _BLACK, _NONE)
+        return Scattered(1 - luminance(self._colour(values, node, "Color", stack)), _BLACK, _NONE)
 
     def _mix(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
         if stack and stack[-1].node_tree.name.startswith(SNOW):  # looks are those without snow
             return self._shader(values, find_socket(node.inputs, "Shader"), stack)
-        factor = np.clip(self._number(values, node, "Fac", stack, 0.5), 0, 1)
+        factor = np.clip(self._number(values, node, "Fac", stack), 0, 1)
         a, b = (self._shader(values, find_socket(node.inputs, key), stack) for key in ("Shader", "Shader_001"))
         return Scattered(*(x + factor * (y - x) for x, y in zip(a, b, strict=True)))
 
@@ -141,39 +121,19 @@ class SurfaceShaders:
         cover = np.clip(a.cover + b.cover - 1, 0, 1)
         return Scattered(cover, a.colour + b.colour, a.through + b.through)
 
-    def _holdout(self, _values: NodeValues, _node: bpy.types.Node, _stack: Stack) -> Scattered:
-        return _UNLIT
-
     def _colour(self, values: NodeValues, node: bpy.types.Node, key: str, stack: Stack) -> Values:
         try:
             return np.clip(values.colour(node, key, stack), 0, 1)
-        except NotUnderstood as error:
-            self._note(error)
-            colour = self.material.diffuse_color[:3] if error.problem else self._mean().colour
-            return np.clip(np.array(colour, np.float32), 0, 1).reshape(3, 1, 1)
+        except ImageMissing as error:
+            self._tell(str(error))
+            return np.clip(np.array(self.material.diffuse_color[:3], np.float32), 0, 1).reshape(3, 1, 1)
 
-    def _number(
-        self, values: NodeValues, node: bpy.types.Node, key: str, stack: Stack, unknown: float | None
-    ) -> Values:
-        """A number; `unknown`, or the mean coverage if that is None, where it is not understood."""
+    def _number(self, values: NodeValues, node: bpy.types.Node, key: str, stack: Stack) -> Values:
         try:
             return values.number(node, key, stack)
-        except NotUnderstood as error:
-            self._note(error)
-            if unknown is None:
-                unknown = 1.0 if error.problem else self._mean().coverage
-            return np.full((1, 1), unknown, np.float32)
-
-    def _note(self, error: NotUnderstood) -> None:
-        if not error.problem:
-            self.notes.needs_baking = True
-        else:
-            self.notes.tell(error.problem)
-
-    def _mean(self) -> Look:
-        if self._means is None:
-            self._means = self._looks.of(self.material, {})
-        return self._means
+        except ImageMissing as error:
+            self._tell(str(error))
+            return np.full((1, 1), {"Alpha": 1.0, "Strength": 1.0, "Fac": 0.5}.get(key, 0.0), np.float32)
 
 
 def _solid(cover: Values, colour: Values, through: Values) -> Scattered:
@@ -187,5 +147,4 @@ _SHADERS: dict[str, Callable[[SurfaceShaders, NodeValues, bpy.types.Node, Stack]
     'BSDF_TRANSPARENT': SurfaceShaders._transparent,
     'MIX_SHADER': SurfaceShaders._mix,
     'ADD_SHADER': SurfaceShaders._add,
-    'HOLDOUT': SurfaceShaders._holdout,
 }

@@ -20,7 +20,7 @@ from ...assets.mesh_features import mesh_features
 from ...errors import SceneError
 from ...refinement.polygons import Meshes, Surface
 from ..attributes import face_offsets, members, read, values_of, world_matrix
-from ..materials.means import Looks
+from ..materials.face_looks import Looks
 from ..materials.nodes import is_ours
 from .looks import LayerLooks
 from .objects import SURFACE_TYPES, materials_of, may_instance, renderable_objects

@@ -19,7 +19,7 @@ from ...light.sources import World
 from ...refinement.lights import Light
 from ..attributes import image_pixels, linear_rgb, world_matrix
 from ..compat import sky_model, tree_in_use
-from ..materials.means import Looks
+from ..materials.face_looks import Looks
 from ..materials.nodes import active_output, upstream
 from .objects import read_occluders, renderable_objects
 
