@@ -27,8 +27,6 @@ CELL = 24
 PAIRS_BATCH = 1 << 20
 #: How much nearer than what it hides something is, over the depth of that: as far as several eyes count.
 _NEARER = 1.0
-#: Part of a pixel that something reaches into before it counts as touched.
-EDGE = 0.0
 
 
 @dataclass(frozen=True)
@@ -173,9 +171,8 @@ class Coverage:
         known &= ~((prints.high[:, 0] > self.end) & (self.end < self.width)) & np.isfinite(prints.high[:, 0])
         low, high = (
             np.clip(np.floor(np.clip(of, -1.0, 1e9)) - first, 0, size - 1).astype(np.int64)
-            for of in (prints.low + EDGE, prints.high - EDGE)
+            for of in (prints.low, prints.high)
         )
-        high = np.maximum(high, low)
         level = np.log2((high - low).max(axis=1) + 1).astype(np.int64)
         out = np.zeros(len(low), bool)
         for number in np.unique(level):

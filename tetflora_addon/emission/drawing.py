@@ -53,7 +53,7 @@ from .shade import Shade
 TILE, AROUND = 240, 64
 #: Pixels from which on a branch that nothing else grows on has a line of its own; smaller ones are as straight.
 LINES = 6.0
-#: Batches, front to back, in which what was made between two depths is tested and covers the image.
+#: Batches, front to back, in which the parts of a slab are tested and cover the image.
 _BATCHES = 6
 #: Width in pixels up to which wood is thin triangles; tubes take their place up to `decisions.BAND` times that.
 TUBES = 0.8

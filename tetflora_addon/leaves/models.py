@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import perpendicular
+from ..arrays import GOLDEN_ANGLE, perpendicular, spiral, spread
 from ..errors import SpeciesError
 from ..parameters import limited
 from .compounds import Compound
@@ -161,25 +161,29 @@ class LeafModel:
 def mean_silhouette(model: LeafModel) -> float:
     """Mean over directions of the area that a leaf of size 1 covers, seen from each, to a few percent.
 
-    Directions follow a spiral over half of a sphere, as far as both sides show the same.
+    A quarter of the surface of what is convex (Cauchy, "Note sur divers théorèmes relatifs à la rectification des
+    courbes et à la quadrature des surfaces", 1841). Directions follow a spiral over half of a sphere, as both sides
+    show the same; faces are drawn as fans of triangles.
     """
     first = model.corner_verts[model.face_offsets[:-1]]
     face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))
     corners = model.positions[np.stack([first[face], model.corner_verts, model.corner_verts[model.next_corner]])]
     number = np.arange(_DIRECTIONS)
-    height, turn = (number + 0.5) / _DIRECTIONS, 2.399963229728653 * number
-    flat = np.sqrt(1.0 - height**2)
     total = 0.0
-    for towards in np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1):
+    for towards in spiral((number + 0.5) / _DIRECTIONS, number, GOLDEN_ANGLE):
         across = perpendicular(towards[None])[0]
-        flatly = corners @ np.stack([across, np.cross(towards, across)], axis=1)
-        low, high = flatly.min(axis=(0, 1)), flatly.max(axis=(0, 1))
-        cell = (high - low) / _CELLS
-        places = low + (np.stack(np.meshgrid(*[np.arange(_CELLS)] * 2), axis=-1).reshape(-1, 2) + 0.5) * cell
-        a, b, c = flatly[:, :, None] - places
-        sides = [u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0] for u, v in ((a, b), (b, c), (c, a))]
-        within = np.all([side >= 0.0 for side in sides], axis=0) | np.all([side <= 0.0 for side in sides], axis=0)
-        total += within.any(axis=0).mean() * np.prod(high - low)
+        flat = corners @ np.stack([across, np.cross(towards, across)], axis=1)
+        low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
+        # In cells, the middles of which are whole numbers.
+        flat = (flat - low) * (_CELLS / np.maximum(high - low, 1e-12)) - 0.5
+        least = np.ceil(flat.min(axis=0)).astype(np.int64).clip(0, _CELLS)
+        wide = np.maximum(np.floor(flat.max(axis=0)).astype(np.int64).clip(-1, _CELLS - 1) - least + 1, 0)
+        owner, index = spread(wide.prod(axis=1))
+        cell = least[owner] + np.stack(np.divmod(index, np.maximum(wide[owner, 1], 1)), axis=1)
+        a, b, c = flat[:, owner] - cell
+        sides = np.stack([u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] for u, v in ((a, b), (b, c), (c, a))])
+        covered = cell[(sides >= 0.0).all(axis=0) | (sides <= 0.0).all(axis=0)]
+        total += len(np.unique(covered @ [_CELLS, 1])) / _CELLS**2 * np.prod(high - low)
     return float(total / _DIRECTIONS)
 
 

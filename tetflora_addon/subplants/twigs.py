@@ -59,6 +59,7 @@ def twig_buffers(
 
 
 def _triangles(flora: Flora, whole: WholeBranches, times: NDArray[np.float64]) -> MeshBuffers:
+    """A triangle from base to tip of each of branches (n,), so many times (n,) as wide."""
     branches, number = whole.branches, len(whole)
     base, tip = _ends(whole.lines)
     along = tip - base
@@ -85,6 +86,7 @@ def _triangles(flora: Flora, whole: WholeBranches, times: NDArray[np.float64]) -
 
 
 def _ribbons(flora: Flora, whole: WholeBranches, times: NDArray[np.float64], parts: NDArray[np.int64]) -> MeshBuffers:
+    """A chain of quadrilaterals (n,) along each of branches (n,), so many times (n,) as wide, as girths taper."""
     branches, lines = whole.branches, whole.lines
     ring, number = spread(parts + 1)
     place = number / parts[ring]

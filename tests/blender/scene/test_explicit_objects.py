@@ -250,7 +250,7 @@ def test_colours_come_from_materials_images_and_attributes():
     pixels[3, 1], pixels[5, 3] = np.nan, np.inf
     image.pixels.foreach_set(pixels.ravel())
     look = looks.of(_material("broken", image=image), {})
-    np.testing.assert_allclose(look.colour, (0.5, 0.25, 0.0), atol=1e-3)
+    np.testing.assert_allclose(look.colour, (0.5, 0.25, 0.0), atol=1e-6)
     assert look.coverage == pytest.approx(14 / 16)
     painted = _material("painted")
     tree = painted.node_tree
@@ -258,7 +258,7 @@ def test_colours_come_from_materials_images_and_attributes():
     node.layer_name = "Paint"
     tree.links.new(node.outputs["Color"], next(n for n in tree.nodes if n.type == 'BSDF_PRINCIPLED').inputs[0])
     found = looks.of(painted, {"Paint": np.array([[0, 0.2, 0.4], [0.2, 0.2, 0.0]], np.float32)})
-    np.testing.assert_allclose(found.colour, (0.1, 0.2, 0.2), atol=1e-3)
+    np.testing.assert_allclose(found.colour, (0.1, 0.2, 0.2), atol=1e-6)
 
 
 def test_nodes_that_are_switched_off_have_no_say():

@@ -16,7 +16,7 @@ import numpy as np
 from mathutils import Euler
 from numpy.typing import NDArray
 
-from .colour_maths import BLENDS, MATHS, STEPS, Values, hue_saturation, luminance
+from .colour_maths import BLENDS, MATHS, STEPS, Values, hue_saturation, luminance, map_range
 from .image_pyramids import Pyramid
 from .nodes import find_socket
 
@@ -28,6 +28,11 @@ _MEANS = {
     ('FRESNEL', "Fac"): 0.09,
     ('LAYER_WEIGHT', "Fresnel"): 0.09,
     ('LAYER_WEIGHT', "Facing"): 0.33,
+    ('NEW_GEOMETRY', "Backfacing"): 0.5,
+    ('NEW_GEOMETRY', "Random Per Island"): 0.5,
+    ('OBJECT_INFO', "Random"): 0.5,
+    ('PARTICLE_INFO', "Random"): 0.5,
+    ('HAIR_INFO', "Random"): 0.5,
     ('LIGHT_PATH', "Is Camera Ray"): 1.0,
 }
 
@@ -171,7 +176,10 @@ class NodeValues:
         if kind not in {'FLOAT', 'VECTOR', 'RGBA'}:
             return self._unknown(node, socket, stack)
         word = {'FLOAT': "Float", 'VECTOR': "Vector", 'RGBA': "Color"}[kind]
-        factor = self.number(node, "Factor_Float", stack)
+        if kind == 'VECTOR' and node.factor_mode == 'NON_UNIFORM':
+            factor = self.colour(node, "Factor_Vector", stack)
+        else:
+            factor = self.number(node, "Factor_Float", stack)
         factor = np.clip(factor, 0, 1) if node.clamp_factor else factor
         read = self.number if kind == 'FLOAT' else self.colour
         a, b = read(node, f"A_{word}", stack), read(node, f"B_{word}", stack)
@@ -186,7 +194,7 @@ class NodeValues:
     def _blend(self, kind: str, a: Values, b: Values, factor: Values) -> Values:
         if kind not in {'MIX', 'MULTIPLY', 'ADD', 'SUBTRACT', 'SCREEN', 'LINEAR_LIGHT'}:
             self._points.uneven()
-        return BLENDS.get(kind, BLENDS['MIX'])(a, b, factor)
+        return BLENDS[kind](a, b, factor)
 
     def _hue_saturation(self, node, _socket, stack) -> Values:
         keys = ("Hue", "Saturation", "Value", "Fac")
@@ -213,6 +221,11 @@ class NodeValues:
             self._scale *= abs(float(scale.mean()))
             return self.colour(node, "Vector", stack) * scale
         operands = [s for s in node.inputs if s.enabled and s.type == 'VECTOR']
+        if node.operation in {'DOT_PRODUCT', 'LENGTH', 'DISTANCE'}:
+            first, *rest = (self.colour(node, s.identifier, stack) for s in operands)
+            if node.operation == 'DOT_PRODUCT':
+                return (first * rest[0]).sum(axis=0)
+            return np.sqrt(((first - (rest[0] if rest else 0)) ** 2).sum(axis=0))
         made = self._compute(node, socket, operands, stack, self.colour)
         if node.operation == 'MULTIPLY' and not operands[1].is_linked:
             self._scale *= float(np.sqrt(abs(np.prod(operands[1].default_value[:2]))))
@@ -254,15 +267,15 @@ class NodeValues:
         return self._curves[key]
 
     def _map_range(self, node, socket, stack) -> Values:
-        if node.data_type != 'FLOAT':
+        if node.data_type != 'FLOAT' or node.interpolation_type == 'STEPPED':
             return self._unknown(node, socket, stack)
         self._points.uneven()
         keys = ("Value", "From Min", "From Max", "To Min", "To Max")
-        value, low, high, to_low, to_high = (self.number(node, key, stack) for key in keys)
-        x = MATHS['DIVIDE'](value - low, high - low)
-        return to_low + (np.clip(x, 0, 1) if node.clamp or node.interpolation_type != 'LINEAR' else x) * (
-            to_high - to_low
-        )
+        values = [self.number(node, key, stack) for key in keys]
+        made = map_range(*values, node.interpolation_type)
+        if node.clamp and node.interpolation_type == 'LINEAR':
+            made = np.clip(made, np.minimum(values[3], values[4]), np.maximum(values[3], values[4]))
+        return made
 
     def _clamp(self, node, _socket, stack) -> Values:
         value, low, high = (self.number(node, key, stack) for key in ("Value", "Min", "Max"))
