@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Map projections on any ellipsoid, and shifts between datums.
 
-Formulas and names of their parameters are those of IOGP Publication 373-7-2 (2023). Transverse Mercator is Krüger's
-series to the fourth order in the third flattening, exact to a micrometre within 3,000 km of the meridian (C. F. F.
-Karney, "Transverse Mercator with an accuracy of a few nanometers", Journal of Geodesy 85, 2011, equations 7 to 36).
-All coordinates are arrays of one length; angles are radians, and longitudes count from the method's own meridian.
+Names of parameters are those of IOGP Publication 373-7-2 (2023), where the formulas stand in real numbers. Here a place
+is one complex number: isometric latitude + i longitude on the ellipsoid, and north + i east on the map. What keeps
+angles is an analytic function then, and its way back the inverse function. Transverse Mercator is Krüger's series to
+the fourth order in the third flattening, exact to a micrometre within 3,000 km of the meridian (C. F. F. Karney,
+"Transverse Mercator with an accuracy of a few nanometers", Journal of Geodesy 85, 2011, equations 7 to 36). Angles are
+radians, and longitudes count from the method's own meridian.
 """
 
 from __future__ import annotations
@@ -13,14 +15,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import asin, atan2, cos, exp, inf, log, sin, sqrt, tan
+from math import asin, atan2, cos, exp, inf, log, sin, sqrt, tan, tanh
 
 import numpy as np
 from numpy.typing import NDArray
 
 _Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
-_Way = Callable[[NDArray[np.float64], NDArray[np.float64]], _Pair]
-_STEPS = 5  # of Newton's method for the latitude, which doubles the digits each time
+_Way = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
+_STEPS = 5  # of Newton's method for latitudes, which doubles the digits each time
+_ROUNDS = 7  # each of which leaves a 150th of the error
 _HALF_PI = np.pi / 2.0
 #: Degrees from the meridian: beyond it nobody has a scene, and series come to an end.
 MOST_OFF = 40.0
@@ -44,24 +47,16 @@ class Ellipsoid:
         """Eccentricity."""
         return sqrt(self.e2)
 
-    def conformal(self, tangent: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Tangent of the conformal latitude, from that of the geographic one (Karney, equations 7 to 9)."""
-        sigma = np.sinh(self.e * np.arctanh(self.e * tangent / np.hypot(1.0, tangent)))
-        return tangent * np.hypot(1.0, sigma) - sigma * np.hypot(1.0, tangent)
-
-    def latitude(self, conformal: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Latitude from the tangent of the conformal one."""
-        tangent = conformal / (1.0 - self.e2)
-        for _ in range(_STEPS):
-            found = self.conformal(tangent)
-            slope = 1.0 + (1.0 - self.e2) * tangent**2
-            slope = slope / ((1.0 - self.e2) * np.hypot(1.0, found) * np.hypot(1.0, tangent))
-            tangent = tangent + (conformal - found) * slope
-        return np.arctan(tangent)
-
     def isometric(self, latitude: NDArray[np.float64]) -> NDArray[np.float64]:
         """Isometric latitude."""
-        return np.arcsinh(self.conformal(np.tan(latitude)))
+        return np.arcsinh(np.tan(latitude)) - self.e * np.arctanh(self.e * np.sin(latitude))
+
+    def of_isometric(self, psi: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Latitude from `isometric`."""
+        phi = np.zeros_like(psi)
+        for _ in range(_ROUNDS):
+            phi = np.arctan(np.sinh(psi + self.e * np.arctanh(self.e * np.sin(phi))))
+        return phi
 
     def cosine(self, latitude: float) -> float:
         """Radius of a parallel, over the longer half-axis."""
@@ -129,22 +124,26 @@ class Definition:
     parameters: tuple[float, ...] = ()
 
     @cached_property
-    def ways(self) -> tuple[_Way, _Way, float]:
+    def ways(self) -> tuple[Callable[..., _Pair], Callable[..., _Pair], float]:
         """From longitude and latitude, back, and the meridian that longitudes count from, degrees."""
-        lengths, angles = self.parameters[-2:], np.radians(self.parameters[:-2])
-        east, north, longitude = *lengths, self.parameters[1]
+        (east, north), angles = self.parameters[-2:], np.radians(self.parameters[:-2])
         if self.method in _SCALED:
             angles[-1] = self.parameters[-3]
-        forward, backward = METHODS[self.method](self.ellipsoid, *angles.tolist())
+        # Web Mercator takes figures of the ellipsoid for those of a sphere.
+        ell = Ellipsoid(self.ellipsoid.a, inf) if self.method == "web" else self.ellipsoid
+        forward, backward = METHODS[self.method](ell, *angles.tolist())
+        equal = self.method in ("aea", "laea")
+        latitudes = (ell.authalic, ell.of_authalic) if equal else (ell.isometric, ell.of_isometric)
 
-        def there(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
-            x, y = forward(x, y)
-            return (x + east) / self.unit, (y + north) / self.unit
+        def there(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+            place = forward(latitudes[0](latitude) + 1j * longitude)
+            return (place.imag + east) / self.unit, (place.real + north) / self.unit
 
         def back(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
-            return backward(x * self.unit - east, y * self.unit - north)
+            place = backward(y * self.unit - north + 1j * (x * self.unit - east))
+            return place.imag, latitudes[1](place.real)
 
-        return there, back, longitude + self.meridian
+        return there, back, self.parameters[1] + self.meridian
 
     @property
     def _turned(self) -> NDArray[np.float64]:
@@ -183,161 +182,100 @@ def _transverse(ell: Ellipsoid, foot: float, _meridian: float, scale: float) -> 
         4397 * n**4 / 161280,
     )
 
-    def northing(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
-        conformal = ell.conformal(np.tan(latitude))
-        cosine = np.cos(longitude)
-        xi = np.arctan2(conformal, cosine)
-        eta = np.arcsinh(np.sin(longitude) / np.hypot(conformal, cosine))
-        along, across = xi, eta
-        for j, alpha in enumerate(alphas, 1):
-            along = along + alpha * np.sin(2 * j * xi) * np.cosh(2 * j * eta)
-            across = across + alpha * np.cos(2 * j * xi) * np.sinh(2 * j * eta)
-        return radius * across, radius * along
+    def northing(q: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        zeta = np.arctan(np.sinh(q))
+        return radius * (zeta + sum(alpha * np.sin(2 * j * zeta) for j, alpha in enumerate(alphas, 1)))
 
-    start = float(northing(np.zeros(1), np.array([foot]))[1][0])
+    start = float(northing(ell.isometric(np.array([foot])) + 0j)[0].real)
 
-    def forward(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
-        x, y = northing(np.where(np.abs(longitude) < np.radians(MOST_OFF), longitude, np.nan), latitude)
-        return x, y - start
+    def backward(p: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        zeta = (p + start) / radius
+        return np.arcsinh(np.tan(zeta - sum(beta * np.sin(2 * j * zeta) for j, beta in enumerate(betas, 1))))
 
-    def backward(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
-        along, across = (y + start) / radius, x / radius
-        xi, eta = along, across
-        for j, beta in enumerate(betas, 1):
-            xi = xi - beta * np.sin(2 * j * along) * np.cosh(2 * j * across)
-            eta = eta - beta * np.cos(2 * j * along) * np.sinh(2 * j * across)
-        wanted = np.sin(xi) / np.hypot(np.sinh(eta), np.cos(xi))
-        return np.arctan2(np.sinh(eta), np.cos(xi)), ell.latitude(wanted)
-
-    return forward, backward
+    return lambda q: np.where(np.abs(q.imag) < np.radians(MOST_OFF), northing(q) - start, np.nan), backward
 
 
-def _cone(n: float, foot: float, radius: Callable, latitude: Callable) -> tuple[_Way, _Way]:
-    """A cone of which radii of parallels are known, and back; ``foot`` is the latitude of y = 0."""
-    middle = float(radius(np.array(foot)))
-
-    def forward(longitude: NDArray[np.float64], phi: NDArray[np.float64]) -> _Pair:
-        r = radius(phi)
-        return r * np.sin(n * longitude), middle - r * np.cos(n * longitude)
-
-    def backward(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
-        side = np.sign(n)
-        return np.arctan2(side * x, side * (middle - y)) / n, latitude(side * np.hypot(x, middle - y))
-
-    return forward, backward
+def _cone(n: float, size: float, middle: float) -> tuple[_Way, _Way]:
+    """A conformal cone, whose apex is so far north of y = 0."""
+    # The apex itself has no logarithm.
+    return lambda q: middle - size * np.exp(-n * q), lambda p: -np.log((middle - p) / size + 1e-99) / n
 
 
 def _lambert(ell: Ellipsoid, foot: float, _meridian: float, *others: float) -> tuple[_Way, _Way]:
     """Lambert's conformal cone, with one parallel and a scale, or with two."""
     first, second = others if len(others) == 2 else (foot, foot)
     scale = 1.0 if len(others) == 2 else others[0]
-    n, psi = sin(first), float(ell.isometric(np.array(first)))
+    n, (psi, other, base) = sin(first), ell.isometric(np.array([first, second, foot])).tolist()
     if abs(first - second) > 1e-9:
-        n = log(ell.cosine(first) / ell.cosine(second)) / (float(ell.isometric(np.array(second))) - psi)
+        n = log(ell.cosine(first) / ell.cosine(second)) / (other - psi)
     size = scale * ell.a * ell.cosine(first) * exp(n * psi) / n
-    return _cone(
-        n,
-        foot,
-        lambda phi: size * np.exp(-n * ell.isometric(phi)),
-        lambda r: ell.latitude(np.sinh(-np.log(r / size) / n)),
-    )
+    return _cone(n, size, size * exp(-n * base))
 
 
 def _albers(ell: Ellipsoid, foot: float, _meridian: float, first: float, second: float) -> tuple[_Way, _Way]:
-    """Albers' cone, true to area."""
+    """Albers' cone, true to area; latitudes are authalic."""
     m1, m2 = ell.cosine(first) ** 2, ell.cosine(second) ** 2
-    q1, q2 = ell.authalic(np.array([first, second])).tolist()
+    q1, q2, base = ell.authalic(np.array([first, second, foot])).tolist()
     n = (m1 - m2) / (q2 - q1) if abs(first - second) > 1e-9 else sin(first)
-    c = m1 + n * q1
-    return _cone(
-        n,
-        foot,
-        lambda phi: ell.a * np.sqrt(c - n * ell.authalic(phi)) / n,
-        lambda r: ell.of_authalic((c - (r * n / ell.a) ** 2) / n),
-    )
+    c, size = m1 + n * q1, ell.a / n
+    middle = size * sqrt(c - n * base)
+
+    def backward(p: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        off = (middle - p) / size
+        return (c - np.abs(off) ** 2) / n - 1j * np.angle(off) / n
+
+    return lambda q: middle - size * np.sqrt(c - n * q.real) * np.exp(-1j * n * q.imag), backward
 
 
 def _mercator(ell: Ellipsoid, latitude: float, _meridian: float, scale: float | None = None) -> tuple[_Way, _Way]:
     """Mercator, with a scale or a parallel that is true to it."""
     radius = ell.a * (ell.cosine(latitude) if scale is None else scale)
-    return (
-        lambda longitude, phi: (radius * longitude, radius * ell.isometric(phi)),
-        lambda x, y: (x / radius, ell.latitude(np.sinh(y / radius))),
-    )
+    return lambda q: radius * q, lambda p: p / radius
 
 
 def _double(ell: Ellipsoid, foot: float, _meridian: float, scale: float) -> tuple[_Way, _Way]:
     """Oblique stereographic projection of a sphere, onto which the ellipsoid is projected before."""
     e2, s = ell.e2, sin(foot)
-    radius = ell.a * sqrt(1.0 - e2) / (1.0 - e2 * s * s)
+    size = 2.0 * scale * ell.a * sqrt(1.0 - e2) / (1.0 - e2 * s * s)
     n = sqrt(1.0 + e2 * cos(foot) ** 4 / (1.0 - e2))
     psi = float(ell.isometric(np.array(foot)))
-    w1 = exp(2.0 * n * psi)
-    start = (w1 - 1.0) / (w1 + 1.0)
-    c = (n + s) * (1.0 - start) / ((n - s) * (1.0 + start))
-    shift = log(c) / 2.0
-    sine = np.tanh(n * psi + shift)
-    cosine = sqrt(1.0 - sine**2)
-    size = 2.0 * scale * radius
-
-    def forward(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
-        chi = np.arctan(np.sinh(n * ell.isometric(latitude) + shift))
-        turn = n * longitude
-        b = 1.0 + np.sin(chi) * sine + np.cos(chi) * cosine * np.cos(turn)
-        return (
-            size * np.cos(chi) * np.sin(turn) / b,
-            size * (np.sin(chi) * cosine - np.cos(chi) * sine * np.cos(turn)) / b,
-        )
-
-    def backward(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
-        off = 2.0 * np.arctan(np.hypot(x, y) / size)
-        slope = np.sin(off) / np.maximum(np.hypot(x, y), 1e-12)
-        chi = np.arcsin(np.clip(np.cos(off) * sine + y * slope * cosine, -1.0, 1.0))
-        turn = np.arctan2(x * slope, cosine * np.cos(off) - y * slope * sine)
-        return turn / n, ell.latitude(np.sinh((np.arctanh(np.sin(chi)) - shift) / n))
-
-    return forward, backward
+    start = tanh(n * psi)
+    shift = log((n + s) * (1.0 - start) / ((n - s) * (1.0 + start))) / 2.0
+    opposite = exp(-n * psi - shift)
+    return (
+        lambda q: size * np.expm1(n * (q - psi)) / (np.exp(n * q + shift) + opposite),
+        lambda p: (np.log((size + p * opposite) / (size * opposite - p)) - shift) / n,
+    )
 
 
 def _polar(ell: Ellipsoid, latitude: float, _meridian: float, scale: float | None = None) -> tuple[_Way, _Way]:
     """Polar stereographic projection, with a scale or a parallel that is true to it."""
-    side = np.sign(latitude)
     rim = sqrt((1.0 + ell.e) ** (1.0 + ell.e) * (1.0 - ell.e) ** (1.0 - ell.e))
     if scale is None:
         scale = ell.cosine(latitude) * rim * exp(abs(float(ell.isometric(np.array(latitude))))) / 2.0
-    size = 2.0 * ell.a * scale / rim
-
-    def forward(longitude: NDArray[np.float64], phi: NDArray[np.float64]) -> _Pair:
-        r = size * np.exp(-side * ell.isometric(phi))
-        return r * np.sin(longitude), -side * r * np.cos(longitude)
-
-    def backward(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
-        r = np.maximum(np.hypot(x, y), 1e-9)
-        return np.arctan2(x, -side * y), ell.latitude(np.sinh(-side * np.log(r / size)))
-
-    return forward, backward
+    side = -1.0 if latitude < 0.0 else 1.0
+    return _cone(side, side * 2.0 * ell.a * scale / rim, 0.0)
 
 
 def _azimuthal(ell: Ellipsoid, foot: float, _meridian: float) -> tuple[_Way, _Way]:
-    """Lambert's azimuthal projection, true to area."""
+    """Lambert's azimuthal projection, true to area; latitudes are authalic."""
     whole, q = ell.authalic(np.array([_HALF_PI, foot])).tolist()
     sine = q / whole
     cosine, radius = sqrt(1.0 - sine**2), ell.a * sqrt(whole / 2.0)
     d = ell.a * ell.cosine(foot) / (radius * cosine)
 
-    def forward(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
-        s = ell.authalic(latitude) / whole
-        c = np.sqrt(np.maximum(1.0 - s * s, 0.0))
-        b = radius * np.sqrt(2.0 / (1.0 + sine * s + cosine * c * np.cos(longitude)))
-        return b * d * c * np.sin(longitude), b / d * (cosine * s - sine * c * np.cos(longitude))
+    def forward(q: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        s = q.real / whole
+        flat = np.sqrt(np.maximum(1.0 - s * s, 0.0)) * np.exp(1j * q.imag)
+        b = radius * np.sqrt(2.0 / (1.0 + sine * s + cosine * flat.real))
+        return b / d * (cosine * s - sine * flat.real) + 1j * b * d * flat.imag
 
-    def backward(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
-        x, y = x / d, y * d
-        r = np.hypot(x, y)
-        off = 2.0 * np.arcsin(np.clip(r / (2.0 * radius), -1.0, 1.0))
-        slope = np.sin(off) / np.maximum(r, 1e-12)
-        s = np.cos(off) * sine + y * slope * cosine
-        return np.arctan2(x * slope, cosine * np.cos(off) - y * slope * sine), ell.of_authalic(whole * s)
+    def backward(p: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        p = p.real * d + 1j * p.imag / d
+        off = 2.0 * np.arcsin(np.clip(np.abs(p) / (2.0 * radius), -1.0, 1.0))
+        p = p * np.sin(off) / np.maximum(np.abs(p), 1e-12)
+        turn = np.arctan2(p.imag, cosine * np.cos(off) - p.real * sine)
+        return whole * (np.cos(off) * sine + p.real * cosine) + 1j * turn
 
     return forward, backward
 
@@ -345,38 +283,25 @@ def _azimuthal(ell: Ellipsoid, foot: float, _meridian: float) -> tuple[_Way, _Wa
 def _oblique(
     ell: Ellipsoid, foot: float, _meridian: float, azimuth: float, skew: float, scale: float, middle: bool = False
 ) -> tuple[_Way, _Way]:
-    """Hotine's oblique Mercator; ``middle``: lengths count from the centre (variant B), not from the equator."""
+    """Hotine's oblique Mercator: that of a sphere, onto which the ellipsoid is projected before, turned about the point
+    where the initial line crosses the equator. ``middle``: lengths count from the centre (variant B), not from there.
+    """
     e2, side = ell.e2, 1.0 if foot >= 0.0 else -1.0
     b = sqrt(1.0 + e2 * cos(foot) ** 4 / (1.0 - e2))
-    radius = ell.a * b * scale * sqrt(1.0 - e2) / (1.0 - e2 * sin(foot) ** 2)
+    radius = ell.a * scale * sqrt(1.0 - e2) / (1.0 - e2 * sin(foot) ** 2)
     d = max(b * sqrt(1.0 - e2) / ell.cosine(foot) / (1.0 - e2 * sin(foot) ** 2), 1.0)
     f = d + side * sqrt(d * d - 1.0)
-    h = f * exp(-b * float(ell.isometric(np.array(foot))))
     tilt = asin(sin(azimuth) / d)
     across = abs(azimuth - _HALF_PI) < 1e-9
     # To the meridian in which the initial line crosses the equator.
-    lead = side * _HALF_PI / b if across else asin(max(min((f - 1.0 / f) / 2.0 * tan(tilt), 1.0), -1.0)) / b
-    start = radius * lead if across else side * radius / b * atan2(sqrt(d * d - 1.0), cos(azimuth))
-    start = start if middle else 0.0
-
-    def forward(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
-        q = h * np.exp(b * ell.isometric(latitude))
-        s, t, turn = (q - 1.0 / q) / 2.0, (q + 1.0 / q) / 2.0, b * (longitude + lead)
-        sink = (s * sin(tilt) - np.sin(turn) * cos(tilt)) / t
-        v = radius * np.log((1.0 - sink) / (1.0 + sink)) / (2.0 * b)
-        u = radius * np.arctan2(s * cos(tilt) + np.sin(turn) * sin(tilt), np.cos(turn)) / b - start
-        return v * cos(skew) + u * sin(skew), u * cos(skew) - v * sin(skew)
-
-    def backward(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
-        v, u = x * cos(skew) - y * sin(skew), y * cos(skew) + x * sin(skew) + start
-        q = np.exp(-b * v / radius)
-        s, t, turn = (q - 1.0 / q) / 2.0, (q + 1.0 / q) / 2.0, b * u / radius
-        sink = (np.sin(turn) * cos(tilt) + s * sin(tilt)) / t
-        psi = (np.log((1.0 + sink) / (1.0 - sink)) / 2.0 - log(h)) / b
-        turned = np.arctan2(s * cos(tilt) - np.sin(turn) * sin(tilt), np.cos(turn))
-        return -turned / b - lead, ell.latitude(np.sinh(psi))
-
-    return forward, backward
+    lead = side * _HALF_PI if across else asin(max(min((f - 1.0 / f) / 2.0 * tan(tilt), 1.0), -1.0))
+    start = radius * lead if across else side * radius * atan2(sqrt(d * d - 1.0), cos(azimuth))
+    shift = log(f) - b * float(ell.isometric(np.array(foot))) + 1j * lead
+    start, turn, skewed = start * middle, complex(sin(tilt), cos(tilt)), complex(cos(skew), sin(skew))
+    return (
+        lambda q: skewed * (-2j * radius * np.arctanh(turn * np.tanh((b * q + shift) / 2.0)) - start),
+        lambda p: (2.0 * np.arctanh(np.tanh((p / skewed + start) * 0.5j / radius) / turn) - shift) / b,
+    )
 
 
 #: Functions that make the two ways of a method from its ellipsoid and angles, a factor last.
@@ -390,7 +315,7 @@ METHODS: dict[str, Callable[..., tuple[_Way, _Way]]] = {
     "stereB": _polar,
     "mercA": _mercator,
     "mercB": _mercator,
-    "web": lambda ell, *_: _mercator(Ellipsoid(ell.a, inf), 0.0, 0.0),  # as if that were a sphere
+    "web": lambda ell, *_: _mercator(ell, 0.0, 0.0),
     "laea": _azimuthal,
     "omercA": _oblique,
     "omercB": lambda *given: _oblique(*given, True),
