@@ -1,24 +1,28 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pixels of TIFF files: strips and tiles, compressed without loss, with predictors.
+"""Images of TIFF files: their tags, and pixels in strips and tiles, compressed without loss, with predictors.
 
-Blender's own reader makes flat ground or noise of what it cannot decode; here damage is an error. Compressions are
-those of TIFF 6.0, Adobe's supplements, and libtiff (LZMA, Zstandard).
+Blender's own reader makes flat ground or noise of what it cannot decode; here damage is an error. Tags are those of
+TIFF 6.0 (Adobe, 1992) and its 64-bit kin BigTIFF; compressions those, and Adobe's and libtiff's (LZMA, Zstandard).
 """
 
 from __future__ import annotations
 
+import json
 import lzma
+import math
+import struct
 import zlib
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ..errors import SceneError, shown
 from ..jobs import Progress
+from .rasters import checked_size
 
 #: Compressions that cannot be read, by name.
 OTHERS = {
@@ -27,111 +31,198 @@ OTHERS = {
 }  # fmt: skip
 _CLEAR, _END, _ZSTANDARD = 256, 257, 50000
 _PROGRESS = 64  # pieces between two signs of life
+#: What is known of tags and keys, and names of tags by their numbers.
+TABLES: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("geotiff.json").read_text(encoding="utf-8"))
+TAGS = {int(number): name for number, name in TABLES["tags"].items()}
+_NUMBERS = {name: number for number, name in TAGS.items()}
+#: Types of values: letter for `struct`; others, such as fractions, occur in none of these tags.
+_TYPES = {1: "B", 2: "s", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 11: "f", 12: "d", 16: "Q", 17: "q"}
+_MOST_TAGS, _MOST_BYTES, _MOST_IMAGES = 4096, 64_000_000, 64
+#: Types of pixels: letter for `numpy.dtype` and bits, by format.
+_FORMATS = {1: ("u", (8, 16, 32, 64)), 2: ("i", (8, 16, 32, 64)), 3: ("f", (16, 32, 64))}
+_LARGEST_PIECE, _MOST_PIECE = 65_536, 50_000_000  # pixels of a side, and of a strip or tile
+_DAMAGED = "it is damaged or was not copied whole; get it again"
 
 
-@dataclass(frozen=True)
-class Layout:
-    """How pixels lie in a file.
+class Tags:
+    """Tags of an image of a file, of the first at the beginning; errors name the tag."""
 
-    Attributes
-    ----------
-    width, height : int
-        Of the image.
-    across, down : int
-        Size of a piece: a tile, or a strip of all columns.
-    tiled : bool
-        Tiles at the border are whole, strips end with the image.
-    bits, samples : int
-        Of a value, and values of a pixel in a piece.
-    dtype : numpy.dtype
-        Of values, in the file's order of bytes.
-    compression, predictor : int
-    reversed : bool
-        Bits of a byte begin with the lowest.
-    """
+    def __init__(self, file: Any, name: str) -> None:
+        self.file, self.name, self.size, self.next = file, name, file.seek(0, 2), 0
+        start = self._bytes(0, 8, "head")
+        form = {b"II*\0": "<I", b"MM\0*": ">I", b"II+\0": "<Q", b"MM\0+": ">Q"}.get(start[:4], "")
+        self.order, self.letter = form[:1], form[1:]  # of bytes, and of offsets
+        if not form or (self.letter == "Q" and start[4:] != struct.pack(f"{self.order}HH", 8, 0)):
+            raise SceneError(f"{name}: this is no TIFF file; export it as GeoTIFF")
+        self.found = self._directory(self._number(self.letter, struct.calcsize(self.letter), "head"))
 
-    width: int
-    height: int
-    across: int
-    down: int
-    tiled: bool
-    bits: int
-    samples: int
-    dtype: np.dtype[Any]
-    compression: int
-    predictor: int
-    reversed: bool = False
+    def _bytes(self, offset: int, number: int, what: str) -> bytes:
+        """A part of the file; what it is begins the message if it is not there."""
+        if offset + number > self.size or number > _MOST_BYTES:
+            raise SceneError(f"{self.name}: {what}: the file ends before it; {_DAMAGED}")
+        self.file.seek(offset)
+        return self.file.read(number)
 
+    def _number(self, letter: str, offset: int, what: str) -> int:
+        """A number in the file."""
+        return struct.unpack(self.order + letter, self._bytes(offset, struct.calcsize(letter), what))[0]
 
-def read_pixels(
-    file: Any, layout: Layout, offsets: Sequence[int], sizes: Sequence[int], name: str
-) -> Generator[Progress, object, tuple[NDArray[Any], NDArray[np.bool_]]]:
-    """Values (h, w) of the first sample, and which pixels are not in the file, (h, w); yields progress.
+    def _directory(self, offset: int) -> dict[str, tuple[int, int, bytes]]:
+        """Type, number of values, and the bytes that hold them or where they are, of the tags that are known here."""
+        count, wide = ("Q", 8) if self.letter == "Q" else ("H", 4)
+        entry = f"{self.order}HH{self.letter}{wide}s"
+        number = self._number(count, offset, "directory")
+        if not 0 < number <= _MOST_TAGS:
+            raise SceneError(f"{self.name}: directory: {number:,} tags; it is damaged; get it again")
+        offset += struct.calcsize(count)
+        data = self._bytes(offset, number * struct.calcsize(entry), "directory")
+        after = offset + len(data)
+        self.next = self._number(self.letter, after, "directory") if after + wide <= self.size else 0
+        return {TAGS[tag]: tuple(told) for tag, *told in struct.iter_unpack(entry, data) if tag in TAGS}
 
-    Raises
-    ------
-    SceneError
-        A piece is damaged, or compressed in a way that cannot be read; ``name`` is the file's.
-    """
-    own = layout
-    if own.compression not in _READERS:
-        how = OTHERS.get(own.compression, f"a way without a name ({own.compression})")
-        raise SceneError(
-            f"{name}: tag Compression (259): it is compressed with {how}, which TetFlora does not read; write it anew, "
-            "for example with gdal_translate -co COMPRESS=DEFLATE"
-        )
-    columns, rows = -(-own.width // own.across), -(-own.height // own.down)
-    kind = "tile" if own.tiled else "strip"
-    if (
-        len(offsets) < columns * rows
-        or own.predictor not in (1, 2, 3)
-        or (own.predictor == 3 and own.dtype.kind != "f")
-    ):
-        raise SceneError(
-            f"{name}: {len(offsets):,} of {columns * rows:,} {kind}s, or an unknown predictor; damaged: get it again"
-        )
-    values = np.zeros((own.height, own.width), np.uint8 if own.bits == 1 else own.dtype.newbyteorder("="))
-    absent = np.zeros((own.height, own.width), bool)
-    for number in range(columns * rows):
-        if number % _PROGRESS == 0:
-            yield Progress(0.9 * number / (columns * rows), f"Reading {name}")
-        top, left = number // columns * own.down, number % columns * own.across
-        place = np.s_[top : min(top + own.down, own.height), left : min(left + own.across, own.width)]
-        if not sizes[number]:
-            absent[place] = True
-            continue
-        high = own.down if own.tiled else values[place].shape[0]
-        row = (own.across * own.samples * own.bits + 7) // 8
-        file.seek(offsets[number])
-        try:
-            data = file.read(sizes[number])
-            data = _READERS[own.compression](data.translate(_TURNED) if own.reversed else data, high * row)
-        except (zlib.error, lzma.LZMAError, EOFError, ValueError, IndexError) as error:
+    def _values(self, tag: str) -> tuple | bytes:
+        """Values of a tag, a text as bytes; none where there is no such tag."""
+        if tag not in self.found:
+            return ()
+        kind, number, here = self.found[tag]
+        if kind not in _TYPES or not number:
+            raise self.broken(tag, "has values of a type that it cannot have")
+        size = number * struct.calcsize(_TYPES[kind])
+        if size > len(here):
+            here = self._bytes(struct.unpack(self.order + self.letter, here)[0], size, tag)
+        out = struct.unpack(f"{self.order}{number}{_TYPES[kind]}", here[:size])
+        return out[0] if kind == 2 else out
+
+    def text(self, tag: str) -> str:
+        """The text of a tag; empty where there is no such tag."""
+        values = self._values(tag)
+        return values.decode("latin-1") if isinstance(values, bytes) else str(values or "")
+
+    def numbers(self, tag: str, least: int = 1) -> tuple:
+        """Finite values of a tag, at least so many, or none."""
+        values = self._values(tag)
+        if values and (isinstance(values, bytes) or len(values) < least or not all(map(math.isfinite, values))):
+            raise self.broken(tag, f"must be {least} finite numbers or more")
+        return values
+
+    def one(self, tag: str, default: int | None = None) -> int:
+        """The first value of a tag."""
+        value = next(iter(self.numbers(tag)), default)
+        if value is None:
+            raise SceneError(f"{self.name}: tag {tag} ({_NUMBERS[tag]}) is missing; export the file again")
+        if int(value) != value or value < 0:
+            raise self.broken(tag, f"is {shown(value)}")
+        return int(value)
+
+    def broken(self, tag: str, text: str) -> SceneError:
+        """The error of a tag."""
+        return SceneError(f"{self.name}: tag {tag} ({_NUMBERS[tag]}) {text}")
+
+    def check_bands(self) -> None:
+        """Refuse what has several values in a pixel; a second one may be what counts."""
+        bands = self.one("SamplesPerPixel", 1)
+        if bands != 1 and not (bands == 2 and self.numbers("ExtraSamples")[:1] in ((1,), (2,))):
+            raise self.broken(
+                "SamplesPerPixel", f"is {bands}; write one band only, for example with gdal_translate -b 1"
+            )
+
+    def pixels(self) -> Generator[Progress, object, tuple[NDArray[Any], NDArray[np.bool_]]]:
+        """Values (h, w) of the first sample, and which pixels are not in the file, (h, w); yields progress."""
+        width, height = self.one("ImageWidth"), self.one("ImageLength")
+        checked_size(width, height, f"{self.name}: ")
+        tiled, dtype = "TileOffsets" in self.found, self._dtype()
+        kind = "tile" if tiled else "strip"
+        across = self.one("TileWidth") if tiled else width
+        down = self.one("TileLength") if tiled else min(self.one("RowsPerStrip", height), height)
+        if not (0 < across <= _LARGEST_PIECE and 0 < down <= _LARGEST_PIECE and across * down <= _MOST_PIECE):
+            raise self.broken(
+                "TileWidth" if tiled else "RowsPerStrip", f"gives pieces of {across:,} by {down:,} pixels"
+            )
+        where = f"{kind.title()}Offsets"
+        self.one(where)  # it is there
+        offsets, sizes = self.numbers(where), self.numbers(f"{kind.title()}ByteCounts")
+        if len(offsets) != len(sizes) or any(
+            a < 0 or b < 0 or a + b > self.size for a, b in zip(offsets, sizes, strict=True)
+        ):
+            raise self.broken(where, f"leads beyond the end of the file; {_DAMAGED}")
+        samples = 1 if self.one("PlanarConfiguration", 1) == 2 else self.one("SamplesPerPixel", 1)
+        predictor, compression, order = (self.one(tag, 1) for tag in ("Predictor", "Compression", "FillOrder"))
+        if compression not in _READERS:
+            how = OTHERS.get(compression, f"a way without a name ({compression})")
             raise SceneError(
-                f"{name}: {kind} {number + 1:,} of {columns * rows:,} is damaged: {error}; get it again"
-            ) from None
-        if len(data) < high * row:
-            raise SceneError(f"{name}: {kind} {number + 1:,} of {columns * rows:,} ends too early; get it again")
-        piece = _values(np.frombuffer(data, np.uint8, high * row).reshape(high, row), own)
-        values[place] = piece[: values[place].shape[0], : values[place].shape[1]]
-    return values, absent
+                f"{self.name}: tag Compression (259): it is compressed with {how}, which TetFlora does not read; write "
+                "it anew, for example with gdal_translate -co COMPRESS=DEFLATE"
+            )
+        columns, rows = -(-width // across), -(-height // down)
+        if len(offsets) < columns * rows or predictor not in (1, 2, 3) or (predictor == 3 and dtype.kind != "f"):
+            raise SceneError(
+                f"{self.name}: {len(offsets):,} of {columns * rows:,} {kind}s, or an unknown predictor; damaged: get "
+                "it again"
+            )
+        values, absent = np.zeros((height, width), dtype.newbyteorder("=")), np.zeros((height, width), bool)
+        row = (across * samples * (1 if dtype.kind == "b" else 8 * dtype.itemsize) + 7) // 8
+        for number in range(columns * rows):
+            if number % _PROGRESS == 0:
+                yield Progress(0.9 * number / (columns * rows), f"Reading {self.name}")
+            top, left = number // columns * down, number % columns * across
+            place = np.s_[top : min(top + down, height), left : min(left + across, width)]
+            if not sizes[number]:
+                absent[place] = True
+                continue
+            high = down if tiled else values[place].shape[0]  # tiles at the border are whole, strips end there
+            self.file.seek(offsets[number])
+            what = f"{self.name}: {kind} {number + 1:,} of {columns * rows:,}"
+            try:
+                data = self.file.read(sizes[number])
+                data = _READERS[compression](data.translate(_TURNED) if order == 2 else data, high * row)
+            except (zlib.error, lzma.LZMAError, EOFError, ValueError, IndexError) as error:
+                raise SceneError(f"{what} is damaged: {error}; get it again") from None
+            if len(data) < high * row:
+                raise SceneError(f"{what} ends too early; get it again")
+            piece = _decoded(np.frombuffer(data, np.uint8, high * row).reshape(high, row), dtype, samples, predictor)
+            values[place] = piece[: values[place].shape[0], : values[place].shape[1]]
+        return values, absent
+
+    def _dtype(self) -> np.dtype[Any]:
+        """Of values, in the file's order of bytes; bool for bits."""
+        bits, form = self.one("BitsPerSample", 1), self.one("SampleFormat", 1)
+        letter, sizes = _FORMATS.get(1 if form == 4 else form, ("", ()))
+        if bits == 1 and self.one("NewSubfileType", 0) & 4:
+            return np.dtype(bool)
+        if bits not in sizes:
+            raise self.broken(
+                "BitsPerSample",
+                f"is {bits}, of format {form}; write 32-bit floats, for example with gdal_translate -ot Float32",
+            )
+        return np.dtype(f"{self.order}{letter}{bits // 8}")
+
+    def mask(self, shape: tuple[int, int]) -> Generator[Progress, object, NDArray[np.bool_]]:
+        """Which pixels count, (h, w), by a mask that is another image of the file; yields progress."""
+        own, seen = self.found, set()
+        try:
+            while self.next and self.next not in seen and len(seen) < _MOST_IMAGES:
+                seen.add(self.next)
+                self.found = self._directory(self.next)
+                if self.one("NewSubfileType", 0) & 4 and (self.one("ImageLength"), self.one("ImageWidth")) == shape:
+                    values, absent = yield from self.pixels()
+                    return (values != 0) & ~absent
+        finally:
+            self.found = own
+        return np.ones(shape, bool)
 
 
-def _values(rows: NDArray[np.uint8], own: Layout) -> NDArray[Any]:
+def _decoded(rows: NDArray[np.uint8], dtype: np.dtype[Any], samples: int, predictor: int) -> NDArray[Any]:
     """First sample of the pixels of a piece, from the bytes (h, n) of its rows."""
-    if own.bits == 1:
-        return np.unpackbits(rows, axis=1)[:, :: own.samples]
-    size, number = own.dtype.itemsize, own.across * own.samples
-    if own.predictor == 3:  # bytes apart by their weight, the highest first, each as the difference from the one before
-        rows = _running(rows.reshape(len(rows), -1, own.samples)).reshape(len(rows), size, number)
-        return np.ascontiguousarray(rows.transpose(0, 2, 1)).view(own.dtype.newbyteorder(">"))[:, :: own.samples, 0]
-    found = rows.view(own.dtype)
-    if own.predictor == 2:
-        whole = found.view(np.dtype(f"{own.dtype.byteorder}u{size}") if size > 1 else np.uint8)
-        whole = whole.astype(whole.dtype.newbyteorder("="))
-        found = _running(whole.reshape(len(rows), -1, own.samples)).reshape(len(rows), number)
-        found = found.view(own.dtype.newbyteorder("="))
-    return found[:, :: own.samples]
+    if dtype.kind == "b":
+        return np.unpackbits(rows, axis=1)[:, ::samples]
+    size, native = dtype.itemsize, dtype.newbyteorder("=")
+    if predictor == 3:  # bytes apart by their weight, the highest first, each as the difference from the one before
+        rows = _running(rows.reshape(len(rows), -1, samples)).reshape(len(rows), size, -1)
+        return np.ascontiguousarray(rows.transpose(0, 2, 1)).view(dtype.newbyteorder(">"))[:, ::samples, 0]
+    if predictor == 2:
+        whole = rows.view(f"{dtype.byteorder}u{size}" if size > 1 else np.uint8).astype(f"u{size}")
+        return _running(whole.reshape(len(rows), -1, samples)).view(native)[:, :, 0]
+    return rows.view(dtype)[:, ::samples]
 
 
 def _running(values: NDArray[Any]) -> NDArray[Any]:
