@@ -33,15 +33,7 @@ _PALETTE = 3
 
 
 def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
-    """Read a GeoTIFF, or a TIFF with a world file; yields progress.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken, or of a kind that cannot be used; names the tag.
-    """
+    """Read a GeoTIFF, or a TIFF with a world file; yields progress."""
     check_regular(path)
     with path.open("rb") as file:
         tags = _Tags(file, path.name)
@@ -65,13 +57,7 @@ def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
 
 
 def place_of_image(path: Path) -> Raster:
-    """Where the pixels of an image lie, as a raster of one value: a TIFF by its tags, others by world files.
-
-    Raises
-    ------
-    OSError, SceneError
-        As `read_tiff`.
-    """
+    """Where the pixels of an image lie, as a raster of one value: a TIFF by its tags, others by world files."""
     check_regular(path)
     if path.suffix.lower() not in (".tif", ".tiff"):
         place, system = _place(path)

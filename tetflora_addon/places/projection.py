@@ -209,13 +209,7 @@ class MapOrigin:
     north: float
 
     def local(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
-        """Metres from the origin, (n, 2), of points (n, 2) of a system.
-
-        Raises
-        ------
-        SceneError
-            Nobody can tell where they lie, or they are too far away; ``what`` begins the message.
-        """
+        """Metres from the origin, (n, 2), of points (n, 2) of a system."""
         local = self.offsets(points, system, what)
         far = np.abs(local).max(initial=0.0)
         if not far < MOST_AWAY:
@@ -227,13 +221,7 @@ class MapOrigin:
         return local
 
     def offsets(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
-        """Metres from the origin, (n, 2), of points (n, 2) of a system, however far.
-
-        Raises
-        ------
-        SceneError
-            Nobody can tell where they lie; ``what`` begins the message.
-        """
+        """Metres from the origin, (n, 2), of points (n, 2) of a system, however far."""
         if (system.code == 0) != (self.system.code == 0):
             known, other = ("the scene", "the file") if system.code == 0 else ("the file", "the scene")
             raise SceneError(
@@ -248,13 +236,7 @@ MOST_AWAY = 250_000.0
 
 
 def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float64], what: str = "") -> MapOrigin:
-    """The place for a scene whose first data lie between two corners, (2,) each; in whole metres.
-
-    Raises
-    ------
-    SceneError
-        They are no places on Earth.
-    """
+    """The place for a scene whose first data lie between two corners, (2,) each; in whole metres."""
     middle = (np.asarray(low, np.float64) + high) / 2.0
     if system.metric or system.code == 0:
         east, north = np.round(system.unit * middle).tolist()

@@ -126,15 +126,7 @@ class Raster:
 
 
 def check_regular(path: Path) -> None:
-    """Refuse folders, links, pipes and devices.
-
-    Raises
-    ------
-    OSError
-        There is nothing, or it cannot be looked at.
-    SceneError
-        It is one of these.
-    """
+    """Refuse folders, links, pipes and devices."""
     if not is_regular(path):
         with suppress(ValueError):  # a zero in its name
             path.lstat()
@@ -142,13 +134,7 @@ def check_regular(path: Path) -> None:
 
 
 def in_degrees(raster: Raster, what: str) -> Raster:
-    """A raster of which no file tells the system; its cells may be so small that they are degrees.
-
-    Raises
-    ------
-    SceneError
-        Nobody can tell; ``what`` begins the message.
-    """
+    """A raster of which no file tells the system; its cells may be so small that they are degrees."""
     if raster.system != System() or not may_be_degrees(raster.outline.min(axis=0), raster.outline.max(axis=0)):
         return raster
     cell = max(np.abs(raster.along).max(), np.abs(raster.down).max())
@@ -166,13 +152,7 @@ _DEGREES, _UNCLEAR = 0.003, 0.1  # cells: no ground is as fine in meters, or as 
 
 
 def checked_size(width: int, height: int, what: str) -> None:
-    """Refuse rasters that are too large, or have no cells.
-
-    Raises
-    ------
-    SceneError
-        ``what`` begins the message.
-    """
+    """Refuse rasters that are too large, or have no cells."""
     if min(width, height) < 2 or max(width, height) > MAX_SIDE or width * height > MAX_CELLS:
         raise SceneError(
             f"{what}{width:,} by {height:,} cells; from 2 by 2 to {MAX_CELLS:,} in all can be read. Crop it, or "
@@ -181,15 +161,7 @@ def checked_size(width: int, height: int, what: str) -> None:
 
 
 def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
-    """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line.
-    """
+    """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system."""
     content = read_whole(path, MAX_TEXT)
     name, header, start, line = path.name, {}, 0, 1
     while line <= _HEAD_LINES:
@@ -307,15 +279,7 @@ def system_beside(path: Path) -> System:
 
 
 def world_file(path: Path) -> list[NDArray[np.float64]]:
-    """Middle of the first cell, and steps along and down, of the world file of an image.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        There is none, or it is broken; names the line.
-    """
+    """Middle of the first cell, and steps along and down, of the world file of an image."""
     for ending in WORLD_FILES.get(path.suffix.lower(), ()):
         beside = next((p for p in (path.with_suffix(ending), path.with_suffix(ending.upper())) if p.exists()), None)
         if beside is None:

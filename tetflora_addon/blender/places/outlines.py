@@ -61,17 +61,12 @@ class Drawn:
 
 @importing
 def outline_steps(order: Import, kind: str = "") -> Generator[Progress, Any, Drawn]:
-    """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
+    """Make curves of the outlines in a file.
 
     Parameters
     ----------
     kind : str
         What all are taken for; empty to tell them by their keys.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
     """
     progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress

@@ -59,13 +59,6 @@ def read_raster(order: Import, path: Path | None = None) -> Generator[Progress, 
     ----------
     path : Path, optional
         Another file, which is read whole, in its place.
-
-    Raises
-    ------
-    OSError
-        One cannot be read.
-    SceneError
-        One is broken, or lacks a place.
     """
     tiles, paths, code = [], [order.path, *order.tiles] if path is None else [path], order.code
     for path in paths:
@@ -164,7 +157,7 @@ class ImportedGround:
 
 @importing
 def terrain_steps(order: Import, most: int, image: Path | None = None) -> Generator[Progress, Any, ImportedGround]:
-    """Make ground; yields progress. Closing the steps leaves all as it was.
+    """Make ground.
 
     Parameters
     ----------
@@ -172,11 +165,6 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Genera
         Faces.
     image : Path, optional
         An orthophoto, which becomes its color.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
     """
     raster = yield from read_raster(order)
     photo = None if image is None else _photo_place(image, raster.system)

@@ -86,7 +86,7 @@ class Planted:
 def inventory_steps(
     order: Import, unknown: str, units: str, skip: bool, columns: Mapping[str, str] | None = None
 ) -> Generator[Progress, Any, Planted]:
-    """Make a field of the trees of a file; yields progress. Closing the steps leaves all as it was.
+    """Make a field of the trees of a file.
 
     Parameters
     ----------
@@ -94,11 +94,6 @@ def inventory_steps(
         `GENERIC`, `LEFT_OUT`, or the identifier of a species for trees of species that nobody knows.
     units, skip, columns
         As of `read_inventory`.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
     """
     progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress
@@ -158,8 +153,7 @@ def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[st
 def canopy_steps(
     order: Import, mix: Mapping[str, float], least: float, below: Path | None = None
 ) -> Generator[Progress, Any, Planted]:
-    """Make a field of the trees that a raster of canopy height shows; yields progress. Closing the steps leaves all
-    as it was.
+    """Make a field of the trees that a raster of canopy height shows.
 
     Parameters
     ----------
@@ -169,11 +163,6 @@ def canopy_steps(
         Height of the smallest tree, metres.
     below : Path, optional
         Elevations of the ground, which are subtracted.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, has no trees, or cannot lie in this scene.
     """
     raster, what = (yield from read_raster(order)), order.what
     made = Planted(notes=[*raster.notes, f"coordinates: {raster.system.name}"])
