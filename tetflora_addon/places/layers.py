@@ -11,8 +11,9 @@ from __future__ import annotations
 import sqlite3
 import struct
 from collections.abc import Iterator
-from contextlib import closing
-from itertools import pairwise
+from contextlib import closing, suppress
+from io import BytesIO
+from itertools import pairwise, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,9 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
             features, system = _shapes(path) if path.suffix.lower() == ".shp" else _package(path)
         except (struct.error, ValueError, IndexError, KeyError, TypeError, OverflowError, RecursionError, MemoryError):
             raise SceneError(f"{name}: it is damaged or was not copied whole; get it again") from None
-        if not chosen and system == System() and may_be_degrees(*_corners(features)):
+        geometries = (feature["geometry"] or {} for feature in features)
+        points = (point for geometry in geometries for point in _positions(geometry.get("coordinates", ())))
+        if not chosen and system == System() and may_be_degrees(list(points)):
             raise SceneError(
                 f"{name}: no file tells its coordinate system (.prj); set Coordinate System to 4326 for longitude and "
                 "latitude, or turn on Plain Meters"
@@ -144,21 +147,13 @@ def _code(crs: Any, name: str) -> int:
     )
 
 
-def _corners(features: list[_Feature]) -> NDArray[np.float64]:
-    """The corners (2, 2) of all coordinates."""
-    found: list[Any] = []
-
-    def gather(values: Any) -> None:
-        if values and isinstance(values[0], int | float):
-            found.append(values[:2])
-        else:
-            for part in values:
-                gather(part)
-
-    for feature in features:
-        gather((feature["geometry"] or {}).get("coordinates", ()))
-    points = np.array(found, np.float64).reshape(-1, 2)
-    return np.stack([points.min(axis=0), points.max(axis=0)]) if len(points) else np.full((2, 2), np.inf)
+def _positions(values: Any) -> Iterator[list[float]]:
+    """Positions within nested lists of coordinates."""
+    if values and isinstance(values[0], int | float):
+        yield values[:2]
+    else:
+        for part in values:
+            yield from _positions(part)
 
 
 def _shapes(path: Path) -> tuple[list[_Feature], System]:
@@ -234,37 +229,33 @@ def _inside(point: NDArray[np.float64], ring: NDArray[np.float64]) -> bool:
 
 def _dbase(path: Path) -> list[dict[str, Any] | None] | None:
     """Rows of the table beside a shapefile, those that are deleted as None; None without a table."""
-    table = next((p for p in (path.with_suffix(".dbf"), path.with_suffix(".DBF")) if p.exists()), None)
+    table, pages = (
+        next((p for p in (path.with_suffix(ending), path.with_suffix(ending.upper())) if p.exists()), None)
+        for ending in (".dbf", ".cpg")
+    )
     if table is None:
         return None
     content = read_whole(table, MAX_BYTES)
-    number, start, size = struct.unpack_from("<IHH", content, 4)
-    pages = next((p for p in (path.with_suffix(".cpg"), path.with_suffix(".CPG")) if p.exists()), None)
     told = read_whole(pages, 4096).decode("latin-1").strip().lower() if pages else ""
-    fields, at, left = [], 32, 1
-    while at + 32 <= start and content[at] != 0x0D:
-        title = content[at : at + 11].split(b"\0")[0]
-        fields.append((title, chr(content[at + 11]), left, left + content[at + 16]))
-        left += content[at + 16]
-        at += 32
-    if number > MAX_ROWS or not size or start + number * size > len(content) + 1:
-        raise ValueError
-    encodings = ("utf-8", "cp1252") if told in ("", "utf-8", "utf8", "65001") else ("cp1252",)
 
     def text(value: bytes) -> str:
-        for encoding in encodings[:-1]:
-            try:
-                return value.decode(encoding)
-            except UnicodeDecodeError:
-                pass
+        if told in ("", "utf-8", "utf8", "65001"):
+            with suppress(UnicodeDecodeError):
+                return value.decode()
         return value.decode("cp1252", "replace")
 
-    titles = [text(title) for title, *_ in fields]
+    number, start, size = struct.unpack_from("<IHH", content, 4)
+    fields = (content[at : at + 32] for at in range(32, start - 31, 32))
+    fields = list(takewhile(lambda field: field[0] != 0x0D, fields))
+    if number > MAX_ROWS or not size or start + number * size > len(content) + 1:
+        raise ValueError
+    row = struct.Struct("c" + "".join(f"{field[16]}s" for field in fields))
+    titles = [text(field[:11].split(b"\0")[0]) for field in fields]
     rows: list[dict[str, Any] | None] = []
-    for row in range(number):
-        record = content[start + row * size : start + (row + 1) * size]
-        values = [text(record[a:b].strip(b"\0 ")) for _, _, a, b in fields]
-        rows.append(None if record[:1] == b"*" else dict(zip(titles, values, strict=True)))
+    for at in range(start, start + number * size, size):
+        mark, *values = row.unpack(content[at : at + row.size].ljust(row.size))
+        values = [text(value.strip(b"\0 ")) for value in values]
+        rows.append(None if mark == b"*" else dict(zip(titles, values, strict=True)))
     return rows
 
 
@@ -310,51 +301,37 @@ def _geometry(blob: Any) -> _Feature | None:
         return None
     if not isinstance(blob, bytes) or blob[:2] != b"GP":
         raise ValueError
-    envelope = {0: 0, 1: 32, 2: 48, 3: 48, 4: 64}[blob[3] >> 1 & 7]
-    return None if blob[3] & 16 else _binary(blob, 8 + envelope)[0]
+    envelope = (0, 32, 48, 48, 64)[blob[3] >> 1 & 7]
+    return None if blob[3] & 16 else _binary(BytesIO(blob[8 + envelope :]))
 
 
-def _binary(data: bytes, at: int, depth: int = 0) -> tuple[_Feature | None, int]:
-    """A geometry of well-known binary from some byte, and where it ends."""
-    order = "<" if data[at] else ">"
-    (code,) = struct.unpack_from(f"{order}I", data, at + 1)
-    at += 5
-    code, more = code & 0xFFFFFFF, (code >> 31 & 1) + (code >> 30 & 1)
-    more, kind = more + {0: 0, 1: 1, 2: 1, 3: 2}[code // 1000], code % 1000
-    size = 8 * (2 + more)
+def _binary(file: BytesIO, depth: int = 0) -> _Feature | None:
+    """The next geometry of well-known binary."""
+    order = "<" if file.read(1)[0] else ">"
 
-    def points(start: int, number: int) -> tuple[list[list[float]], int]:
-        flat = np.frombuffer(data, f"{order}f8", (2 + more) * number, start).reshape(number, -1)[:, :2]
-        return flat.tolist(), start + number * size
+    def number() -> int:
+        return struct.unpack(f"{order}I", file.read(4))[0]
 
-    def count(start: int) -> tuple[int, int]:
-        (number,) = struct.unpack_from(f"{order}I", data, start)
-        if number > len(data):
-            raise ValueError
-        return number, start + 4
+    code = number()
+    heights, kind = divmod(code & 0xFFFFFFF, 1000)
+    size = 2 + (code >> 31) + (code >> 30 & 1) + (0, 1, 1, 2)[heights]
+
+    def points(many: int) -> list[list[float]]:
+        flat = np.frombuffer(file.read(8 * size * many), f"{order}f8")
+        return flat.reshape(many, size)[:, :2].tolist()
 
     if kind == 1:
-        found, at = points(at, 1)
-        return {"type": "Point", "coordinates": found[0]} if np.isfinite(found[0]).all() else None, at
-    number, at = count(at)
+        (point,) = points(1)
+        return {"type": "Point", "coordinates": point} if np.isfinite(point).all() else None
+    many = number()
     if kind == 2:
-        found, at = points(at, number)
-        return {"type": "LineString", "coordinates": found}, at
+        return {"type": "LineString", "coordinates": points(many)}
     if kind == 3:
-        rings = []
-        for _ in range(number):
-            many, at = count(at)
-            ring, at = points(at, many)
-            rings.append(ring)
-        return {"type": "Polygon", "coordinates": rings}, at
+        return {"type": "Polygon", "coordinates": [points(number()) for _ in range(many)]}
     if kind not in (4, 5, 6, 7) or depth > _DEEPEST:
         raise ValueError
-    parts = []
-    for _ in range(number):
-        part, at = _binary(data, at, depth + 1)
-        parts.append(part)
-    parts = [part for part in parts if part]
+    parts = [part for _ in range(many) if (part := _binary(file, depth + 1))]
     if kind == 7:
-        return {"type": "GeometryCollection", "geometries": parts}, at
+        return {"type": "GeometryCollection", "geometries": parts}
     names = {4: "MultiPoint", 5: "MultiLineString", 6: "MultiPolygon"}
-    return {"type": names[kind], "coordinates": [part["coordinates"] for part in parts]}, at
+    return {"type": names[kind], "coordinates": [part["coordinates"] for part in parts]}

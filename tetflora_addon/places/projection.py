@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, readable
 from .methods import TRUE, Definition, Ellipsoid
@@ -141,9 +141,10 @@ def chosen_system(code: int, own: System, what: str) -> System:
     return System() if code == PLAIN else system_of(code or own.code, what) if code or own.code > 0 else own
 
 
-def may_be_degrees(low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:
-    """Whether places between two corners, (2,) each, can be longitude and latitude."""
-    return bool((np.abs([low, high]) <= [360.0, 90.0]).all())
+def may_be_degrees(points: ArrayLike) -> bool:
+    """Whether points (n, 2), of which there is one at least, can be longitude and latitude."""
+    points = np.array(points, np.float64).reshape(-1, 2)
+    return bool(len(points) and (np.abs(points) <= [360.0, 90.0]).all())
 
 
 def code_in(text: str) -> int | None:

@@ -135,7 +135,7 @@ def check_regular(path: Path) -> None:
 
 def in_degrees(raster: Raster, what: str) -> Raster:
     """A raster of which no file tells the system; its cells may be so small that they are degrees."""
-    if raster.system != System() or not may_be_degrees(raster.outline.min(axis=0), raster.outline.max(axis=0)):
+    if raster.system != System() or not may_be_degrees(raster.outline):
         return raster
     cell = max(np.abs(raster.along).max(), np.abs(raster.down).max())
     if cell < _DEGREES:
