@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Import real places: terrain, trees that were measured or seen from above, and outlines of a map."""
 
-from collections.abc import Generator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,20 +16,18 @@ from ..tetflora_addon.blender.places.columns import (
     columns_in,
     show_columns,
 )
-from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE, Import
-from ..tetflora_addon.blender.places.outlines import Drawn, outline_steps, told
-from ..tetflora_addon.blender.places.terrain import PATTERN, ImportedGround, terrain_steps
-from ..tetflora_addon.blender.places.trees import GENERIC, LEFT_OUT, Planted, canopy_steps, inventory_steps
+from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE, Import, Imported, Steps
+from ..tetflora_addon.blender.places.outlines import outline_steps
+from ..tetflora_addon.blender.places.terrain import PATTERN, terrain_steps
+from ..tetflora_addon.blender.places.trees import GENERIC, LEFT_OUT, canopy_steps, inventory_steps
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
 from ..tetflora_addon.errors import TetFloraError, readable
-from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.places.inventories import IMPERIAL, METRIC
 from ..tetflora_addon.places.layers import ENDINGS
 from ..tetflora_addon.places.outlines import KINDS
 from ..tetflora_addon.places.projection import PLAIN
-from ..tetflora_addon.places.species_names import told as names_told
 from .add import mix_in, parse_weights
-from .base import ModalJob, counted, in_object_mode, select_only
+from .base import ModalJob, in_object_mode, select_only
 from .populations import selected_grounds
 
 _LAYERS = ";".join(f"*{ending}" for ending in ENDINGS)
@@ -127,6 +124,12 @@ class _Importing(ModalJob, ImportHelper):
         crop = {"crop": self.crop, "side": self.crop_size}
         return Import(context.scene, graph, self.path, code, self.new_origin, selected, **crop, **others)
 
+    def finish(self, context: bpy.types.Context, result: Imported) -> set[str]:
+        if result.object is not None:
+            select_only(context, [result.object])
+        self.report({'WARNING' if result.warning else 'INFO'}, readable("; ".join(result.told)))
+        return {'FINISHED'}
+
 
 class _Raster(_Importing):
     """Mix-in for those that read rasters, or several tiles of one."""
@@ -187,47 +190,11 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
         subtype='FILE_PATH',
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, ImportedGround]:
+    def steps(self, context: bpy.types.Context) -> Steps:
         return terrain_steps(self.order(context), self.most, _file(self.image))
 
-    def finish(self, context: bpy.types.Context, result: ImportedGround) -> set[str]:
-        select_only(context, [result.object])
-        faces = counted(len(result.object.data.polygons), "face")
-        coarser = "; the file is finer, see Most Faces" if result.coarser else ""
-        parts = [f'Ground "{result.object.name}" of {faces}, one every {result.step:.2f} m{coarser}', *result.notes]
-        return self.done(readable("; ".join(parts)))
 
-
-class _Trees(_Importing):
-    """Mix-in for those that make fields of trees."""
-
-    def planted(self, context: bpy.types.Context, result: Planted) -> set[str]:
-        """Report; the operator's result."""
-        select_only(context, [result.object])
-        parts = [f"{counted(result.number, 'tree')} imported"]
-        inventory = result.inventory
-        if inventory is not None and inventory.left_out:
-            parts.append(f"rows without a tree left out: {names_told(inventory.left_out)}")
-        if result.completed:
-            parts.append(f"heights of {result.completed:,} follow from trunk or crown")
-        if result.beside:
-            parts.append(f"{result.beside:,} stand beside the ground")
-        if result.kin:
-            parts.append(f"{result.kin.total():,} stand as their nearest kin: {names_told(result.kin)}")
-        parts += result.notes
-        if inventory is not None and inventory.skipped:
-            parts.append(f"{counted(inventory.skipped, 'broken row')} skipped, the first: {inventory.first}")
-        if result.unknown:
-            left = " and left out" if result.left_out else ""
-            parts.insert(1, f"{result.unknown.total():,} of unknown species{left}: {names_told(result.unknown, 25)}")
-        text = readable("; ".join(parts))
-        if not result.unknown and not (inventory is not None and inventory.skipped):
-            return self.done(text)
-        self.report({'WARNING'}, text)
-        return {'FINISHED'}
-
-
-class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
+class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
     """Make a field of the trees of an inventory, CSV or GeoJSON: species, place and sizes of each.
 
     They stand on the selected meshes, or on imported terrain.
@@ -298,15 +265,12 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
             if (name != "species" or self.unknown == 'SPECIES') and (name != "crop_size" or self.crop == MIDDLE):
                 layout.prop(self, name)
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
+    def steps(self, context: bpy.types.Context) -> Steps:
         chosen = self.species if self.unknown == 'SPECIES' and self.species != NO_SPECIES else self.unknown
         return inventory_steps(self.order(context), chosen, self.units, self.skip, columns_in(self.columns))
 
-    def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
-        return self.planted(context, result)
 
-
-class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
+class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
     """Make a field of the trees that a canopy height model shows, each with its height and the width of its crown.
 
     They stand on the selected meshes, or on imported terrain.
@@ -337,12 +301,9 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
         subtype='FILE_PATH',
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
+    def steps(self, context: bpy.types.Context) -> Steps:
         self.species = self.species or mix_in(context.scene.tetflora.populate)
         return canopy_steps(self.order(context), parse_weights(self.species), self.least, _file(self.below))
-
-    def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
-        return self.planted(context, result)
 
 
 class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
@@ -365,11 +326,8 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
         default='KEYS',
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Drawn]:
+    def steps(self, context: bpy.types.Context) -> Steps:
         return outline_steps(self.order(context), "" if self.kind == 'KEYS' else self.kind.title())
-
-    def finish(self, _context: bpy.types.Context, result: Drawn) -> set[str]:
-        return self.done(readable("; ".join([f"Outlines imported: {told(result.number)}", *result.notes])))
 
 
 CLASSES = (

@@ -19,7 +19,7 @@ from ..files import read_whole
 from ..jobs import Progress
 from .geotiff import read_tiff
 from .projection import LONGITUDE_LATITUDE, System
-from .rasters import MAX_TEXT, Raster, checked_size, numbers_in, read_ascii, system_beside, without_nodata
+from .rasters import MAX_TEXT, Raster, checked_size, numbers_in, read_ascii, system_beside, upright, without_nodata
 
 #: Endings of files whose values the engine reads itself.
 ENDINGS = (".asc", ".txt", ".grd", ".agr", ".dem", ".hgt", ".xyz", ".csv", ".tif", ".tiff")
@@ -64,9 +64,7 @@ def _hgt(path: Path) -> Raster:
     values = np.frombuffer(content, ">i2").reshape(side, side).astype(np.float32)
     step = 1.0 / (side - 1)
     corner = np.array([west, south + 1.0])
-    return Raster(
-        without_nodata(values, _VOID), corner, np.array([step, 0.0]), np.array([0.0, -step]), System(LONGITUDE_LATITUDE)
-    )
+    return Raster(without_nodata(values, _VOID), corner, *upright(step, step), System(LONGITUDE_LATITUDE))
 
 
 def _xyz(path: Path) -> Generator[Progress, object, Raster]:
@@ -85,29 +83,44 @@ def _xyz(path: Path) -> Generator[Progress, object, Raster]:
     if columns < 3 or len(found) % columns or len(found) < 4 * columns:
         raise SceneError(f"{name}: line {line}: each line must have x, y and height; correct it")
     yield Progress(0.5, f"Reading {name}")
-    x, y, z = found.reshape(-1, columns)[:, :3].T
-    (west, dx, column), (south, dy, row) = _even(x, name, "x"), _even(y, name, "y")
-    width, height = int(column.max()) + 1, int(row.max()) + 1
-    checked_size(width, height, f"{name}: ")
-    values = np.full((height, width), np.nan, np.float32)
-    values[height - 1 - row, column] = z
-    corner, steps = np.array([west, south + dy * (height - 1)]), (np.array([dx, 0.0]), np.array([0.0, -dy]))
-    return Raster(without_nodata(values, -9999.0), corner, *steps, system_beside(path))
+    places = found.reshape(-1, columns)[:, :3]
+    steps = _step(places[:, 0], name, "x"), _step(places[:, 1], name, "y")
+    return _gridded(places, steps, name, system_beside(path), nothing=-9999.0)
 
 
-def _even(values: NDArray[np.float64], name: str, what: str) -> tuple[float, float, NDArray[np.int64]]:
-    """Where places begin, their step, and the number of steps of each, (n,)."""
+def _step(values: NDArray[np.float64], name: str, what: str) -> float:
+    """The step of evenly spaced places."""
     some = np.unique(values)
     gaps = np.diff(some)
     gaps = gaps[gaps > 1e-3 * gaps.max(initial=0.0)]
     step = float(np.median(gaps[gaps < 1.5 * gaps.min()])) if len(gaps) else 0.0
-    number = np.rint((values - some[0]) / step) if step > 0.0 else np.full(len(values), np.inf)
-    if not number.max() < 1e6 or np.abs((values - some[0]) / step - number).max() > max(_EVEN, 1e-4 * number.max()):
+    number = np.rint((some - some[0]) / step) if step > 0.0 else np.full(len(some), np.inf)
+    if not number.max() < 1e6 or np.abs((some - some[0]) / step - number).max() > max(_EVEN, 1e-4 * number.max()):
         raise SceneError(
             f"{name}: its values of {what} are not evenly spaced; these are points and no grid. Make one of them, for "
             "example with gdal_grid"
         )
-    return float(some[0]), step, number.astype(np.int64)
+    return step
+
+
+def _gridded(
+    places: NDArray[np.float64],
+    steps: tuple[float, float],
+    name: str,
+    system: System,
+    scale: float = 1.0,
+    nothing: float | None = None,
+) -> Raster:
+    """A raster of heights at places (n, 3), of which each step is so many units of the system."""
+    low = places[:, :2].min(axis=0)
+    number = np.rint((places[:, :2] - low) / steps)
+    width, height = (int(min(most, 1e9)) + 1 for most in number.max(axis=0).tolist())
+    checked_size(width, height, f"{name}: ")
+    column, row = number.astype(np.int64).T
+    values = np.full((height, width), np.nan, np.float32)
+    values[height - 1 - row, column] = places[:, 2]
+    corner = scale * (low + [0.0, steps[1] * (height - 1)])
+    return Raster(without_nodata(values, nothing), corner, *upright(scale * steps[0], scale * steps[1]), system)
 
 
 def _usgs(path: Path) -> Raster:
@@ -132,30 +145,23 @@ def _usgs(path: Path) -> Raster:
             x, y, base = (real(at + a, at + a + 24) for a in (24, 48, 72))
             more = max(number - _FIRST, 0)
             records = 1 + -(-more // _LATER)
-            if not 0 < number < 70_000 or at + (records - 1) * _RECORD >= len(content):
+            if not (0 < number < 70_000 and np.isfinite((x, y, base)).all()) or at + (records - 1) * _RECORD >= len(
+                content
+            ):
                 raise ValueError
             block = content[at : at + records * _RECORD].ljust(records * _RECORD)
             text = block[144 : 144 + _FIRST * _VALUE]
             text += b"".join(block[k * _RECORD : k * _RECORD + _LATER * _VALUE] for k in range(1, records))
-            numbers = np.array([int(text[k : k + _VALUE]) for k in range(0, number * _VALUE, _VALUE)], np.float64)
-            found.append((x, y, np.where(numbers <= -32767, np.nan, numbers * per + base)))
+            numbers = np.frombuffer(text, f"S{_VALUE}", number).astype(np.float64)
+            z = np.where(numbers <= -32767, np.nan, numbers * per + base)
+            found.append(np.stack([np.full(number, x), y + dy * np.arange(number), z], axis=1))
             at += records * _RECORD
     except (ValueError, KeyError, IndexError, OverflowError):
         raise SceneError(
             f"{name}: neither an ASCII grid nor an elevation model of the USGS, or damaged; export it as GeoTIFF"
         ) from None
-    west, south = min(f[0] for f in found), min(f[1] for f in found)
-    column = [round((f[0] - west) / dx) for f in found]
-    row = [round((f[1] - south) / dy) for f in found]
-    width, height = max(column) + 1, max(r + len(f[2]) for r, f in zip(row, found, strict=True))
-    checked_size(width, height, f"{name}: ")
-    values = np.full((height, width), np.nan, np.float32)
-    for i, j, (_, _, z) in zip(column, row, found, strict=True):
-        values[height - j - len(z) : height - j, i] = z[::-1]
-    corner = scale * np.array([west, south + dy * (height - 1)])
     system = System(4267) if plane == 0 else System(26700 + zone) if 1 <= zone <= 22 else System()
-    along, down = np.array([scale * dx, 0.0]), np.array([0.0, -scale * dy])
-    return Raster(without_nodata(values, None), corner, along, down, system)
+    return _gridded(np.concatenate(found), (dx, dy), name, system, scale)
 
 
 def mosaic(tiles: Sequence[Raster], names: Sequence[str]) -> Raster:

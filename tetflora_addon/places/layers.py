@@ -24,7 +24,7 @@ from ..errors import SceneError, shown
 from ..files import is_regular, json_of, read_whole
 from .prj import system_in
 from .projection import LONGITUDE_LATITUDE, System, chosen_system, code_in, known_systems, may_be_degrees
-from .rasters import system_beside
+from .rasters import beside, system_beside
 
 MAX_BYTES, MAX_ROWS = 200_000_000, 2_000_000
 #: Endings of files that `read_features` reads.
@@ -229,10 +229,7 @@ def _inside(point: NDArray[np.float64], ring: NDArray[np.float64]) -> bool:
 
 def _dbase(path: Path) -> list[dict[str, Any] | None] | None:
     """Rows of the table beside a shapefile, those that are deleted as None; None without a table."""
-    table, pages = (
-        next((p for p in (path.with_suffix(ending), path.with_suffix(ending.upper())) if p.exists()), None)
-        for ending in (".dbf", ".cpg")
-    )
+    table, pages = beside(path, ".dbf"), beside(path, ".cpg")
     if table is None:
         return None
     content = read_whole(table, MAX_BYTES)

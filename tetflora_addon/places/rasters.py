@@ -30,14 +30,6 @@ _HEAD_LINES = 40
 _PIECE = 4_000_000  # bytes of text between two signs of life
 _LIMIT = 1e7  # metres: what is higher, or has larger coordinates than a thousand times so much, is no place
 _SMALL = 4096  # bytes of world files and files with the name of a coordinate system
-WORLD_FILES = {
-    ".png": (".pgw", ".pngw", ".wld"),
-    ".jpg": (".jgw", ".jpgw", ".wld"),
-    ".jpeg": (".jgw", ".jpegw", ".wld"),
-    ".jp2": (".j2w", ".jp2w", ".wld"),
-    ".tif": (".tfw", ".tifw", ".wld"),
-    ".tiff": (".tfw", ".tiffw", ".wld"),
-}
 
 
 @dataclass(frozen=True)
@@ -91,17 +83,12 @@ class Raster:
         h, w = self.values.shape
         column, row = np.clip(column, 0.0, w - 1.0), np.clip(row, 0.0, h - 1.0)
         i, j = (np.minimum(np.floor(c), max(n - 2, 0)).astype(np.int64) for c, n in ((column, w), (row, h)))
-        u, v = column - i, row - j
-        right, below = np.minimum(i + 1, w - 1), np.minimum(j + 1, h - 1)
         out = np.zeros(len(i))
-        for weight, y, x in (
-            ((1 - u) * (1 - v), j, i),
-            (u * (1 - v), j, right),
-            ((1 - u) * v, below, i),
-            (u * v, below, right),
-        ):
-            # What does not count may be nan.
-            out += np.where(weight > 0.0, weight * self.values[y, x], 0.0)
+        for y, x in ((j, i), (j, i + 1), (j + 1, i), (j + 1, i + 1)):
+            weight = (1.0 - np.abs(column - x)) * (1.0 - np.abs(row - y))
+            # What does not count may be nan, and lies beyond a raster of one cell.
+            values = self.values[np.minimum(y, h - 1), np.minimum(x, w - 1)]
+            out += np.where(weight > 0.0, weight * values, 0.0)
         return out
 
     def coarser(self, most: int) -> Raster:
@@ -123,6 +110,11 @@ class Raster:
         # The last blocks may be smaller: whoever needs places of their middles moves by less than half a block.
         corner = self.places(np.array([(step - 1) / 2]), np.array([(step - 1) / 2]))[0]
         return replace(self, values=values, corner=corner, along=step * self.along, down=step * self.down)
+
+
+def upright(dx: float, dy: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Steps along rows to the east, and down to the south."""
+    return np.array([dx, 0.0]), np.array([0.0, -dy])
 
 
 def check_regular(path: Path) -> None:
@@ -201,7 +193,7 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
     nothing = header.get("nodata_value", -9999.0)
     values = without_nodata(values.reshape(height, width), nothing)
     first = np.array([corner[0], corner[1] + (height - 1) * dy])
-    return Raster(values, first, np.array([dx, 0.0]), np.array([0.0, -dy]), system_beside(path))
+    return Raster(values, first, *upright(dx, dy), system_beside(path))
 
 
 def _ascii_head(header: dict[str, float], name: str) -> tuple[int, int, tuple[float, float], float, float]:
@@ -270,30 +262,34 @@ def without_nodata(values: NDArray[np.floating], nothing: float | None) -> NDArr
     return np.where(bad, np.float32(np.nan), values)
 
 
+def beside(path: Path, *endings: str) -> Path | None:
+    """The first file with the name of another and one of some endings, in small or large letters."""
+    paths = (path.with_suffix(ending) for small in endings for ending in (small, small.upper()))
+    return next((found for found in paths if found.exists()), None)
+
+
 def system_beside(path: Path) -> System:
     """The system in a file ``.prj`` beside another."""
-    for beside in (path.with_suffix(".prj"), path.with_suffix(".PRJ")):
-        with suppress(OSError):
-            return system_in(read_whole(beside, 16 * _SMALL).decode("latin-1"))
-    return System()
+    found = beside(path, ".prj")
+    return system_in(read_whole(found, 16 * _SMALL).decode("latin-1")) if found else System()
 
 
 def world_file(path: Path) -> list[NDArray[np.float64]]:
     """Middle of the first cell, and steps along and down, of the world file of an image."""
-    for ending in WORLD_FILES.get(path.suffix.lower(), ()):
-        beside = next((p for p in (path.with_suffix(ending), path.with_suffix(ending.upper())) if p.exists()), None)
-        if beside is None:
-            continue
-        lines = read_whole(beside, _SMALL).decode("latin-1").split()
-        if len(lines) != 6:
-            raise SceneError(f"{beside.name}: {len(lines)} numbers; a world file has six, one on each line; correct it")
-        a, d, b, e, x, y = (
-            _number(text.replace(",", "."), f"{beside.name}: line {number}") for number, text in enumerate(lines, 1)
+    ending = path.suffix.lower()
+    endings = f"{ending[:2]}{ending[-1:]}w", f"{ending}w", ".wld"
+    found = beside(path, *endings)
+    if found is None:
+        raise SceneError(
+            f"{path.name}: nothing tells where it lies, neither tags nor a world file ({', '.join(endings)}); export "
+            "it as GeoTIFF"
         )
-        if not abs(a * e - b * d) > 0.0:
-            raise SceneError(f"{beside.name}: line 1: its cells have no size; correct it")
-        return [np.array([x, y]), np.array([a, d]), np.array([b, e])]
-    names = ", ".join(WORLD_FILES.get(path.suffix.lower(), ()))
-    raise SceneError(
-        f"{path.name}: nothing tells where it lies, neither tags nor a world file ({names}); export it as GeoTIFF"
+    lines = read_whole(found, _SMALL).decode("latin-1").split()
+    if len(lines) != 6:
+        raise SceneError(f"{found.name}: {len(lines)} numbers; a world file has six, one on each line; correct it")
+    a, d, b, e, x, y = (
+        _number(text.replace(",", "."), f"{found.name}: line {number}") for number, text in enumerate(lines, 1)
     )
+    if not abs(a * e - b * d) > 0.0:
+        raise SceneError(f"{found.name}: line 1: its cells have no size; correct it")
+    return [np.array([x, y]), np.array([a, d]), np.array([b, e])]

@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import bpy
 import numpy as np
@@ -29,8 +29,6 @@ KEY = "tetflora_place"
 TERRAIN = "tetflora_terrain"
 #: What an import may be cropped to: nothing, a box around its middle, or what the scene has there already.
 WHOLE, MIDDLE, EXISTING = 'WHOLE', 'MIDDLE', 'EXISTING'
-_Result = TypeVar("_Result")
-_Steps = Callable[..., Generator[Progress, Any, _Result]]
 
 
 def origin_of(scene: bpy.types.Scene) -> MapOrigin | None:
@@ -188,10 +186,23 @@ class Import:
         }
 
 
-def importing(steps: _Steps[_Result]) -> _Steps[_Result]:
+@dataclass
+class Imported:
+    """What an import made: the object if it is one, parts of the report, and whether that is a warning."""
+
+    object: bpy.types.Object | None
+    told: list[str]
+    warning: bool = False
+
+
+#: Of an import.
+Steps = Generator[Progress, Any, Imported]
+
+
+def importing(steps: Callable[..., Steps]) -> Callable[..., Steps]:
     """Make a guarded job of the steps of an `Import`: what they work on may be deleted between two of them."""
 
-    def read(order: Import, *others: Any, **named: Any) -> Generator[Progress, Any, _Result]:
+    def read(order: Import, *others: Any, **named: Any) -> Steps:
         try:
             return (yield from steps(order, *others, **named))
         except OSError as error:
@@ -199,7 +210,7 @@ def importing(steps: _Steps[_Result]) -> _Steps[_Result]:
             raise SceneError(f"{name}: cannot read the file: {error.strerror or error}") from None
 
     @wraps(steps)
-    def job(order: Import, *others: Any, **named: Any) -> Generator[Progress, Any, _Result]:
+    def job(order: Import, *others: Any, **named: Any) -> Steps:
         data = JobData("Importing", order.scene, order.depsgraph.view_layer)
         data.add_objects(list(order.selected))
         return guarded(data, read(order, *others, **named))

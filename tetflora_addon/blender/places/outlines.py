@@ -8,11 +8,7 @@ corners, roads are ribbons: a curve that is tilted on its side and extruded.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Generator
-from dataclasses import dataclass
 from math import pi
-from typing import Any
 
 import bpy
 import numpy as np
@@ -21,10 +17,11 @@ from numpy.typing import NDArray
 from ...jobs import Progress
 from ...places.outlines import BUILDING, KINDS, WATER, MapFeature, denser, one_ring, read_outlines
 from ...planting.height_grid import HeightGrid
+from ..attributes import members
 from ..compat import shader_tree
 from ..placing.terrain import HALF_WIDTH
 from ..worker import call_in_thread
-from .origin import Import, importing
+from .origin import Import, Imported, Steps, importing
 from .terrain import heights_steps
 
 _STEP, _ABOVE = 4.0, 0.08  # metres between points of roads on the ground, and how far they lie above it
@@ -42,25 +39,8 @@ BUILDING_MARK = "tetflora_building"
 _MARK = "tetflora_map"
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """What importing made.
-
-    Attributes
-    ----------
-    collections : list of bpy.types.Collection
-    number : Counter
-        Outlines of each kind.
-    notes : list of str
-    """
-
-    collections: list[bpy.types.Collection]
-    number: Counter
-    notes: list[str]
-
-
 @importing
-def outline_steps(order: Import, kind: str = "") -> Generator[Progress, Any, Drawn]:
+def outline_steps(order: Import, kind: str = "") -> Steps:
     """Make curves of the outlines in a file.
 
     Parameters
@@ -97,26 +77,24 @@ def outline_steps(order: Import, kind: str = "") -> Generator[Progress, Any, Dra
     except BaseException:  # an error, or Esc
         _remove([top, *made], list(looks.values()))
         raise
-    found = [collection for collection in made if collection.objects]
-    for collection in found:
+    found = {kind: collection for kind, collection in zip(KINDS, made, strict=True) if collection.objects}
+    for collection in found.values():
         top.children.link(collection)
     bpy.data.batch_remove([collection for collection in made if not collection.objects])
     order.scene.collection.children.link(top)
     order.remember(place)
-    return Drawn(found, Counter(outline.kind for outline in outlines), [*notes, f"coordinates: {system.name}"])
+    told = ", ".join(f"{kind} {len(collection.objects):,}" for kind, collection in found.items())
+    return Imported(None, [f"Outlines imported: {told}", *notes, f"coordinates: {system.name}"])
 
 
 def building_areas(scene: bpy.types.Scene) -> list[NDArray[np.float64]]:
     """Borders (k, 2) of the buildings that were imported into a scene, in world space."""
-    found = []
-    for obj in scene.objects:
-        if obj.type == 'CURVE' and obj.get(BUILDING_MARK):
-            for spline in obj.data.splines[:1]:
-                points = np.zeros(4 * len(spline.points), np.float32)
-                spline.points.foreach_get("co", points)
-                world = np.array(obj.matrix_world)
-                found.append((points.reshape(-1, 4).astype(np.float64)[:, :3] @ world[:3, :3].T + world[:3, 3])[:, :2])
-    return found
+    return [
+        (members(spline.points, "co", 4).astype(np.float64) @ np.array(obj.matrix_world).T)[:, :2]
+        for obj in scene.objects
+        if obj.type == 'CURVE' and obj.get(BUILDING_MARK)
+        for spline in obj.data.splines[:1]
+    ]
 
 
 def _remove(collections: list[bpy.types.Collection], materials: list[bpy.types.Material]) -> None:
@@ -189,8 +167,3 @@ def _look(kind: str, looks: dict[str, bpy.types.Material]) -> bpy.types.Material
             found.diffuse_color = (*colour, 1.0)
         looks[kind] = found
     return looks[kind]
-
-
-def told(number: Counter) -> str:
-    """How many outlines of which kinds there are, for a report."""
-    return ", ".join(f"{kind} {number[kind]:,}" for kind in KINDS if number[kind])

@@ -12,7 +12,7 @@ import struct
 import zlib
 from collections.abc import Generator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,13 +29,13 @@ from ...places.pixels import use_zstandard
 from ...places.projection import System, between, chosen_system
 from ...places.rasters import MAX_CELLS, Raster, checked_size, in_degrees
 from ...planting.height_grid import HeightGrid, cell_for, height_grid
-from ..attributes import write
+from ..attributes import image_pixels, write
 from ..compat import shader_tree
 from ..materials.nodes import Graph
 from ..materials.soil import soil_material
 from ..placing.terrain import read_ground
 from ..worker import call_in_thread, steps_in_thread
-from .origin import TERRAIN, Import, importing
+from .origin import TERRAIN, Import, Imported, Steps, importing
 
 with suppress(ImportError):
     import zstandard
@@ -113,50 +113,27 @@ def _png(path: Path) -> Raster:
         if end > len(content) or zlib.crc32(content[at + 4 : end - 4]) != int.from_bytes(content[end - 4 : end]):
             raise SceneError(f"{path.name}: byte {at:,}: it is damaged or was not copied whole")
         at = end
-    values = np.rint(_pixels(path, width, height) * np.float32(2**bits - 1))
-    return replace(place_of_image(path), values=values.astype(np.float32))
-
-
-def _pixels(path: Path, width: int, height: int) -> NDArray[np.float32]:
-    """First channel of the pixels (h, w) of an image, the uppermost row first; nan stays nan."""
-    unreadable = f"{path.name}: Blender cannot read its pixels; it is damaged"
-    try:
-        image = bpy.data.images.load(str(path), check_existing=False)
-    except RuntimeError:
-        raise SceneError(unreadable) from None
+    image = _loaded(path, "Blender cannot read its pixels; it is damaged")
     try:
         image.colorspace_settings.name = "Non-Color"
         if tuple(image.size) != (width, height) or not image.channels:
-            raise SceneError(unreadable)
-        pixels = np.zeros(width * height * image.channels, np.float32)
-        image.pixels.foreach_get(pixels)
-        return np.ascontiguousarray(pixels.reshape(height, width, -1)[::-1, :, 0])
+            raise SceneError(f"{path.name}: Blender cannot read its pixels; it is damaged")
+        values = np.rint(image_pixels(image)[::-1, :, 0] * np.float32(2**bits - 1))
     finally:
         bpy.data.images.remove(image)
+    return replace(place_of_image(path), values=values)
 
 
-@dataclass(frozen=True)
-class ImportedGround:
-    """What importing made.
-
-    Attributes
-    ----------
-    object : bpy.types.Object
-    step : float
-        Distance of its vertices, metres.
-    coarser : bool
-        Whether that is more than in the file.
-    notes : list of str
-    """
-
-    object: bpy.types.Object
-    step: float
-    coarser: bool
-    notes: list[str]
+def _loaded(path: Path, unreadable: str) -> bpy.types.Image:
+    """An image of a file."""
+    try:
+        return bpy.data.images.load(str(path), check_existing=False)
+    except RuntimeError:
+        raise SceneError(f"{path.name}: {unreadable}") from None
 
 
 @importing
-def terrain_steps(order: Import, most: int, image: Path | None = None) -> Generator[Progress, Any, ImportedGround]:
+def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
     """Make ground.
 
     Parameters
@@ -191,7 +168,9 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Genera
     order.scene.collection.objects.link(made)
     order.remember(place)
     step = float(np.linalg.norm(points[faces[:, 0], :2] - points[faces[:, 1], :2], axis=1).mean())
-    return ImportedGround(made, step, coarse is not raster, notes)
+    finer = "; the file is finer, see Most Faces" * (coarse is not raster)
+    ground = f'Ground "{made.name}" of {len(faces):,} faces, one every {step:.2f} m{finer}'
+    return Imported(made, [ground, *notes])
 
 
 def _faces(raster: Raster) -> NDArray[np.int64]:
@@ -218,18 +197,14 @@ def _photo_place(path: Path, ground: System) -> Raster:
 
 def _photo_material(path: Path, cells: NDArray[np.float64]) -> tuple[bpy.types.Material, NDArray[np.float64], int]:
     """A material of an image, UV (n, 2) of places in its pixels (n, 2), and how many of these lie beside it."""
-    unreadable = SceneError(f"{path.name}: Blender cannot read this image; write it as JPEG, PNG or 8-bit TIFF")
-    try:
-        image = bpy.data.images.load(str(path), check_existing=False)
-    except RuntimeError:
-        raise unreadable from None
+    unreadable = "Blender cannot read this image; write it as JPEG, PNG or 8-bit TIFF"
+    image = _loaded(path, unreadable)
     size = np.array(image.size, np.float64)
     inside = ((cells >= 0.0) & (cells <= size)).all(axis=1)
     if not size.all() or not inside.any():
         bpy.data.images.remove(image)
-        raise (
-            SceneError(f"{path.name}: the image lies elsewhere; choose one of this place") if size.all() else unreadable
-        )
+        why = "the image lies elsewhere; choose one of this place" if size.all() else unreadable
+        raise SceneError(f"{path.name}: {why}")
     material = bpy.data.materials.new(path.stem)
     graph = Graph(shader_tree(material))
     texture = graph.node("ShaderNodeTexImage", extension='EXTEND')

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Generator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import tau
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from ...jobs import Progress
 from ...places.canopy import checked_canopy, find_trees, heights_above, without_areas
 from ...places.inventories import Inventory, read_inventory
 from ...places.projection import MapOrigin
-from ...places.species_names import GENUS, KIN, KIND, best_of, words_of
+from ...places.species_names import GENUS, KIN, KIND, best_of, told, words_of
 from ...planting.places import Placement
 from ...planting.rules import species_by_weight
 from ...species.species import Species
@@ -33,7 +33,7 @@ from ..scene.sizes import fits_of
 from ..species.edits import catalogue, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .completion import complete
-from .origin import Import, importing
+from .origin import Import, Imported, Steps, importing
 from .outlines import building_areas
 from .terrain import heights_steps, read_raster
 
@@ -50,42 +50,10 @@ GENERIC, LEFT_OUT = 'GENERIC', 'LEAVE_OUT'
 _GENERIC = "broadleaf_tree"
 
 
-@dataclass
-class Planted:
-    """What importing made.
-
-    Attributes
-    ----------
-    object : bpy.types.Object
-        The field.
-    number : int
-    kin, unknown : Counter
-        Names that stand for others, with how many trees have them: of other species, and of no known one.
-    left_out : int
-        Trees of unknown species that were not planted.
-    completed : int
-        Heights that followed from other sizes.
-    beside : int
-        Trees where there is no ground.
-    notes : list of str
-    inventory : Inventory, optional
-    """
-
-    object: bpy.types.Object | None = None
-    number: int = 0
-    kin: Counter = field(default_factory=Counter)
-    unknown: Counter = field(default_factory=Counter)
-    left_out: int = 0
-    completed: int = 0
-    beside: int = 0
-    notes: list[str] = field(default_factory=list)
-    inventory: Inventory | None = None
-
-
 @importing
 def inventory_steps(
     order: Import, unknown: str, units: str, skip: bool, columns: Mapping[str, str] | None = None
-) -> Generator[Progress, Any, Planted]:
+) -> Steps:
     """Make a field of the trees of a file.
 
     Parameters
@@ -111,21 +79,33 @@ def inventory_steps(
         )
     place = order.origin(inventory.points, inventory.system)
     flat = order.local(place, inventory.points, inventory.system)
-    notes = [*inventory.notes, f"coordinates: {inventory.system.name}"]
-    made = Planted(notes=notes, inventory=inventory)
-    identifiers, kinds = _species(inventory, unknown, made)
+    identifiers, kinds, kin, others = _species(inventory, unknown)
     kept = np.flatnonzero(kinds >= 0)
     if not len(kept):
         raise SceneError(f"{order.what}none of its trees is of a known species; choose what stands for unknown ones")
     kinds, sizes = kinds[kept], {name: values[kept] for name, values in inventory.sizes.items()}
     yield Progress(0.5, "Completing sizes")
-    sizes["height"], made.completed = complete(sizes, kinds, identifiers, lambda name: species_for(order.scene, name))
-    yield from _plant(order, place, flat[kept], kinds, identifiers, sizes, made)
+    sizes["height"], completed = complete(sizes, kinds, identifiers, lambda name: species_for(order.scene, name))
+    made = yield from _plant(order, place, flat[kept], kinds, identifiers, sizes)
+    left = " and left out" * (len(kept) < len(flat))
+    made.told[1:1] = [
+        *[f"{others.total():,} of unknown species{left}: {told(others, 25)}"] * bool(others),
+        *[f"rows without a tree left out: {told(inventory.left_out)}"] * bool(inventory.left_out),
+        *[f"heights of {completed:,} follow from trunk or crown"] * bool(completed),
+        *[f"{kin.total():,} stand as their nearest kin: {told(kin)}"] * bool(kin),
+    ]
+    made.told += [*inventory.notes, f"coordinates: {inventory.system.name}"]
+    if number := inventory.skipped:
+        made.told.append(f"{number:,} broken row{'s' * (number > 1)} skipped, the first: {inventory.first}")
+    made.warning = bool(others or number)
     return made
 
 
-def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[str], NDArray[np.int32]]:
-    """Species of the catalogue, and the index (n,) of each tree's; -1 for those to leave out."""
+def _species(inventory: Inventory, unknown: str) -> tuple[list[str], NDArray[np.int32], Counter, Counter]:
+    """Species of the catalogue, and the index (n,) of each tree's, -1 for those to leave out; and names that stand for
+    others, with how many trees have them: of other species, and of no known one.
+    """
+    kin, others = Counter(), Counter()
     known, counts = catalogue(), np.bincount(inventory.name, minlength=len(inventory.names))
     chosen: list[str] = []
     for names, count in zip(inventory.names, counts.tolist(), strict=True):
@@ -134,25 +114,22 @@ def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[st
             continue
         match, name = best_of(names, known)
         if match is None or match.certainty == KIND:
-            made.unknown[names[0] if names else ""] += count
+            others[names[0] if names else ""] += count
             kind = match.species if match is not None else _GENERIC
             kind = {GENERIC: kind, LEFT_OUT: ""}.get(unknown, unknown)
-            made.left_out += 0 if kind else count
         else:
             kind = match.species
             # A bare genus says no more than what it gets.
             if match.certainty == KIN or (match.certainty == GENUS and len(words_of(name)) > 1):
-                made.kin[name] += count
+                kin[name] += count
         chosen.append(kind)
     identifiers = sorted({kind for kind in chosen if kind})
     index = {kind: number for number, kind in enumerate(identifiers)}
-    return identifiers, np.array([index.get(kind, -1) for kind in chosen], np.int32)[inventory.name]
+    return identifiers, np.array([index.get(kind, -1) for kind in chosen], np.int32)[inventory.name], kin, others
 
 
 @importing
-def canopy_steps(
-    order: Import, mix: Mapping[str, float], least: float, below: Path | None = None
-) -> Generator[Progress, Any, Planted]:
+def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: Path | None = None) -> Steps:
     """Make a field of the trees that a raster of canopy height shows.
 
     Parameters
@@ -165,14 +142,13 @@ def canopy_steps(
         Elevations of the ground, which are subtracted.
     """
     raster, what = (yield from read_raster(order)), order.what
-    made = Planted(notes=[*raster.notes, f"coordinates: {raster.system.name}"])
     if below is not None:
         ground = yield from read_raster(order, below)
         progress = Progress(0.05, "Subtracting the ground")
         raster = yield from call_in_thread(progress, heights_above, raster, ground, what)
     values, notes = checked_canopy(raster.values, what)
     raster = replace(raster, values=values)
-    made.notes += notes
+    notes = [*raster.notes, f"coordinates: {raster.system.name}", *notes]
     place = order.origin(raster.outline, raster.system)
     h, w = raster.values.shape
     # Steps from a cell in the middle to the next ones, in metres of the scene.
@@ -186,7 +162,7 @@ def canopy_steps(
             Progress(0.1, "Leaving out roofs"), without_areas, flat_cells, roofs
         )
         raster = replace(raster, values=flat_cells.values)
-        made.notes += [f"{number:,} cells on buildings left out"] * (number > 0)
+        notes += [f"{number:,} cells on buildings left out"] * (number > 0)
     if cell > _COARSEST:
         raise SceneError(f"{what}its cells are {cell:.1f} m wide; trees can be told apart up to {_COARSEST:g} m")
     found = yield from steps_in_thread(find_trees(raster.values, cell, least), Progress(0.1, "Looking for treetops"))
@@ -203,7 +179,8 @@ def canopy_steps(
         "crown_width": found.width.astype(np.float32),
         "offset": np.column_stack([found.offset @ unit, np.zeros(number)]).astype(np.float32),
     }
-    yield from _plant(order, place, flat, kinds, identifiers, sizes, made)
+    made = yield from _plant(order, place, flat, kinds, identifiers, sizes)
+    made.told += notes
     return made
 
 
@@ -218,19 +195,19 @@ def _plant(
     kinds: NDArray[np.int32],
     identifiers: list[str],
     sizes: dict[str, NDArray[np.float32]],
-    made: Planted,
-) -> Generator[Progress, Any, None]:
+) -> Steps:
     """Make the field; its plants stand on the ground, those beside it as high as the ground is on average."""
     progress = Progress(0.8, "Standing trees on the ground")
     yield progress
     heights = yield from heights_steps(order, progress)
-    z = np.zeros(len(flat))
+    parts, z = [f"{len(flat):,} tree{'s' * (len(flat) > 1)} imported"], np.zeros(len(flat))
     if heights is not None:
         z = heights.at(heights.height, flat)
         beside, corner = ~np.isfinite(z), np.array([heights.west, heights.south])
         # Beyond its box the ground goes on as at its border.
         beyond = ((flat < corner) | (flat > corner + heights.cell * np.array(heights.height.shape[::-1]))).any(axis=1)
-        made.beside = int((beside | beyond).sum())
+        number = (beside | beyond).sum()
+        parts += [f"{number:,} stand beside the ground"] * bool(number)
         z[beside] = z[~beside].mean() if not beside.all() else 0.0
     keys = child_key(key_of_seed(0), np.arange(len(flat)))
     seeds = (uniform(keys, _SEED) * 2**31).astype(np.int32)
@@ -240,16 +217,16 @@ def _plant(
     ages = None if age is None else np.where(sizes["height"] > 0.0, 0.0, age)
     fit = yield from _fit_steps(order.scene, placement, identifiers, sizes)
     yield Progress(0.95, "Making the field")
-    made.object = add_field(order.scene, placement, identifiers, ages=ages)
-    made.object.name = made.object.data.name = order.path.stem
+    made = add_field(order.scene, placement, identifiers, ages=ages)
+    made.name = made.data.name = order.path.stem
     for key, attribute in ATTRIBUTES.items():
         if key in sizes and sizes[key].any():
-            write(made.object.data, attribute, sizes[key], data_type='FLOAT')
+            write(made.data, attribute, sizes[key], data_type='FLOAT')
     for values, attribute in ((sizes.get("offset"), "tf_crown_offset"), (fit, "tf_fit")):
         if values is not None:
-            write(made.object.data, attribute, values, data_type='FLOAT_VECTOR')
-    made.number = len(flat)
+            write(made.data, attribute, values, data_type='FLOAT_VECTOR')
     order.remember(place)
+    return Imported(made, parts)
 
 
 def _fit_steps(
