@@ -5,3 +5,14 @@
 What reads a file raises an `OSError` if it cannot be read, and a `SceneError` if it is broken, which names the line,
 tag or feature. Texts called ``what`` or ``where`` begin messages of a `SceneError`, which says what to do.
 """
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+
+@cache
+def table(name: str) -> dict[str, Any]:
+    """What a JSON file of this room holds."""
+    return json.loads(Path(__file__).with_name(f"{name}.json").read_text(encoding="utf-8"))

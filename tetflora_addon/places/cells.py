@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .titles import table
+from . import table
 
-_CELLS: dict[str, Any] = table()["cells"]
+_CELLS: dict[str, Any] = table("titles")["cells"]
 _MISSING, _METRES = _CELLS["missing"], {float(metres): forms for metres, forms in _CELLS["units"].items()}
 _NUMBER, _UNIT = r"\d+(?:[.,’' ]\d{3})*(?:[.,]\d+)?(?:e[+-]?\d+)?|[.,]\d+", "|".join(_METRES.values())
 _SHAPE = re.compile(

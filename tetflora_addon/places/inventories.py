@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
+from . import table
 from .cells import NOTHING, NUMBER, RANGE, WORD, cells, place_in
 from .layers import ENDINGS
 from .projection import LONGITUDE_LATITUDE, MOST_AWAY, PLAIN, System, between, chosen_system, place_about
@@ -26,15 +27,7 @@ from .tables import Table, read_csv, read_points
 from .titles import FIELDS, NAMES, NEVER, Title, read_title, said_of
 
 #: Largest value of each size, metres or years: taller than any tree that lives.
-_MOST = {
-    "height": 150.0,
-    "diameter": 15.0,
-    "girth": 48.0,
-    "crown_width": 100.0,
-    "crown_radius": 50.0,
-    "crown_base": 120.0,
-    "age": 10_000.0,
-}
+_MOST: dict[str, float] = table("titles")["most"]
 _TRUNKS = ("diameter", "girth")
 #: Medians without a unit, metres, beyond which it was centimetres, and beyond which millimetres.
 _SMALLER = {"diameter": (2.5, 150.0), "girth": (8.0, 500.0)}
@@ -265,15 +258,7 @@ class _Reading:
             self.notes.append(f"columns not used: {', '.join(unused)}")
         skipped = int((~self.good).sum()) - self.left_out.total() + self.table.broken
         return Inventory(
-            names,
-            index[self.good],
-            points[self.good],
-            system,
-            kept,
-            self.notes,
-            skipped,
-            self.first,
-            self.left_out,
+            names, index[self.good], points[self.good], system, kept, self.notes, skipped, self.first, self.left_out
         )
 
     def _texts(self, title: str) -> NDArray[np.str_]:

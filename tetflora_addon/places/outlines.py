@@ -6,7 +6,6 @@ words of what others call kinds of things, or by the name of their layer.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NAME, SceneError, readable
+from . import table
 from .layers import LAYER, list_of, parts_of, read_features
 from .projection import System
 from .tables import MAX_POINTS, coordinates, flat_tags
@@ -25,7 +25,7 @@ WOOD, MEADOW, WATER, ROAD, BUILDING, OTHER = "Woods", "Meadows", "Water", "Roads
 KINDS = (WOOD, MEADOW, WATER, ROAD, BUILDING, OTHER)
 #: Most outlines of a file: each becomes an object.
 MAX_OUTLINES = 20_000
-_TABLES: dict[str, Any] = json.loads(Path(__file__).with_name("kinds.json").read_text(encoding="utf-8"))
+_TABLES = table("kinds")
 #: Kinds by keys and values of OpenStreetMap.
 _VALUES = {(key, value): kind for key, values in _TABLES["values"].items() for value, kind in values.items()}
 #: Keys that tell by themselves, whatever their value; the first that a feature has counts.
@@ -86,7 +86,8 @@ def read_outlines(path: Path, code: int = 0, kind: str = "") -> tuple[list[MapFe
     points = slivers = 0
     for number, feature in enumerate(features, 1):
         where = f"{path.name}: feature {number:,}"
-        tags = _lower(flat_tags(feature.get("properties") or {}))
+        tags = flat_tags(feature.get("properties") or {}).items()
+        tags = {str(key).strip().lower(): value for key, value in tags if value not in (None, "")}
         names = (str(feature.get(LAYER, "")), path.stem)
         for rings, closed in _rings(feature["geometry"], where):
             points += sum(map(len, rings))
@@ -114,25 +115,13 @@ def read_outlines(path: Path, code: int = 0, kind: str = "") -> tuple[list[MapFe
 
 
 def _rings(geometry: dict[str, Any] | None, where: str) -> Iterator[tuple[tuple[NDArray[np.float64], ...], bool]]:
-    """Areas and lines of a geometry, an area as border and holes."""
+    """Areas and lines of a geometry, an area as border and holes without their last points, which are the first."""
     for kind, values in parts_of(geometry, where):
         if kind == "LineString":
             yield (coordinates(values, where),), False
         elif kind == "Polygon" and values != []:
-            yield tuple(_ring(ring, where) for ring in list_of(values, where)), True
-
-
-def _ring(values: Any, where: str) -> NDArray[np.float64]:
-    """A ring (k, 2) without its last point, which is the first."""
-    ring = coordinates(values, where)
-    if len(ring) > 1 and (ring[0] == ring[-1]).all():
-        ring = ring[:-1]
-    return ring
-
-
-def _lower(tags: dict[str, Any]) -> dict[str, Any]:
-    """Tags by their keys in small letters, as far as they have a value."""
-    return {str(key).strip().lower(): value for key, value in tags.items() if value not in (None, "")}
+            rings = [coordinates(ring, where) for ring in list_of(values, where)]
+            yield tuple(r[:-1] if len(r) > 1 and (r[0] == r[-1]).all() else r for r in rings), True
 
 
 def _outline(

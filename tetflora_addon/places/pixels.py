@@ -8,13 +8,11 @@ TIFF 6.0 (Adobe, 1992) and its 64-bit kin BigTIFF; compressions those, and Adobe
 
 from __future__ import annotations
 
-import json
 import lzma
 import math
 import struct
 import zlib
 from collections.abc import Callable, Generator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,17 +20,13 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
 from ..jobs import Progress
+from . import table
 from .rasters import checked_size
 
-#: Compressions that cannot be read, by name.
-OTHERS = {
-    2: "CCITT", 3: "CCITT fax", 4: "CCITT fax", 6: "JPEG", 7: "JPEG", 33003: "JPEG 2000", 33005: "JPEG 2000",
-    34712: "JPEG 2000", 34887: "LERC", 50000: "Zstandard", 50001: "WebP", 50002: "JPEG XL", 52546: "JPEG XL",
-}  # fmt: skip
 _CLEAR, _END, _ZSTANDARD = 256, 257, 50000
 _PROGRESS = 64  # pieces between two signs of life
 #: What is known of tags and keys, and names of tags by their numbers.
-TABLES: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("geotiff.json").read_text(encoding="utf-8"))
+TABLES = table("geotiff")
 TAGS = {int(number): name for number, name in TABLES["tags"].items()}
 _NUMBERS = {name: number for number, name in TAGS.items()}
 #: Types of values: letter for `struct`; others, such as fractions, occur in none of these tags.
@@ -148,7 +142,7 @@ class Tags:
         samples = 1 if self.one("PlanarConfiguration", 1) == 2 else self.one("SamplesPerPixel", 1)
         predictor, compression, order = (self.one(tag, 1) for tag in ("Predictor", "Compression", "FillOrder"))
         if compression not in _READERS:
-            how = OTHERS.get(compression, f"a way without a name ({compression})")
+            how = TABLES["compressions"].get(str(compression), f"a way without a name ({compression})")
             raise SceneError(
                 f"{self.name}: tag Compression (259): it is compressed with {how}, which TetFlora does not read; write "
                 "it anew, for example with gdal_translate -co COMPRESS=DEFLATE"

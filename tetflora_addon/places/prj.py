@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from . import table
 from .methods import METHODS, WGS84, Definition, Ellipsoid
-from .projection import LONGITUDE_LATITUDE, System, code_in, known_systems, read_figures
+from .projection import LONGITUDE_LATITUDE, System, code_in, known_systems
 
-_FIGURES = read_figures()
+_FIGURES = table("systems")
 #: Geographic systems by what names of datums begin with, and methods by what theirs do; letters and digits only.
 _DATUMS: dict[str, int] = _FIGURES["datums"]
 _METHODS: dict[str, str] = _FIGURES["methods"]
@@ -95,7 +96,7 @@ def _well_known(node: _Node) -> System:
     angle = _child(base, "UNIT", "ANGLEUNIT")
     angle = degrees(angle[1][1]) if angle else 1.0
     if node is base:
-        named = _code_of_datum(str((_child(base, "DATUM", "ENSEMBLE") or ("", [""]))[1][0]))
+        named = _code_of_datum((_child(base, "DATUM", "ENSEMBLE") or ("", [""]))[1][0])
         return System(named) if named and known_systems()[named] == datum else _system(datum)
     conversion = _child(node, "CONVERSION") or node
     method = _child(conversion, "PROJECTION", "METHOD")
@@ -134,12 +135,12 @@ def _datum(base: _Node) -> Definition:
     meridian = _child(base, "PRIMEM")
     east = float(meridian[1][1]) if meridian else 0.0
     if node is None:
-        return datum_named(_plain(base[1][0]).removeprefix("gcs")) or Definition("geo", meridian=east)
+        return known_systems().get(_code_of_datum(base[1][0])) or Definition("geo", meridian=east)
     shape, shift = _child(node, "SPHEROID", "ELLIPSOID"), _child(node, "TOWGS84")
     ellipsoid = Ellipsoid(shape[1][1], shape[1][2] or 1e9) if shape else WGS84
     if not (6.2e6 < ellipsoid.a < 6.5e6 and ellipsoid.inverse > 100.0):
         ellipsoid = WGS84
-    known = datum_named(str(node[1][0]))
+    known = known_systems().get(_code_of_datum(node[1][0]))
     if shift and len(shift[1]) in (3, 7):
         return Definition("geo", ellipsoid, (*shift[1], *([0.0] * (7 - len(shift[1])))), east)
     if known is None or abs(known.ellipsoid.a - ellipsoid.a) > 1.0:
@@ -147,15 +148,9 @@ def _datum(base: _Node) -> Definition:
     return replace(known, meridian=east)
 
 
-def datum_named(name: str) -> Definition | None:
-    """The geographic system of a datum by its name; None for others."""
-    code = _code_of_datum(name)
-    return known_systems()[code] if code else None
-
-
-def _code_of_datum(name: str) -> int:
+def _code_of_datum(name: Any) -> int:
     """EPSG code of the geographic system of a datum; 0 for unknown ones."""
-    name = _plain(name)
+    name = _plain(name).removeprefix("gcs")
     fitting = [part for part in _DATUMS if name.removeprefix("d").startswith(part) or name.startswith(part)]
     return _DATUMS[max(fitting, key=len)] if fitting else 0
 
@@ -228,7 +223,7 @@ def _old(text: str) -> System:
     words = {line.split()[0].lower(): " ".join(line.split()[1:]).upper() for line in head.splitlines() if line.split()}
     name, units = words.get("projection", ""), words.get("units", "METERS")
     metres = _FOOT if "INT" in units and "F" in units else _SURVEY_FOOT if units.startswith("F") else 1.0
-    datum = datum_named(words.get("datum", "")) or Definition("geo")
+    datum = known_systems().get(_code_of_datum(words.get("datum", ""))) or Definition("geo")
     if name.startswith("GEO"):
         return System(_code_of_datum(words.get("datum", "")) or LONGITUDE_LATITUDE)
     datum = replace(datum, unit=metres)

@@ -8,17 +8,15 @@ Figures of systems, ellipsoids and shifts of datums are in ``systems.json``, tho
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass, field, replace
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, readable
+from . import table
 from .methods import TRUE, Definition, Ellipsoid
 
 #: EPSG code of longitude and latitude, and of Web Mercator.
@@ -88,15 +86,9 @@ def _about(longitude: float, latitude: float) -> Definition:
 
 
 @cache
-def read_figures() -> dict[str, Any]:
-    """Figures and names of systems."""
-    return json.loads(Path(__file__).with_name("systems.json").read_text(encoding="utf-8"))
-
-
-@cache
 def known_systems() -> dict[int, Definition]:
     """All systems that have an EPSG code here."""
-    data = read_figures()
+    data = table("systems")
     ellipsoids, shifts = [Ellipsoid(*e) for e in data["ellipsoids"]], [tuple(s) for s in data["shifts"]]
     found = {}
     for method, ellipsoid, shift, meridian, unit, rows in data["systems"]:

@@ -11,15 +11,14 @@ where German and Dutch join words: ``Sumpfeiche`` is an oak, ``pseudoacacia`` no
 
 from __future__ import annotations
 
-import json
 import re
 import unicodedata
 from collections.abc import Container, Iterator, Sequence
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import readable
+from . import table
 
 #: How sure a name is: the species itself, another of its genus, of nearest kin, or only conifer or broadleaf.
 SPECIES, GENUS, KIN, KIND = range(4)
@@ -64,12 +63,6 @@ class _Names(NamedTuple):
     codes: dict[str, Match]
 
 
-@cache
-def table() -> dict[str, dict]:
-    """What `species_names.json` holds."""
-    return json.loads(Path(__file__).with_name("species_names.json").read_text(encoding="utf-8"))
-
-
 def words_of(name: str) -> list[str]:
     """Words of a name in plain small letters, without cultivars, brackets and ranks."""
     name = re.sub(r"\([^)]*\)", " ", _CULTIVARS.sub(" ", name[:200]))
@@ -104,7 +97,7 @@ def _shorter(word: str) -> Iterator[str]:
 @cache
 def _known() -> _Names:
     """The table, indexed by joined words."""
-    data = table()
+    data = table("species_names")
     known = _Names({}, {}, {}, {}, {}, {})
     own = {words_of(name)[0] for names in data["species"].values() for name in names["scientific"]}
     for family, groups in data["families"].items():
@@ -239,14 +232,9 @@ def _common(words: list[str]) -> Match | None:
 
 
 @cache
-def _unknown() -> set[str]:
-    """Words of names that name nothing."""
-    return set(table()["unknown"].split())
-
-
 def is_name(text: str) -> bool:
     """Whether a text names any plant at all."""
-    return not set(plain_words(text)) <= _unknown()
+    return not set(plain_words(text)).issubset(table("species_names")["unknown"].split())
 
 
 def told(names: dict[str, int], most: int = 8) -> str:

@@ -8,23 +8,16 @@ The words are in `titles.json`. A title is cut into them wherever it hides them:
 
 from __future__ import annotations
 
-import json
 import re
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
+from . import table
 from .species_names import plain_words
 
-
-@cache
-def table() -> dict:
-    """What `titles.json` holds."""
-    return json.loads(Path(__file__).with_name("titles.json").read_text(encoding="utf-8"))
-
-
+_TABLE = table("titles")
 #: What a column may hold, with its name for artists.
-FIELDS: dict[str, str] = table()["fields"]
+FIELDS: dict[str, str] = _TABLE["fields"]
 #: Fields that may be told by several columns.
 NAMES = ("genus", "name", "common", "leaf", "family")
 _SIZES = {"h": "height", "d": "diameter", "z": "z", "e": "x", "n": "y"}  # of a single letter
@@ -61,14 +54,14 @@ class Title(NamedTuple):
 def _words() -> tuple[dict[str, str], dict[str, float], dict[str, str]]:
     """Meanings of words, metres of units, and the words that begin with some letters."""
     words, begun = {}, {}
-    for meaning, texts in table()["words"].items():
+    for meaning, texts in _TABLE["words"].items():
         for text in texts.split():
             word = "".join(plain_words(text))
             if word not in words:
                 words[word] = meaning
             for end in range(3, len(word)):
                 begun.setdefault(word[:end], word)
-    units = {"".join(plain_words(u)): float(m) for m, us in table()["units"].items() for u in us.split()}
+    units = {"".join(plain_words(u)): float(m) for m, us in _TABLE["units"].items() for u in us.split()}
     return words, units, begun
 
 
@@ -136,7 +129,7 @@ def _field(meant: set[str]) -> tuple[str, int]:
 
     Of a rule ``a|b !c =d|e`` there is one of a and b, no c, and nothing but d and e.
     """
-    for rule, name, doubt in table()["rules"]:
+    for rule, name, doubt in _TABLE["rules"]:
         parts = [(part[0], meant.intersection(part.lstrip("!=").split("|"))) for part in rule.split()]
         if all(some == meant if way == "=" else bool(some) != (way == "!") for way, some in parts):
             return name, doubt
@@ -146,7 +139,7 @@ def _field(meant: set[str]) -> tuple[str, int]:
 @cache
 def _values() -> dict[tuple[str, ...], str]:
     """What words of cells say, by these words."""
-    values = {what: texts for what, texts in table()["values"].items() if what != "rest"}
+    values = {what: texts for what, texts in _TABLE["values"].items() if what != "rest"}
     return {tuple(plain_words(text)): what for what, texts in values.items() for text in texts.split(";")}
 
 
@@ -156,7 +149,7 @@ def said_of(text: str) -> str:
 
     "Dead" and "dead tree" say it, "dead branches" does not; after "vacant" anything may stand.
     """
-    words, rest = tuple(plain_words(text)), set(table()["values"]["rest"].split())
+    words, rest = tuple(plain_words(text)), set(_TABLE["values"]["rest"].split())
     for end in range(min(len(words), 4), 0, -1):
         what = _values().get(words[:end], "")
         if what and (what in ("vacant", "stump", "planned") or rest.issuperset(words[end:])):

@@ -13,9 +13,9 @@ import pytest
 from benchmarks import places_files as files
 from benchmarks import places_inventories as inventories
 from tetflora_addon.errors import SceneError
-from tetflora_addon.places import cells
+from tetflora_addon.places import cells, table
 from tetflora_addon.places.inventories import IMPERIAL, preview, read_inventory
-from tetflora_addon.places.species_names import GENUS, KIN, KIND, SPECIES, best_of, names_in, species_named, table, told
+from tetflora_addon.places.species_names import GENUS, KIN, KIND, SPECIES, best_of, names_in, species_named, told
 from tetflora_addon.places.titles import FIELDS, read_title, said_of
 
 _CATALOGUE = Path(__file__).parents[3] / "tetflora_addon" / "catalogue"
@@ -277,7 +277,7 @@ def test_a_scientific_name_counts_before_a_common_one():
 
 
 def test_the_table_of_names_fits_the_catalogue():
-    known, data = {path.stem for path in _CATALOGUE.glob("*.json")}, table()
+    known, data = {path.stem for path in _CATALOGUE.glob("*.json")}, table("species_names")
     kin = {kin for groups in data["families"].values() for kin, _ in names_in(groups)}
     assert {*data["species"], *data["kin"], *data["kinds"], *kin} <= known
     # Each entry stands below a source that is explained.

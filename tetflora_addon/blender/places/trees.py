@@ -28,6 +28,7 @@ from ...planting.rules import species_by_weight
 from ...species.species import Species
 from ..attributes import write
 from ..placing.plant_objects import add_field
+from ..scene.field_sizes import FIT, NUMBERS, OFFSET
 from ..scene.own_ages import Sizes
 from ..scene.sizes import fits_of
 from ..species.edits import catalogue, grown, species_for
@@ -38,13 +39,7 @@ from .outlines import building_areas
 from .terrain import heights_steps, read_raster
 
 #: Attributes of fields by the names that sizes have in inventories.
-ATTRIBUTES = {
-    "height": "tf_height",
-    "diameter": "tf_diameter",
-    "crown_width": "tf_crown_width",
-    "crown_base": "tf_crown_base",
-    "dead": "tf_dead",
-}
+_ATTRIBUTES = {name.removeprefix("tf_"): name for name in NUMBERS}
 #: What to do with species that nobody knows.
 GENERIC, LEFT_OUT = 'GENERIC', 'LEAVE_OUT'
 _GENERIC = "broadleaf_tree"
@@ -219,10 +214,10 @@ def _plant(
     yield Progress(0.95, "Making the field")
     made = add_field(order.scene, placement, identifiers, ages=ages)
     made.name = made.data.name = order.path.stem
-    for key, attribute in ATTRIBUTES.items():
+    for key, attribute in _ATTRIBUTES.items():
         if key in sizes and sizes[key].any():
             write(made.data, attribute, sizes[key], data_type='FLOAT')
-    for values, attribute in ((sizes.get("offset"), "tf_crown_offset"), (fit, "tf_fit")):
+    for values, attribute in ((sizes.get("offset"), OFFSET), (fit, FIT)):
         if values is not None:
             write(made.data, attribute, values, data_type='FLOAT_VECTOR')
     order.remember(place)
@@ -234,7 +229,7 @@ def _fit_steps(
 ) -> Generator[Progress, Any, NDArray[np.float32] | None]:
     """Factors on height and crown width, (n, 3), that make up for what is random in each plant; None for none."""
     none, number = np.zeros(len(placement)), len(placement)
-    columns = [sizes.get(key, none).astype(np.float64) for key in ATTRIBUTES]
+    columns = [sizes.get(key, none).astype(np.float64) for key in _ATTRIBUTES]
     if not columns[0].any():
         return None
     offset = sizes["offset"][:, :2] if "offset" in sizes else np.zeros((number, 2))
