@@ -43,6 +43,15 @@ def _file(text: str) -> Path | None:
     return Path(bpy.path.abspath(text)) if text else None
 
 
+def column_row(layout: bpy.types.UILayout, title: str, values: str, translate: bool = False) -> bpy.types.UILayout:
+    """Begin a row of the table of columns; what they are taken for, and the unit, come next."""
+    row = layout.split(factor=0.25)
+    row.label(text=title, translate=translate)
+    row = row.split(factor=0.45)
+    row.label(text=values, translate=translate)
+    return row
+
+
 class _Importing(ModalJob, ImportHelper):
     """Mix-in for operators that import a place from a file."""
 
@@ -257,6 +266,9 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
         layout = self.layout
         if self.table:
             rows = min(max(len(self.table), 4), 16)
+            heads = column_row(layout, "Column in the File", "Some of Its Values", translate=True)
+            heads.label(text="Taken For")
+            heads.label(text="Unit")
             layout.template_list(
                 "TETFLORA_UL_inventory_columns", "", self, "table", self, "active", rows=rows, maxrows=rows
             )

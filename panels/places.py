@@ -9,6 +9,7 @@ from ..operators.places import (
     TETFLORA_OT_import_inventory,
     TETFLORA_OT_import_outlines,
     TETFLORA_OT_import_terrain,
+    column_row,
 )
 from ..tetflora_addon.blender.places.origin import origin_of
 from ..tetflora_addon.errors import TetFloraError
@@ -27,10 +28,7 @@ class TETFLORA_UL_inventory_columns(bpy.types.UIList):
     """Columns of an inventory that is about to be imported."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
-        row = layout.split(factor=0.25)
-        row.label(text=item.name, translate=False)
-        row = row.split(factor=0.45)
-        row.label(text=item.values, translate=False)
+        row = column_row(layout, item.name, item.values)
         row.prop(item, "field", text="")
         row.prop(item, "unit", text="")
 

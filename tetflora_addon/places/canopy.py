@@ -29,7 +29,7 @@ _MOST_WINDOW = 20.0  # metres from a top within which others are looked for
 _LEAN = 0.6  # at most, how far the middle of a crown is from its top, in radii
 #: Metres: what no ground is that trees are measured from, what no tree is, and what is seldom the lowest of a canopy.
 _GROUND, _TALLEST, _NEAR = 60.0, 130.0, 8.0
-_ROWS, _AT_ONCE = 256, 4_000_000  # rows of a surface at a time, and pairs of a cell and a corner
+_ROWS = 256  # of a surface at a time
 _AROUND = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0))
 
 
@@ -63,10 +63,9 @@ def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
     for top in range(0, h, _ROWS):
         row = np.arange(top, min(top + _ROWS, h))
         places = surface.places(np.tile(np.arange(w), len(row)), np.repeat(row, w))
-        column, line = ground.cells(between(places, surface.system, ground.system)).T
-        inside = (column >= -0.5) & (column <= ground.values.shape[1] - 0.5)
-        inside &= (line >= -0.5) & (line <= ground.values.shape[0] - 0.5)
-        below = np.where(inside, ground.at(np.nan_to_num(column), np.nan_to_num(line)), np.nan)
+        cells = ground.cells(between(places, surface.system, ground.system))
+        inside = ((cells >= -0.5) & (cells <= np.array(ground.values.shape[::-1]) - 0.5)).all(axis=1)
+        below = np.where(inside, ground.at(*np.nan_to_num(cells).T), np.nan)
         out[row] = surface.values[row] - below.reshape(len(row), w)
     if not np.isfinite(out).any():
         raise SceneError(f"{what}the two rasters have no place in common; choose another Ground Below")
@@ -103,18 +102,13 @@ def without_areas(raster: Raster, areas: Sequence[NDArray[np.float64]]) -> tuple
     inside = np.zeros((h, w), bool)
     for area in areas:
         ring = raster.cells(area)
-        low = np.clip(np.floor(ring.min(axis=0)), 0, (w, h)).astype(np.int64)
-        high = np.clip(np.ceil(ring.max(axis=0)) + 1, 0, (w, h)).astype(np.int64)
-        if not (high > low).all():
-            continue
-        x = np.arange(low[0], high[0])[None, :, None]
         (x1, y1), (x2, y2) = ring.T, np.roll(ring, -1, axis=0).T
-        slope = np.divide(x2 - x1, y2 - y1, out=np.zeros(len(ring)), where=y2 != y1)
-        rows = max(_AT_ONCE // (x.size * len(ring)), 1)
-        for top in range(low[1], high[1], rows):
-            y = np.arange(top, min(top + rows, high[1]))[:, None, None]
-            crossed = ((y1 > y) != (y2 > y)) & (x < x1 + (y - y1) * slope)
-            inside[top : top + len(y), low[0] : high[0]] |= crossed.sum(axis=2) % 2 == 1
+        rows = np.arange(max(int(np.ceil(y1.min())), 0), min(int(np.floor(y1.max())) + 1, h))
+        line, edge = np.nonzero((y1 > rows[:, None]) != (y2 > rows[:, None]))
+        crossed = x1[edge] + (rows[line] - y1[edge]) * (x2 - x1)[edge] / (y2 - y1)[edge]
+        turned = np.zeros((len(rows), w + 1), bool)  # from each border on, the other side
+        np.logical_xor.at(turned, (line, np.clip(np.ceil(crossed), 0, w).astype(np.int64)), True)
+        inside[rows] |= np.logical_xor.accumulate(turned, axis=1)[:, :-1]
     values = np.where(inside, np.float32(np.nan), raster.values)
     return replace(raster, values=values), int((inside & np.isfinite(raster.values)).sum())
 

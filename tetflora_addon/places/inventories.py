@@ -368,34 +368,30 @@ class _Reading:
 
     def _points(self, code: int) -> tuple[NDArray[np.float64], System]:
         """Coordinates and their system."""
-        name, given, found = self.table.name, self.table.points, self.found
-        pair = "coordinates"
-        if given is not None:
-            points, system = given, self.table.system
-        else:
-            metres = "x" in found and "y" in found
-            degrees = "longitude" in found and "latitude" in found
-            if not (metres or degrees or "place" in found):
+        name, points, system, pair = self.table.name, self.table.points, self.table.system, ("coordinates",)
+        if points is None:
+            degrees, metres, one = ("longitude", "latitude"), ("x", "y"), ("place",)
+            pair, *more = [pair for pair in (degrees, metres, one) if self.found.keys() >= set(pair)] or [()]
+            if not pair:
                 raise SceneError(
                     f"{name}: line 1: no columns of coordinates; name them x and y, or longitude and latitude"
                 )
-            if "place" in found and not degrees and not metres:
+            if metres in more and code and not chosen_system(code, System(), "").geographic:
+                pair = metres
+            if pair == one:
                 points, own = self._places()
-                pair, metres = "place", False
                 code = code or own
-                metres = not code and bool((np.abs(points[self.good]) > (360.0, 180.0)).any())
+                plain = (np.abs(points[self.good]) > (360.0, 180.0)).any()
             else:
-                metres = metres and (not degrees or (code and not chosen_system(code, System(), "").geographic))
-                columns = ("x", "y") if metres else ("longitude", "latitude")
-                pair = columns[0]
-                points = np.stack([self._coordinate(column) for column in columns], axis=1)
-                if not metres and not code and len(low := points[self.good]) and np.median(np.abs(low[:, 1])) > 360.0:
-                    metres = True
+                points = np.stack([self._coordinate(column) for column in pair], axis=1)
+                plain = pair == metres
+                if not plain and not code and len(low := points[self.good]) and np.median(np.abs(low[:, 1])) > 360.0:
+                    plain = True
                     self.notes.append("longitude and latitude read as meters")
-            if metres and not code and _are_degrees(points[self.good]):
-                metres = False
+            if plain and not code and _are_degrees(points[self.good]):
+                plain = False
                 self.notes.append("x and y read as longitude and latitude")
-            system = chosen_system(code or (0 if metres else LONGITUDE_LATITUDE), System(), f"{name}: ")
+            system = chosen_system(code or (0 if plain else LONGITUDE_LATITUDE), System(), f"{name}: ")
         if system.geographic:
             some = np.abs(points[self.good])
             if len(some) and 90.0 < np.median(some[:, 1]) <= 180.0 and np.median(some[:, 0]) <= 90.0:
@@ -403,10 +399,10 @@ class _Reading:
                 self.notes.append("coordinates read as latitude, longitude")
             self._refuse(
                 ~((points >= (-360.0, -90.0)) & (points <= (360.0, 90.0))).all(axis=1),
-                pair,
+                pair[0],
                 lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} are no longitude and latitude; set Coordinate System",
             )
-        self._refuse_far(points, system, pair)
+        self._refuse_far(points, system, pair[0])
         return points, system
 
     def _refuse_far(self, points: NDArray[np.float64], system: System, column: str) -> None:

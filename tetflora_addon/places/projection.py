@@ -102,18 +102,7 @@ def known_systems() -> dict[int, Definition]:
 
 
 def system_of(code: int, what: str = "") -> System:
-    """The system of an EPSG code.
-
-    Parameters
-    ----------
-    what : str
-        Begins the message, such as the name of a file.
-
-    Raises
-    ------
-    SceneError
-        It is none of those that are known here; says what to do.
-    """
+    """The system of an EPSG code, if it is known here."""
     if code in known_systems():
         return System(code)
     raise SceneError(
@@ -123,13 +112,7 @@ def system_of(code: int, what: str = "") -> System:
 
 
 def chosen_system(code: int, own: System, what: str) -> System:
-    """The system of what an artist chose, which is an EPSG code, `PLAIN`, or 0 for the file's own.
-
-    Raises
-    ------
-    SceneError
-        As `system_of`.
-    """
+    """The system of what an artist chose, which is an EPSG code, `PLAIN`, or 0 for the file's own."""
     return System() if code == PLAIN else system_of(code or own.code, what) if code or own.code > 0 else own
 
 

@@ -32,13 +32,7 @@ WHOLE, MIDDLE, EXISTING = 'WHOLE', 'MIDDLE', 'EXISTING'
 
 
 def origin_of(scene: bpy.types.Scene) -> MapOrigin | None:
-    """The place of a scene; None before its first import.
-
-    Raises
-    ------
-    SceneError
-        What is stored cannot be a place.
-    """
+    """The place of a scene; None before its first import."""
     stored = scene.get(KEY)
     if stored is None:
         return None
@@ -126,13 +120,7 @@ class Import:
         return list(self.selected) or [obj for obj in self.scene.objects if obj.type == 'MESH' and obj.get(TERRAIN)]
 
     def box(self, points: NDArray[np.float64], system: System) -> Box | None:
-        """What the file with some points (n, 2) is cropped to; None for all of it.
-
-        Raises
-        ------
-        SceneError
-            They lie over too large an area, or there is nothing to crop to.
-        """
+        """What the file with some points (n, 2) is cropped to; None for all of it."""
         if self.crop == WHOLE:
             place_about(system, points.min(axis=0), points.max(axis=0), self.what)
             return None
@@ -157,11 +145,6 @@ class Import:
         """The scene's place, or one in the middle of points (n, 2), if it has none or another is asked for.
 
         Plain metres are taken for those of the scene, if it has a map of metres; whether they are near is asked later.
-
-        Raises
-        ------
-        SceneError
-            It has one that cannot be read, or the points lie nowhere.
         """
         place = None if self.new else origin_of(self.scene)
         return place or place_about(system, points.min(axis=0), points.max(axis=0), self.what)
