@@ -126,6 +126,8 @@ class Definition:
     @cached_property
     def ways(self) -> tuple[Callable[..., _Pair], Callable[..., _Pair], float]:
         """From longitude and latitude, back, and the meridian that longitudes count from, degrees."""
+        if self.method == "geo":
+            return lambda *place: np.degrees(place), lambda *place: np.radians(place), 0.0
         (east, north), angles = self.parameters[-2:], np.radians(self.parameters[:-2])
         if self.method in _SCALED:
             angles[-1] = self.parameters[-3]

@@ -134,15 +134,11 @@ def code_in(text: str) -> int | None:
 def to_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Longitude and latitude on WGS 84 in degrees, (n, 2), of points (n, 2) in a system that lies on Earth."""
     points, own = system.unit * np.asarray(points, np.float64), system.definition
-    if own.method == "geo":
-        if not any(own.shift):
-            return points
-        longitude, latitude = np.radians(points).T
-    else:
-        _, back, meridian = own.ways
-        longitude, latitude = back(*points.T)
-        longitude = longitude + np.radians(meridian)
-    return np.degrees(np.stack(own.to_wgs84(longitude, latitude), axis=1))
+    if own.method == "geo" and not any(own.shift):
+        return points
+    _, back, meridian = own.ways
+    longitude, latitude = back(*points.T)
+    return np.degrees(np.stack(own.to_wgs84(longitude + np.radians(meridian), latitude), axis=1))
 
 
 def from_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -154,8 +150,6 @@ def from_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.floa
     if own.method == "geo" and not any(own.shift):
         return points
     longitude, latitude = own.from_wgs84(*np.radians(points).T)
-    if own.method == "geo":
-        return np.degrees(np.stack([longitude, latitude], axis=1))
     there, _, meridian = own.ways
     off = longitude - np.radians(meridian)
     off = np.where(np.abs(off) <= np.pi, off, (off + np.pi) % (2.0 * np.pi) - np.pi)

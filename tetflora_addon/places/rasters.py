@@ -26,7 +26,7 @@ MAX_CELLS, MAX_TEXT = 40_000_000, 1_000_000_000
 MAX_SIDE = 65_000
 _HEADER = {"ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy", "nodata_value"}
 _BEYOND = 3.4e38  # fits into single precision, as numbers that stand for nothing do
-_HEAD_LINES = 40
+_HEAD = 4096  # bytes
 _PIECE = 4_000_000  # bytes of text between two signs of life
 _LIMIT = 1e7  # metres: what is higher, or has larger coordinates than a thousand times so much, is no place
 _SMALL = 4096  # bytes of world files and files with the name of a coordinate system
@@ -155,13 +155,11 @@ def checked_size(width: int, height: int, what: str) -> None:
 def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
     """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system."""
     content = read_whole(path, MAX_TEXT)
-    name, header, start, line = path.name, {}, 0, 1
-    while line <= _HEAD_LINES:
-        end = content.find(b"\n", start)
-        end = len(content) if end < 0 else end
-        words = content[start : min(end, start + 200)].decode("latin-1").split()
+    name, header, start = path.name, {}, 0
+    for line, text in enumerate(content[:_HEAD].split(b"\n"), 1):
+        words = text[:200].decode("latin-1").split()
         key = words[0].lower() if words else ""
-        if (words and not re.match(r"[A-Za-z_]", key)) or key in ("nan", "inf") or start >= len(content):
+        if words and (not re.match(r"[A-Za-z_]", key) or key in ("nan", "inf")):
             break
         if words:
             if key not in _HEADER or len(words) != 2:
@@ -169,7 +167,7 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
                     f"{name}: line {line}: {shown(' '.join(words))} is no line of the head of an ASCII grid; correct it"
                 )
             header[key] = _number(words[1], f"{name}: line {line}: {key}")
-        start, line = end + 1, line + 1
+        start += len(text) + 1
     width, height, corner, dx, dy = _ascii_head(header, name)
     # Each value is at least one digit and a space: a small file is no large grid, whatever its head says.
     if len(content) - start + 1 < 2 * width * height:
