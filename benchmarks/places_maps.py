@@ -14,9 +14,9 @@ import zstandard
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
 from tetflora_addon.places.canopy import checked_canopy
+from tetflora_addon.places.geotiff import use_zstandard
 from tetflora_addon.places.grids import read_grid
 from tetflora_addon.places.outlines import read_outlines
-from tetflora_addon.places.pixels import use_zstandard
 from tetflora_addon.places.projection import between, chosen_system, place_about
 from tetflora_addon.places.rasters import in_degrees
 

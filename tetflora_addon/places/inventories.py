@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
 from . import table
-from .cells import NOTHING, NUMBER, RANGE, WORD, cells, place_in
 from .layers import ENDINGS
 from .projection import LONGITUDE_LATITUDE, MOST_AWAY, PLAIN, System, between, chosen_system, place_about
 from .species_names import KIND, is_name, key_of, species_named
-from .tables import Table, read_csv, read_points
+from .tables import NOTHING, NUMBER, RANGE, WORD, Table, cells, place_in, read_csv, read_points
 from .titles import FIELDS, NAMES, NEVER, Title, read_title, said_of
 
 #: Largest value of each size, metres or years: taller than any tree that lives.

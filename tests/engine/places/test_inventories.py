@@ -13,7 +13,7 @@ import pytest
 from benchmarks import places_files as files
 from benchmarks import places_inventories as inventories
 from tetflora_addon.errors import SceneError
-from tetflora_addon.places import cells, table
+from tetflora_addon.places import table, tables
 from tetflora_addon.places.inventories import IMPERIAL, preview, read_inventory
 from tetflora_addon.places.species_names import GENUS, KIN, KIND, SPECIES, best_of, names_in, species_named, told
 from tetflora_addon.places.titles import FIELDS, read_title, said_of
@@ -312,7 +312,7 @@ def test_the_table_of_names_fits_the_catalogue():
     ],
 )
 def test_numbers_as_people_write_them(text, value, unit):
-    values, units, _ = cells.cells(np.array([text]))
+    values, units, _ = tables.cells(np.array([text]))
     assert (values[0], units[0]) == pytest.approx((value, unit), nan_ok=True)
 
 

@@ -16,7 +16,7 @@ from benchmarks import places_files as files
 from benchmarks import places_maps as maps
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
-from tetflora_addon.places import pixels
+from tetflora_addon.places import geotiff
 from tetflora_addon.places.canopy import checked_canopy, heights_above, without_areas
 from tetflora_addon.places.geotiff import place_of_image
 from tetflora_addon.places.grids import mosaic, read_grid
@@ -76,7 +76,7 @@ def test_damage_is_never_ground(tmp_path, packed):
 
 def test_what_cannot_be_read_is_named(tmp_path, monkeypatch):
     path = tmp_path / "a.tif"
-    monkeypatch.delitem(pixels._READERS, 50000)  # Python by itself
+    monkeypatch.delitem(geotiff._READERS, 50000)  # Python by itself
     for code, name in ((34887, "LERC"), (50000, "Zstandard"), (7, "JPEG"), (4711, "4711")):
         path.write_bytes(files.geotiff(files.hills(20), packed=(code, zlib.compress)))
         with pytest.raises(SceneError, match=rf"compressed with .*{name}.*gdal_translate"):
@@ -85,7 +85,7 @@ def test_what_cannot_be_read_is_named(tmp_path, monkeypatch):
 
 def test_codes_of_tables_that_are_full():
     for data in (bytes(30_000), bytes(range(256)) * 60, np.random.default_rng(1).bytes(20_000), b"ab" * 5000, b"a"):
-        assert pixels._lzw(files.lzw(data), len(data)) == data
+        assert geotiff._lzw(files.lzw(data), len(data)) == data
 
 
 def test_a_tile_of_the_shuttle_mission(tmp_path):

@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...files import read_whole
 from ...jobs import Progress
-from ...places.geotiff import place_of_image
+from ...places.geotiff import place_of_image, use_zstandard
 from ...places.grids import ENDINGS, mosaic, read_grid
-from ...places.pixels import use_zstandard
 from ...places.projection import System, between, chosen_system
 from ...places.rasters import MAX_CELLS, Raster, checked_size, in_degrees
 from ...planting.height_grid import HeightGrid, cell_for, height_grid
