@@ -25,9 +25,8 @@ from numpy.typing import NDArray
 from ..errors import SceneError, shown
 from ..jobs import Progress
 from . import table
-from .methods import Definition, Ellipsoid
 from .prj import described, system_in, utm_zone
-from .projection import System, known_systems
+from .projection import Definition, Ellipsoid, System, known_systems
 from .rasters import Raster, check_regular, checked_size, system_beside, without_nodata, world_file
 
 _CLEAR, _END, _ZSTANDARD = 256, 257, 50000

@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from . import table
-from .methods import METHODS, WGS84, Definition, Ellipsoid
-from .projection import LONGITUDE_LATITUDE, System, code_in, known_systems
+from .projection import LONGITUDE_LATITUDE, METHODS, WGS84, Definition, Ellipsoid, System, code_in, known_systems
 
 _FIGURES = table("systems")
 #: Geographic systems by what names of datums begin with, and methods by what theirs do; letters and digits only.
