@@ -27,10 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SceneError, readable
 from . import table
 
-#: EPSG code of longitude and latitude, and of Web Mercator.
-LONGITUDE_LATITUDE, WEB_MERCATOR = 4326, 3857
-#: What stands for a plane in metres in place of a code.
-PLAIN = -1
+#: EPSG code of longitude and latitude, and what stands for a plane in metres in place of a code.
+LONGITUDE_LATITUDE, PLAIN = 4326, -1
 _HEIGHTS = {4937: 4258}  # systems with heights, by those without
 _Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
 _Way = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]

@@ -25,6 +25,7 @@ from ..runtime import JobData, guarded
 
 #: Custom property of the scene.
 KEY = "tetflora_place"
+_STORED = ("code", "longitude", "latitude", "east", "north")
 #: On objects that are imported ground.
 TERRAIN = "tetflora_terrain"
 #: What an import may be cropped to: nothing, a box around its middle, or what the scene has there already.
@@ -37,7 +38,7 @@ def origin_of(scene: bpy.types.Scene) -> MapOrigin | None:
     if stored is None:
         return None
     try:
-        code, *numbers = (float(stored[name]) for name in ("code", "longitude", "latitude", "east", "north"))
+        code, *numbers = (float(stored[name]) for name in _STORED)
         if not np.isfinite(numbers).all() or np.abs(numbers).max() > 1e9:
             raise ValueError
         system = System(int(code), *numbers[:2])
@@ -160,13 +161,7 @@ class Import:
 
     def remember(self, place: MapOrigin) -> None:
         """Store the place of the scene."""
-        self.scene[KEY] = {
-            "code": place.system.code,
-            "longitude": place.system.longitude,
-            "latitude": place.system.latitude,
-            "east": place.east,
-            "north": place.north,
-        }
+        self.scene[KEY] = {name: getattr(place, name, getattr(place.system, name, 0)) for name in _STORED}
 
 
 @dataclass

@@ -18,7 +18,7 @@ from ...jobs import Progress
 from ...places.outlines import BUILDING, KINDS, WATER, MapFeature, denser, one_ring, read_outlines
 from ...planting.height_grid import HeightGrid
 from ..attributes import members
-from ..compat import shader_tree
+from ..materials.nodes import Graph, surface_material
 from ..placing.terrain import HALF_WIDTH
 from ..worker import call_in_thread
 from .origin import Import, Imported, Steps, importing
@@ -35,8 +35,6 @@ _LOOKS = {
 }
 #: On objects that are imported buildings.
 BUILDING_MARK = "tetflora_building"
-#: On materials of maps.
-_MARK = "tetflora_map"
 
 
 @importing
@@ -67,15 +65,14 @@ def outline_steps(order: Import, kind: str = "") -> Steps:
     heights = yield from heights_steps(order, Progress(0.4, "Reading the ground"))
     top = bpy.data.collections.new(order.path.stem)
     made = [bpy.data.collections.new(kind) for kind in KINDS]
-    looks = {}
     try:
         for number, (outline, own) in enumerate(zip(outlines, rings, strict=True)):
             if number % _AT_ONCE == 0:
                 yield Progress(0.5 + 0.5 * number / len(outlines), "Drawing outlines", amid=True)
-            curve = _curve(outline, own, heights, looks)
+            curve = _curve(outline, own, heights)
             made[KINDS.index(outline.kind)].objects.link(curve)
     except BaseException:  # an error, or Esc
-        _remove([top, *made], list(looks.values()))
+        _remove([top, *made])
         raise
     found = {kind: collection for kind, collection in zip(KINDS, made, strict=True) if collection.objects}
     for collection in found.values():
@@ -97,20 +94,16 @@ def building_areas(scene: bpy.types.Scene) -> list[NDArray[np.float64]]:
     ]
 
 
-def _remove(collections: list[bpy.types.Collection], materials: list[bpy.types.Material]) -> None:
+def _remove(collections: list[bpy.types.Collection]) -> None:
     """Take back what was drawn."""
     objects = [obj for collection in collections for obj in collection.objects]
     curves = [obj.data for obj in objects]
+    materials = {material for curve in curves for material in curve.materials}
     bpy.data.batch_remove([*objects, *collections])
     bpy.data.batch_remove([*curves, *(material for material in materials if not material.users)])
 
 
-def _curve(
-    outline: MapFeature,
-    rings: list[NDArray[np.float64]],
-    heights: HeightGrid | None,
-    looks: dict[str, bpy.types.Material],
-) -> bpy.types.Object:
+def _curve(outline: MapFeature, rings: list[NDArray[np.float64]], heights: HeightGrid | None) -> bpy.types.Object:
     """One outline as an object; its points count from its first one, so that far ones are exact."""
     data = bpy.data.curves.new(outline.name, 'CURVE')
     filled = outline.closed and outline.kind in (WATER, BUILDING)
@@ -138,7 +131,7 @@ def _curve(
         if ribbon:
             spline.points.foreach_set("tilt", np.full(len(local), pi / 2.0, np.float32))
     if filled or ribbon:
-        data.materials.append(_look(outline.kind if outline.kind in (WATER, BUILDING) else "", looks))
+        data.materials.append(_look(outline.kind if outline.kind in (WATER, BUILDING) else ""))
     obj = bpy.data.objects.new(outline.name, data)
     obj.location = foot
     if ribbon:
@@ -153,17 +146,13 @@ def _on(heights: HeightGrid | None, points: NDArray[np.float64]) -> NDArray[np.f
     return np.zeros(len(points)) if heights is None else np.nan_to_num(heights.at(heights.height, points), nan=0.0)
 
 
-def _look(kind: str, looks: dict[str, bpy.types.Material]) -> bpy.types.Material:
+def _look(kind: str) -> bpy.types.Material:
     """The material of water, buildings or roads; that of an earlier import if there is one."""
     name, colour, rough = _LOOKS[kind]
-    if kind not in looks:
-        found = next((m for m in bpy.data.materials if m.get(_MARK) == name and m.library is None), None)
-        if found is None:
-            found = bpy.data.materials.new(name)
-            found[_MARK] = name
-            surface = next(node for node in shader_tree(found).nodes if node.type == 'BSDF_PRINCIPLED')
-            surface.inputs["Base Color"].default_value = (*colour, 1.0)
-            surface.inputs["Roughness"].default_value = rough
-            found.diffuse_color = (*colour, 1.0)
-        looks[kind] = found
-    return looks[kind]
+
+    def build(graph: Graph, material: bpy.types.Material) -> None:
+        material.diffuse_color = (*colour, 1.0)
+        surface = graph.node("ShaderNodeBsdfPrincipled", {"Base Color": (*colour, 1.0), "Roughness": rough})
+        graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
+
+    return surface_material(name, 1, build)

@@ -28,7 +28,7 @@ from ...planting.rules import species_by_weight
 from ...species.species import Species
 from ..attributes import write
 from ..placing.plant_objects import add_field
-from ..scene.field_sizes import FIT, NUMBERS, OFFSET
+from ..scene.field_sizes import FIT, HEIGHT, NUMBERS, OFFSET, SIZE_ATTRIBUTES
 from ..scene.own_ages import Sizes
 from ..scene.sizes import fits_of
 from ..species.edits import catalogue, grown, species_for
@@ -38,8 +38,6 @@ from .origin import Import, Imported, Steps, importing
 from .outlines import building_areas
 from .terrain import heights_steps, read_raster
 
-#: Attributes of fields by the names that sizes have in inventories.
-_ATTRIBUTES = {name.removeprefix("tf_"): name for name in NUMBERS}
 #: What to do with species that nobody knows.
 GENERIC, LEFT_OUT = 'GENERIC', 'LEAVE_OUT'
 _GENERIC = "broadleaf_tree"
@@ -210,34 +208,30 @@ def _plant(
     placement = Placement(np.column_stack([flat, z]), turns, np.ones(len(flat)), kinds, seeds, len(flat))
     age = sizes.get("age")
     ages = None if age is None else np.where(sizes["height"] > 0.0, 0.0, age)
-    fit = yield from _fit_steps(order.scene, placement, identifiers, sizes)
+    columns = {name: sizes[key] for name in NUMBERS if (key := name.removeprefix("tf_")) in sizes and sizes[key].any()}
+    columns |= {OFFSET: sizes["offset"]} if "offset" in sizes else {}
+    if HEIGHT in columns:
+        columns[FIT] = yield from _fit_steps(order.scene, placement, identifiers, columns)
     yield Progress(0.95, "Making the field")
     made = add_field(order.scene, placement, identifiers, ages=ages)
     made.name = made.data.name = order.path.stem
-    for key, attribute in _ATTRIBUTES.items():
-        if key in sizes and sizes[key].any():
-            write(made.data, attribute, sizes[key], data_type='FLOAT')
-    for values, attribute in ((sizes.get("offset"), OFFSET), (fit, FIT)):
-        if values is not None:
-            write(made.data, attribute, values, data_type='FLOAT_VECTOR')
+    for name, values in columns.items():
+        write(made.data, name, values, data_type=SIZE_ATTRIBUTES[name])
     order.remember(place)
     return Imported(made, parts)
 
 
 def _fit_steps(
-    scene: bpy.types.Scene, placement: Placement, identifiers: list[str], sizes: dict[str, NDArray[np.float32]]
-) -> Generator[Progress, Any, NDArray[np.float32] | None]:
-    """Factors on height and crown width, (n, 3), that make up for what is random in each plant; None for none."""
-    none, number = np.zeros(len(placement)), len(placement)
-    columns = [sizes.get(key, none).astype(np.float64) for key in _ATTRIBUTES]
-    if not columns[0].any():
-        return None
-    offset = sizes["offset"][:, :2] if "offset" in sizes else np.zeros((number, 2))
-    own = Sizes(*columns, offset, np.ones((number, 2)))
+    scene: bpy.types.Scene, placement: Placement, identifiers: list[str], columns: dict[str, NDArray[np.float32]]
+) -> Generator[Progress, Any, NDArray[np.float32]]:
+    """Factors on height and crown width, (n, 3), that make up for what is random in each plant."""
+    none, number = np.zeros((len(placement), 3)), len(placement)
+    numbers = (columns.get(name, none[:, 0]).astype(np.float64) for name in NUMBERS)
+    own = Sizes(*numbers, columns.get(OFFSET, none)[:, :2], none[:, :2] + 1.0)
     turn, frame = placement.azimuth, np.zeros((number, 3, 3))
     frame[:, 0, 0] = frame[:, 1, 1] = np.cos(turn)
     frame[:, 1, 0], frame[:, 0, 1], frame[:, 2, 2] = np.sin(turn), -np.sin(turn), 1.0
-    given = placement.species, placement.seed.astype(np.int64), np.zeros((number, 3)), frame, np.ones(number)
+    given = placement.species, placement.seed.astype(np.int64), none, frame, np.ones(number)
     species = {name: species_for(scene, name) for name in set(identifiers) & grown().keys()}
 
     def find(name: str) -> Species:
