@@ -49,10 +49,10 @@ def steps(ui):
     ui.values["near"] = polygons(scene)
     yield from ui.picture("near")
 
-    uid = result_collections(scene, 'VIEW')[0].session_uid
+    uid = complete(scene)[0].session_uid
     look(space, 70.0, 400.0)
     yield 0.5
-    yield from ui.until(lambda: quiet(scene) and result_collections(scene, 'VIEW')[0].session_uid != uid, 120, "far")
+    yield from ui.until(lambda: quiet(scene) and complete(scene)[0].session_uid != uid, 120, "far")
     ui.values["far"] = polygons(scene)
     yield from ui.picture("far")
     ui.values["message"] = auto.message()
@@ -70,8 +70,12 @@ def look(space, tilt, distance):
 
 def finished(scene):
     """Whether a result is shown that is not under construction."""
-    found = result_collections(scene, 'VIEW')
-    return bool(found) and all("tetflora_unfinished" not in c for c in found)
+    return bool(complete(scene))
+
+
+def complete(scene):
+    """Results that are not under construction: the coarse one stays beside the finer one while that is made."""
+    return [c for c in result_collections(scene, 'VIEW') if "tetflora_unfinished" not in c]
 
 
 def quiet(scene):
@@ -80,6 +84,6 @@ def quiet(scene):
 
 
 def polygons(scene):
-    """Those of all results."""
-    made = [o for c in result_collections(scene, 'VIEW') for o in c.objects if o.type == 'MESH']
+    """Those of all complete results."""
+    made = [o for c in complete(scene) for o in c.objects if o.type == 'MESH']
     return sum(len(o.data.polygons) for o in made)
