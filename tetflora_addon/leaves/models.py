@@ -256,13 +256,14 @@ def _folded(half_width: float, fold: float, droop: float) -> LeafModel:
 
 
 def _spray() -> LeafModel:
-    """Four narrow quads fanned out in a plane and tilted out of it: a bundle of needles."""
+    """Four narrow quads fanned out in a plane, tilted out of it, and turned by turns: a bundle of needles."""
     positions = []
     for i in range(4):
         turn = np.radians(-55 + 110 * (i + 0.5) / 4)
         along = np.array([np.sin(turn), np.cos(turn), 0.25 * (1 if i % 2 else -1)])
         along /= np.linalg.norm(along)
-        across = 0.035 * np.array([np.cos(turn), -np.sin(turn), 0.0])
+        across = np.array([np.cos(turn), -np.sin(turn), 0.0])
+        across = 0.025 / np.sqrt(2.0) * (across + (1 if i // 2 % 2 else -1) * np.cross(across, along))
         positions += [0 * along - across, 0 * along + across, along + across, along - across]
     faces = np.arange(16).reshape(4, 4).tolist()
     return leaf_model(np.array(positions), faces, np.tile([[0, 0], [1, 0], [1, 1], [0, 1]], (4, 1)))
