@@ -8,6 +8,8 @@ takes from uniform surroundings, whatever the renderer samples: lamps, a constan
 
 from __future__ import annotations
 
+from functools import reduce
+from math import tau
 from typing import Any
 
 import bpy
@@ -15,7 +17,7 @@ import bpy
 from ...light import scattering
 from ...light.scattering import GLOSS, GLOSS_ROUGHNESS
 from ..compat import loses_summed_lobes
-from .nodes import LEAF_GREEN, Graph, find_socket, shader_group
+from .nodes import LEAF_GREEN, Graph, Term, node_group
 
 MICROSPHERE = "TetFlora Microsphere"
 SCATTER = "TetFlora Scatter"
@@ -72,120 +74,88 @@ def microsphere_group() -> bpy.types.NodeTree:
         ("Roundness", 'Float', 1.0, UNIT, about),
         ("Facing", 'Vector', (0.0, 0.0, 0.0), None, facing),
     )
-    return shader_group(MICROSPHERE, _VERSION, inputs, ENGINES, _shaders)
+    return node_group(MICROSPHERE, _VERSION, inputs, ENGINES, _shaders)
 
 
-def _shaders(graph: Graph, given: Any) -> dict[str, bpy.types.NodeSocket]:
+def _shaders(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
     """Both engines' shaders from the same lobes."""
-    geometry = graph.node("ShaderNodeNewGeometry").outputs
+    geometry = graph.outputs("ShaderNodeNewGeometry")
     incoming, face = geometry["Incoming"], geometry["True Normal"]
-    back = graph.scaled(given["Colour"], given["p"])
-    transmission = given["Transmission"]
-    through = graph.vector('SCALE', graph.tinted(back, given["Through Tint"]), transmission)
-    back = graph.vector('SCALE', back, graph.math('SUBTRACT', 1.0, transmission))
+    back, transmission = graph.scaled(given["Colour"], given["p"]), given["Transmission"]
+    through = graph.tinted(back, given["Through Tint"]) * transmission
+    back = back * (1.0 - transmission)
 
     particle = particle_normal(graph, given, geometry)
     axis = graph.vector('NORMALIZE', given["Normal"])
-    plane = graph.vector('SCALE', axis, _sign(graph, axis, incoming))
-    width = _highlight_width(graph, given)
+    plane = axis * (_away(graph, axis, incoming) * -2.0 + 1.0)
+    # Phong's exponent as the width of a microfacet distribution: α = √(1 / (2 spear + 1)).
+    width = (given["spear"] * 2.0 + 1.0) ** -0.5
     gloss, kept = _gloss_weight(graph, given, (plane, incoming, face), width)
-    weights = {
-        'particle': graph.math('SUBTRACT', 1.0, given["Plane"]),
-        'plane': graph.math('SUBTRACT', given["Plane"], kept),
-    }
     full, simple, lobes = [], [], []
-    beyond: dict[str, list] = {'near': [], 'far': []}
-    for name, normal in (('particle', particle), ('plane', plane)):
-        reflected, transmitted = (graph.vector('SCALE', colour, weights[name]) for colour in (back, through))
+    for normal, weight in ((particle, 1.0 - given["Plane"]), (plane, given["Plane"] - kept)):
+        reflected, transmitted = back * weight, through * weight
         simple += _sheet(graph, reflected, transmitted, normal)
         # Towards the face's own side; where that turns the plane away from the viewer, both sides change places.
         facing = graph.vector('DOT_PRODUCT', normal, face)
-        turned = graph.math('LESS_THAN', facing, 0.0)
-        normal = graph.vector('SCALE', normal, graph.math('MULTIPLY_ADD', turned, -2.0, 1.0))
-        near, far = _swapped(graph, reflected, transmitted, turned)
+        turned = facing < 0.0
+        normal = normal * (turned * -2.0 + 1.0)
+        change = (transmitted - reflected) * turned
+        near, far = reflected + change, transmitted - change
         full += _sheet(graph, near, far, normal)
-        lost = graph.math('MULTIPLY_ADD', graph.math('ABSOLUTE', facing), -0.5, 0.5)
-        beyond['near'].append(graph.vector('SCALE', far, lost))
-        beyond['far'].append(graph.vector('SCALE', near, lost))
-        lobes.append((near, far, normal, lost))
+        lobes.append((near, far, normal, abs(facing) * -0.5 + 0.5))
     highlight = _highlight(graph, plane, gloss, width)
     if loses_summed_lobes():
         sheet, share = _one_of(graph, lobes, given["Plane"])
-        seen = _highlight(graph, plane, graph.math('MULTIPLY', gloss, share), width)
+        seen = _highlight(graph, plane, gloss * share, width)
         return {"Cycles": _sum(graph, [*sheet, seen]), "EEVEE": _sum(graph, [*simple, highlight])}
-    full += _sheet(graph, *(graph.vector('ADD', *beyond[side]) for side in ('near', 'far')), face)
+    (near, far, _, lost), (near_too, far_too, _, lost_too) = lobes
+    full += _sheet(graph, far * lost + far_too * lost_too, near * lost + near_too * lost_too, face)
     return {"Cycles": _sum(graph, [*full, highlight]), "EEVEE": _sum(graph, [*simple, highlight])}
 
 
-def _one_of(graph: Graph, lobes: list[tuple], planes: Any) -> tuple[list[bpy.types.Node], Any]:
+def _one_of(graph: Graph, lobes: list[tuple[Term, ...]], planes: Term) -> tuple[list[bpy.types.Node], Term]:
     """A sheet around one normal: particle or plane by chance, divided by its probability; and the highlight's factor.
 
     What the horizon cuts off of one lobe of a normal is added to the other, with which it has no direction in common.
     """
-    where = graph.node("ShaderNodeNewGeometry").outputs["Position"]
-    noise = graph.node("ShaderNodeTexWhiteNoise", {"Vector": where, "W": 2.0}, noise_dimensions='4D')
-    flat = graph.math('LESS_THAN', find_socket(noise.outputs, "Value"), planes)
-    near, far, normal, lost = (_chosen(graph, *pair, flat) for pair in zip(*lobes, strict=True))
-    chance = graph.math('ABSOLUTE', graph.math('SUBTRACT', graph.math('SUBTRACT', 1.0, flat), planes))
+    where = graph.outputs("ShaderNodeNewGeometry")["Position"]
+    noise = graph.outputs("ShaderNodeTexWhiteNoise", {"Vector": where, "W": 2.0}, noise_dimensions='4D')
+    flat = noise["Value"] < planes
+    # A number is chosen as vectors are.
+    near, far, normal, lost = (
+        graph.vector('ADD', first, graph.vector('SCALE', graph.vector('SUBTRACT', second, first), flat))
+        for first, second in zip(*lobes, strict=True)
+    )
     # Never chosen where it is 0 but for rounding.
-    share = graph.math('DIVIDE', 1.0, graph.math('MAXIMUM', chance, 1e-6))
+    share = 1.0 / graph.math('MAXIMUM', abs(1.0 - flat - planes), 1e-6)
     added = graph.math('DIVIDE', lost, graph.math('SUBTRACT', 1.0, lost))
-    both = [
-        graph.vector('SCALE', graph.vector('ADD', own, graph.vector('SCALE', other, added)), share)
-        for own, other in ((near, far), (far, near))
-    ]
-    return _sheet(graph, *both, normal), graph.math('MULTIPLY', share, flat)
+    return _sheet(graph, (near + far * added) * share, (far + near * added) * share, normal), share * flat
 
 
-def _chosen(graph: Graph, first: Any, second: Any, which: Any) -> bpy.types.NodeSocket:
-    """The first of two vectors where `which` is 0, the second where it is 1."""
-    return graph.vector('ADD', first, graph.vector('SCALE', graph.vector('SUBTRACT', second, first), which))
-
-
-def particle_normal(graph: Graph, given: Any, geometry: Any) -> bpy.types.NodeSocket:
+def particle_normal(graph: Graph, given: dict[str, Any], geometry: dict[str, Term]) -> Term:
     """Normal m of the particle that was hit.
 
     The points of a sphere that a viewer sees have normals with density cos / π around him: those of I + q, with q
     anywhere on a sphere of radius 1 (Roundness times that, to leave some of them turned to the viewer).
     """
-    noise = graph.node("ShaderNodeTexWhiteNoise", {"Vector": geometry["Position"], "W": 1.0}, noise_dimensions='4D')
-    random = graph.node("ShaderNodeSeparateXYZ", {"Vector": noise.outputs["Color"]}).outputs
-    height = graph.math('MULTIPLY_ADD', random[0], 2.0, -1.0)
-    radius = graph.math(
-        'SQRT',
-        graph.math('MAXIMUM', graph.math('MULTIPLY_ADD', height, graph.math('MULTIPLY', height, -1.0), 1.0), 0.0),
-    )
-    turn = graph.math('MULTIPLY', random[1], 6.283185307179586)
-    around = graph.node(
-        "ShaderNodeCombineXYZ",
-        {
-            "X": graph.math('MULTIPLY', radius, graph.math('COSINE', turn)),
-            "Y": graph.math('MULTIPLY', radius, graph.math('SINE', turn)),
-            "Z": height,
-        },
-    )
+    inputs = {"Vector": geometry["Position"], "W": 1.0}
+    random = graph.parts(graph.outputs("ShaderNodeTexWhiteNoise", inputs, noise_dimensions='4D')["Color"])
+    height = random[0] * 2.0 + -1.0
+    radius = graph.math('SQRT', graph.math('MAXIMUM', height * -height + 1.0, 0.0))
+    turn = random[1] * tau
+    around = graph.xyz(radius * graph.math('COSINE', turn), radius * graph.math('SINE', turn), height)
     # A little less than 1, so that the sum is never zero.
-    reach = graph.math('MULTIPLY', given["Roundness"], 0.999)
-    seen = graph.vector('ADD', geometry["Incoming"], graph.vector('SCALE', around, reach))
-    unset = graph.math('LESS_THAN', graph.vector('LENGTH', given["Facing"]), 0.5)
-    seen = graph.vector('SCALE', seen, unset)
-    own = graph.vector('SCALE', given["Facing"], graph.math('SUBTRACT', 1.0, unset))
-    return graph.vector('NORMALIZE', graph.vector('ADD', seen, own))
+    seen = geometry["Incoming"] + around * graph.math('MULTIPLY', given["Roundness"], 0.999)
+    unset = graph.vector('LENGTH', given["Facing"]) < 0.5
+    return graph.vector('NORMALIZE', seen * unset + given["Facing"] * (1.0 - unset))
 
 
-def _sign(graph: Graph, first: Any, second: Any) -> bpy.types.NodeSocket:
-    """1 where two vectors lie on one side, else −1."""
-    away = graph.math('LESS_THAN', graph.vector('DOT_PRODUCT', first, second), 0.0)
-    return graph.math('MULTIPLY_ADD', away, -2.0, 1.0)
+def _away(graph: Graph, first: Term, second: Term) -> Term:
+    """1 where two vectors lie on different sides, else 0."""
+    return graph.vector('DOT_PRODUCT', first, second) < 0.0
 
 
-def _swapped(graph: Graph, first: Any, second: Any, turned: Any) -> tuple[Any, Any]:
-    """Both colours, in the other order where `turned` is 1."""
-    change = graph.vector('SCALE', graph.vector('SUBTRACT', second, first), turned)
-    return graph.vector('ADD', first, change), graph.vector('SUBTRACT', second, change)
-
-
-def _sheet(graph: Graph, near: Any, far: Any, normal: Any) -> list[bpy.types.Node]:
+def _sheet(graph: Graph, near: Term, far: Term, normal: Term) -> list[bpy.types.Node]:
     """Cosine lobes around a normal, of one colour on its side and of another on the other."""
     return [
         graph.node("ShaderNodeBsdfDiffuse", {"Color": near, "Normal": normal}),
@@ -193,12 +163,9 @@ def _sheet(graph: Graph, near: Any, far: Any, normal: Any) -> list[bpy.types.Nod
     ]
 
 
-def _highlight_width(graph: Graph, given: Any) -> bpy.types.NodeSocket:
-    """Phong's exponent as the width of a microfacet distribution: α = √(1 / (2 spear + 1))."""
-    return graph.math('POWER', graph.math('MULTIPLY_ADD', given["spear"], 2.0, 1.0), -0.5)
-
-
-def _gloss_weight(graph: Graph, given: Any, directions: tuple[Any, Any, Any], width: Any) -> tuple[Any, Any]:
+def _gloss_weight(
+    graph: Graph, given: dict[str, Term], directions: tuple[Term, Term, Term], width: Term
+) -> tuple[Term, Term]:
     """Fraction of all light that the highlight gets, Plane · s, and what of it is left above the face's horizon.
 
     Planes whose highlight would dip under the face have none. What the horizon cuts off of the others, the plane
@@ -206,19 +173,17 @@ def _gloss_weight(graph: Graph, given: Any, directions: tuple[Any, Any, Any], wi
     means over planes, faces and viewers of sampled lobes, within .02 for α from .13 to .45.
     """
     plane, incoming, face = directions
-    mirrored = graph.vector('SCALE', plane, graph.math('MULTIPLY', graph.vector('DOT_PRODUCT', plane, incoming), 2.0))
-    height = graph.vector('DOT_PRODUCT', graph.vector('SUBTRACT', mirrored, incoming), face)
+    mirrored = plane * (graph.vector('DOT_PRODUCT', plane, incoming) * 2.0)
+    height = graph.vector('DOT_PRODUCT', mirrored - incoming, face)
     lowest = graph.math('MINIMUM', height, graph.vector('DOT_PRODUCT', plane, face))
     scale = 1.0 / (_CLEAR - _GLANCING)
-    clear = graph.math('MULTIPLY_ADD', lowest, scale, -_GLANCING * scale)
-    clear = graph.math('MINIMUM', graph.math('MAXIMUM', clear, 0.0), 1.0)
-    weight = graph.math('MULTIPLY', graph.math('MULTIPLY', given["Plane"], given["s"]), clear)
-    rate = graph.math('MULTIPLY', graph.math('POWER', width, -0.66), -1.3)
-    cut = graph.math('MULTIPLY', graph.math('EXPONENT', graph.math('MULTIPLY', height, rate)), -0.29)
-    return weight, graph.math('MULTIPLY_ADD', weight, cut, weight)
+    clear = graph.math('MINIMUM', graph.math('MAXIMUM', lowest * scale + -_GLANCING * scale, 0.0), 1.0)
+    weight = given["Plane"] * given["s"] * clear
+    cut = graph.math('EXPONENT', height * (width**-0.66 * -1.3)) * -0.29
+    return weight, weight * cut + weight
 
 
-def _highlight(graph: Graph, normal: Any, weight: Any, width: Any) -> bpy.types.NodeSocket:
+def _highlight(graph: Graph, normal: Term, weight: Term, width: Term) -> Term:
     """White reflection around a normal; light that bounces among facets counts, or up to a third would be lost.
 
     Its weight is no colour: grey facets would absorb at each bounce.
@@ -226,15 +191,12 @@ def _highlight(graph: Graph, normal: Any, weight: Any, width: Any) -> bpy.types.
     inputs = {"Color": (1.0, 1.0, 1.0, 1.0), "Roughness": graph.math('SQRT', width), "Normal": normal}
     shader = graph.node("ShaderNodeBsdfAnisotropic", inputs, distribution='MULTI_GGX')
     # Mixed with nothing.
-    return graph.node("ShaderNodeMixShader", {"Fac": weight, "Shader_001": shader}).outputs[0]
+    return Term(graph, graph.node("ShaderNodeMixShader", {"Fac": weight, "Shader_001": shader}).outputs[0])
 
 
-def _sum(graph: Graph, shaders: list[Any]) -> bpy.types.NodeSocket:
+def _sum(graph: Graph, shaders: list[Any]) -> Any:
     """All shaders together; their colours hold the weights."""
-    total = shaders[0]
-    for shader in shaders[1:]:
-        total = graph.node("ShaderNodeAddShader", {"Shader": total, "Shader_001": shader}).outputs[0]
-    return total
+    return reduce(lambda a, b: graph.node("ShaderNodeAddShader", {"Shader": a, "Shader_001": b}), shaders)
 
 
 def scatter_group() -> bpy.types.NodeTree:
@@ -268,4 +230,4 @@ def scatter_group() -> bpy.types.NodeTree:
         gloss = graph.node("ShaderNodeBsdfAnisotropic", {"Color": WHITE, "Roughness": roughness, "Normal": normal})
         return {"Shader": graph.mix(given["Gloss"], sheet, gloss)}
 
-    return shader_group(SCATTER, _SCATTER_VERSION, inputs, [("Shader", 'Shader')], build)
+    return node_group(SCATTER, _SCATTER_VERSION, inputs, [("Shader", 'Shader')], build)

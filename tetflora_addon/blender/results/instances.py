@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Protocol
+from typing import Any, Protocol
 
 import bpy
 import numpy as np
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..attributes import read, write
 from ..compat import set_node_input
 from ..main_thread import in_main_thread
-from ..materials.nodes import Graph, find_socket, get_or_create
+from ..materials.nodes import Graph, Term, node_group
 from ..scene.looks import look_like
 from .collection import Results
 
@@ -229,50 +229,34 @@ def _instancer(
 
 def _group(kind: str) -> bpy.types.NodeTree:
     """Geometry nodes that turn points into instances of an object, of a collection, or of the objects of one."""
-    socket = "Object" if kind == 'OBJECT' else "Collection"
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        for name, in_out, socket_type in (
-            ("Geometry", 'INPUT', "Geometry"),
-            (_SOURCE, 'INPUT', socket),
-            ("Geometry", 'OUTPUT', "Geometry"),
-        ):
-            tree.interface.new_socket(name=name, in_out=in_out, socket_type=f"NodeSocket{socket_type}")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs
+    def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
         if kind == 'OBJECT':
-            info = graph.node("GeometryNodeObjectInfo", {"Object": given[_SOURCE]}, transform_space='ORIGINAL')
-            find_socket(info.inputs, "As Instance").default_value = True
-            shown = find_socket(info.outputs, "Geometry")
+            inputs = {"Object": given[_SOURCE], "As Instance": True}
+            shown = graph.outputs("GeometryNodeObjectInfo", inputs, transform_space='ORIGINAL')["Geometry"]
         else:
-            info = graph.node("GeometryNodeCollectionInfo", {"Collection": given[_SOURCE]}, transform_space='ORIGINAL')
-            for key in ("Separate Children", "Reset Children"):
-                find_socket(info.inputs, key).default_value = kind == 'CHILDREN'
-            shown = find_socket(info.outputs, "Instances")
+            inputs = {
+                "Collection": given[_SOURCE],
+                **dict.fromkeys(("Separate Children", "Reset Children"), kind == 'CHILDREN'),
+            }
+            shown = graph.outputs("GeometryNodeCollectionInfo", inputs, transform_space='ORIGINAL')["Instances"]
         # Points lose their matrices, or instances would keep them as well. Only here: to remove them from instances, or
         # to do anything to what these show, would turn objects into plain geometry.
         bare = graph.node("GeometryNodeRemoveAttribute", {"Geometry": given["Geometry"], "Name": MATRIX})
         pick = graph.node("FunctionNodeInputInt")
         if kind == 'CHILDREN':
             pick = graph.node("GeometryNodeInputNamedAttribute", {"Name": PICK}, data_type='INT')
-        placed = graph.node("GeometryNodeInstanceOnPoints", {"Points": bare, "Instance": shown, "Instance Index": pick})
-        find_socket(placed.inputs, "Pick Instance").default_value = True  # the source, not a geometry that holds it
+        # "Pick Instance": the source, not a geometry that holds it.
+        inputs = {"Points": bare, "Instance": shown, "Instance Index": pick, "Pick Instance": True}
+        placed = graph.node("GeometryNodeInstanceOnPoints", inputs)
         stored = graph.node("GeometryNodeInputNamedAttribute", {"Name": MATRIX}, data_type='FLOAT4X4')
-        number = graph.node("GeometryNodeInputIndex")
-        matrix = graph.node(
-            "GeometryNodeSampleIndex",
-            {"Geometry": given["Geometry"], "Value": stored, "Index": number},
-            data_type='FLOAT4X4',
-            domain='POINT',
-        )
+        inputs = {"Geometry": given["Geometry"], "Value": stored, "Index": graph.node("GeometryNodeInputIndex")}
+        matrix = graph.node("GeometryNodeSampleIndex", inputs, data_type='FLOAT4X4', domain='POINT')
         turned = graph.node("GeometryNodeSetInstanceTransform", {"Instances": placed, "Transform": matrix})
-        graph.node("NodeGroupOutput", {"Geometry": turned})
-        graph.arrange()
+        return {"Geometry": turned}
 
-    def new(name: str) -> bpy.types.NodeTree:
-        return bpy.data.node_groups.new(name, "GeometryNodeTree")
-
-    return get_or_create(bpy.data.node_groups, _NAMES[kind], _VERSION, new, build)
+    inputs = (("Geometry", 'Geometry'), (_SOURCE, 'Object' if kind == 'OBJECT' else 'Collection'))
+    return node_group(_NAMES[kind], _VERSION, inputs, (("Geometry", 'Geometry'),), build, 'Geometry')
 
 
 def _collection(results: Results, name: str, objects: Sequence[bpy.types.Object]) -> bpy.types.Collection:

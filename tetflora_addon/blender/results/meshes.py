@@ -8,6 +8,7 @@ Where Python cannot resize point clouds, geometry nodes make them from the verti
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
+from typing import Any
 
 import bpy
 import numpy as np
@@ -17,7 +18,7 @@ from ...buffers import MeshBuffers, PointBuffers
 from ...jobs import at_once
 from ..attributes import face_offsets, members, type_for, write
 from ..compat import can_resize_point_clouds
-from ..materials.nodes import Graph, get_or_create
+from ..materials.nodes import Graph, Term, node_group
 from ..runtime import is_there
 
 UV_MAP = "UVMap"
@@ -237,21 +238,15 @@ def _write_cloud(name: str, vertices: MeshBuffers) -> bpy.types.PointCloud:
 def spheres_group(material: bpy.types.Material) -> bpy.types.NodeTree:
     """The group "TetFlora Spheres" of geometry nodes: vertices become points with the radius in their attribute."""
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        for in_out in ('INPUT', 'OUTPUT'):
-            tree.interface.new_socket(name="Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs["Geometry"]
+    def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
         named = graph.node("GeometryNodeInputNamedAttribute", {"Name": "radius"}, data_type='FLOAT')
-        points = graph.node("GeometryNodeMeshToPoints", {"Mesh": given, "Radius": named}, mode='VERTICES')
+        inputs = {"Mesh": given["Geometry"], "Radius": named}
+        points = graph.node("GeometryNodeMeshToPoints", inputs, mode='VERTICES')
         # Points made of vertices do not inherit the material.
-        graph.node("NodeGroupOutput", {"Geometry": graph.node("GeometryNodeSetMaterial", {"Geometry": points})})
-        graph.arrange()
+        return {"Geometry": graph.node("GeometryNodeSetMaterial", {"Geometry": points})}
 
-    def new(name: str) -> bpy.types.NodeTree:
-        return bpy.data.node_groups.new(name, "GeometryNodeTree")
-
-    group = get_or_create(bpy.data.node_groups, SPHERES, _SPHERES_VERSION, new, build)
+    whole = (("Geometry", 'Geometry'),)
+    group = node_group(SPHERES, _SPHERES_VERSION, whole, whole, build, 'Geometry')
     for node in group.nodes:
         if node.bl_idname == "GeometryNodeSetMaterial":
             node.inputs["Material"].default_value = material

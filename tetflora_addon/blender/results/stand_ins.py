@@ -9,9 +9,11 @@ as it is now.
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
-from ..materials.nodes import Graph, find_socket, get_or_create
+from ..materials.nodes import Graph, Term, find_socket, node_group
 from ..scene.looks import look_like
 from ..scene.objects import geometry_of
 from .collection import Results
@@ -121,20 +123,13 @@ def _drop_instances(made: bpy.types.Object) -> None:
 def _group() -> bpy.types.NodeTree:
     """Geometry nodes that pass on all but instances."""
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        for in_out in ('INPUT', 'OUTPUT'):
-            tree.interface.new_socket(name="Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs["Geometry"]
-        parts = graph.node("GeometryNodeSeparateComponents", {"Geometry": given})
+    def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
+        parts = graph.node("GeometryNodeSeparateComponents", {"Geometry": given["Geometry"]})
         joined = graph.node("GeometryNodeJoinGeometry")
         for part in parts.outputs:
             if part.name != "Instances":
-                tree.links.new(part, find_socket(joined.inputs, "Geometry"))
-        graph.node("NodeGroupOutput", {"Geometry": joined})
-        graph.arrange()
+                graph.feed(find_socket(joined.inputs, "Geometry"), part)
+        return {"Geometry": joined}
 
-    def new(name: str) -> bpy.types.NodeTree:
-        return bpy.data.node_groups.new(name, "GeometryNodeTree")
-
-    return get_or_create(bpy.data.node_groups, _NAME, _VERSION, new, build)
+    whole = (("Geometry", 'Geometry'),)
+    return node_group(_NAME, _VERSION, whole, whole, build, 'Geometry')
