@@ -3,16 +3,14 @@
 """What each face of a mesh looks like from afar: colour, transmission and coverage, sampled from its materials.
 
 A triangle is divided into smaller ones of equal size, as many as it covers texels (`look_points`). In the middle of
-each, shaders and nodes are evaluated (`surface_shaders`, `node_values`), and images are means over a piece as large as
-it (`image_pyramids`). Triangles with the same texture coordinates, as those of a leaf that was copied thousands of
+each, shaders and nodes are evaluated (`node_values`), and images are means over a piece as large as it
+(`image_pyramids`). Triangles with the same texture coordinates, as those of a leaf that was copied thousands of
 times, are evaluated once.
-
-Where on the triangles of a mesh a material is evaluated, and how many points that takes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -25,13 +23,11 @@ from ..attributes import read, values_of
 from ..compat import tree_in_use
 from .colour_maths import Values, luminance
 from .image_pyramids import Pyramid, Pyramids
-from .node_values import ImageMissing, NodeValues
+from .node_values import ImageMissing, NodeValues, Scattered, source_of
 from .nodes import active_output, find_socket, upstream
-from .surface_shaders import SurfaceShaders
 
 #: What Blender shows where there is no material.
 GREY = (0.8, 0.8, 0.8)
-Shade = tuple[Values, Values, Values]
 
 #: Parts along an edge, at most; texels of the finest image along an edge of a part, about. Where steps, or several
 #: images, make the mean of what nodes get something else than the mean of what comes out, single texels are looked at.
@@ -64,23 +60,27 @@ class MeshLayers:
 
 @dataclass
 class Plan:
-    """How one material is evaluated on one mesh.
+    """How one material is evaluated on one mesh; a point where everything has its mean, which notes what is asked for.
 
     Attributes
     ----------
     name : str
         Of the material, for messages.
+    layers : MeshLayers
+    known : Known
     problems : list of str
         For the artist.
+    viewport : (3,) float32
+        The material's colour in viewports, for images that are missing.
     constant : (5,) float32
         Cover, colour times cover, and the lightness of what goes through; of where all has its mean, if it varies.
-    shade : callable, optional
-        What its shaders do with light at some points: cover, colour times cover, lightness of what goes through;
-        None if it has none.
-    known : bool
+    surface : bpy.types.NodeSocket, optional
+        What its shaders lead to; None if it has none.
+    is_known : bool
         Whether its transmission is.
     maps, colours : list of str
         UV maps and other attributes that it depends on.
+    images : set of bpy.types.Image
     texels : float
         Of the finest image, along a unit of texture coordinates.
     uneven : bool
@@ -88,12 +88,16 @@ class Plan:
     """
 
     name: str
-    problems: list[str]
+    layers: MeshLayers
+    known: Known
+    viewport: NDArray[np.float32]
     constant: NDArray[np.float32]
-    shade: Callable[[NodeValues], Shade | None] | None = None
-    known: bool = True
+    problems: list[str] = field(default_factory=list)
+    surface: bpy.types.NodeSocket | None = None
+    is_known: bool = False
     maps: list[str] = field(default_factory=list)
     colours: list[str] = field(default_factory=list)
+    images: set[bpy.types.Image] = field(default_factory=set)
     texels: float = 1.0
     uneven: bool = False
 
@@ -102,20 +106,70 @@ class Plan:
         if problem not in self.problems:
             self.problems.append(problem)
 
+    def uv(self, name: str) -> tuple[Values, Values, Values]:
+        """Texture coordinates u and v, and the side (1, k) of what each place stands for; '' is the first map."""
+        name = self.layers.map_named(name)
+        if name and name not in self.maps:
+            self.maps.append(name)
+        return _ANYWHERE
+
+    def is_map(self, name: str) -> bool:
+        """Whether an attribute holds texture coordinates."""
+        return self.layers.types.get(name) == 'FLOAT2'
+
+    def attribute(self, name: str) -> Values:
+        """A colour attribute (4, p, k)."""
+        exists = name in self.layers.types
+        if exists and name not in self.colours:
+            self.colours.append(name)
+        mean = np.full(4, 0.5 if exists else 0.0, np.float32)
+        if (known := self.layers.means.get(name)) is not None:
+            mean[: len(known)] = known if len(known) > 1 else known[0]
+        return mean.reshape(4, 1, 1)
+
+    def pyramid(self, node: bpy.types.Node, scale: float) -> Pyramid:
+        """The image of a node, whose coordinates are stretched by a factor."""
+        image = node.image
+        if image is None:
+            raise ImageMissing(
+                f'An image of material "{self.name}" is missing; its viewport color stands for it. Choose an image in '
+                f'the node "{node.label or node.name}"'
+            )
+        pyramid = self.known.pyramids.of(image, node.outputs["Alpha"].is_linked)
+        if pyramid is None:
+            raise ImageMissing(
+                f'The image "{image.name}" of material "{self.name}" cannot be read; the viewport color stands for it. '
+                "Find it with File > External Data > Find Missing Files"
+            )
+        if image.source == 'TILED':
+            self.tell(f'The image "{image.name}" of material "{self.name}" has several tiles; the first stands for all')
+        self.images.add(image)
+        self.texels = max(self.texels, pyramid.side * scale)
+        return pyramid
+
+    def mark_uneven(self) -> None:
+        """Note that the mean of what comes out is not what comes out for the mean."""
+        self.uneven = True
+
+    def unknown(self) -> None:
+        """Note that only a renderer knows what comes out of a node."""
+        self.tell(
+            f'Some nodes of material "{self.name}" are only known to a renderer; their middle value stands for them. '
+            "Bake them to an image to see their pattern from afar"
+        )
+
     @property
     def names(self) -> list[str]:
         """Attributes that it depends on; none where it is the same everywhere."""
         return [*self.maps, *(name for name in self.colours if name not in self.maps)]
 
-    def sampled(self, corners: dict[str, NDArray], layers: MeshLayers, known: Known, most: int) -> NDArray:
+    def sampled(self, corners: dict[str, NDArray], most: int) -> NDArray:
         """Means over some triangles (t, 5) float32, as `constant`.
 
         Parameters
         ----------
         corners : mapping of str to (t, 3, width) float32
             Of each attribute in `names`, at the corners of the triangles.
-        layers : MeshLayers
-        known : Known
         most : int
             Points of all distinct triangles, about.
         """
@@ -131,8 +185,8 @@ class Plan:
                 some = rows[start : start + step]
                 part = np.float32(0 if self.uneven else 1 / n)
                 sizes = {name: height[None, some] * part for name, (_, height) in extents.items()}
-                points = _Sampled(self, layers, known, {name: corners[name][some] for name in self.names}, sizes, n)
-                found[some] = _means_of(self.shade(NodeValues(points, known.curves)))
+                points = _Sampled(self, {name: corners[name][some] for name in self.names}, sizes, n)
+                found[some] = _means_of(NodeValues(points, self.known.curves).shader(self.surface))
         return found[which]
 
     def _parts(self, lengths: list[NDArray[np.float32]], count: int, most: int) -> NDArray[np.int32]:
@@ -152,86 +206,25 @@ _ANYWHERE = _HALF, _HALF, np.full((1, 1), np.inf, np.float32)  # a point that st
 _BATCH = 1 << 15  # points that are evaluated at once, so that they stay in the processor's cache
 
 
-class _Probe:
-    """A point where everything has its mean; remembers what evaluating a material asks for."""
-
-    def __init__(self, plan: Plan, layers: MeshLayers, known: Known) -> None:
-        self._plan, self._layers, self._known = plan, layers, known
-        self.images: set[bpy.types.Image] = set()
-
-    def uv(self, name: str) -> tuple[Values, Values, Values]:
-        name = self._layers.map_named(name)
-        if name and name not in self._plan.maps:
-            self._plan.maps.append(name)
-        return _ANYWHERE
-
-    def is_map(self, name: str) -> bool:
-        return self._layers.types.get(name) == 'FLOAT2'
-
-    def attribute(self, name: str) -> Values:
-        exists = name in self._layers.types
-        if exists and name not in self._plan.colours:
-            self._plan.colours.append(name)
-        mean = np.full(4, 0.5 if exists else 0.0, np.float32)
-        if (known := self._layers.means.get(name)) is not None:
-            mean[: len(known)] = known if len(known) > 1 else known[0]
-        return mean.reshape(4, 1, 1)
-
-    def pyramid(self, node: bpy.types.Node, scale: float) -> Pyramid:
-        material, image = self._plan.name, node.image
-        if image is None:
-            raise ImageMissing(
-                f'An image of material "{material}" is missing; its viewport color stands for it. Choose an image in '
-                f'the node "{node.label or node.name}"'
-            )
-        pyramid = self._known.pyramids.of(image, node.outputs["Alpha"].is_linked)
-        if pyramid is None:
-            raise ImageMissing(
-                f'The image "{image.name}" of material "{material}" cannot be read; the viewport color stands for it. '
-                "Find it with File > External Data > Find Missing Files"
-            )
-        if image.source == 'TILED':
-            self._plan.tell(
-                f'The image "{image.name}" of material "{material}" has several tiles; the first stands for all'
-            )
-        self.images.add(image)
-        self._plan.texels = max(self._plan.texels, pyramid.side * scale)
-        return pyramid
-
-    def uneven(self) -> None:
-        self._plan.uneven = True
-
-    def unknown(self) -> None:
-        self._plan.tell(
-            f'Some nodes of material "{self._plan.name}" are only known to a renderer; their middle value stands for '
-            "them. Bake them to an image to see their pattern from afar"
-        )
-
-
-class _Sampled:
+class _Sampled(Plan):
     """Points (p, k) of k triangles: the middles of n × n parts of each."""
 
     def __init__(
         self,
         plan: Plan,
-        layers: MeshLayers,
-        known: Known,
         corners: dict[str, NDArray[np.float32]],
         sizes: dict[str, NDArray[np.float32]],
         n: int,
     ) -> None:
-        self._plan, self._layers, self._known = plan, layers, known
+        vars(self).update(vars(plan))
         self._corners, self._sizes, self._weights = corners, sizes, _middles(n)
 
     def uv(self, name: str) -> tuple[Values, Values, Values]:
-        name = self._layers.map_named(name)
+        name = self.layers.map_named(name)
         if not name:
             return _ANYWHERE
         u, v = (self._weights @ self._corners[name][:, :, i].T for i in range(2))
         return u, v, self._sizes[name]
-
-    def is_map(self, name: str) -> bool:
-        return self._layers.types.get(name) == 'FLOAT2'
 
     def attribute(self, name: str) -> Values:
         if name not in self._corners:
@@ -244,21 +237,8 @@ class _Sampled:
             parts.append(np.zeros_like(parts[0]))
         return np.stack([*parts[:3], parts[3] if len(parts) > 3 else np.ones_like(parts[0])])
 
-    def pyramid(self, node: bpy.types.Node, _scale: float) -> Pyramid:
-        pyramid = None
-        if node.image is not None:
-            pyramid = self._known.pyramids.of(node.image, node.outputs["Alpha"].is_linked)
-        if pyramid is None:
-            raise ImageMissing  # the probe has told about it
-        return pyramid
 
-    def uneven(self) -> None:
-        pass
-
-    unknown = uneven
-
-
-def _means_of(shade: Shade) -> NDArray[np.float32]:
+def _means_of(shade: Scattered) -> NDArray[np.float32]:
     """Means over the points of each triangle (k, 5); (1, 5) where all are the same."""
     parts = [part.mean(axis=0) for part in (shade[0], *shade[1], shade[2])]
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
@@ -376,9 +356,9 @@ class MeshLooks:
         maps = mesh.uv_layers
         first = next((layer.name for layer in maps if layer.active_render), maps[0].name if len(maps) else "")
         types = {a.name: a.data_type for a in mesh.attributes if a.domain in _DOMAINS and a.data_type in _TYPES}
-        self._known, self._layers = known, MeshLayers(first, types)
         self.materials = materials
-        self.plans = [_plan_of(material, self._layers, known) for material in materials]
+        layers = MeshLayers(first, types)
+        self.plans = [_plan_of(material, layers, known) for material in materials]
         self._values: dict[str, tuple[str, NDArray]] = {}
         for name in {name for plan in self.plans for name in plan.names}:
             attribute = mesh.attributes[name]
@@ -440,7 +420,7 @@ class MeshLooks:
     def _write(self, made: FaceLooks, faces: slice, values: NDArray[np.floating], slot: NDArray[np.int32]) -> None:
         """Means over what is not transparent, from those over whole faces (n, 5)."""
         plain = np.array([plan.constant[1:4] / max(plan.constant[0], _LEAST) for plan in self.plans], np.float32)
-        known = np.array([plan.known for plan in self.plans])
+        known = np.array([plan.is_known for plan in self.plans])
         cover, colour, through = values[:, 0], values[:, 1:4], values[:, 4]
         light = luminance(colour.T)
         passed = np.divide(through, light, out=np.zeros_like(light), where=light > 1e-6)
@@ -460,7 +440,7 @@ class MeshLooks:
             rows = slice(None) if len(self.plans) == 1 else np.flatnonzero(slot == number)
             if plan.names:
                 corners = {name: self._corners(name, loops[rows], verts[rows], face[rows]) for name in plan.names}
-                values[rows] = plan.sampled(corners, self._layers, self._known, most)
+                values[rows] = plan.sampled(corners, most)
         return values
 
     def _corners(self, name: str, loops: NDArray, verts: NDArray, face: NDArray) -> NDArray[np.float32]:
@@ -513,21 +493,25 @@ class Looks:
         cover, *colour, through = plan.constant.astype(np.float64).tolist()
         colour = np.clip(np.array(colour) / max(cover, _LEAST), 0, 1)
         passed = np.clip(through / max(float(luminance(colour * cover)), 1e-6), 0, 1)
-        return Look(tuple(colour.tolist()), float(passed) if plan.known else np.nan, cover)
+        return Look(tuple(colour.tolist()), float(passed) if plan.is_known else np.nan, cover)
 
 
 def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, known: Known) -> Plan:
     """Evaluate a material once where everything has its mean, and note what that takes."""
-    if material is None:
-        return Plan("", [], np.array([1.0, *GREY, 0.0], np.float32))
-    plan = Plan(material.name, [], np.array([1.0, *np.clip(material.diffuse_color[:3], 0, 1), 0.0], np.float32))
-    plan.shade = SurfaceShaders(material, plan.tell).at
-    probe = _Probe(plan, layers, known)
-    found = plan.shade(NodeValues(probe, known.curves))
-    plan.known = found is not None
-    if found is not None:
-        plan.constant = _means_of(found)[0]
-        plan.uneven |= len(probe.images) > 1
+    seen = np.array(GREY if material is None else np.clip(material.diffuse_color[:3], 0, 1), np.float32)
+    name = "" if material is None else material.name
+    plan = Plan(name, layers, known, seen, np.array([1.0, *seen, 0.0], np.float32), is_known=material is None)
+    output = None if material is None else active_output(tree_in_use(material), 'OUTPUT_MATERIAL')
+    surface = None if output is None else find_socket(output.inputs, "Surface")
+    if surface is not None and source_of(surface, ())[0] is None:
+        plan.tell(
+            f'Material "{name}" has no surface shader; its viewport color stands for it. Link a shader to the Surface '
+            "of its Material Output"
+        )
+    elif surface is not None:
+        plan.surface, plan.is_known = surface, True
+        plan.constant = _means_of(NodeValues(plan, known.curves).shader(surface))[0]
+        plan.uneven |= len(plan.images) > 1
     return plan
 
 
