@@ -246,7 +246,6 @@ class FileReader:
 
         Parameters
         ----------
-        kind : type
         data : object
             What `json.load` gave.
         where : str

@@ -10,7 +10,7 @@ from devtools import session
 from tests.blender.renders import picture, small_scene
 from tetflora_addon import buffers, errors
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.materials import bark, materials, microsphere, nodes, shell
+from tetflora_addon.blender.materials import bark, materials, microsphere, nodes
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.species import species
 
@@ -277,7 +277,7 @@ def test_names_and_marks():
         materials.leaf_material("Oak"),
         materials.bark_material("Oak"),
         materials.proxy_material(),
-        shell.shell_material(),
+        microsphere.shell_material(),
         microsphere.scatter_group(),
     ]
     names = ["TetFlora Oak leaf", "TetFlora Oak bark", "TetFlora proxy", "TetFlora shell", "TetFlora Scatter"]

@@ -165,12 +165,14 @@ class Graph:
     Parameters
     ----------
     tree : bpy.types.NodeTree
-        Emptied first.
+    fresh : bool
+        Whether it is emptied first.
     """
 
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
+    def __init__(self, tree: bpy.types.NodeTree, fresh: bool = True) -> None:
         self.tree = tree
-        tree.nodes.clear()
+        if fresh:
+            tree.nodes.clear()
 
     def node(self, kind: str, inputs: dict[str, Any] | None = None, **settings: Any) -> bpy.types.Node:
         """Add a node, set its properties, and link or set its inputs: a value, a term, a socket, or a node's first."""

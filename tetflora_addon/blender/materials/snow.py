@@ -19,9 +19,18 @@ from typing import Any
 import bpy
 
 from .materials import ASSET_PROXY, ASSET_SPHERE, BAKED, PROXY, SPHERE
-from .microsphere import ENGINES, MICROSPHERE, UNIT, microsphere_group, particle_normal
-from .nodes import LEAF_GREEN, SNOW, Graph, Term, find_socket, is_own, node_group
-from .shell import BAKED_SHELL, BAKED_SHELL_MATERIAL, SHELL, SHELL_MATERIAL
+from .microsphere import (
+    BAKED_SHELL,
+    BAKED_SHELL_MATERIAL,
+    ENGINES,
+    MICROSPHERE,
+    SHELL,
+    SHELL_MATERIAL,
+    UNIT,
+    microsphere_group,
+    particle_normal,
+)
+from .nodes import LEAF_GREEN, SNOW, Graph, Term, is_own, node_group
 from .soil import is_soil
 
 AMOUNT = "TetFlora Snow Amount"
@@ -71,8 +80,14 @@ def fit(materials: Iterable[bpy.types.Material | None]) -> None:
     snowy = any(has_snow(scene) for scene in bpy.data.scenes)
     for material in set(materials) - {None}:
         own = is_own(material) or is_soil(material)
-        if own and material.node_tree is not None and not material.name.startswith(_OTHERS):
-            _fit_cloud(snowy) if material.name in _CLOUDS else _fit_surface(material, snowy)
+        if not own or material.node_tree is None or material.name.startswith(_OTHERS):
+            continue
+        if material.name in _CLOUDS:
+            _fit_cloud(snowy)
+        elif snowy:
+            add_snow(material, mark=True)
+        else:
+            _clear(material.node_tree)
 
 
 def fit_soils() -> None:
@@ -177,13 +192,6 @@ def _amount_group() -> bpy.types.NodeTree:
     return node_group(AMOUNT, _VERSION, (), (("Snow", 'Float'),), build)
 
 
-def _fit_surface(material: bpy.types.Material, snowy: bool) -> None:
-    if snowy:
-        add_snow(material, mark=True)
-    else:
-        _clear(material.node_tree)
-
-
 def _fit_cloud(snowy: bool) -> None:
     """Snow within the groups of shells, whose materials hold nothing else."""
     for name in (SHELL, BAKED_SHELL):
@@ -203,27 +211,19 @@ def _fit_cloud(snowy: bool) -> None:
 
 def _cover_baked_shell(tree: bpy.types.NodeTree) -> None:
     """White particles that the lights of the scene illuminate, where there is snow, in place of baked light."""
-    end = next(node for node in tree.nodes if node.type == 'GROUP_OUTPUT')
-    cover = _group_node(tree, _cloud_group(), end, mark=True).outputs["Cover"]
+    end, before = next(node for node in tree.nodes if node.type == 'GROUP_OUTPUT'), set(tree.nodes)
+    graph = Graph(tree, fresh=False)
+    cover = graph.outputs("ShaderNodeGroup", node_tree=_cloud_group())["Cover"]
     for engine, _ in ENGINES:
         added = end.inputs[engine].links[0].from_node
-        through = added.inputs[1].links[0].from_node.inputs["Color"].links[0].from_socket
-        opacity = tree.nodes.new("ShaderNodeMath")
-        opacity.operation = 'SUBTRACT'
-        opacity.inputs[0].default_value = 1.0
-        tree.links.new(through, opacity.inputs[1])
-        lit = _group_node(tree, microsphere_group(), added, mark=True)
-        lit.inputs["Colour"].default_value, lit.inputs["s"].default_value = _CLUSTER, 0.0
-        tree.links.new(opacity.outputs[0], lit.inputs["p"])
-        for key, name, output in (("Normal", "tf_normal", "Vector"), ("Plane", "tf_plane", "Fac")):
-            attribute = tree.nodes.new("ShaderNodeAttribute")
-            attribute.attribute_name, attribute[_MARK] = name, True
-            tree.links.new(find_socket(attribute.outputs, output), lit.inputs[key])
-        mixed = tree.nodes.new("ShaderNodeMixShader")
-        opacity[_MARK] = mixed[_MARK] = True
-        _put_between(tree, added.inputs[0], mixed.inputs[1], mixed.outputs[0])
-        tree.links.new(cover, mixed.inputs[0])
-        tree.links.new(find_socket(lit.outputs, engine), mixed.inputs[2])
+        baked, clear = (socket.links[0].from_socket for socket in added.inputs)
+        through = Term(graph, clear.node.inputs["Color"].links[0].from_socket)
+        looks = {"Colour": _CLUSTER, "s": 0.0, "p": graph.math('SUBTRACT', 1.0, through)}
+        looks |= {"Normal": graph.attribute("tf_normal", "Vector"), "Plane": graph.attribute("tf_plane", "Fac")}
+        lit = graph.outputs("ShaderNodeGroup", looks, node_tree=microsphere_group())
+        graph.feed(added.inputs[0], graph.mix(cover, baked, lit[engine]))
+    for node in set(tree.nodes) - before:
+        node[_MARK] = True
 
 
 def _group_node(tree: bpy.types.NodeTree, group: bpy.types.NodeTree, before: Any, mark: bool) -> bpy.types.Node:

@@ -75,7 +75,6 @@ def soil_material(
 
     Parameters
     ----------
-    name : str
     colours : (rows, columns, 3) float64
         Linear RGB of soil and what lies on it; the first row is at the smallest y.
     green : (rows, columns) float64

@@ -165,16 +165,7 @@ def plants_wanted(scene: bpy.types.Scene) -> None:
         listeners.notify()
 
 
-def _redraw(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    redraw()
-
-
-def _plants_changed(group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    plants_wanted(group.id_data)
-
-
-def _freeze_changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get)
+_SHOWN = {"options": set(), "update": lambda _group, _context: redraw()}
 
 
 class TetFloraPreview(bpy.types.PropertyGroup):
@@ -189,15 +180,13 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         min=0,
         soft_max=24,
         max=1000,
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     wires: BoolProperty(
         name="Tetrahedra",
         description="Draw the edges of tetrahedra that contain plants",
         default=True,
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     colour: EnumProperty(
         name="Color By",
@@ -219,8 +208,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             ),
         ),
         default='FORM',
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     projected: BoolProperty(
         name="Translucent",
@@ -229,8 +217,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             "first, as many as keep the viewport responsive"
         ),
         default=False,
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     forms: EnumProperty(
         name="Show",
@@ -242,8 +229,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             ('SPLIT', "To Split", "Tetrahedra that the next level splits", 8),
         ),
         default={'EXPLICIT', 'PROXY', 'HIDDEN', 'SPLIT'},
-        options={'ENUM_FLAG'},
-        update=_redraw,
+        **{**_SHOWN, "options": {'ENUM_FLAG'}},
     )
     plants: EnumProperty(
         name="Plants",
@@ -255,14 +241,13 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         ),
         default='NONE',
         options=set(),
-        update=_plants_changed,
+        update=lambda group, _context: plants_wanted(group.id_data),
     )
     statistics: BoolProperty(
         name="Statistics",
         description="Show the level and the numbers of tetrahedra and polygons in the corner of the viewport",
         default=True,
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     freeze: BoolProperty(
         name="Freeze Camera",
@@ -271,7 +256,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             "camera or navigate. Its view is drawn as a pyramid. Not saved in the file"
         ),
         options=set(),
-        update=_freeze_changed,
+        update=lambda group, context: freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get),
     )
 
 
