@@ -150,7 +150,7 @@ def test_leaves_facets_and_spheres_of_the_same_kind_are_as_white(amount):
 )
 def test_materials_are_as_before_when_no_scene_has_snow(make):
     material = make()
-    trees = [material.node_tree, *(bpy.data.node_groups.get(n) for n in (microsphere.SHELL.BAKED_SHELL))]
+    trees = [material.node_tree, *(bpy.data.node_groups.get(n) for n in (microsphere.SHELL, microsphere.BAKED_SHELL))]
     trees = [tree for tree in trees if tree is not None]
     before = [_nodes(tree) for tree in trees]
     _year(0.5, enabled=False)
