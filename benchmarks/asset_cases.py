@@ -20,8 +20,7 @@ from devtools import session
 from tetflora_addon import parallel
 from tetflora_addon.assets import kept
 from tetflora_addon.assets.compiled import compile_asset
-from tetflora_addon.blender.assets.geometry import read_source_steps
-from tetflora_addon.blender.assets.parts import Target, digest_of
+from tetflora_addon.blender.assets.parts import Target, digest_of, read_source_steps
 from tetflora_addon.jobs import at_once
 from tetflora_addon.processes import pool
 

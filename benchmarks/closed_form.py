@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from devtools import session
 from devtools.formats import set_format
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.materials import shell
+from tetflora_addon.blender.materials import microsphere
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.emission import shells
 
@@ -99,7 +99,7 @@ def _place(cells: NDArray, kappa: NDArray, light: NDArray | None = None, **value
         rank=-cells[..., 2].mean(axis=1),
         light=light,
     )
-    material = shell.shell_material() if light is None else shell.baked_shell_material()
+    material = microsphere.shell_material() if light is None else microsphere.baked_shell_material()
     group = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
     if light is None:
         group.inputs["Through Tint"].default_value = (1.0, 1.0, 1.0, 1.0)

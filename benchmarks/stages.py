@@ -75,7 +75,7 @@ def run(quick: bool) -> dict[str, float]:
         begun = time.process_time()
 
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
+    seeds = read_plants(scene, depsgraph, depsgraph.view_layer)[0]
     lap("read", held(seeds))
     flora = compile_for(seeds.identifiers, scene, depsgraph)
     lap("compile", held([flora.rows, flora.bound]))

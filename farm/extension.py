@@ -23,9 +23,8 @@ def _part(name: str) -> ModuleType:
 
 _errors = _part("errors")
 SceneError, readable = _errors.SceneError, _errors.readable
-_frames = _part("blender.cli.frames")
-Run, frame_numbers = _frames.Run, _frames.frame_numbers
 command = _part("blender.cli.command")
+Run, frame_numbers = command.Run, command.frame_numbers
 estimate = _part("blender.job.contents").estimate
 species_folders = _part("blender.preferences").species_folders
 read_camera = _part("blender.scene.camera").read_camera

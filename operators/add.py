@@ -17,8 +17,8 @@ from ..tetflora_addon.blender.placing.rules import copy_entry
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES, read_skeleton, upright_turn
 from ..tetflora_addon.blender.settings import properties_of
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, operator_items
+from ..tetflora_addon.blender.species.editor import present_species
 from ..tetflora_addon.blender.species.edits import catalogue, unknown_text
-from ..tetflora_addon.blender.species.values import present_species
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.planting.rules import Rules

@@ -13,8 +13,7 @@ from ..tetflora_addon.blender.assets.marks import (
     use_as_species,
 )
 from ..tetflora_addon.blender.placing.plant_objects import prepare_scene
-from ..tetflora_addon.blender.scene.objects import may_scatter
-from ..tetflora_addon.blender.scene.scatterers import is_scatter, mark_scatter
+from ..tetflora_addon.blender.scene.objects import is_scatter, mark_scatter, may_scatter
 from ..tetflora_addon.blender.species.asset_species import Datablock, asset_of
 from ..tetflora_addon.errors import SceneError
 from .base import Reporting, counted, in_object_mode

@@ -19,6 +19,7 @@ from ..tetflora_addon.blender.species.catalogue import (
     save_species,
     write_species,
 )
+from ..tetflora_addon.blender.species.editor import orders_of, present_species
 from ..tetflora_addon.blender.species.edits import (
     catalogue,
     change_species,
@@ -28,7 +29,6 @@ from ..tetflora_addon.blender.species.edits import (
     species_data,
     store_species,
 )
-from ..tetflora_addon.blender.species.values import orders_of, present_species
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.schema import DEFAULT_SPUR
 from ..tetflora_addon.species.skeletons import MAX_ORDERS

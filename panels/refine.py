@@ -15,8 +15,7 @@ from ..tetflora_addon.blender.job.render import render_errors
 from ..tetflora_addon.blender.placing.first_forest import is_first_forest
 from ..tetflora_addon.blender.results.forms import few_bounces, form_of
 from ..tetflora_addon.blender.results.output import KIND
-from ..tetflora_addon.blender.scene.objects import has_contents, has_plants, may_scatter
-from ..tetflora_addon.blender.scene.scatterers import is_drop, is_scatter
+from ..tetflora_addon.blender.scene.objects import has_contents, has_plants, is_drop, is_scatter, may_scatter
 from ..tetflora_addon.blender.viewport import auto
 from .base import (
     Button,

@@ -16,9 +16,15 @@ from ..operators.species import (
     TETFLORA_OT_save_species,
 )
 from ..tetflora_addon.blender.species.catalogue import own_file
-from ..tetflora_addon.blender.species.editor import VARIATION
+from ..tetflora_addon.blender.species.editor import (
+    NO_LEAF,
+    OBJECT_LEAF,
+    VARIATION,
+    orders_of,
+    present_order,
+    present_species,
+)
 from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skipped_files
-from ..tetflora_addon.blender.species.values import NO_LEAF, OBJECT_LEAF, orders_of, present_order, present_species
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.schema import ORDER_KEYS
 from ..tetflora_addon.species.species import LEAF_KINDS

@@ -119,11 +119,8 @@ class Arrays:
                 return self
             index = np.flatnonzero(index)  # once, not for each column
         columns = (getattr(self, name) for name in _names(type(self)))
-        return type(self)(*(self._rows(c, index) if isinstance(c, np.ndarray | Arrays) else c for c in columns))
-
-    @staticmethod
-    def _rows(own: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:
-        return own.take(index) if isinstance(own, Arrays) else gathered(own, index)
+        columns = (c.take(index) if isinstance(c, Arrays) else c for c in columns)
+        return type(self)(*(gathered(c, index) if isinstance(c, np.ndarray) else c for c in columns))
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
@@ -138,7 +135,9 @@ class Arrays:
     @classmethod
     def empty(cls) -> Self:
         """No things. Columns are (0,) float64 unless their fields have metadata by `column` or `nested`."""
-        return cls(*(f.metadata.get("empty", _no_numbers)() for f in fields(cls) if f.name not in _optional(cls)))
+        return cls(
+            *(f.metadata.get("empty", lambda: np.zeros(0))() for f in fields(cls) if f.name not in _optional(cls))
+        )
 
 
 def column(*shape: int, dtype: DTypeLike = np.float64) -> dict[str, Callable]:
@@ -205,10 +204,6 @@ def _joined(columns: list[Any]) -> Any:
     if isinstance(columns[0], Arrays):
         return type(columns[0]).concatenate(columns)
     return np.concatenate(columns) if isinstance(columns[0], np.ndarray) else columns[0]
-
-
-def _no_numbers() -> NDArray[np.float64]:
-    return np.zeros(0)
 
 
 @cache

@@ -157,7 +157,12 @@ def json_of(content: bytes | str, constant: Callable[[str], float] = float) -> A
         # Some editors begin a file with a mark of its encoding.
         text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
         text.encode()
-        data = json.loads(text, parse_constant=constant, parse_int=_integer, object_pairs_hook=_once)
+        data = json.loads(
+            text,
+            parse_constant=constant,
+            parse_int=lambda number: int(number) if len(number) <= _DIGITS else float(number),
+            object_pairs_hook=_once,
+        )
         if "\\u" in text:
             json.dumps(data, ensure_ascii=False).encode()
     except _Twice:
@@ -184,10 +189,6 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         twice = next(name for name, _ in pairs if name in seen or seen.add(name))
         raise _Twice(f"{readable(twice, NAME)}: duplicate key in one object; remove one of them")
     return data
-
-
-def _integer(text: str) -> int | float:
-    return int(text) if len(text) <= _DIGITS else float(text)
 
 
 def _refuse_nul(path: Path) -> None:

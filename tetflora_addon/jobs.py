@@ -7,7 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 _Item, _Step, _Result = TypeVar("_Item"), TypeVar("_Step"), TypeVar("_Result")
 #: What a job works between two redraws, in times of what the last redraw took, and at most, seconds: Esc waits for it.
@@ -48,16 +48,15 @@ class Progress:
         return mapped(steps, lambda _: amid)
 
 
-def mapped(
-    steps: Generator[_Item, None, _Result], change: Callable[[_Item], _Step]
-) -> Generator[_Step, object, _Result]:
-    """The steps of a part of a job as those of the whole; returns what the part returns."""
+def mapped(steps: Generator[_Item, Any, _Result], change: Callable[[_Item], _Step]) -> Generator[_Step, Any, _Result]:
+    """The steps of a part of a job as those of the whole; the part gets what is sent, and its result is returned."""
+    sent = None
     while True:
         try:
-            step = next(steps)
+            step = steps.send(sent)
         except StopIteration as stop:
             return stop.value
-        yield change(step)
+        sent = yield change(step)
 
 
 class Pace:

@@ -260,7 +260,6 @@ class FileReader:
 
         Parameters
         ----------
-        kind : type
         data : object
             What `json.load` gave.
         where : str

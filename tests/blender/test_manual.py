@@ -15,7 +15,7 @@ from tetflora_addon.blender import preferences, properties
 from tetflora_addon.blender.biomes.properties import TetFloraBiome
 from tetflora_addon.blender.cli.command import main
 from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraMixEntry, TetFloraPopulation
-from tetflora_addon.blender.results import output_properties
+from tetflora_addon.blender.results import collection
 from tetflora_addon.blender.settings import TetFloraWind, TetFloraYear
 from tetflora_addon.blender.stands.properties import TetFloraStand, TetFloraStandEntry
 from tetflora_addon.blender.viewport import state
@@ -33,8 +33,8 @@ GROUPS = (
     TetFloraPopulation,
     TetFloraMixEntry,
     TetFloraBiome,
-    output_properties.TetFloraOutput,
-    output_properties.TetFloraSpeciesOutput,
+    collection.TetFloraOutput,
+    collection.TetFloraSpeciesOutput,
     state.TetFloraPreview,
     TetFloraBrush,
     TetFloraWind,

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work between two redraws of a window, by a clock of the test's own."""
+"""Work between two redraws of a window, by a clock of the test's own; parts of jobs."""
 
 from __future__ import annotations
 
 import pytest
 
 from tetflora_addon import jobs
-from tetflora_addon.jobs import Pace, Progress
+from tetflora_addon.jobs import Pace, Progress, mapped
 
 STEP, LEAST = 0.05, 0.01
 
@@ -57,3 +57,20 @@ def test_of_a_slow_window_most_of_the_time_is_work_and_esc_waits_no_longer_than_
     assert worked(clock, pace, 0.2, waiting) >= 2.0 * 0.2
     assert worked(clock, pace, 9.0, waiting) <= 1.0 + STEP
     assert worked(clock, pace, 0.0, waiting) <= STEP  # soon again
+
+
+def test_a_part_of_a_job_gets_what_is_sent_and_its_result_is_returned():
+    received = []
+
+    def part():
+        received.append((yield 1))
+        received.append((yield 2))
+        return "done"
+
+    steps = mapped(part(), lambda item: 10 * item)
+    assert next(steps) == 10
+    assert steps.send("first") == 20
+    with pytest.raises(StopIteration) as stop:
+        steps.send("second")
+    assert stop.value.value == "done"
+    assert received == ["first", "second"]

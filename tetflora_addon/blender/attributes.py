@@ -29,7 +29,6 @@ class Kind(NamedTuple):
     ----------
     field : str
         Name of the value among the properties of an element.
-    dtype : type
     width : int
         Numbers of a value.
     """
@@ -98,8 +97,6 @@ def write(geometry: Geometry, name: str, values: NDArray, domain: str = 'POINT',
 
     Parameters
     ----------
-    geometry : bpy.types.Mesh or bpy.types.PointCloud or bpy.types.Curves
-    name : str
     values : (n,) or (n, width)
         As many as the domain has elements; converted to the dtype of the attribute.
     domain : {'POINT', 'EDGE', 'FACE', 'CORNER', 'CURVE'}

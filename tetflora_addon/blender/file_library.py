@@ -59,7 +59,6 @@ class OwnFiles:
     ----------
     noun, nouns : str
         What they are, in errors.
-    error : type
     folders : callable
         Gives the folders that exist.
     folder : callable

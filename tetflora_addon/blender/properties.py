@@ -19,10 +19,10 @@ from .biomes import properties as biome_properties
 from .places import columns
 from .placing import properties
 from .placing.plant_objects import show_age
-from .results import output_properties
+from .results import collection
 from .results.forms import form_property
 from .runtime import Listeners
-from .scene import scatterers
+from .scene import objects
 from .scene.explicit import EXPLICIT_PROPERTY
 from .scene.field_sizes import STAND_SMOOTH, STAND_YEAR
 from .scene.own_ages import AGE_PROPERTY
@@ -121,7 +121,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         override=_OVERRIDES,
     )
     is_explicit: BoolProperty(**EXPLICIT_PROPERTY, override=_OVERRIDES)
-    is_scatter: BoolProperty(**scatterers.SCATTER_PROPERTY, override=_OVERRIDES)
+    is_scatter: BoolProperty(**objects.SCATTER_PROPERTY, override=_OVERRIDES)
     population: StringProperty(
         name="Population", description="Identity of the population that created this", options={'HIDDEN'}
     )
@@ -247,7 +247,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
         type=biome_properties.TetFloraBiome,
     )
     biomes_index: IntProperty(name="Active Biome", options={'HIDDEN', 'SKIP_SAVE'})
-    output: PointerProperty(type=output_properties.TetFloraOutput)
+    output: PointerProperty(type=collection.TetFloraOutput)
     brush: PointerProperty(type=properties.TetFloraBrush)
     wind: PointerProperty(type=settings.TetFloraWind)
     year: PointerProperty(type=settings.TetFloraYear)
@@ -273,7 +273,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
     linked_scatters: CollectionProperty(
         name="Linked Scatterers",
         description="Linked objects whose scatter is refined",
-        type=scatterers.TetFloraLinkedScatter,
+        type=objects.TetFloraLinkedScatter,
         options={'HIDDEN'},
     )
     species_editor: PointerProperty(name="Species Editor", type=editor.TetFloraSpeciesEditor, options={'HIDDEN'})
@@ -285,8 +285,8 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
 
 
 _MODULES = (
-    *(properties, stand_properties, biome_properties, output_properties, state),
-    *(editor, edits, asset_species, scatterers, settings, columns),
+    *(properties, stand_properties, biome_properties, collection, state),
+    *(editor, edits, asset_species, objects, settings, columns),
 )
 CLASSES = (
     *(cls for module in _MODULES for cls in module.CLASSES),

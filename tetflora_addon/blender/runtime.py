@@ -113,7 +113,6 @@ class JobData:
     ----------
     job : str
         Its name for the artist.
-    scene : bpy.types.Scene
     view_layer : bpy.types.ViewLayer, optional
         Its dependency graph goes with it, and using that would crash Blender.
     """

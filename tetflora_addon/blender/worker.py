@@ -13,14 +13,14 @@ from __future__ import annotations
 import atexit
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Generator
-from contextlib import closing
+from contextlib import closing, suppress
+from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 from weakref import WeakSet
 
 from .. import parallel
-from ..jobs import Progress
+from ..jobs import Progress, mapped
 from ..jobs import at_once as run
 from ..processes import pool
 
@@ -79,27 +79,28 @@ def in_thread(work: Generator[_Item, Any, _Result], ahead: int = 0) -> Generator
         sent = None
         while True:
             worker.ask(sent)
-            while not worker.has_news(LOOK):
+            while (news := worker.news(LOOK)) is None:
                 worker.tell((yield None))
-            if worker.ended:
-                return worker.result()
-            sent = yield worker.take()
+            if news[0] == 'item':
+                sent = yield news.pop()
+            elif news[0] == 'result':
+                return news.pop()
+            else:
+                raise news.pop()
     finally:
         worker.stop()
 
 
 def steps_in_thread(work: Generator[Progress, Any, _Result], progress: Progress) -> Generator[Progress, Any, _Result]:
     """As `in_thread`, for work whose items are its progress; the last one, at first a given one, stands meanwhile."""
-    sent = None
+
+    def shown(item: Progress | None) -> Progress:
+        nonlocal progress
+        progress = item or progress
+        return progress.again if item is None else progress
+
     with closing(in_thread(work)) as items:
-        while True:
-            try:
-                item = items.send(sent)
-            except StopIteration as stop:
-                return stop.value
-            if item is not None:
-                progress = item
-            sent = yield progress.again if item is None else progress
+        return (yield from mapped(items, shown))
 
 
 def call_in_thread(
@@ -116,17 +117,13 @@ def calling(function: Callable[..., _Result], *given: object) -> Generator[Any, 
 
 
 class _Worker:
-    """A generator in a thread; `ask`, `has_news` and `take` are for the one who wants the items."""
+    """A generator in a thread, which goes on as often as it is asked to."""
 
     def __init__(self, work: Generator, ahead: int) -> None:
-        self._work, self._ahead = work, ahead
-        self._changed = threading.Condition()
-        self._items: deque = deque()
-        self._asked = self._made = 0
-        self._sent: object = None
-        self._end: tuple[object, BaseException | None] | None = None
+        self._work, self._sent, self.stopped = work, None, False
+        self._wanted, self._lock = threading.Semaphore(ahead), threading.Lock()
+        self._news: SimpleQueue[list] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="TetFlora", daemon=True)
-        self.stopped = False
 
     def start(self) -> None:
         self._thread.start()
@@ -134,49 +131,24 @@ class _Worker:
 
     def ask(self, sent: object) -> None:
         """Ask for one more item, and go on with what was sent for the last one."""
-        with self._changed:
-            self._asked += 1
-            self._sent = sent or self._sent
-            self._changed.notify_all()
+        self.tell(sent)
+        self._wanted.release()
 
     def tell(self, sent: object) -> None:
         """Keep what is sent while there is nothing yet."""
-        with self._changed:
+        with self._lock:
             self._sent = sent or self._sent
 
-    def has_news(self, seconds: float) -> bool:
-        """Whether there is an item or the end; waits for it."""
-        with self._changed:
-            return self._changed.wait_for(lambda: self._items or self._end, seconds)
-
-    @property
-    def ended(self) -> bool:
-        """Whether there is no item left, and none will come."""
-        return not self._items and self._end is not None
-
-    def take(self) -> object:
-        """The next item."""
-        with self._changed:
-            return self._items.popleft()
-
-    def result(self) -> object:
-        """What the work returned; or its error is raised."""
-        result, error = self._end
-        self._end = (None, None)
-        if error is None:
-            return result
-        try:
-            raise error
-        finally:
-            del error  # else it would hold itself by its traceback
+    def news(self, seconds: float) -> list | None:
+        """What it is, 'item', 'result' or 'error', and that itself; None where there is nothing for so long."""
+        with suppress(Empty):
+            return self._news.get(timeout=seconds)
+        return None
 
     def stop(self) -> None:
         """Let it end at its next item; whatever it has made goes."""
-        with self._changed:
-            self.stopped = True
-            self._items.clear()
-            self._end = self._end and (None, None)
-            self._changed.notify_all()
+        self.stopped, self._news = True, SimpleQueue()
+        self._wanted.release()
         if self._thread.ident is None:
             self._work.close()
 
@@ -186,42 +158,27 @@ class _Worker:
         return not self._thread.is_alive()
 
     def _run(self) -> None:
-        end: tuple[object, BaseException | None] = (None, None)
+        end, begun = ['result', None], False
         try:
-            while self._wanted():
-                self._put(self._work.send(self._received()))
+            while self._wanted.acquire() and not self.stopped:
+                with self._lock:  # nothing can be sent to what has not begun
+                    sent, self._sent = (self._sent, None) if begun else (None, self._sent)
+                begun = True
+                self._put(['item', self._work.send(sent)])
         except StopIteration as stop:
-            end = (stop.value, None)
+            end = ['result', stop.value]
         except BaseException as error:
-            end = (None, error)
+            end = ['error', error]
         try:
             self._work.close()
         finally:
             self._work = None
-            with self._changed:
-                self._end = (None, None) if self.stopped else end
-                end = None  # an error's traceback holds this frame
-                self._changed.notify_all()
+            self._put(end)
+            end = None  # an error's traceback holds this frame
 
-    def _wanted(self) -> bool:
-        """Wait until one more item is wanted; False if none will be."""
-        with self._changed:
-            self._changed.wait_for(lambda: self.stopped or self._made < self._asked + self._ahead)
-            return not self.stopped
-
-    def _received(self) -> object:
-        if not self._made:
-            return None  # nothing can be sent to what has not begun
-        with self._changed:
-            sent, self._sent = self._sent, None
-            return sent
-
-    def _put(self, item: object) -> None:
-        with self._changed:
-            self._made += 1
-            if not self.stopped:
-                self._items.append(item)
-                self._changed.notify_all()
+    def _put(self, news: list) -> None:
+        if not self.stopped:
+            self._news.put(news)
 
 
 _workers: WeakSet[_Worker] = WeakSet()

@@ -32,7 +32,7 @@ def test_a_plant_is_the_asset_as_it_stands_stretched_and_mirrored_as_the_plant()
     assert found.matrices[0, :3, :3] == pytest.approx(np.diag([-1.0, 1.0, 5.0]) @ turned, abs=1e-6)
     assert found.matrices[0, :3, 3] == pytest.approx([1.0, 2.0, 3.0])
     with pytest.raises(plants.NoPlantsError):
-        plants.read_plants(scene(), depsgraph(), bpy.context.view_layer)
+        plants.read_plants(scene(), depsgraph(), bpy.context.view_layer)[0]
     given = contents.read_scene(scene(), depsgraph(), bpy.context.view_layer)
     assert len(given.seeds) == 0 and len(given.places) == 1
 
@@ -56,7 +56,7 @@ def test_a_field_may_hold_both_and_keeps_rotation_and_scale():
     field = write_field("field", position, turn, np.full(4, 2.0), kinds, seeds, ["bush", own])
     scene().collection.objects.link(field)
     field.scale = (1.0, 1.0, 3.0)
-    assert len(plants.read_plants(scene(), depsgraph(), bpy.context.view_layer)) == 2
+    assert len(plants.read_plants(scene(), depsgraph(), bpy.context.view_layer)[0]) == 2
     (found,) = read()
     assert found.owner == field and len(found) == 2
     assert found.matrices[:, 0, 3] == pytest.approx([1.0, 2.0])

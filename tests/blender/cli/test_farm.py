@@ -19,7 +19,7 @@ from farm import assets, bundle, template, write_job
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, tiny_render
 from tetflora_addon import errors
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.cli import frames
+from tetflora_addon.blender.cli import command
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -96,7 +96,7 @@ def test_the_zip_holds_the_extension_and_nothing_else(shot, tmp_path):
     (path,) = (tmp_path / "job" / "tetflora").glob("tetflora-*.zip")
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
-    assert {"blender_manifest.toml", "__init__.py", "tetflora_addon/blender/cli/frames.py"} <= set(names)
+    assert {"blender_manifest.toml", "__init__.py", "tetflora_addon/blender/cli/command.py"} <= set(names)
     assert [
         n for n in names if "__pycache__" in n or n.startswith(("tests/", "docs/", ".", "benchmarks/", "farm/"))
     ] == []
@@ -329,9 +329,9 @@ def test_lists_of_very_many_frames():
     with pytest.raises(errors.SceneError, match="Frame 300000 occurs twice"):
         template.frame_expression([(1, 300_000, 1), (300_000, 300_000, 1)])
     with pytest.raises(ValueError, match="again and again"):
-        frames.frame_runs(",".join(["0-1048574"] * 10_000))
+        command.frame_runs(",".join(["0-1048574"] * 10_000))
     with pytest.raises(ValueError, match=r"^9{57}\.\.\. is not a range"):
-        frames.frame_runs("9" * 100_000)
+        command.frame_runs("9" * 100_000)
     assert time.process_time() - begun < 5
 
 
@@ -370,16 +370,16 @@ RUNS = st.lists(
 
 @given(RUNS)
 def test_an_expression_names_the_frames_that_it_was_made_of(runs):
-    numbers = frames.frame_numbers(runs)
+    numbers = command.frame_numbers(runs)
     if len(set(numbers)) < len(numbers):
         return
-    assert frames.frame_numbers(frames.frame_runs(template.frame_expression(runs))) == numbers
+    assert command.frame_numbers(command.frame_runs(template.frame_expression(runs))) == numbers
 
 
 @pytest.mark.parametrize("text", ["", "a", "1-", "3-1", "1-9:0", "1..4", "1-9:-1", "1,,2"])
 def test_other_expressions_are_refused(text):
     with pytest.raises(ValueError, match="not a range of frames"):
-        frames.frame_runs(text)
+        command.frame_runs(text)
 
 
 def test_a_name_is_no_variable():

@@ -10,7 +10,7 @@ from devtools import session
 from tests.blender.renders import picture, small_scene
 from tetflora_addon import buffers, errors
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.materials import bark, bark_tools, materials, microsphere, nodes, shell
+from tetflora_addon.blender.materials import bark, materials, microsphere, nodes
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.species import species
 
@@ -182,11 +182,10 @@ def knots():
     """A material that shines with 1 in the eyes of large knots, with .25 where ridges give way to them."""
 
     def build(graph, _material):
-        place = graph.node("ShaderNodeGroup", node_tree=bark.place_group()).outputs["Place"]
-        where = bark_tools.Place(place, None, None, None, None, None, None)
-        eye = bark_tools.knot(graph, where, 0.8, (0.5, 0.5, 0.5))
-        moved = graph.vector('LENGTH', bark_tools.aside(graph, eye, 1.0))
-        seen = graph.math('ADD', bark_tools.lips(graph, eye)[1], graph.math('MULTIPLY', moved, 0.25))
+        place = graph.outputs("ShaderNodeGroup", node_tree=bark.place_group())["Place"]
+        where = bark.Place(place, None, None, None, None, None, None)
+        eye = bark.knot(graph, where, 0.8, graph.xyz(0.5, 0.5, 0.5))
+        seen = bark.lips(graph, eye)[1] + graph.vector('LENGTH', bark.aside(graph, eye, 1.0)) * 0.25
         graph.node("ShaderNodeOutputMaterial", {"Surface": graph.node("ShaderNodeEmission", {"Color": seen})})
 
     return nodes.surface_material("knots", 1, build)
@@ -278,7 +277,7 @@ def test_names_and_marks():
         materials.leaf_material("Oak"),
         materials.bark_material("Oak"),
         materials.proxy_material(),
-        shell.shell_material(),
+        microsphere.shell_material(),
         microsphere.scatter_group(),
     ]
     names = ["TetFlora Oak leaf", "TetFlora Oak bark", "TetFlora proxy", "TetFlora shell", "TetFlora Scatter"]

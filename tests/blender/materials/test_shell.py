@@ -12,7 +12,7 @@ import pytest
 from devtools import session
 from tests.blender.renders import picture, small_scene
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.materials import shell
+from tetflora_addon.blender.materials import microsphere
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.emission import shells
 
@@ -37,7 +37,7 @@ def place(
         np.tile(normal, (count, 1)),
         np.full(count, plane),
     )
-    material = shell.shell_material()
+    material = microsphere.shell_material()
     group = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
     for name, value in {"Stochastic": stochastic, "s": 0.0, "Variation": 0.0, "Roundness": 0.0, **sockets}.items():
         group.inputs[name].default_value = value
@@ -165,7 +165,7 @@ def test_light_from_the_viewer_gives_the_colour():
 
 
 def test_one_output_for_each_engine():
-    material = shell.shell_material()
+    material = microsphere.shell_material()
     targets = sorted(n.target for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     assert targets == ['CYCLES', 'EEVEE']
     assert material.cycles.use_bump_map_correction is False
@@ -236,7 +236,7 @@ def baked(path, light, extinction):
         rank=np.arange(count)[::-1],
         light=np.repeat(light[..., None], 3, axis=2),
     )
-    material = shell.baked_shell_material()
+    material = microsphere.baked_shell_material()
     mesh = meshes.write_mesh("shells", buffers, [material])
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("shells", mesh))
 

@@ -11,7 +11,7 @@ from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon import buffers
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import frame_cache, refine
-from tetflora_addon.blender.materials import materials, microsphere, nodes, shell, snow, soil
+from tetflora_addon.blender.materials import materials, microsphere, nodes, snow, soil
 from tetflora_addon.blender.results import meshes
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -144,13 +144,13 @@ def test_leaves_facets_and_spheres_of_the_same_kind_are_as_white(amount):
         materials.proxy_material,
         materials.sphere_material,
         materials.baked_material,
-        shell.shell_material,
-        shell.baked_shell_material,
+        microsphere.shell_material,
+        microsphere.baked_shell_material,
     ],
 )
 def test_materials_are_as_before_when_no_scene_has_snow(make):
     material = make()
-    trees = [material.node_tree, *(bpy.data.node_groups.get(n) for n in (shell.SHELL, shell.BAKED_SHELL))]
+    trees = [material.node_tree, *(bpy.data.node_groups.get(n) for n in (microsphere.SHELL, microsphere.BAKED_SHELL))]
     trees = [tree for tree in trees if tree is not None]
     before = [_nodes(tree) for tree in trees]
     _year(0.5, enabled=False)

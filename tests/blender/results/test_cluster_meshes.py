@@ -13,9 +13,9 @@ from tests.blender.renders import picture, small_scene
 from tests.blender.scenes import depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.attributes import face_offsets, members, read, values_of, write
-from tetflora_addon.blender.results.cluster_meshes import AssetMeshes, SurfaceArrays, cluster_mesh_steps, read_mesh
 from tetflora_addon.blender.results.collection import Results
 from tetflora_addon.blender.results.instances import add_cluster, add_cluster_instances
+from tetflora_addon.blender.results.meshes import AssetMeshes, SurfaceArrays, cluster_mesh_steps, read_mesh
 from tetflora_addon.jobs import at_once
 
 ENGINES = ["CYCLES", compat.eevee_engine()]

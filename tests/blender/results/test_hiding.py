@@ -15,7 +15,7 @@ from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results import hiding, instances
 from tetflora_addon.blender.results.collection import Results
-from tetflora_addon.blender.results.stand_ins import add_stand_in
+from tetflora_addon.blender.results.instances import add_stand_in
 from tetflora_addon.errors import SceneError
 
 ENGINES = ["CYCLES", compat.eevee_engine()]

@@ -48,7 +48,7 @@ def field_of(number, kinds=("birch",), places=None, **attributes):
 
 
 def plants():
-    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)[0]
 
 
 def compiled(kind):

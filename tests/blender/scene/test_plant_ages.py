@@ -37,7 +37,7 @@ def scene(clean_file):
 
 def seeds(scene):
     graph = depsgraph()
-    return read_plants(scene, graph, graph.view_layer)
+    return read_plants(scene, graph, graph.view_layer)[0]
 
 
 def row_of_plants(plants_ages, species=SPECIES):

@@ -27,7 +27,7 @@ def _camera():
 
 
 def _plants():
-    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)[0]
 
 
 def _occluders():

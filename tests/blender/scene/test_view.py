@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.blender.scenes import add_camera
-from tetflora_addon.blender.scene.camera import read_camera
-from tetflora_addon.blender.scene.view import camera_of, view_camera, viewport_of
+from tetflora_addon.blender.scene.camera import camera_of, read_camera, view_camera, viewport_of
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 

@@ -5,20 +5,29 @@
 Which objects are species is stored with the scene and not with them, so that those that are linked can be species too.
 An identifier follows from the name that the asset has when it becomes a species: taken off the list and put on again,
 it is the species of the same plants.
+
+How large they are, and a small picture of them for menus, follow from points on their surface, within a moment: nothing
+is compiled and no renderer is asked. Materials count by their mean colour.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from hashlib import blake2b
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
+from ...arrays import srgb_of
 from ...errors import SceneError
+from ..attributes import members, read
+from ..materials.face_looks import GREY, Looks
 from ..materials.nodes import is_ours
 from ..scene.objects import SURFACE_TYPES, may_instance
 from ..species.asset_species import (
+    PICTURE_SIDE,
     PREFIX,
     Datablock,
     TetFloraAssetSpecies,
@@ -29,8 +38,248 @@ from ..species.asset_species import (
     stored_picture,
 )
 from ..species.edits import tell_listeners
-from .measures import measure, size_of
+from .parts import Target
 from .places import Scatter, read_scatters, variants_of
+
+_POINTS = 60_000  # of a picture
+_TRIANGLES = 200_000  # of one mesh that are looked at
+_LEAST = 1e-3  # metres that a crown is wide and tall
+_FINER = 2  # pixels of the picture that is made for one that is kept
+_BASE = 0.1  # fraction of the area that lies below the crown's base
+_UP, _SIDE = np.array([0.0, -0.26, 0.966]), np.array([1.0, 0.0, 0.0])  # axes of the picture: a little from above
+_SUN = np.array([-0.45, -0.55, 0.7])
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Of a plant of scale 1: metres, number of faces, m², linear RGB; and a picture, the lowest row first."""
+
+    radius: float
+    base: float
+    height: float
+    polygons: float
+    leaves: float
+    colour: tuple[float, float, float]
+    picture: NDArray[np.uint8]
+
+
+@dataclass
+class _Mesh:
+    """A mesh in its places (k, 4, 4): corners of triangles (t, 3, 3), area (t,), colour (t, 3), coverage (t,).
+
+    ``faces`` and ``leaves``, the area of leaves, are those of one place.
+    """
+
+    places: NDArray[np.float64]
+    corners: NDArray[np.float64]
+    area: NDArray[np.float64]
+    colour: NDArray[np.float64]
+    coverage: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    faces: int
+    leaves: float
+
+    @property
+    def sizes(self) -> float:
+        """Sum over places of how many times larger areas are there."""
+        return float((np.abs(np.linalg.det(self.places[:, :3, :3])) ** (2.0 / 3.0)).sum())
+
+
+def _meshes_of(
+    target: Target, matrix: NDArray[np.float64], depsgraph: bpy.types.Depsgraph, looks: Looks
+) -> list[_Mesh]:
+    found = []
+    for part in target.parts(depsgraph)[0]:
+        with part.opened(depsgraph) as opened:
+            if opened is not None:
+                found.append(_read_one(*opened, matrix @ part.matrices, looks))
+    return found
+
+
+def _read_one(
+    mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], places: NDArray[np.float64], looks: Looks
+) -> _Mesh:
+    mesh.calc_loop_triangles()
+    positions = np.nan_to_num(read(mesh, "position").astype(np.float64))
+    triangles = members(mesh.loop_triangles, "loops", 3, np.int32)
+    faces = members(mesh.loop_triangles, "polygon_index", dtype=np.int32)
+    factor = 1.0
+    if len(triangles) > _TRIANGLES:
+        some = np.linspace(0, len(triangles) - 1, _TRIANGLES).astype(np.int64)
+        triangles, faces, factor = triangles[some], faces[some], len(triangles) / _TRIANGLES
+    corners = positions[read(mesh, ".corner_vert")[triangles]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * factor * np.sqrt(np.einsum("ni,ni->n", normal, normal))
+    seen = [looks.of(material, {}) for material in materials]
+    slot = np.clip(members(mesh.polygons, "material_index", dtype=np.int32)[faces], 0, len(seen) - 1)
+    coverage = np.array([look.coverage for look in seen])[slot]
+    # Of closed leaves both sides have area; each edge of theirs has two faces.
+    loose = min(max(2.0 * len(mesh.edges) / len(mesh.loops) - 1.0, 0.0), 1.0)
+    return _Mesh(
+        places=places,
+        corners=corners,
+        area=area,
+        colour=np.array([look.colour for look in seen])[slot],
+        coverage=coverage,
+        low=positions.min(axis=0),
+        high=positions.max(axis=0),
+        faces=len(mesh.polygons),
+        leaves=(0.5 + 0.5 * loose) * float(area @ coverage),
+    )
+
+
+def measure(variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: bpy.types.Depsgraph) -> Measures | None:
+    """Means over the variants of a species, and a picture of the first.
+
+    Parameters
+    ----------
+    variants : iterable
+        Targets, each with the matrix (4, 4) from its space to that of the plant.
+
+    Returns
+    -------
+    Measures or None
+        None where nothing has a face.
+
+    Raises
+    ------
+    SceneError
+        Something instances itself.
+    """
+    found, looks = [], Looks()
+    for target, matrix in variants:
+        meshes = _meshes_of(target, matrix, depsgraph, looks)
+        if meshes:
+            found.append(_measured(meshes, picture=not found))
+    if not found:
+        return None
+    numbers = np.array([(m.radius, m.base, m.height, m.polygons, m.leaves) for m in found]).mean(axis=0).tolist()
+    colour = tuple(np.mean([m.colour for m in found], axis=0).tolist())
+    return Measures(*numbers, colour, found[0].picture)
+
+
+def size_of(
+    variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: bpy.types.Depsgraph
+) -> tuple[float, float]:
+    """Radius and height alone, as `measure` finds them, at a fraction of the cost; zeros where nothing has a face."""
+    found = []
+    for target, matrix in variants:
+        boxes = [_corners(low, high, matrix @ places) for low, high, places in _boxes(target, depsgraph)]
+        if boxes:
+            low = np.min([box.min(axis=(0, 1)) for box in boxes], axis=0)
+            found.append(_extent(low, np.max([box.max(axis=(0, 1)) for box in boxes], axis=0)))
+    return tuple(np.mean(found, axis=0).tolist()) if found else (0.0, 0.0)
+
+
+def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
+    """Distance from an asset's origin within which all of it lies, metres in its own space.
+
+    Raises
+    ------
+    SceneError
+        It instances itself.
+    """
+    boxes = [np.linalg.norm(_corners(*box), axis=-1).max() for box in _boxes(target, depsgraph)]
+    return float(max(boxes, default=0.0))
+
+
+def _boxes(target: Target, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
+    """Extent of each mesh of a target, and its places."""
+    for part in target.parts(depsgraph)[0]:
+        with part.opened(depsgraph) as opened:
+            if opened is not None:
+                positions = np.nan_to_num(read(opened[0], "position"))
+                yield positions.min(axis=0), positions.max(axis=0), part.matrices
+
+
+def _extent(low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[float, float]:
+    """Radius and height of a plant that fills a box."""
+    height = float(high[2] if high[2] > 0.0 else high[2] - low[2])
+    return max(0.5 * float((high - low)[:2].max()), _LEAST), max(height, _LEAST)
+
+
+def _corners(low: NDArray, high: NDArray, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners (k, 8, 3) of a box in some places."""
+    corner = np.array(np.meshgrid(*zip(low, high, strict=True)), np.float64).reshape(3, -1).T
+    return corner @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]
+
+
+def _measured(meshes: list[_Mesh], picture: bool) -> Measures:
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for mesh in meshes:
+        box = _corners(mesh.low, mesh.high, mesh.places)
+        low, high = np.minimum(low, box.min(axis=(0, 1))), np.maximum(high, box.max(axis=(0, 1)))
+    points, normals, colours = _sampled(meshes)
+    radius, height = _extent(low, high)
+    base = float(np.clip(np.quantile(points[:, 2], _BASE), 0.0, height)) if len(points) else 0.0
+    return Measures(
+        radius=radius,
+        base=base,
+        height=height,
+        polygons=float(sum(len(mesh.places) * mesh.faces for mesh in meshes)),
+        leaves=sum(mesh.sizes * mesh.leaves for mesh in meshes),
+        colour=tuple(colours.mean(axis=0).tolist()) if len(colours) else GREY,
+        picture=_drawn(points, normals, colours, low, high) if picture else np.zeros((0, 0, 4), np.uint8),
+    )
+
+
+def _sampled(meshes: list[_Mesh]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Points evenly on what covers, with the normals and colors there, (n, 3) each."""
+    total = sum(mesh.sizes * float(mesh.area.sum()) for mesh in meshes)
+    draw = np.random.default_rng(1)
+    out: list[tuple[NDArray, NDArray, NDArray]] = []
+    for mesh in meshes:
+        own = float(mesh.area.sum())
+        number = int(np.ceil(_POINTS * mesh.sizes * own / total)) if own > 0.0 else 0
+        if not number:
+            continue
+        triangle = draw.choice(len(mesh.area), number, p=mesh.area / own)
+        triangle = triangle[draw.random(number) < mesh.coverage[triangle]]
+        place = mesh.places[draw.integers(len(mesh.places), size=len(triangle))]
+        corners = mesh.corners[triangle]
+        u, v = draw.random((2, len(triangle), 1))
+        u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+        edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        point = corners[:, 0] + u * edges[0] + v * edges[1]
+        turned = [np.einsum("nij,nj->ni", place[:, :3, :3], edge) for edge in edges]
+        position = np.einsum("nij,nj->ni", place[:, :3, :3], point) + place[:, :3, 3]
+        out.append((position, np.cross(*turned), mesh.colour[triangle]))
+    if not out:
+        return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))
+    position, normal, colour = (np.concatenate(column) for column in zip(*out, strict=True))
+    length = np.sqrt(np.einsum("ni,ni->n", normal, normal))
+    return position, normal / np.maximum(length, 1e-12)[:, None], colour
+
+
+def _drawn(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    colours: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> NDArray[np.uint8]:
+    """Points as a picture, each hiding what is behind it."""
+    side = PICTURE_SIDE * _FINER
+    middle, extent = 0.5 * (low + high), max(float((high - low).max()), 1e-9)
+    away = points - middle
+    scale = 0.92 * side / extent
+    column = np.floor(0.5 * side + scale * (away @ _SIDE)).astype(np.int64)
+    row = np.floor(0.5 * side + scale * (away @ _UP)).astype(np.int64)
+    depth = away @ np.cross(_SIDE, _UP)
+    inside = (column >= 0) & (column < side) & (row >= 0) & (row < side)
+    column, row, depth, normals, colours = (a[inside] for a in (column, row, depth, normals, colours))
+    light = 0.4 + 0.6 * np.abs(normals @ (_SUN / np.linalg.norm(_SUN)))
+    order = np.argsort(depth, kind="stable")  # the nearest is written last
+    picture = np.zeros((side, side, 4))
+    picture[row[order], column[order], :3] = np.clip(colours * light[:, None], 0.0, 1.0)[order]
+    picture[row[order], column[order], 3] = 1.0
+    small = picture.reshape(PICTURE_SIDE, _FINER, PICTURE_SIDE, _FINER, 4).mean(axis=(1, 3))
+    with np.errstate(invalid="ignore"):
+        small[..., :3] = np.nan_to_num(small[..., :3] / small[..., 3:])
+    small[..., :3] = srgb_of(small[..., :3])
+    return np.round(255.0 * small).astype(np.uint8)
+
 
 _NO_FACES = "it has no faces. Choose a mesh, curve or collection with a surface, or add faces"
 _SAME = 1e-4  # relative difference of sizes that is none
@@ -54,7 +303,6 @@ def use_as_species(
     ----------
     scene : bpy.types.Scene
         Receives the entry.
-    depsgraph : bpy.types.Depsgraph
     datablock : bpy.types.Object or bpy.types.Collection
         Original; may be linked from a library.
     variants : bool

@@ -2,30 +2,148 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an asset consists of: each distinct mesh once, with all of its places in the asset, as arrays.
 
-Objects, collections, nodes, particles and what is instanced by instances are followed down to meshes.
-
-What is instanced: an object, a collection, or geometry that nodes instance without an object of its own.
-
-Its digest tells whether what it shows has changed since it was compiled.
+An asset is an object, a collection, or geometry that nodes instance without an object of its own. What it instances by
+collections, nodes and particles is followed down to meshes. Its digest, of meshes, materials and images, tells whether
+what it shows has changed since it was compiled.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...assets.asset import AssetSource, AssetSurface
 from ...errors import SceneError
-from ..attributes import members, read, values_of, world_matrix
+from ...jobs import mapped
+from ..attributes import image_pixels, members, read, values_of, world_matrix
+from ..compat import tree_in_use
+from ..materials.face_looks import FaceReader
 from ..materials.nodes import is_ours
-from ..scene.instances import instanced
-from ..scene.objects import SURFACE_TYPES, collected, geometry_of, has_nodes, is_listed, listed_instances, materials_of
-from .material_digests import attributes_of, material_digest
+from ..scene.objects import (
+    SURFACE_TYPES,
+    collected,
+    geometry_of,
+    has_nodes,
+    instanced,
+    is_listed,
+    listed_instances,
+    materials_of,
+)
+
+#: Of nodes, where they stand in the editor and how they look there.
+_IDLE = {"rna_type", "name", "label", "width", "height", "color", "location", "location_absolute", "parent", "select"}
+_IDLE |= {"bl_idname", "bl_label", "bl_description", "bl_icon", "bl_static_type", "warning_propagation", "dimensions"}
+_IDLE |= {"bl_width_default", "bl_width_min", "bl_width_max", "bl_height_default", "bl_height_min", "bl_height_max"}
+_IDLE |= {"internal_links", "inputs", "outputs", "color_tag", "hide", "use_custom_color", "show_options"}
+_IDLE |= {"show_preview", "show_texture", "image_user", "texture_mapping", "color_mapping"}
+_VALUES = {'BOOLEAN', 'INT', 'FLOAT', 'STRING', 'ENUM'}
+# Content of packed images by identity and length: they are read once.
+_packed: dict[tuple[int, int], str] = {}
+
+
+def material_digest(material: bpy.types.Material | None) -> str:
+    """Hexadecimal digest of what a material looks like."""
+    if material is None:
+        return ""
+    content = hashlib.sha256(repr(tuple(material.diffuse_color)).encode())
+    tree = tree_in_use(material)
+    if tree is not None:
+        _add_tree(content, tree)
+    return content.hexdigest()
+
+
+def attributes_of(material: bpy.types.Material | None) -> Iterator[str]:
+    """Names of attributes that a material asks for, groups included."""
+    waiting = [] if material is None or (tree := tree_in_use(material)) is None else [tree]
+    while waiting:
+        for node in waiting.pop().nodes:
+            if node.type == 'ATTRIBUTE':
+                yield node.attribute_name
+            elif node.type == 'VERTEX_COLOR':
+                yield node.layer_name
+            elif node.type == 'GROUP' and node.node_tree is not None:
+                waiting.append(node.node_tree)
+
+
+def _add_tree(content: hashlib._Hash, tree: bpy.types.NodeTree) -> None:
+    nodes = {node.as_pointer(): i for i, node in enumerate(tree.nodes)}
+    for node in tree.nodes:
+        if node.type in {'FRAME', 'REROUTE'}:
+            continue
+        content.update(node.bl_idname.encode())
+        for name in _settings(node):
+            _add(content, name, getattr(node, name))
+        for socket in node.inputs:
+            if not socket.is_linked and hasattr(socket, "default_value"):
+                _add(content, socket.identifier, socket.default_value)
+        if node.type in {'RGB', 'VALUE'}:
+            _add(content, "value", node.outputs[0].default_value)
+    for link in tree.links:
+        ends = (link.from_node, link.from_socket), (link.to_node, link.to_socket)
+        named = [(nodes[node.as_pointer()], socket.identifier) for node, socket in ends]
+        content.update(f"{named}{link.is_muted}".encode())
+
+
+def _settings(node: bpy.types.Node) -> list[str]:
+    kind = node.bl_idname
+    if kind not in _known:
+        properties = node.bl_rna.properties
+        _known[kind] = [p.identifier for p in properties if p.identifier not in _IDLE and p.type != 'COLLECTION']
+    return _known[kind]
+
+
+_known: dict[str, list[str]] = {}
+
+
+def _add(content: hashlib._Hash, name: str, value: Any) -> None:
+    if isinstance(value, bpy.types.Image):
+        value = image_digest(value)
+    elif isinstance(value, bpy.types.NodeTree):
+        content.update(name.encode())
+        _add_tree(content, value)
+        return
+    elif isinstance(value, bpy.types.ColorRamp):
+        parts = [(e.position, *e.color) for e in value.elements]
+        value = (value.interpolation, value.color_mode, value.hue_interpolation, parts)
+    elif isinstance(value, bpy.types.CurveMapping):
+        value = [[(*p.location, p.handle_type) for p in curve.points] for curve in value.curves]
+    elif isinstance(value, bpy.types.ID):
+        value = value.name_full
+    elif isinstance(value, bpy.types.bpy_struct):
+        return
+    elif hasattr(value, "__len__") and not isinstance(value, str):
+        value = tuple(value)
+    content.update(f"{name}={value!r};".encode())
+
+
+def image_digest(image: bpy.types.Image) -> str:
+    """Digest of an image: of its pixels if only this file has them, else of the file that it is in."""
+    how = f"{tuple(image.size)} {image.source} {image.alpha_mode} {image.colorspace_settings.name} "
+    if image.is_dirty and image.size[0]:
+        return how + hashlib.sha256(np.ascontiguousarray(image_pixels(image))).hexdigest()
+    packed = image.packed_file
+    if packed is not None:
+        key = image.session_uid, packed.size
+        if key not in _packed:
+            _packed[key] = hashlib.sha256(packed.data).hexdigest()
+        return how + _packed[key]
+    if image.source == 'GENERATED':
+        return how + f"{image.generated_type} {tuple(image.generated_color)}"
+    path = Path(bpy.path.abspath(image.filepath, library=image.library))
+    try:
+        stat = path.stat()
+    except OSError:
+        return how + f"{path}"
+    return how + f"{path} {stat.st_size} {stat.st_mtime_ns}"
+
 
 Slots = list[bpy.types.Material | None]
 
@@ -110,7 +228,7 @@ def parts_of(
     return list(walk.parts.values()), walk.warnings
 
 
-Path = tuple[bpy.types.ID, ...]
+Trail = tuple[bpy.types.ID, ...]
 
 
 class _Walk:
@@ -121,7 +239,7 @@ class _Walk:
         self.parts: dict[object, AssetPart] = {}
         self.warnings: list[str] = []
 
-    def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], path: Path) -> None:
+    def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], path: Trail) -> None:
         """Take an original object with what it instances."""
         if obj in path:
             raise SceneError(
@@ -140,7 +258,7 @@ class _Walk:
             if obj.type == 'CURVES' and geometry.mesh is not None:
                 self._add(obj, AssetPart(obj.name, geometry), matrices)
 
-    def collection(self, collection: bpy.types.Collection, matrices: NDArray[np.float64], path: Path) -> None:
+    def collection(self, collection: bpy.types.Collection, matrices: NDArray[np.float64], path: Trail) -> None:
         """Take what a collection shows in renders."""
         if collection in path:
             raise SceneError(
@@ -151,14 +269,14 @@ class _Walk:
         for obj, places in collected(collection, matrices, self.depsgraph):
             self.object(obj, places, path)
 
-    def geometry(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Path) -> None:
+    def geometry(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Trail) -> None:
         """Take geometry without an object, with what it instances."""
         if geometry.mesh is not None:
             name = geometry.name or (path[-1].name if path else self.name)
             self._add(geometry, AssetPart(name, geometry), matrices)
         self._instances(geometry, matrices, path)
 
-    def _instances(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Path) -> None:
+    def _instances(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Trail) -> None:
         keys = np.zeros(len(matrices), np.uint64)
         for target, places, _ in instanced(geometry, matrices, keys):
             if isinstance(target, bpy.types.GeometrySet):
@@ -247,11 +365,6 @@ def digest_of(target: Target, depsgraph: bpy.types.Depsgraph) -> str:
 
     Names of objects do not count, and of images in files only which file it is, how long and how old.
 
-    Parameters
-    ----------
-    target : Target
-    depsgraph : bpy.types.Depsgraph
-
     Raises
     ------
     SceneError
@@ -288,3 +401,97 @@ def _add_mesh(content: hashlib._Hash, mesh: bpy.types.Mesh, slots: Slots) -> Non
             content.update(values_of(attribute, "color" if kind in _COLOURS else ""))
     first = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
     content.update(first.encode())
+
+
+#: Triangles whose corners become vertices at once.
+_TRIANGLES = 1 << 18
+
+
+def read_source_steps(
+    target: Target, depsgraph: bpy.types.Depsgraph
+) -> Generator[float, None, tuple[AssetSource, tuple[str, ...]]]:
+    """Read all surfaces of an asset; yields the fraction that is done.
+
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        Between two steps it may be evaluated again, but must be there.
+
+    Returns
+    -------
+    AssetSource
+    tuple of str
+        Warnings for the artist: images that are missing, materials without shaders, and what is left out.
+
+    Raises
+    ------
+    SceneError
+        The asset has no faces, has vertices that are not finite numbers, or instances itself; the message names it.
+    """
+    parts, left = target.parts(depsgraph)
+    reader = FaceReader()
+    reader.warn(left)
+    digest = digest_of_parts(parts, depsgraph)
+    surfaces: list[AssetSurface] = []
+    shown: list[AssetPart] = []
+    for number, part in enumerate(parts):
+        steps = _surface_steps(part, depsgraph, reader)
+        surface = yield from mapped(steps, lambda done, before=number: (before + done) / len(parts))
+        if surface is not None:
+            surfaces.append(surface)
+            shown.append(part)
+    if not surfaces:
+        raise SceneError(
+            f'"{target.name}" has no faces, so there is nothing to refine as an asset; add faces, or choose another '
+            "object or collection"
+        )
+    counts = [len(part.matrices) for part in shown]
+    source = AssetSource(
+        name=target.name,
+        surfaces=tuple(surfaces),
+        surface=np.repeat(np.arange(len(surfaces)), counts).astype(np.int32),
+        matrices=np.concatenate([part.matrices for part in shown]),
+        digest=digest,
+    )
+    if not np.isfinite(source.matrices).all():
+        raise SceneError(
+            f'"{target.name}" shows instances whose place is not a finite number; correct the nodes or particles that '
+            "make them"
+        )
+    return source, tuple(reader.warnings)
+
+
+def _surface_steps(
+    part: AssetPart, depsgraph: bpy.types.Depsgraph, reader: FaceReader
+) -> Generator[float, None, AssetSurface | None]:
+    """Read one mesh; None if it has no faces. Between two steps nothing of Blender's meshes is held."""
+    with part.opened(depsgraph) as opened:
+        if opened is None:
+            return None
+        mesh, slots = opened
+        positions = read(mesh, "position")
+        if not np.isfinite(positions).all():
+            raise SceneError(f'"{part.name}" has vertices that are not finite numbers; delete them')
+        mesh.calc_loop_triangles()
+        faces = len(mesh.polygons)
+        loops = members(mesh.loop_triangles, "loops", 3, np.int32)
+        face = members(mesh.loop_triangle_polygons, "value", dtype=np.int32)
+        corner_verts = read(mesh, ".corner_vert")
+        looks = reader.prepare(mesh, slots)
+    yield 0.0
+    found = yield from looks.steps(faces, positions, loops, corner_verts, face)
+    return AssetSurface(
+        name=part.name,
+        positions=positions,
+        triangles=_vertices(loops, corner_verts),
+        face=face,
+        **found,
+    )
+
+
+def _vertices(loops: NDArray[np.int32], corner_verts: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Vertices of triangles from their corners, in the same array."""
+    for start in range(0, len(loops), _TRIANGLES):
+        piece = loops[start : start + _TRIANGLES]
+        piece[:] = np.take(corner_verts, piece)
+    return loops

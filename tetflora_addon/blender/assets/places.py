@@ -9,7 +9,7 @@ many parts is taken for a tree itself. All places of an asset are computed at on
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -18,18 +18,20 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ..attributes import world_matrix
-from ..scene.instances import Reference, instanced, name_keys
 from ..scene.objects import (
     DEEPEST,
     SURFACE_TYPES,
+    Reference,
     geometry_of,
     has_nodes,
+    instanced,
     is_listed,
+    is_scatter,
     listed_instances,
+    name_keys,
     renderable_objects,
 )
 from ..scene.plants import AssetPlants, read_asset_plants
-from ..scene.scatterers import is_scatter
 from ..species.asset_species import TetFloraAssetSpecies, asset_species
 from .parts import Target
 
@@ -47,27 +49,24 @@ class Places:
     ----------
     target : Target
         What stands there.
-    owner : bpy.types.Object
-        The original object that shows it: the instancer, the plant or the field; the first one where each place has its
-        own.
     matrices : (n, 4, 4) float64
         From the asset's space to world space.
     keys : (n,) uint64
         Tell individuals apart, through animations as well.
     owners : tuple of bpy.types.Object
-        Of each place where they differ, n of them; else only the ``owner``.
+        The original object that shows it: the instancer, the plant or the field; n of them where each place has its
+        own.
     """
 
     target: Target
-    owner: bpy.types.Object
     matrices: NDArray[np.float64]
     keys: NDArray[np.uint64]
-    owners: tuple[bpy.types.Object, ...] = ()
+    owners: tuple[bpy.types.Object, ...]
 
-    def __post_init__(self) -> None:
-        """Where nothing is said, all places are of one owner."""
-        if not self.owners:
-            object.__setattr__(self, "owners", (self.owner,))
+    @property
+    def owner(self) -> bpy.types.Object:
+        """The first one."""
+        return self.owners[0]
 
     def __len__(self) -> int:
         """Number of places."""
@@ -80,21 +79,6 @@ class Places:
         matrices = self.matrices.copy()
         matrices[:, :3, 3] -= origin
         return replace(self, matrices=matrices)
-
-
-@dataclass
-class Scatter:
-    """What an object scatters.
-
-    Attributes
-    ----------
-    places : list of Places
-    left : dict of str to int
-        Instances that are no assets, by name and number: empties, lights, cameras and volumes.
-    """
-
-    places: list[Places] = field(default_factory=list)
-    left: dict[str, int] = field(default_factory=dict)
 
 
 def read_places(
@@ -191,7 +175,7 @@ def _by_variant(plants: AssetPlants, variants: list[Variant]) -> list[Places]:
         if whole.any():
             own, matrices = own[whole], matrices[whole]
             owners = plants.owners if len(plants.owners) == 1 else tuple(plants.owners[i] for i in own.tolist())
-            found.append(Places(target, owners[0], matrices, keys[own], owners))
+            found.append(Places(target, matrices, keys[own], owners))
     return found
 
 
@@ -205,14 +189,16 @@ def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     """
     found, slow = {}, []
     for obj in objects:
-        walk = found[obj] = _Walk(obj, depsgraph)
+        walk = found[obj] = Scatter(obj, depsgraph)
         if is_listed(obj):
             slow.append(obj)
         else:
             walk.shown(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), name_keys([obj]))
     if slow:
         _one_by_one({obj: found[obj] for obj in slow}, depsgraph)
-    return {obj: walk.scatter() for obj, walk in found.items()}
+    for walk in found.values():
+        walk.finish()
+    return found
 
 
 def shows_faces(target: Target, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -230,26 +216,30 @@ def shows_faces(target: Target, depsgraph: bpy.types.Depsgraph) -> bool:
     return False
 
 
-def _has_surface(geometry: bpy.types.GeometrySet) -> bool:
-    return geometry.mesh is not None and len(geometry.mesh.polygons) > 0
-
-
 def _target(datablock: bpy.types.Object | bpy.types.Collection) -> Target:
     return Target(datablock=datablock, geometry=None, owner=None, name=datablock.name)
 
 
-class _Walk:
-    """Follows what one object instances to its assets, with all places at once."""
+class Scatter:
+    """What one object scatters: what it instances is followed to its assets, with all places at once.
+
+    Attributes
+    ----------
+    places : list of Places
+        Each target once, when all has been followed.
+    left : dict of str to int
+        Instances that are no assets, by name and number: empties, lights, cameras and volumes.
+    """
 
     def __init__(self, owner: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         self.owner, self.depsgraph = owner, depsgraph
+        self.places: list[Places] = []
         self.left: dict[str, int] = {}
         self._parts: dict[Target, list[tuple[NDArray, NDArray]]] = {}
         self._faces: dict[Target, bool] = {}
 
-    def scatter(self) -> Scatter:
-        """What was found, each target once."""
-        places = []
+    def finish(self) -> None:
+        """Gather the places of each target."""
         for target, parts in self._parts.items():
             matrices, keys = (
                 column[0] if len(parts) == 1 else np.concatenate(column) for column in zip(*parts, strict=True)
@@ -265,8 +255,7 @@ class _Walk:
             if not whole.all():
                 matrices, keys = matrices[whole], keys[whole]
             if len(keys):
-                places.append(Places(target, self.owner, matrices, keys))
-        return Scatter(places, self.left)
+                self.places.append(Places(target, matrices, keys, (self.owner,)))
 
     def shown(self, obj: bpy.types.Object, places: NDArray[np.float64], keys: NDArray, depth: int = 0) -> None:
         """Take what an object instances."""
@@ -312,10 +301,11 @@ class _Walk:
                 return False
             shown = geometry
         points = shown.instances_pointcloud()
-        return points is not None and 0 < len(points.points) <= MOST_IN_GROUP and not _has_surface(shown)
+        bare = shown.mesh is None or not len(shown.mesh.polygons)
+        return bare and points is not None and 0 < len(points.points) <= MOST_IN_GROUP
 
 
-def _one_by_one(walks: dict[bpy.types.Object, _Walk], depsgraph: bpy.types.Depsgraph) -> None:
+def _one_by_one(walks: dict[bpy.types.Object, Scatter], depsgraph: bpy.types.Depsgraph) -> None:
     """Instances of particles and on vertices and faces, which only Blender's own list has."""
     listed: dict[tuple[bpy.types.Object, bpy.types.Object], tuple[list, list]] = {}
     for owner, instance in listed_instances(depsgraph, walks):

@@ -6,6 +6,8 @@ Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An 
 ``--json`` the last line on stdout is a JSON object, after Blender's own output.
 """
 
+from __future__ import annotations
+
 import argparse
 import json
 import os
@@ -19,7 +21,7 @@ from typing import Any
 
 import bpy
 
-from ...errors import SceneError, TetFloraError
+from ...errors import VALUE, SceneError, TetFloraError, readable
 from ..compat import EEVEE_ENGINES, eevee_engine
 from ..job.contents import estimate
 from ..job.refine import refine
@@ -27,7 +29,61 @@ from ..properties import TetFloraScene
 from ..runtime import failed_frames
 from ..saved_files import damaged, write_blend
 from ..scene.camera import read_camera
-from .frames import LAST_FRAME, Run, frame_numbers, frame_runs
+
+#: First, last and step of frames.
+Run = tuple[int, int, int]
+
+#: Last frame in Blender.
+LAST_FRAME = 1_048_574
+
+_NUMBER = r"[0-9]{1,9}"  # what Python makes of more digits, or of others, is of no use
+_RUN = re.compile(rf"(-?{_NUMBER})(?:-(-?{_NUMBER})(?::({_NUMBER}))?)?")
+#: Frames of Blender, those below zero included.
+_MOST_FRAMES = 2 * LAST_FRAME + 1
+
+
+def frame_runs(text: str) -> list[Run]:
+    """Read a range expression: ``1-10``, ``7``, ``1-99:2``, or several with commas.
+
+    Parameters
+    ----------
+    text : str
+        As in the specification (section 3.4.1.1.1), without negative steps.
+
+    Returns
+    -------
+    list of tuple
+        First, last and step, in the order of the text; the last is a frame of its run.
+
+    Raises
+    ------
+    ValueError
+        Another expression, a range that runs backwards, a frame that Blender does not have, or more frames than it has.
+    """
+    runs, number = [], 0
+    quoted = readable(text, VALUE)
+    for part in text.split(","):
+        match = _RUN.fullmatch(part.strip())
+        if match is None:
+            raise ValueError(f"{quoted} is not a range of frames such as 1-24, 7 or 1-99:2")
+        first = int(match[1])
+        last = first if match[2] is None else int(match[2])
+        step = int(match[3] or 1)
+        if last < first or step < 1:
+            raise ValueError(f"{quoted} is not a range of frames such as 1-24, 7 or 1-99:2")
+        if max(-first, last) > LAST_FRAME:
+            raise ValueError(f"{quoted} exceeds the last frame that Blender supports, {LAST_FRAME:,}")
+        number += (last - first) // step + 1
+        if number > _MOST_FRAMES:
+            raise ValueError(f"{quoted} names frames again and again: Blender has only {_MOST_FRAMES:,}")
+        runs.append((first, last - (last - first) % step, step))
+    return runs
+
+
+def frame_numbers(runs: Sequence[Run]) -> list[int]:
+    """All frames of runs, repeated ones included."""
+    return [frame for first, last, step in runs for frame in range(first, last + 1, step)]
+
 
 NAME = "tetflora"
 #: Largest number of samples in Cycles.

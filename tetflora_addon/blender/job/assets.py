@@ -24,8 +24,7 @@ from ...emission.asset_plan import Keeping
 from ...errors import SceneError, TetFloraError
 from ...jobs import Progress, at_once, mapped
 from ...refinement.asset_parts import PlacedAssets
-from ..assets.geometry import read_source_steps
-from ..assets.parts import Target, digest_of
+from ..assets.parts import Target, digest_of, read_source_steps
 from ..assets.places import Places
 from ..results.hiding import hidden_originals, originals_shown
 from ..worker import steps_in_thread
@@ -55,7 +54,6 @@ class Bound:
         Index into these.
     keeping : Keeping
         Which are always drawn as the originals.
-    warnings : tuple of str
     """
 
     targets: tuple[Target, ...]

@@ -10,9 +10,11 @@ from dataclasses import dataclass, field, fields, replace
 import bpy
 import numpy as np
 
-from ... import memory
+from ... import memory, parallel
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
+from ...emission.budget import BYTES_PER_POLYGON
+from ...emission.expansion import expanded_faces
 from ...emission.light import Sources
 from ...errors import SceneError
 from ...growth.growth import trunks
@@ -27,17 +29,18 @@ from ...refinement.strays import Strays
 from ...species.catalogue import list_species, load_species
 from ...species.species import Species
 from ..assets.places import Places, read_places
+from ..preferences import wanted_threads
 from ..results.forms import form_of
 from ..results.hiding import originals_shown
 from ..results.leaf_objects import resolved_species
-from ..scene.ages import grown_species
+from ..scene.ages import kind_species
 from ..scene.explicit import Explicit, read_explicit
 from ..scene.lights import read_lights, read_sources, sky_suns
 from ..scene.looks import LayerLooks
 from ..scene.objects import read_occluders
-from ..scene.plants import NoPlantsError, read_plants_of
+from ..scene.plants import NoPlantsError, read_plants
 from ..scene.skeletons import plain_kind
-from ..settings import check_limits, season_of, wind_of
+from ..settings import check_limits, season_of, wind_of, years_of
 
 
 @dataclass(frozen=True)
@@ -127,7 +130,7 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
         explicit = read_explicit(depsgraph, view_layer)
         places = tuple(read_places(scene, depsgraph, view_layer))
         try:
-            seeds, owners, unknown = read_plants_of(scene, depsgraph, view_layer)
+            seeds, owners, unknown = read_plants(scene, depsgraph, view_layer)
         except NoPlantsError:
             if explicit is None and not places:
                 raise
@@ -164,7 +167,7 @@ def load_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bp
         return [load_species(min(list_species()))]
     # Each species is looked up once, of however many ages there are plants.
     plain = {kind: resolved_species(scene, kind, depsgraph) for kind in {plain_kind(kind) for kind in identifiers}}
-    return [grown_species(scene, kind, plain[plain_kind(kind)]) for kind in identifiers]
+    return [kind_species(plain[plain_kind(kind)], kind, years_of(scene)) for kind in identifiers]
 
 
 def in_year(scene: bpy.types.Scene, flora: Flora) -> Flora:
@@ -237,3 +240,43 @@ def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
     # Proxies that fill their tetrahedra are divided as long as they show; facets need no more than their visibility.
     proxy_block = emission.proxy_block if emission.facets else min(emission.proxy_block, 1e9)
     return replace(settings_from(scene), hidden_block=emission.hidden_block, proxy_block=proxy_block)
+
+
+def use_machine(scene: bpy.types.Scene) -> None:
+    """Let what follows work with as many threads, and processes with as much memory, as the artist wants."""
+    parallel.use(wanted_threads(scene))
+    pool.use(memory.limit(scene.tetflora.max_memory))
+
+
+def check_fits(what: str, polygons: float, left: float, remedy: str) -> None:
+    """Refuse what would make too many polygons.
+
+    Parameters
+    ----------
+    what : str
+        Begins the message.
+    polygons : float
+        At least.
+    left : float
+        Bytes, see `contents.memory_left`.
+    remedy : str
+        What to do, beside raising the limit.
+
+    Raises
+    ------
+    SceneError
+        Has the numbers, and says what to do.
+    """
+    if (needed := polygons * BYTES_PER_POLYGON) > left:
+        raise SceneError(
+            f"{what} would make more than {polygons / 1e6:,.1f} million polygons, which take "
+            f"{needed / memory.GIGABYTE:,.1f} GB with rendering; Max Memory leaves {left / memory.GIGABYTE:,.1f} GB. "
+            f"Raise Max Memory, {remedy}"
+        )
+
+
+def check_expanded(flora: Flora, seeds: Seeds, camera: Camera, left: float) -> None:
+    """Refuse to expand plants that would not fit, near a camera as finely as it sees them; as `check_fits`."""
+    for polygons in expanded_faces(flora, seeds, camera):
+        remedy = "turn Expand Everything off, use fewer plants, or move the camera away from them"
+        check_fits("Expand Everything", polygons, left, remedy)

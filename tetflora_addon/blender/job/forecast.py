@@ -23,7 +23,7 @@ from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
 from ...refinement.estimate import Estimate, Stand, estimate
-from ..attributes import read
+from ..attributes import read, values_of
 from ..runtime import Handlers
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
@@ -268,8 +268,7 @@ def _stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: ND
     attribute = points.attributes.get(name)
     if attribute is None or attribute.domain != 'POINT' or attribute.data_type not in {'FLOAT', 'INT'}:
         return None
-    values = np.zeros(len(attribute.data), np.float32 if attribute.data_type == 'FLOAT' else np.int32)
-    attribute.data.foreach_get("value", values)
+    values = values_of(attribute)
     return values[chosen] if len(values) > chosen[-1] else None
 
 

@@ -19,7 +19,7 @@ from ...camera.camera import Camera
 from ...camera.view_cells import Around, ViewCells, cell_camera
 from ...growth.crown_forms import farthest
 from ...species.species import Species
-from ..assets.measures import reach_of
+from ..assets.marks import reach_of
 from ..assets.parts import digest_of
 from ..compat import drawn_disc
 from ..materials.snow import has_snow
@@ -27,11 +27,11 @@ from ..results.hiding import hidden_originals, hide_originals, name_of, object_n
 from ..results.leaf_objects import brought_materials
 from ..results.output import REPLACED, remove_collection, result_collections
 from ..results.proxies import shade_again
-from ..scene.ages import grown_species
+from ..scene.ages import kind_species
 from ..scene.camera import read_camera
 from ..scene.skeletons import species_of
 from ..settings import season_of, wind_of, years_of
-from ..species.asset_species import TetFloraAssetSpecies, asset_species
+from ..species.asset_species import asset_species
 from ..species.edits import species_for
 from .contents import Given, load_for, read_scene, settings_from
 
@@ -110,8 +110,8 @@ def scene_digest(
         given.sources,
         explicit,
         [
-            (targets[one.target], _names(one.owners), one.matrices, one.keys, given.looks[one.owner])
-            for one in given.places
+            (targets[p.target], [o.name_full for o in p.owners], p.matrices, p.keys, given.looks[p.owner])
+            for p in given.places
         ],
         choices(scene),
         [_digest_of_species(one) for one in species],
@@ -121,24 +121,16 @@ def scene_digest(
     return content.hexdigest()
 
 
-def _names(objects: Sequence[bpy.types.Object]) -> list[str]:
-    return [obj.name_full for obj in objects]
-
-
 def choices(scene: bpy.types.Scene) -> list:
     """Settings of a scene in its digest, without any object; cheap enough for every change."""
     group = scene.tetflora
     materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
     chosen = [getattr(group, name) for name in _CHOICES]
-    assets = [(identifier, _asset_name(one), one.variants) for identifier, one in asset_species(scene).items()]
+    assets = [(k, (a.object or a.collection).name_full, a.variants) for k, a in asset_species(scene).items()]
     # Snow follows its number by itself, once it is there.
     season = season_of(scene)
     moment = wind_of(scene), season and replace(season, snow=float(has_snow(scene))), years_of(scene)
     return [settings_from(scene), chosen, materials, assets, *moment, drawn_disc(scene.render.engine)]
-
-
-def _asset_name(entry: TetFloraAssetSpecies) -> str:
-    return (entry.object or entry.collection).name_full
 
 
 def _digest_of_species(species: Species) -> str:
@@ -192,7 +184,7 @@ def _around(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: Given
     """Spheres around meshes and assets, and around plants with all branches on the way to the last twig."""
     seeds, meshes = given.seeds, None if given.explicit is None else given.explicit.meshes
     # Lengths are in metres for trunks, and in those of their parents for all others.
-    grown = [grown_species(scene, kind, species_for(scene, species_of(kind))) for kind in seeds.identifiers]
+    grown = [kind_species(species_for(scene, species_of(kind)), kind, years_of(scene)) for kind in seeds.identifiers]
     orders = [species.orders for species in grown]
     heights = np.array([np.cumprod([order.length.mean for order in own]).sum() for own in orders])
     centres, radii = [seeds.position], [heights[seeds.species] * seeds.scale * farthest(seeds.crown)]

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -28,8 +28,7 @@ from ..scene.ages import classed
 from ..scene.own_ages import stored_ages
 from ..scene.skeletons import kind_of
 from ..worker import call_in_thread
-from .contents import compile_for, expected_polygons, in_year, memory_left
-from .limits import check_fits
+from .contents import check_fits, compile_for, expected_polygons, in_year, memory_left
 
 _UPRIGHT = np.eye(3)
 
@@ -46,22 +45,8 @@ def single_seed(identifier: str, seed: int, frame: NDArray[np.float64] = _UPRIGH
     )
 
 
-@dataclass(frozen=True)
-class Part:
-    """Polygons of a plant with the same materials.
-
-    Attributes
-    ----------
-    kind : str
-        ``'bark'``, ``'leaf'`` or ``'blossom'``.
-    form : int
-        Which of the species' forms of leaf.
-    buffers : MeshBuffers
-    """
-
-    kind: str
-    form: int
-    buffers: MeshBuffers
+#: Polygons of a plant with the same materials: ``'bark'``, ``'leaf'`` or ``'blossom'``; form of leaf; buffers.
+Part = tuple[str, int, MeshBuffers]
 
 
 def plant_parts(flora: Flora, seeds: Seeds) -> list[Part]:
@@ -72,7 +57,7 @@ def plant_parts(flora: Flora, seeds: Seeds) -> list[Part]:
         found.setdefault((block.kind, block.form), []).append(block.buffers)
     joined = [(*what, concatenate_buffers(buffers)) for what, buffers in sorted(found.items())]
     # Row vectors times the frame are rotated back.
-    return [Part(kind, form, replace(b, positions=b.positions @ frame)) for kind, form, b in joined if b is not None]
+    return [(kind, form, replace(b, positions=b.positions @ frame)) for kind, form, b in joined if b is not None]
 
 
 def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[Part]) -> bpy.types.Mesh:
@@ -81,17 +66,16 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
     Wood is shaded smooth, leaves flat. The scene's leaf objects and output settings count.
     """
     numbered, materials = [], []
-    for part in parts:
-        buffers = part.buffers
+    for kind, form, buffers in parts:
         _, index = buffers.attributes.get("material_index", ("", np.zeros(buffers.polygons, dtype=np.int32)))
         attributes = {**buffers.attributes, "material_index": ("FACE", index + np.int32(len(materials)))}
         numbered.append(replace(buffers, attributes=attributes, smooth=True))
-        materials += materials_of(scene, species, part.kind, part.form)
+        materials += materials_of(scene, species, kind, form)
     whole = concatenate_buffers(numbered)
     if whole is None:
         raise SceneError(f'A plant of "{species.name}" has no branches or leaves; edit the species')
     mesh = write_mesh(name, whole, materials)
-    sharp = np.repeat([not p.buffers.smooth for p in parts], [p.buffers.polygons for p in parts])
+    sharp = np.repeat([not b.smooth for *_, b in parts], [b.polygons for *_, b in parts])
     if sharp.any():
         write(mesh, "sharp_face", sharp, 'FACE')
     return mesh
@@ -108,8 +92,6 @@ def make_plant_mesh_steps(
     ----------
     scene : bpy.types.Scene
         With edited species and leaf objects.
-    depsgraph : bpy.types.Depsgraph
-    plants : iterable of bpy.types.Object
 
     Returns
     -------

@@ -3,28 +3,37 @@
 """From a scene of plants and meshes to results, in steps that can be shown, stopped and undone.
 
 The engine works in a thread beside Blender's (`worker`); only reading and writing datablocks happens here.
+
+While Blender takes one block of polygons over, the engine makes the next in its thread. Instances of assets are
+originals where they are whole, and meshes of clusters where some of them are near.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import groupby
+from typing import TypeVar
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import memory
+from ...assets.kites import kite_mesh
+from ...buffers import MeshBuffers, concatenate_buffers
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
-from ...emission.asset_plan import plan_of
+from ...emission.asset_plan import AssetPlan, plan_of
 from ...emission.asset_sight import AssetSight
 from ...emission.budget import afford
 from ...emission.drawing import drawing
-from ...emission.forms import EmissionForm, Refined
-from ...emission.plants import Transition, expanded_blocks
-from ...emission.polygons import polygon_blocks
+from ...emission.forms import Refined
+from ...emission.plants import Block, Transition, expanded_blocks
+from ...emission.polygons import PolygonBlock, polygon_blocks
 from ...jobs import Progress, mapped
 from ...processes import pool
 from ...proxies.facet_weights import facet_weights, measuring, unmeasured
@@ -33,29 +42,297 @@ from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
 from ...refinement.settings import FIRST_LOOK, RefinementSettings
 from ...refinement.statistics import Statistics, Stopwatch
+from ..assets.parts import Target
+from ..assets.places import Places
 from ..compat import drawn_disc
 from ..main_thread import in_main_thread
+from ..materials.materials import baked_material
 from ..results.collection import Results
-from ..results.forms import form_of
-from ..results.hiding import hide_originals, remove_results
-from ..results.leaf_objects import leaf_objects
+from ..results.forms import ProxyForm, form_of
+from ..results.hiding import hide_originals, originals_shown, remove_results
+from ..results.instances import add_cluster, add_cluster_instances, add_instances, add_stand_in, carrier_of
+from ..results.leaf_objects import leaf_objects, material_steps
+from ..results.meshes import AssetMeshes, cluster_mesh_steps, mesh_steps, read_mesh
 from ..results.output import adopt_materials, release_materials, result_collections
 from ..results.proxies import Baking, write_proxies
 from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..scene.skeletons import look_of
-from ..worker import at_once, call_in_thread, nobody_waits, steps_in_thread
-from .asset_writing import bake_light, write_assets, write_blocks, write_plain, write_polygons
+from ..worker import at_once, call_in_thread, in_thread, nobody_waits, steps_in_thread
 from .assets import Bound, asset_warnings, bind_steps, is_plain
-from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
-from .limits import check_expanded, use_machine
+from .contents import (
+    Given,
+    check_expanded,
+    compile_for,
+    in_wind,
+    load_for,
+    memory_left,
+    read_scene,
+    refinement_settings,
+    use_machine,
+)
 
+#: Clusters of which meshes are made between two looks at the window.
+_AT_ONCE = 16
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_FRACTION = 0.6
-
 #: Polygons, were all plants expanded, from which on other processes are started at once.
 _MANY = 1e6
+
+_Block = TypeVar("_Block")
+
+
+@dataclass
+class _Run:
+    """One refinement: what it reads, what it has made of that, and where results go.
+
+    The camera and the contents are None until they are read; ``beside`` are earlier results that stay, ``originals``
+    objects whose place results take.
+    """
+
+    depsgraph: bpy.types.Depsgraph
+    camera: Camera | None = None
+    given: Given | None = None
+    data: JobData | None = None
+    results: Results | None = None
+    beside: Sequence[bpy.types.Collection] = ()
+    flora: Flora | None = None
+    bound: Bound | None = None
+    settings: RefinementSettings | None = None
+    originals: list[bpy.types.Object] = field(default_factory=list)
+    statistics: Statistics = field(default_factory=Statistics)
+    clock: Stopwatch = field(default_factory=Stopwatch)
+    form: ProxyForm | None = None
+    baking: Baking | None = None
+
+
+def left_alone(bound: Bound, plan: AssetPlan) -> NDArray[np.bool_]:
+    """Owners (k,) of which every instance is the original: they go on showing them themselves."""
+    whole = np.zeros(len(bound.placed), bool)
+    whole[plan.whole] = True
+    number = np.bincount(bound.owner, ~whole, len(bound.owners))
+    return (number == 0) & np.array([_scatters(owner) for owner in bound.owners], bool)
+
+
+def _scatters(owner: bpy.types.Object | None) -> bool:
+    """Whether an object shows its instances itself; plants do not."""
+    return owner is not None and not owner.tetflora.is_plant and not owner.tetflora.is_field
+
+
+def _write_plain(run: _Run) -> None:
+    """Write instances of plants as originals; objects that scatter go on showing theirs themselves."""
+    shown: dict[Target, list[Places]] = {}
+    for one in run.given.places:
+        run.statistics.instances_whole += len(one)
+        if not _scatters(one.owner):
+            shown.setdefault(one.target, []).append(one)
+    for number, (target, every) in enumerate(shown.items()):
+        matrices, keys = (np.concatenate([getattr(one, name) for one in every]) for name in ("matrices", "keys"))
+        source = target.datablock or carrier_of(run.results, target)
+        add_instances(run.results, f"{target.name} {number:03d}", source, matrices, _ids(keys))
+
+
+def _ids(keys: NDArray[np.uint64]) -> NDArray[np.int32]:
+    return (keys >> np.uint64(33)).astype(np.int32)
+
+
+def write_assets(run: _Run, plan: AssetPlan) -> Generator[Progress, None, None]:
+    """Write what a plan draws as instances."""
+    results, bound, statistics = run.results, run.bound, run.statistics
+    alone = left_alone(bound, plan)
+    asset, owner = bound.placed.instances.asset, bound.owner
+    ids = _ids(bound.placed.instances.key)
+    progress = Progress(0.94, "Placing instances")
+    yield progress
+    whole = plan.whole[~alone[owner[plan.whole]]]
+    for number, (target, shown, rows) in enumerate(_groups(bound, asset[whole], owner[whole])):
+        at = whole[rows]
+        source = target.datablock or carrier_of(results, target)
+        add_instances(results, f"{target.name} {number:03d}", source, bound.matrices[at], ids[at], shown)
+        yield progress
+    statistics.instances_whole = len(whole) + int(alone[owner[plan.whole]].sum())
+    for own, make in ((plan.meshes, _clusters), (plan.kites, _kites)):
+        for target in range(len(bound.targets)):
+            rows = np.flatnonzero(asset[own.instance] == target)
+            if len(rows):
+                cluster = own.cluster[rows] - bound.placed.assets.root[target]
+                yield from _write_clusters(run, target, cluster, own.instance[rows], ids, make is _kites, make)
+    for number, shown in enumerate(bound.owners):
+        if _scatters(shown) and not alone[number]:
+            run.originals.append(shown)
+            with originals_shown(results.scene, run.depsgraph):
+                add_stand_in(results, f"{shown.name} {number:03d}", shown, run.depsgraph)
+
+
+def _groups(
+    bound: Bound, asset: NDArray[np.int32], owner: NDArray[np.int32]
+) -> Iterator[tuple[Target, bpy.types.Object | None, NDArray[np.int64]]]:
+    """Rows (k,) of the same asset and the same owner each."""
+    for pair in np.unique(asset.astype(np.int64) * len(bound.owners) + owner).tolist():
+        target, shown = divmod(pair, len(bound.owners))
+        yield bound.targets[target], bound.owners[shown], np.flatnonzero((asset == target) & (owner == shown))
+
+
+Maker = Callable[[int, str], Generator[None, None, tuple[bpy.types.Mesh, int]]]
+
+
+def _clusters(run: _Run, target: int) -> Maker:
+    """What makes meshes of clusters of their own faces, with the number of these."""
+    with originals_shown(run.results.scene, run.depsgraph):
+        meshes = read_meshes(run.bound.targets[target], run.depsgraph)
+    asset = run.bound.placed.assets.every[target]
+
+    def make(cluster: int, name: str) -> Generator[None, None, tuple[bpy.types.Mesh, int]]:
+        part, face = asset.faces_of(cluster)
+        return (yield from cluster_mesh_steps(meshes, name, part, face)), len(face)
+
+    return make
+
+
+def _kites(run: _Run, target: int) -> Maker:
+    """What makes meshes of kites for the leaves of clusters."""
+    material = run.form.asset_material()
+    run.results.use([material])
+    asset = run.bound.placed.assets.every[target]
+
+    def make(cluster: int, name: str) -> Generator[None, None, tuple[bpy.types.Mesh, int]]:
+        buffers = kite_mesh(asset.leaves_of(cluster))
+        return (yield from mesh_steps(name, buffers, [material])), buffers.polygons
+
+    return make
+
+
+def _write_clusters(
+    run: _Run,
+    target: int,
+    cluster: NDArray[np.int64],
+    instance: NDArray[np.int32],
+    ids: NDArray[np.int32],
+    kites: bool,
+    maker: Callable[[_Run, int], Maker],
+) -> Generator[Progress, None, None]:
+    """Meshes of the clusters of one asset, each once, and instances of them."""
+    results, bound, make = run.results, run.bound, maker(run, target)
+    name = bound.targets[target].name + (" kites" if kites else "")
+    progress = Progress(0.94, f'Making clusters of "{name}"')
+    yield progress
+    like = bound.targets[target].datablock
+    like = like if isinstance(like, bpy.types.Object) else None
+    used, pick = np.unique(cluster, return_inverse=True)
+    objects = []
+    for number, one in enumerate(used.tolist()):
+        mesh, faces = yield from progress.during(make(one, f"{name} {number:06d}"))
+        objects.append(add_cluster(results, name, number, mesh, like))
+        if kites:
+            run.statistics.polygons_proxy += faces
+        else:
+            run.statistics.polygons_meshed += faces
+        if number % _AT_ONCE == 0:
+            yield progress
+    shown = bound.owner[instance]
+    for number, who in enumerate(np.unique(shown).tolist()):
+        rows = np.flatnonzero(shown == who)
+        at = instance[rows]
+        places = pick[rows].astype(np.int32), bound.matrices[at], ids[at]
+        add_cluster_instances(results, f"{name} clusters {number:03d}", objects, *places, bound.owners[who])
+    run.statistics.instances_clusters += len(cluster)
+
+
+def read_meshes(target: Target, depsgraph: bpy.types.Depsgraph) -> AssetMeshes:
+    """All surfaces of an asset, numbered as those of its `AssetSource`."""
+    surfaces, numbers, matrices = [], [], []
+    for part in target.parts(depsgraph)[0]:
+        with part.opened(depsgraph) as opened:
+            if opened is not None:
+                numbers += [len(surfaces)] * len(part.matrices)
+                surfaces.append(read_mesh(*opened))
+                matrices.append(part.matrices)
+    return AssetMeshes(surfaces, np.array(numbers, np.int32), np.concatenate(matrices))
+
+
+def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Generator[Progress, None, None]:
+    """Write blocks of plants; progress goes from a given fraction to .95, and the statistics count."""
+    materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
+
+    def write(block: Block) -> Generator[None, None, Progress]:
+        species, what = run.flora.species[block.species], (block.species, block.kind, block.form)
+        if what not in materials:
+            if run.baking is not None and run.baking.leaves:
+                materials[what] = [baked_material()]
+            else:
+                materials[what] = yield from material_steps(run.results.scene, species, block.kind, block.form)
+        name = f"{species.name} {block.kind} {block.number:03d}"
+        yield
+        look = run.results.look_of(block.species)
+        obj = yield from run.results.add(name, block.kind, block.buffers, materials[what], species, look)
+        _made(run, obj, block.buffers, lit=True)
+        text = f"Making polygons: {run.statistics.polygons_meshed:,}"
+        return Progress(start + (0.95 - start) * block.fraction, text)
+
+    yield from _written(_of_all_ages(run, blocks), write, Progress(start, "Making polygons"))
+
+
+def _of_all_ages(run: _Run, blocks: Iterator[Block]) -> Iterator[Block]:
+    """Blocks of which those of one species and look at several ages are one mesh: each object costs a renderer time."""
+    first: dict[tuple[str, str], int] = {}
+    named = [(one.identifier, run.results.look_of(n)) for n, one in enumerate(run.flora.species)]
+    same = [first.setdefault(named[n], n) if one.form is None else n for n, one in enumerate(run.flora.species)]
+    if same == list(range(len(same))):
+        yield from blocks
+        return
+    for _, run_of in groupby(blocks, key=lambda block: block.number):
+        parts: dict[tuple[int, str, int], list[Block]] = {}
+        for block in run_of:
+            parts.setdefault((same[block.species], block.kind, block.form), []).append(block)
+        for some in parts.values():
+            yield replace(some[-1], buffers=concatenate_buffers([block.buffers for block in some]))
+
+
+def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Generator[Progress, None, None]:
+    """Write polygons of meshes that take part, with their own materials; the statistics count."""
+    explicit = run.given.explicit
+
+    def write(block: PolygonBlock) -> Generator[None, None, Progress]:
+        surface, materials = explicit.meshes.surfaces[block.surface], explicit.materials[block.surface]
+        name = f"{surface.name} {block.number:03d}"
+        obj = yield from run.results.add(name, "explicit", block.buffers, materials, look=surface.look)
+        _made(run, obj, block.buffers, lit=False)
+        return Progress(0.95, f"Keeping polygons: {run.statistics.polygons_meshed:,}")
+
+    yield from _written(blocks, write, Progress(0.95, "Keeping polygons"))
+
+
+def _written(
+    blocks: Iterator[_Block], write: Callable[[_Block], Generator[None, None, Progress]], progress: Progress
+) -> Generator[Progress, None, None]:
+    """Write blocks one by one, while the next is computed."""
+    with closing(in_thread(blocks, ahead=1)) as made:
+        for block in made:
+            if block is not None:
+                progress = yield from progress.during(write(block))
+            yield progress.again if block is None else progress
+
+
+def _made(run: _Run, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> None:
+    if run.baking is not None:
+        run.baking.add(obj, buffers, lit)
+    run.statistics.polygons_meshed += buffers.polygons
+    run.statistics.memory_mb += buffers.nbytes / 1e6
+
+
+def _bake_light(baking: Baking, refined: Refined) -> Generator[Progress, None, None]:
+    """Compute the light of everything, and write that of meshes."""
+    if refined.facet_pixels is not None:
+        facets = (Progress(0.9, f"Baking light: {count:,} facets") for count in baking.add_facets(refined))
+        yield from steps_in_thread(facets, Progress(0.9, "Baking light"))
+    shadows = (Progress(0.9 + 0.03 * done, f"Baking light: {done:.0%} of the shadows") for done in baking.look(refined))
+    yield from steps_in_thread(shadows, Progress(0.9, "Baking light"))
+    progress = Progress(0.93, "Baking light")
+    for done in baking.light_meshes():
+        if done is not None:
+            progress = Progress(0.93 + 0.02 * done, f"Baking light: {done:.0%} of the leaves")
+        yield progress.again if done is None else progress
 
 
 def refine_steps(
@@ -77,7 +354,6 @@ def refine_steps(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph
         Evaluated for the frame.
     view_layer : bpy.types.ViewLayer, optional
@@ -108,121 +384,104 @@ def refine_steps(
     data.add_objects(taking_part(scene))
     data.add_objects(leaf_objects(scene).values())
     results = Results(scene, 'RENDER' if for_render else 'VIEW', mark, data)
-    return guarded(data, _refine_steps(data, results, depsgraph, layer, beside, camera, given, first_look))
+    run = _Run(depsgraph, camera, given, data, results, beside)
+    return guarded(data, _refine_steps(run, layer, first_look))
 
 
 def _refine_steps(
-    data: JobData,
-    results: Results,
-    depsgraph: bpy.types.Depsgraph,
-    layer: bpy.types.ViewLayer,
-    beside: Sequence[bpy.types.Collection],
-    camera: Camera | None,
-    given: Given | None,
-    first_look: bool,
+    run: _Run, layer: bpy.types.ViewLayer, first_look: bool
 ) -> Generator[Progress, bool | None, Statistics]:
-    clock, scene = Stopwatch(), results.scene
+    results, depsgraph, clock, statistics = run.results, run.depsgraph, run.clock, run.statistics
+    scene = results.scene
     use_machine(scene)
     yield Progress(0.0, "Reading the scene")
-    if camera is None or given is None:
+    if run.camera is None or run.given is None:
         depsgraph.update()  # reading what was deleted since the last step would crash Blender
-    if camera is None:
-        camera = read_camera(scene, depsgraph, region_only=results.purpose == 'RENDER')
-    if given is None:
-        given = read_scene(scene, depsgraph, layer)
+    camera = run.camera or read_camera(scene, depsgraph, region_only=results.purpose == 'RENDER')
+    given = run.given or read_scene(scene, depsgraph, layer)
     camera = camera.local()
     if scene.tetflora.expand_everything:  # for no camera: exports, and others' renderers
         camera = camera.counted_from(origin_near(given.seeds.position))
-    given = given.counted_from(camera.origin)
+    run.camera, run.given = camera, given.counted_from(camera.origin)
+    given = run.given
     results.origin, results.owners = camera.origin, given.looks
     results.looks = [look_of(kind) for kind in given.species]
     clock.lap("read")
     progress = Progress(0.02, "Compiling species")
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
-    flora = in_wind(scene, flora, camera, given.seeds.motion is not None)
+    flora = run.flora = in_wind(scene, flora, camera, given.seeds.motion is not None)
     clock.lap("compile")
     full = yield from call_in_thread(progress, given.polygons_full, flora)
     if full > _MANY:
         pool.start()
-    statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds, unknown=given.unknown)
-    refined = not scene.tetflora.expand_everything
+    statistics.plants, statistics.polygons_full, statistics.unknown = len(given.seeds), full, given.unknown
     statistics.instances = sum(len(one) for one in given.places)
+    refined = not scene.tetflora.expand_everything
     asset_warnings.clear()
-    bound, left = None, memory_left(scene, camera)
+    left = memory_left(scene, camera)
     if not refined:
         yield from call_in_thread(progress, check_expanded, flora, given.seeds, camera, left)
     plain = not refined or is_plain(scene, given.places, depsgraph, left)
     if not plain:
-        bound = yield from bind_steps(scene, given.places, depsgraph, camera, left)
+        run.bound = yield from bind_steps(scene, given.places, depsgraph, camera, left)
         clock.lap("compile")
-    if bound is not None:
-        statistics.polygons_full += bound.faces
-        full += bound.faces
+    if run.bound is not None:
+        statistics.polygons_full += run.bound.faces
     # Explicit objects stay visible themselves where everything is expanded.
-    originals = given.explicit.originals if given.explicit is not None and refined else []
+    run.originals = [*given.explicit.originals] if given.explicit is not None and refined else []
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)
-    if first_look and refined and full > _MANY and not nobody_waits():
-        yield from _first_look(data, results, flora, given, bound, depsgraph, camera, beside, originals)
+    if first_look and refined and statistics.polygons_full > _MANY and not nobody_waits():
+        yield from _first_look(run)
         clock.lap("first look")
     try:
         if not refined:
             in_main_thread(results.open)
-            yield from write_blocks(results, flora, expanded_blocks(flora, given.seeds, camera), statistics, 0.05)
+            yield from _write_blocks(run, expanded_blocks(flora, given.seeds, camera), 0.05)
         elif plain and not given.others:
             in_main_thread(results.open)  # instances alone, best left as they are
         else:
-            settings = refinement_settings(scene)
-            work = _write_refined(results, flora, given, bound, depsgraph, camera, statistics, clock, settings)
-            originals = [*originals, *(yield from work)]
+            run.settings = refinement_settings(scene)
+            yield from _write_refined(run)
         if plain:
-            in_main_thread(partial(write_plain, results, given.places, statistics))
+            in_main_thread(partial(_write_plain, run))
         clock.lap("emit")
-        data.check()
+        run.data.check()
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C
         in_main_thread(results.discard)
         raise
-    in_main_thread(partial(_replace, results, beside, originals))
+    in_main_thread(partial(_replace, run))
     memory.give_back()
     statistics.seconds = dict(clock.seconds)
     scene.tetflora.statistics = json.dumps(statistics.as_dict())
     return statistics
 
 
-def _first_look(
-    data: JobData,
-    results: Results,
-    flora: Flora,
-    given: Given,
-    bound: Bound | None,
-    depsgraph: bpy.types.Depsgraph,
-    camera: Camera,
-    beside: Sequence[bpy.types.Collection],
-    originals: Sequence[bpy.types.Object],
-) -> Generator[Progress, bool | None, None]:
+def _first_look(run: _Run) -> Generator[Progress, bool | None, None]:
     """A coarse result in place of earlier ones, without baked light."""
-    first = Results(results.scene, results.purpose, "", data)
-    first.origin, first.owners, first.looks = results.origin, results.owners, results.looks
-    given = replace(given, sources=None)
-    settings, camera = refinement_settings(results.scene).first_look(), camera.smaller(FIRST_LOOK)
+    whole = run.results
+    results = Results(whole.scene, whole.purpose, "", run.data)
+    results.origin, results.owners, results.looks = whole.origin, whole.owners, whole.looks
+    settings, camera = refinement_settings(whole.scene).first_look(), run.camera.smaller(FIRST_LOOK)
+    first = replace(run, results=results, given=replace(run.given, sources=None), settings=settings, camera=camera)
+    first.originals, first.statistics, first.clock = [*run.originals], Statistics(), Stopwatch()
     try:
-        work = _write_refined(first, flora, given, bound, depsgraph, camera, Statistics(), Stopwatch(), settings)
-        more = yield from mapped(work, lambda p: Progress(0.02 + 0.03 * p.fraction, "First look", p.waiting))
-        originals = [*originals, *more]
-        data.check()
+        yield from mapped(_write_refined(first), lambda p: Progress(0.02 + 0.03 * p.fraction, "First look", p.waiting))
+        run.data.check()
     except BaseException:
-        in_main_thread(first.discard)
+        in_main_thread(results.discard)
         raise
-    in_main_thread(partial(_replace, first, beside, originals))
-    data.forget(first.collection)
+    in_main_thread(partial(_replace, first))
+    run.data.forget(results.collection)
 
 
-def _replace(results: Results, beside: Sequence[bpy.types.Collection], originals: Sequence[bpy.types.Object]) -> None:
+def _replace(run: _Run) -> None:
     """Let new results take the place of earlier ones and of what they show."""
-    remove_results(results.scene, results.purpose, keep=(results.collection, *beside))
+    results = run.results
+    remove_results(results.scene, results.purpose, keep=(results.collection, *run.beside))
     release_materials()
-    hide_originals(results.scene, results.purpose, originals)
+    hide_originals(results.scene, results.purpose, run.originals)
     results.finish()
 
 
@@ -245,7 +504,8 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     given = read_scene(scene, depsgraph, depsgraph.view_layer).counted_from(camera.origin)
     flora = in_wind(scene, compile_for(given.species, scene, depsgraph), camera)
     bound = at_once(bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera)))
-    return camera, at_once(_run_loop(flora, given, bound, camera, refinement_settings(scene), Statistics()))
+    settings = refinement_settings(scene)
+    return camera, at_once(_run_loop(_Run(depsgraph, camera, given, flora=flora, bound=bound, settings=settings)))
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
@@ -267,47 +527,31 @@ def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
     return removed
 
 
-def _run_loop(
-    flora: Flora,
-    given: Given,
-    bound: Bound | None,
-    camera: Camera,
-    settings: RefinementSettings,
-    statistics: Statistics,
-) -> Generator[Progress, bool | None, Refinement]:
+def _run_loop(run: _Run) -> Generator[Progress, bool | None, Refinement]:
     """Refine; the statistics get a step for each pass."""
-    placed = None if bound is None else bound.placed
-    passes = loop.refine(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights, placed)
-    fraction, enough = 0.05, None
-    while True:
-        try:
-            state, last = passes.send(enough), False
-        except StopIteration as stop:
-            state, last = stop.value, True
-        statistics.steps.append(step_of(state))
-        if last:
-            return state
+    given, placed = run.given, None if run.bound is None else run.bound.placed
+    others = given.occluders, given.polygons, given.lights, placed
+    fraction = 0.05
+
+    def told(state: Refinement) -> Progress:
+        nonlocal fraction
+        run.statistics.steps.append(step_of(state))
         waiting = int((state.decision == Decision.SPLIT).sum())
         fraction += 0.15 * (_LOOP_FRACTION - fraction)  # the number of passes is unknown
-        enough = yield Progress(
+        return Progress(
             fraction, f"Refining, pass {state.passes}: {state.tree.tetrahedra_made:,} tetrahedra, {waiting:,} to split"
         )
 
+    state = yield from mapped(loop.refine(run.flora, given.seeds, run.camera, run.settings, *others), told)
+    run.statistics.steps.append(step_of(state))
+    return state
 
-def _refined(
-    flora: Flora,
-    given: Given,
-    bound: Bound | None,
-    camera: Camera,
-    settings: RefinementSettings,
-    form: EmissionForm,
-    disc: float,
-    baked: bool,
-    statistics: Statistics,
-    clock: Stopwatch,
-) -> Generator[Progress, bool | None, Refined]:
+
+def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, Refined]:
     """Refine, and find out what the proxies depend on."""
-    refinement = yield from _run_loop(flora, given, bound, camera, settings, statistics)
+    flora, given, bound, camera, statistics = run.flora, run.given, run.bound, run.camera, run.statistics
+    form = run.form.emission
+    refinement = yield from _run_loop(run)
     yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
     assets = None if bound is None else (AssetSight(refinement, camera, form.facets), bound.keeping)
     if form.facets and unmeasured(flora):
@@ -315,8 +559,8 @@ def _refined(
         for name, done in measuring(flora, range(len(flora.species))):
             yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
         yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
-    detail = afford(refinement, camera, settings, form.faces, form.primitive_bytes, assets)
-    clock.lap("refine")
+    detail = afford(refinement, camera, run.settings, form.faces, form.primitive_bytes, assets)
+    run.clock.lap("refine")
     _count(statistics, detail.refinement)
     statistics.strays = given.named(refinement.strays)
     planned = None
@@ -328,7 +572,7 @@ def _refined(
         return Refined(flora, refinement, camera, tolerance=detail.tolerance, assets=planned)
     transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
     # Light is baked for facets, whatever is made of them then.
-    becomes = None if baked else form.form(camera, disc)
+    becomes = None if run.baking is not None else form.form(camera, disc)
     sizes, weights = detail.pixels, facet_weights(flora)
     with_all = drawing(
         flora,
@@ -341,49 +585,34 @@ def _refined(
         given.occluders,
         becomes,
         detail.most,
-        settings.shadow_cutoff,
+        run.settings.shadow_cutoff,
     )
     looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner] if bound else np.zeros(0, str)
     return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc, looks)
 
 
-def _write_refined(
-    results: Results,
-    flora: Flora,
-    given: Given,
-    bound: Bound | None,
-    depsgraph: bpy.types.Depsgraph,
-    camera: Camera,
-    statistics: Statistics,
-    clock: Stopwatch,
-    settings: RefinementSettings,
-) -> Generator[Progress, bool | None, list[bpy.types.Object]]:
-    """Refine, and make meshes, instances and proxies; returns objects that scatter what has taken part."""
-    scene, form = results.scene, form_of(results.scene)
-    left = memory_left(scene, camera)
+def _write_refined(run: _Run) -> Generator[Progress, bool | None, None]:
+    """Refine, and make meshes, instances and proxies; objects that scatter what has taken part are replaced as well."""
+    scene, given = run.results.scene, run.given
+    run.form, left = form_of(scene), memory_left(scene, run.camera)
     # What the process holds already and what the image takes count too.
-    settings = replace(settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
-    disc = drawn_disc(scene.render.engine)
-    baked = given.sources is not None
-    work = _refined(flora, given, bound, camera, settings, form.emission, disc, baked, statistics, clock)
-    refined = yield from steps_in_thread(work, Progress(0.05, "Refining, pass 1"))
-    in_main_thread(results.open)
-    baking = None
+    run.settings = replace(run.settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
     if given.sources is not None:
-        baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-    yield from write_blocks(results, flora, refined.mesh_blocks(), statistics, _LOOP_FRACTION, baking)
+        run.baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
+    work = _refined(run, drawn_disc(scene.render.engine))
+    refined = yield from steps_in_thread(work, Progress(0.05, "Refining, pass 1"))
+    in_main_thread(run.results.open)
+    yield from _write_blocks(run, refined.mesh_blocks(), _LOOP_FRACTION)
     if given.explicit is not None:
-        blocks = polygon_blocks(refined.refinement, camera, None if refined.pixels is None else refined.pixels.seen)
-        yield from write_polygons(results, given.explicit, blocks, statistics, baking)
-    hidden = []
+        pixels = None if refined.pixels is None else refined.pixels.seen
+        yield from _write_polygons(run, polygon_blocks(refined.refinement, run.camera, pixels))
     if refined.assets is not None:
-        hidden = yield from write_assets(results, form, bound, refined.assets[1], depsgraph, statistics)
-    if baking is not None:
-        clock.lap("emit")
-        yield from bake_light(baking, refined)
-        clock.lap("light")
-    yield from write_proxies(results, form, refined, statistics, baking)
-    return hidden
+        yield from write_assets(run, refined.assets[1])
+    if run.baking is not None:
+        run.clock.lap("emit")
+        yield from _bake_light(run.baking, refined)
+        run.clock.lap("light")
+    yield from write_proxies(run.results, run.form, refined, run.statistics, run.baking)
 
 
 def _count(statistics: Statistics, refinement: Refinement) -> None:

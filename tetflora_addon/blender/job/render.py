@@ -95,13 +95,17 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
             make = partial(_make, scene)
             with looked_at_once():
                 if window_draws():
-                    _warn_of_unlocked(scene)
+                    name = (with_uid(bpy.data.scenes, _rendering.outer) or scene).name
+                    about = "is off, so the window stands still while frames are refined"
+                    _warn(f'Lock Interface of the scene "{name}" {about}', "lock")
                     in_main_thread(make)
                 else:
                     make()
             made = True
-        elif not scene.tetflora.refine_at_render and has_plants(scene) and not _has_meshes(scene):
-            _warn_of_nothing()
+        elif not scene.tetflora.refine_at_render and has_plants(scene):
+            nothing = all(KIND not in obj for obj in scene.objects)
+            if nothing and _warn("nothing is refined and Refine at Render is off, so the render shows no plants", ""):
+                nothing_refined.notify()
     except NoPlantsError:
         pass  # the artist has disabled or hidden all of them
     except TetFloraError as error:
@@ -259,21 +263,6 @@ def _show_hidden() -> None:
 
 def _there(uids: list[int]) -> list[bpy.types.Collection]:
     return [found for uid in uids if (found := with_uid(bpy.data.collections, uid)) is not None]
-
-
-def _has_meshes(scene: bpy.types.Scene) -> bool:
-    """Whether a scene has plants as meshes: results, or meshes that were results."""
-    return any(KIND in obj for obj in scene.objects)
-
-
-def _warn_of_nothing() -> None:
-    if _warn("nothing is refined and Refine at Render is off, so the render shows no plants", ""):
-        nothing_refined.notify()
-
-
-def _warn_of_unlocked(scene: bpy.types.Scene) -> None:
-    name = (with_uid(bpy.data.scenes, _rendering.outer) or scene).name
-    _warn(f'Lock Interface of the scene "{name}" is off, so the window stands still while frames are refined', "lock")
 
 
 def _warn(text: str, about: str) -> bool:

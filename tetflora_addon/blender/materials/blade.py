@@ -17,7 +17,7 @@ from typing import Any
 import bpy
 
 from ...light.scattering import GLOSS, THROUGH_TINT
-from .nodes import LEAF_GREEN, Graph, find_socket, shader_group, smooth_step
+from .nodes import LEAF_GREEN, Graph, Term, node_group
 
 # Raise this when nodes or numbers change; `blade_version` then makes new materials as well.
 _VERSION = 2
@@ -53,8 +53,6 @@ _SWELL = 0.05
 _DEAD, _DEAD_THROUGH = (0.12, 0.062, 0.022, 1.0), (0.07, 0.028, 0.006, 1.0)
 #: Digits of a leaf's color: far enough apart for leaves of nearly the same color, and robust against rounding.
 _DIGITS = (1187.0, 2039.0, 3121.0)
-
-Socket = Any  # or None, where there is nothing
 
 
 @dataclass(frozen=True)
@@ -145,7 +143,7 @@ def blade_group(kind: str) -> bpy.types.NodeTree:
     outputs = (("Reflected", 'Color'), ("Through", 'Color'), ("Gloss", 'Float'), ("Roughness", 'Float'))
     outputs = (*outputs, ("Normal", 'Vector'))
     name = f"TetFlora {kind.capitalize()} Leaf Blade"
-    return shader_group(name, _VERSION, inputs, outputs, lambda graph, given: _built(graph, given, blade))
+    return node_group(name, _VERSION, inputs, outputs, lambda graph, given: _built(graph, given, blade))
 
 
 def blade_version(kind: str) -> int:
@@ -153,147 +151,120 @@ def blade_version(kind: str) -> int:
     return 100 * _VERSION + list(BLADES).index(kind)
 
 
-def _built(graph: Graph, given: Any, blade: BladeLook) -> dict[str, Any]:
+def _built(graph: Graph, given: dict[str, Term], blade: BladeLook) -> dict[str, Any]:
     """What the group's outputs are linked to, by name."""
     place = graph.attribute("UVMap", "Vector")
     own = graph.math('FRACT', graph.vector('DOT_PRODUCT', graph.attribute("tf_colour", "Vector"), _DIGITS))
-    moved = graph.vector('ADD', place, graph.vector('SCALE', (17.0, 29.0, 0.0), own))
-    geometry = graph.node("ShaderNodeNewGeometry").outputs
-    side = graph.math('MULTIPLY_ADD', geometry["Backfacing"], 2.0, -1.0)  # -1 above, 1 below
+    moved = place + (17.0, 29.0, 0.0) * own
+    geometry = graph.outputs("ShaderNodeNewGeometry")
+    side = geometry["Backfacing"] * 2.0 + -1.0  # -1 above, 1 below
     noise = _noise(graph, moved, 7.0, 2.0)
-    mottled = graph.math('MULTIPLY_ADD', graph.math('SUBTRACT', noise, 0.5), given["Mottling"], 1.0)
+    mottled = (noise - 0.5) * given["Mottling"] + 1.0
     tone, glow, height = _venation(graph, given, blade, place)
 
     back, through = (_varied(graph, mottled, *line) for line in ((tone, _VEIN_HUE), (glow, _THROUGH_HUE)))
-    back = graph.vector('MULTIPLY', back, paler(graph, graph.math('MULTIPLY', side, given["Paler Underside"])))
-    through = graph.vector('MULTIPLY', through, tuple(THROUGH_TINT.tolist()))
-    back, through = (graph.tinted(given["Colour"], colour) for colour in (back, through))
+    back = back * paler(side * given["Paler Underside"])
+    back, through = (graph.tinted(given["Colour"], colour) for colour in (back, through * tuple(THROUGH_TINT.tolist())))
     if blade.wear:
         dead = _dead(graph, given, place, own, noise)
-        back, through = (_mixed(graph, dead, *pair) for pair in ((back, _DEAD), (through, _DEAD_THROUGH)))
+        back, through = (graph.mixed(dead, *pair) for pair in ((back, _DEAD), (through, _DEAD_THROUGH)))
 
     return {
         "Reflected": back,
         "Through": through,
         "Gloss": sheen(graph, side, given["Gloss"]),
-        "Roughness": graph.math('MULTIPLY_ADD', geometry["Backfacing"], HAIRY, given["Roughness"]),
+        "Roughness": geometry["Backfacing"] * HAIRY + given["Roughness"],
         "Normal": _relief(graph, given, moved, height, side) if blade.relief else geometry["Normal"],
     }
 
 
-def paler(graph: Graph, side: Socket) -> Socket:
+def paler(side: Term) -> Term:
     """Factors on what a side of leaves reflects: -1 is the upper one, 1 the underside, 0 the mean of both."""
-    return graph.vector('ADD', graph.vector('SCALE', PALER, side), (1.0, 1.0, 1.0))
+    return PALER * side + (1.0, 1.0, 1.0)
 
 
-def sheen(graph: Graph, side: Socket, gloss: Any) -> Socket:
+def sheen(graph: Graph, side: Term, gloss: Term) -> Term:
     """What a side of leaves mirrors as they are seen, from what leaves mirror on the mean."""
-    facing = graph.node("ShaderNodeLayerWeight", {"Blend": 0.5}).outputs["Facing"]
-    grazing = graph.math('MULTIPLY_ADD', graph.math('POWER', facing, 5.0), _GRAZING, _FACING)
-    of_side = graph.math('MULTIPLY', graph.math('MULTIPLY_ADD', side, -GLOSSIER, 1.0), gloss)
-    return graph.math('MULTIPLY', of_side, grazing)
+    facing = graph.outputs("ShaderNodeLayerWeight", {"Blend": 0.5})["Facing"]
+    return (side * -GLOSSIER + 1.0) * gloss * (facing**5.0 * _GRAZING + _FACING)
 
 
 def _venation(
-    graph: Graph, given: Any, blade: BladeLook, place: Socket
-) -> tuple[Socket | None, Socket | None, Socket | None]:
+    graph: Graph, given: dict[str, Term], blade: BladeLook, place: Term
+) -> tuple[Term | None, Term | None, Term | None]:
     """Tone of the lines in reflected and in passing light, 0 on average, and the height of the blade, from 0 to 1.
 
     None where the blade has no veins.
     """
     if not blade.veins:
         return None, None, None
-    uv = graph.node("ShaderNodeSeparateXYZ", {"Vector": place}).outputs
-    across, along = graph.math('SUBTRACT', uv["X"], 0.5), uv["Y"]
-    aside = graph.math('ABSOLUTE', across)
+    u, v, _ = graph.parts(place)
+    across, along = u - 0.5, v
+    aside = abs(across)
     if not blade.angle:
-        wave = graph.math('PINGPONG', graph.math('MULTIPLY', aside, given["Veins"]), 0.5)
-        start = aside
+        wave = graph.math('PINGPONG', aside * given["Veins"], 0.5)
     else:
         if blade.palmate:
             aside, along = _nearest_rib(graph, aside, along)
         # Veins leave at an angle, bend towards the tip, and alternate from left to right.
-        slope = graph.math('MULTIPLY_ADD', aside, -_BEND, -1.0 / tan(radians(blade.angle)))
-        start = graph.math('MULTIPLY_ADD', aside, slope, along)
-        turn = graph.math('MULTIPLY', graph.math('GREATER_THAN', across, 0.0), 0.5)
-        wave = graph.math('PINGPONG', graph.math('MULTIPLY_ADD', start, given["Veins"], turn), 0.5)
-    vein = graph.math('SUBTRACT', smooth_step(graph, wave, 0.1, 0.02), _VEIN_MEAN)
-    lines = graph.math('MULTIPLY', vein, given["Vein Lines"])
-    glow = graph.math('MULTIPLY', vein, given["Dark Against Light"])
+        start = aside * (aside * -_BEND + -1.0 / tan(radians(blade.angle))) + along
+        wave = graph.math('PINGPONG', start * given["Veins"] + (across > 0.0) * 0.5, 0.5)
+    vein = graph.step(wave, 0.1, 0.02) - _VEIN_MEAN
+    lines, glow = vein * given["Vein Lines"], vein * given["Dark Against Light"]
     # 4 w (1 - w) is a dome between two veins, of height 1.
-    dome = graph.math('MULTIPLY', wave, graph.math('MULTIPLY_ADD', wave, -4.0, 4.0))
+    dome = wave * (wave * -4.0 + 4.0)
     if blade.midrib:
-        taper = graph.math('DIVIDE', aside, graph.math('MAXIMUM', graph.math('SUBTRACT', 1.15, along), 0.15))
-        rib = smooth_step(graph, taper, _RIB[1], _RIB[0])
+        taper = aside / graph.math('MAXIMUM', 1.15 - along, 0.15)
         # The halo is wider than the rib and as much less dark as that is light, so that the mean stays.
-        halo = smooth_step(graph, taper, _HALO[1], _HALO[0])
-        rib = graph.math('MULTIPLY_ADD', halo, -sum(_RIB) / sum(_HALO), rib)
-        lines = graph.math('MULTIPLY_ADD', rib, given["Midrib"], lines)
-        glow = graph.math('MULTIPLY_ADD', graph.math('MULTIPLY', rib, 1.5), given["Dark Against Light"], glow)
-    glow = graph.math('MULTIPLY', glow, -1.0)
+        halo = graph.step(taper, _HALO[1], _HALO[0])
+        rib = halo * (-sum(_RIB) / sum(_HALO)) + graph.step(taper, _RIB[1], _RIB[0])
+        lines = rib * given["Midrib"] + lines
+        glow = rib * 1.5 * given["Dark Against Light"] + glow
+    glow = -glow
     if blade.net:
-        cells = {"Vector": place, "Scale": graph.math('MULTIPLY', given["Veins"], _NET), "Randomness": 0.9}
-        edge = graph.node("ShaderNodeTexVoronoi", cells, feature='DISTANCE_TO_EDGE', voronoi_dimensions='2D')
-        net = graph.math('SUBTRACT', smooth_step(graph, edge.outputs["Distance"], 0.12, 0.02), _NET_MEAN)
-        net = graph.math('MULTIPLY', net, given["Vein Lines"])
-        lines, glow = (graph.math('MULTIPLY_ADD', net, by, tone) for by, tone in ((0.35, lines), (0.5, glow)))
-    blade_only = graph.math('GREATER_THAN', uv["Y"], 0.0)  # petioles lie below 0 in the UV map
-    lines, glow = (graph.math('MULTIPLY', tone, blade_only) for tone in (lines, glow))
-    return lines, glow, dome
+        cells = {"Vector": place, "Scale": given["Veins"] * _NET, "Randomness": 0.9}
+        edge = graph.outputs("ShaderNodeTexVoronoi", cells, feature='DISTANCE_TO_EDGE', voronoi_dimensions='2D')
+        net = (graph.step(edge["Distance"], 0.12, 0.02) - _NET_MEAN) * given["Vein Lines"]
+        lines, glow = net * 0.35 + lines, net * 0.5 + glow
+    blade_only = v > 0.0  # petioles lie below 0 in the UV map
+    return lines * blade_only, glow * blade_only, dome
 
 
-def _nearest_rib(graph: Graph, aside: Socket, along: Socket) -> tuple[Socket, Socket]:
+def _nearest_rib(graph: Graph, aside: Term, along: Term) -> tuple[Term, Term]:
     """Places across and along the nearest of five main veins that leave the base at angles of 0, 44 and 88 degrees."""
-    place = graph.node("ShaderNodeCombineXYZ", {"X": aside, "Y": along}).outputs["Vector"]
+    place = graph.xyz(aside, along)
     half = radians(_PALM / 2)
     # Mirrored at the line halfway between two ribs, as often as there are others: no angles, which cost twice as much.
     across = (cos(half), -sin(half), 0.0)
     for last in (False, True):
         beyond = graph.math('MAXIMUM', graph.vector('DOT_PRODUCT', place, across), 0.0)
-        away = graph.vector('SCALE', tuple(-2.0 * value for value in across), beyond)
-        place = graph.vector('ADD', place, away)
-        if not last:
-            place = graph.vector('ABSOLUTE', place)
-    folded = graph.node("ShaderNodeSeparateXYZ", {"Vector": place}).outputs
-    return graph.math('ABSOLUTE', folded["X"]), folded["Y"]
+        place = place + tuple(-2.0 * value for value in across) * beyond
+        place = place if last else abs(place)
+    u, v, _ = graph.parts(place)
+    return abs(u), v
 
 
-def _varied(graph: Graph, mottled: Socket, tone: Socket, hue: tuple[float, float, float]) -> Socket:
+def _varied(graph: Graph, mottled: Term, tone: Term | None, hue: tuple[float, float, float]) -> Term:
     """Factors on colours: mottling, and a tone times a hue."""
-    grey = graph.node("ShaderNodeCombineXYZ", {"X": mottled, "Y": mottled, "Z": mottled})
-    return grey if tone is None else graph.vector('ADD', grey, graph.vector('SCALE', hue, tone))
+    grey = graph.xyz(mottled, mottled, mottled)
+    return grey if tone is None else grey + hue * tone
 
 
-def _dead(graph: Graph, given: Any, place: Socket, own: Socket, noise: Socket) -> Socket:
+def _dead(graph: Graph, given: dict[str, Term], place: Term, own: Term, noise: Term) -> Term:
     """Share of dead tissue: none on most leaves; on a few the tip, the ends of lobes, and spots."""
-    worn = graph.math('SUBTRACT', own, graph.math('SUBTRACT', 1.0, given["Wear"]))
-    worn = graph.math('DIVIDE', worn, graph.math('MAXIMUM', given["Wear"], 1e-3))
-    away = graph.vector('DISTANCE', place, (0.5, 0.4, 0.0))
-    field = graph.math('MULTIPLY_ADD', noise, 0.7, away)
-    rim = graph.math('MULTIPLY_ADD', worn, 0.18, field)
-    spot = graph.math('MULTIPLY_ADD', noise, 1.6, -0.2)
-    edge = smooth_step(graph, graph.math('MAXIMUM', rim, spot), 0.93, 1.0)
-    return graph.math('MULTIPLY', edge, smooth_step(graph, worn, 0.0, 0.05))
+    worn = (own - (1.0 - given["Wear"])) / graph.math('MAXIMUM', given["Wear"], 1e-3)
+    rim = worn * 0.18 + (noise * 0.7 + graph.vector('DISTANCE', place, (0.5, 0.4, 0.0)))
+    edge = graph.step(graph.math('MAXIMUM', rim, noise * 1.6 + -0.2), 0.93, 1.0)
+    return edge * graph.step(worn, 0.0, 0.05)
 
 
-def _mixed(graph: Graph, factor: Socket, first: Socket, second: Any) -> Socket:
-    """Mix two colours."""
-    inputs = {"Factor_Float": factor, "A_Color": first, "B_Color": second}
-    return find_socket(graph.node("ShaderNodeMix", inputs, data_type='RGBA').outputs, "Result_Color")
-
-
-def _relief(graph: Graph, given: Any, place: Socket, dome: Socket, side: Socket) -> Socket:
+def _relief(graph: Graph, given: dict[str, Term], place: Term, dome: Term | None, side: Term) -> bpy.types.Node:
     """Normal of a blade that swells between its veins and undulates; a groove above is a ridge below."""
-    swell = _noise(graph, place, 2.2, 0.0)
-    height = graph.math('MULTIPLY', swell, _SWELL)
+    height = _noise(graph, place, 2.2, 0.0) * _SWELL
     if dome is not None:
-        deep = graph.math('DIVIDE', given["Relief"], graph.math('MAXIMUM', given["Veins"], 1.0))
-        height = graph.math('MULTIPLY_ADD', dome, deep, height)
-    height = graph.math('MULTIPLY', height, graph.math('MULTIPLY', side, -1.0))
-    return graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": given["Leaf Length"], "Height": height})
+        height = dome * (given["Relief"] / graph.math('MAXIMUM', given["Veins"], 1.0)) + height
+    return graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": given["Leaf Length"], "Height": height * -side})
 
 
-def _noise(graph: Graph, place: Socket, scale: float, detail: float) -> Socket:
-    """Noise over the leaf from 0 to 1, .5 on average."""
-    inputs = {"Vector": place, "Scale": scale, "Detail": detail, "Roughness": 0.6}
-    return find_socket(graph.node("ShaderNodeTexNoise", inputs, noise_dimensions='2D').outputs, "Fac")
+def _noise(graph: Graph, place: Term, scale: float, detail: float) -> Term:
+    return graph.noise(place, detail, 0.6, scale, noise_dimensions='2D')[0]

@@ -2,17 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What each face of a mesh looks like from afar: colour, transmission and coverage, sampled from its materials.
 
-A triangle is divided into smaller ones of equal size, as many as it covers texels (`look_points`). In the middle of
-each, shaders and nodes are evaluated (`surface_shaders`, `node_values`), and images are means over a piece as large as
-it (`image_pyramids`). Triangles with the same texture coordinates, as those of a leaf that was copied thousands of
-times, are evaluated once.
-
-Where on the triangles of a mesh a material is evaluated, and how many points that takes.
+A triangle is divided into smaller ones of equal size, as many as it covers texels. In the middle of each, shaders and
+nodes are evaluated (`node_values`), and images are means over a piece as large as it (`Pyramid`). Triangles with the
+same texture coordinates, as those of a leaf that was copied thousands of times, are evaluated once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -21,17 +18,189 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...growth.hashing import mix
-from ..attributes import read, values_of
+from ..attributes import image_pixels, linear_rgb, read, values_of
 from ..compat import tree_in_use
-from .colour_maths import Values, luminance
-from .image_pyramids import Pyramid, Pyramids
-from .node_values import ImageMissing, NodeValues
+from .node_values import ImageMissing, NodeValues, Scattered, Values, luminance, source_of
 from .nodes import active_output, find_socket, upstream
-from .surface_shaders import SurfaceShaders
+
+#: Columns or rows of the finest copy that is kept; finer ones say nothing about whole faces of a plant.
+MOST_TEXELS = 2048
+#: Pixels that are worked on at once, so that they stay in the processor's cache.
+_PIXELS = 1 << 16
+#: Bytes of pyramids that are kept for the next material.
+_MOST_BYTES = 512 << 20
+
+
+@dataclass(frozen=True)
+class Pyramid:
+    """Copies of an image, each half as wide as the one before.
+
+    Attributes
+    ----------
+    texels : (n,) uint64
+        Of all copies; each is four float16: linear RGB times alpha, and alpha.
+    start, columns, rows : (l,) int32
+        First texel, and size, of each copy.
+    width, height : (l,) float32
+        Texels that the whole image would be wide and high in each copy; of sizes that are no power of two, the last
+        texels stick out.
+    """
+
+    texels: NDArray[np.uint64]
+    start: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    width: NDArray[np.float32]
+    height: NDArray[np.float32]
+
+    @property
+    def side(self) -> float:
+        """Texels across in the finest copy: the root of their number."""
+        return float(np.sqrt(self.width[0] * self.height[0]))
+
+    @property
+    def levels(self) -> int:
+        """Number of copies l."""
+        return len(self.start)
+
+    def look(
+        self, u: NDArray[np.float32], v: NDArray[np.float32], size: NDArray[np.float32], extension: str
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Mean colours (3, p, k) and alpha (p, k) around some points.
+
+        Parameters
+        ----------
+        u, v : (p, k) or (1, 1) float32
+        size : (1, k) float32
+            Side of the square that counts, in units of the image.
+        extension : {'REPEAT', 'EXTEND', 'CLIP', 'MIRROR'}
+        """
+        with np.errstate(divide="ignore"):
+            # Of long images the short side counts: more noise, but nothing from beside the square.
+            level = np.floor(np.log2(size * min(self.width[0], self.height[0])))
+        level = np.clip(np.nan_to_num(level), 0, self.levels - 1).astype(np.int32)
+        outside = None
+        if extension == 'CLIP':
+            outside = (u < 0) | (u > 1) | (v < 0) | (v > 1)
+        x, x0, x1 = _columns(u, self.width[level], self.columns[level], extension)
+        y, y0, y1 = _columns(v, self.height[level], self.rows[level], extension)
+        first, stride = self.start[level], self.columns[level]
+        low, high = first + y0 * stride, first + y1 * stride
+        found = self._texels(low + x0) * ((1 - x) * (1 - y))[..., None]
+        found += self._texels(low + x1) * (x * (1 - y))[..., None]
+        found += self._texels(high + x0) * ((1 - x) * y)[..., None]
+        found += self._texels(high + x1) * (x * y)[..., None]
+        if outside is not None:
+            found[outside] = 0
+        colour, alpha = np.ascontiguousarray(np.moveaxis(found[..., :3], -1, 0)), found[..., 3].copy()
+        return colour / np.maximum(alpha, 1e-6), alpha
+
+    def _texels(self, index: NDArray[np.int32]) -> NDArray[np.float32]:
+        return np.take(self.texels, index).view(np.float16).reshape(*index.shape, 4).astype(np.float32)
+
+
+def _columns(
+    u: NDArray[np.float32], width: NDArray[np.float32], columns: NDArray[np.int32], extension: str
+) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
+    """Of one axis: where between two texels, and both of these."""
+    if extension == 'REPEAT':
+        u = u - np.floor(u)
+    elif extension == 'MIRROR':
+        u = 1 - np.abs(1 - (u - 2 * np.floor(u * np.float32(0.5))))
+    else:
+        u = np.clip(u, 0, 1)
+    x = u * width - np.float32(0.5)
+    whole = np.floor(x)
+    x -= whole
+    first = whole.astype(np.int32)
+    second = first + 1
+    if extension == 'REPEAT':
+        first = np.where(first < 0, columns - 1, np.minimum(first, columns - 1))
+        return x, first, np.where(second >= columns, 0, second)
+    return x, np.clip(first, 0, columns - 1), np.clip(second, 0, columns - 1)
+
+
+def pyramid_of(image: bpy.types.Image, weighted: bool, most: int = MOST_TEXELS) -> Pyramid | None:
+    """The pyramid of an image; None if it has no pixels.
+
+    Parameters
+    ----------
+    weighted : bool
+        Whether its alpha counts: coarser copies then have the colour of what is not transparent.
+    most : int
+        If less than `MOST_TEXELS`, only about as many columns or rows are looked at.
+    """
+    if not (all(image.size) and image.channels):
+        return None
+    pixels = image_pixels(image)
+    if most < MOST_TEXELS:
+        # An odd step, so that a power of two of columns does not make a few of them stand for all.
+        step = max(1, max(image.size) // most) | 1
+        pixels = pixels[::step, ::step]
+    height, width = pixels.shape[:2]
+    halvings = max(0, int(np.ceil(np.log2(max(width, height) / MOST_TEXELS))))
+    levels = [_finest(image, pixels, weighted, halvings)]
+    widths = [np.array([width, height], np.float32) / (1 << halvings)]
+    while max(levels[-1].shape[:2]) > 1:
+        levels.append(_halved(levels[-1]))
+        widths.append(widths[-1] / 2)
+    sizes = [level.shape[0] * level.shape[1] for level in levels]
+    texels = np.concatenate([level.astype(np.float16).reshape(-1, 4) for level in levels])
+    return Pyramid(
+        texels=texels.view(np.uint64).reshape(-1),
+        start=np.cumsum([0, *sizes[:-1]]).astype(np.int32),
+        columns=np.array([level.shape[1] for level in levels], np.int32),
+        rows=np.array([level.shape[0] for level in levels], np.int32),
+        width=np.array(widths, np.float32)[:, 0],
+        height=np.array(widths, np.float32)[:, 1],
+    )
+
+
+def _finest(image: bpy.types.Image, pixels: NDArray[np.float32], weighted: bool, halvings: int) -> NDArray[np.float16]:
+    """The finest copy that is kept (h, w, 4): linear RGB times alpha, and alpha."""
+    height, width, channels = pixels.shape
+    # Eight bits have 256 values: a table is ten times as fast as a power.
+    table = None if image.is_float else linear_rgb(image, np.linspace(0, 1, 256, dtype=np.float32)[:, None])[:, 0]
+    table = None if table is None else table.astype(np.float32)
+    has_alpha = channels == 4 and image.alpha_mode != 'NONE'
+    # Pixels of floating point images are multiplied by their alpha already.
+    associated = image.is_float and image.alpha_mode != 'CHANNEL_PACKED'
+    step = max(1 << halvings, _PIXELS // width >> halvings << halvings)
+    found = np.zeros((-(-height // (1 << halvings)), -(-width // (1 << halvings)), 4), np.float16)
+    for row in range(0, height, step):
+        block = pixels[row : row + step]
+        alpha = np.clip(block[..., 3:], 0, 1) if has_alpha else None
+        if table is None:
+            out = np.ones((*block.shape[:2], 4), np.float32)
+            out[..., :3] = np.clip(linear_rgb(image, block), 0, 60_000)
+        else:
+            block = np.broadcast_to(block[..., :1], (*block.shape[:2], 4)) if channels < 3 else block
+            out = np.take(table, (block * np.float32(255) + np.float32(0.5)).astype(np.uint8))
+            out = np.concatenate([out, np.ones_like(out[..., :1])], axis=2) if channels == 3 else out
+        if has_alpha and associated:
+            out /= np.maximum(alpha, 1e-6)
+        if has_alpha and weighted:
+            out *= alpha
+            out[..., 3:] = alpha
+        else:
+            out[..., 3] = 1
+        for _ in range(halvings):
+            out = _halved(out)
+        start = row >> halvings
+        found[start : start + len(out)] = np.minimum(out, np.float32(60_000))
+    return found
+
+
+def _halved(level: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Half as many columns and rows; the last ones count twice where their number is odd."""
+    height, width = level.shape[:2]
+    level = np.pad(level, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge") if height % 2 or width % 2 else level
+    halves = level[0::2].astype(np.float32) + level[1::2]
+    return (halves[:, 0::2] + halves[:, 1::2]) * np.float32(0.25)
+
 
 #: What Blender shows where there is no material.
 GREY = (0.8, 0.8, 0.8)
-Shade = tuple[Values, Values, Values]
 
 #: Parts along an edge, at most; texels of the finest image along an edge of a part, about. Where steps, or several
 #: images, make the mean of what nodes get something else than the mean of what comes out, single texels are looked at.
@@ -39,14 +208,6 @@ _MOST_PARTS, _MOST_PARTS_UNEVEN = 32, 64
 _TEXELS, _TEXELS_UNEVEN = 8.0, 3.0
 #: Texture coordinates and colours that differ by less are the same.
 _SAME = 1.0 / (1 << 14)
-
-
-@dataclass
-class Known:
-    """What is kept from one material to the next: images and tables of ramps."""
-
-    pyramids: Pyramids = field(default_factory=Pyramids)
-    curves: dict[int, NDArray[np.float32]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -64,7 +225,7 @@ class MeshLayers:
 
 @dataclass
 class Plan:
-    """How one material is evaluated on one mesh.
+    """How one material is evaluated on one mesh; a point where everything has its mean, which notes what is asked for.
 
     Attributes
     ----------
@@ -72,12 +233,13 @@ class Plan:
         Of the material, for messages.
     problems : list of str
         For the artist.
+    viewport : (3,) float32
+        The material's colour in viewports, for images that are missing.
     constant : (5,) float32
         Cover, colour times cover, and the lightness of what goes through; of where all has its mean, if it varies.
-    shade : callable, optional
-        What its shaders do with light at some points: cover, colour times cover, lightness of what goes through;
-        None if it has none.
-    known : bool
+    surface : bpy.types.NodeSocket, optional
+        What its shaders lead to; None if it has none.
+    is_known : bool
         Whether its transmission is.
     maps, colours : list of str
         UV maps and other attributes that it depends on.
@@ -88,12 +250,16 @@ class Plan:
     """
 
     name: str
-    problems: list[str]
+    layers: MeshLayers
+    reader: FaceReader
+    viewport: NDArray[np.float32]
     constant: NDArray[np.float32]
-    shade: Callable[[NodeValues], Shade | None] | None = None
-    known: bool = True
+    problems: list[str] = field(default_factory=list)
+    surface: bpy.types.NodeSocket | None = None
+    is_known: bool = False
     maps: list[str] = field(default_factory=list)
     colours: list[str] = field(default_factory=list)
+    images: set[bpy.types.Image] = field(default_factory=set)
     texels: float = 1.0
     uneven: bool = False
 
@@ -102,20 +268,70 @@ class Plan:
         if problem not in self.problems:
             self.problems.append(problem)
 
+    def uv(self, name: str) -> tuple[Values, Values, Values]:
+        """Texture coordinates u and v, and the side (1, k) of what each place stands for; '' is the first map."""
+        name = self.layers.map_named(name)
+        if name and name not in self.maps:
+            self.maps.append(name)
+        return _ANYWHERE
+
+    def is_map(self, name: str) -> bool:
+        """Whether an attribute holds texture coordinates."""
+        return self.layers.types.get(name) == 'FLOAT2'
+
+    def attribute(self, name: str) -> Values:
+        """A colour attribute (4, p, k)."""
+        exists = name in self.layers.types
+        if exists and name not in self.colours:
+            self.colours.append(name)
+        mean = np.full(4, 0.5 if exists else 0.0, np.float32)
+        if (known := self.layers.means.get(name)) is not None:
+            mean[: len(known)] = known if len(known) > 1 else known[0]
+        return mean.reshape(4, 1, 1)
+
+    def pyramid(self, node: bpy.types.Node, scale: float) -> Pyramid:
+        """The image of a node, whose coordinates are stretched by a factor."""
+        image = node.image
+        if image is None:
+            raise ImageMissing(
+                f'An image of material "{self.name}" is missing; its viewport color stands for it. Choose an image in '
+                f'the node "{node.label or node.name}"'
+            )
+        pyramid = self.reader.pyramid(image, node.outputs["Alpha"].is_linked)
+        if pyramid is None:
+            raise ImageMissing(
+                f'The image "{image.name}" of material "{self.name}" cannot be read; the viewport color stands for it. '
+                "Find it with File > External Data > Find Missing Files"
+            )
+        if image.source == 'TILED':
+            self.tell(f'The image "{image.name}" of material "{self.name}" has several tiles; the first stands for all')
+        self.images.add(image)
+        self.texels = max(self.texels, pyramid.side * scale)
+        return pyramid
+
+    def mark_uneven(self) -> None:
+        """Note that the mean of what comes out is not what comes out for the mean."""
+        self.uneven = True
+
+    def unknown(self) -> None:
+        """Note that only a renderer knows what comes out of a node."""
+        self.tell(
+            f'Some nodes of material "{self.name}" are only known to a renderer; their middle value stands for them. '
+            "Bake them to an image to see their pattern from afar"
+        )
+
     @property
     def names(self) -> list[str]:
         """Attributes that it depends on; none where it is the same everywhere."""
         return [*self.maps, *(name for name in self.colours if name not in self.maps)]
 
-    def sampled(self, corners: dict[str, NDArray], layers: MeshLayers, known: Known, most: int) -> NDArray:
+    def sampled(self, corners: dict[str, NDArray], most: int) -> NDArray:
         """Means over some triangles (t, 5) float32, as `constant`.
 
         Parameters
         ----------
         corners : mapping of str to (t, 3, width) float32
             Of each attribute in `names`, at the corners of the triangles.
-        layers : MeshLayers
-        known : Known
         most : int
             Points of all distinct triangles, about.
         """
@@ -131,8 +347,8 @@ class Plan:
                 some = rows[start : start + step]
                 part = np.float32(0 if self.uneven else 1 / n)
                 sizes = {name: height[None, some] * part for name, (_, height) in extents.items()}
-                points = _Sampled(self, layers, known, {name: corners[name][some] for name in self.names}, sizes, n)
-                found[some] = _means_of(self.shade(NodeValues(points, known.curves)))
+                points = _Sampled(self, {name: corners[name][some] for name in self.names}, sizes, n)
+                found[some] = _means_of(NodeValues(points, self.reader.curves).shader(self.surface))
         return found[which]
 
     def _parts(self, lengths: list[NDArray[np.float32]], count: int, most: int) -> NDArray[np.int32]:
@@ -152,86 +368,25 @@ _ANYWHERE = _HALF, _HALF, np.full((1, 1), np.inf, np.float32)  # a point that st
 _BATCH = 1 << 15  # points that are evaluated at once, so that they stay in the processor's cache
 
 
-class _Probe:
-    """A point where everything has its mean; remembers what evaluating a material asks for."""
-
-    def __init__(self, plan: Plan, layers: MeshLayers, known: Known) -> None:
-        self._plan, self._layers, self._known = plan, layers, known
-        self.images: set[bpy.types.Image] = set()
-
-    def uv(self, name: str) -> tuple[Values, Values, Values]:
-        name = self._layers.map_named(name)
-        if name and name not in self._plan.maps:
-            self._plan.maps.append(name)
-        return _ANYWHERE
-
-    def is_map(self, name: str) -> bool:
-        return self._layers.types.get(name) == 'FLOAT2'
-
-    def attribute(self, name: str) -> Values:
-        exists = name in self._layers.types
-        if exists and name not in self._plan.colours:
-            self._plan.colours.append(name)
-        mean = np.full(4, 0.5 if exists else 0.0, np.float32)
-        if (known := self._layers.means.get(name)) is not None:
-            mean[: len(known)] = known if len(known) > 1 else known[0]
-        return mean.reshape(4, 1, 1)
-
-    def pyramid(self, node: bpy.types.Node, scale: float) -> Pyramid:
-        material, image = self._plan.name, node.image
-        if image is None:
-            raise ImageMissing(
-                f'An image of material "{material}" is missing; its viewport color stands for it. Choose an image in '
-                f'the node "{node.label or node.name}"'
-            )
-        pyramid = self._known.pyramids.of(image, node.outputs["Alpha"].is_linked)
-        if pyramid is None:
-            raise ImageMissing(
-                f'The image "{image.name}" of material "{material}" cannot be read; the viewport color stands for it. '
-                "Find it with File > External Data > Find Missing Files"
-            )
-        if image.source == 'TILED':
-            self._plan.tell(
-                f'The image "{image.name}" of material "{material}" has several tiles; the first stands for all'
-            )
-        self.images.add(image)
-        self._plan.texels = max(self._plan.texels, pyramid.side * scale)
-        return pyramid
-
-    def uneven(self) -> None:
-        self._plan.uneven = True
-
-    def unknown(self) -> None:
-        self._plan.tell(
-            f'Some nodes of material "{self._plan.name}" are only known to a renderer; their middle value stands for '
-            "them. Bake them to an image to see their pattern from afar"
-        )
-
-
-class _Sampled:
+class _Sampled(Plan):
     """Points (p, k) of k triangles: the middles of n × n parts of each."""
 
     def __init__(
         self,
         plan: Plan,
-        layers: MeshLayers,
-        known: Known,
         corners: dict[str, NDArray[np.float32]],
         sizes: dict[str, NDArray[np.float32]],
         n: int,
     ) -> None:
-        self._plan, self._layers, self._known = plan, layers, known
+        vars(self).update(vars(plan))
         self._corners, self._sizes, self._weights = corners, sizes, _middles(n)
 
     def uv(self, name: str) -> tuple[Values, Values, Values]:
-        name = self._layers.map_named(name)
+        name = self.layers.map_named(name)
         if not name:
             return _ANYWHERE
         u, v = (self._weights @ self._corners[name][:, :, i].T for i in range(2))
         return u, v, self._sizes[name]
-
-    def is_map(self, name: str) -> bool:
-        return self._layers.types.get(name) == 'FLOAT2'
 
     def attribute(self, name: str) -> Values:
         if name not in self._corners:
@@ -244,21 +399,8 @@ class _Sampled:
             parts.append(np.zeros_like(parts[0]))
         return np.stack([*parts[:3], parts[3] if len(parts) > 3 else np.ones_like(parts[0])])
 
-    def pyramid(self, node: bpy.types.Node, _scale: float) -> Pyramid:
-        pyramid = None
-        if node.image is not None:
-            pyramid = self._known.pyramids.of(node.image, node.outputs["Alpha"].is_linked)
-        if pyramid is None:
-            raise ImageMissing  # the probe has told about it
-        return pyramid
 
-    def uneven(self) -> None:
-        pass
-
-    unknown = uneven
-
-
-def _means_of(shade: Shade) -> NDArray[np.float32]:
+def _means_of(shade: Scattered) -> NDArray[np.float32]:
     """Means over the points of each triangle (k, 5); (1, 5) where all are the same."""
     parts = [part.mean(axis=0) for part in (shade[0], *shade[1], shade[2])]
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
@@ -314,52 +456,54 @@ _FEW_TEXELS = 512  # columns or rows of images of which only the mean counts
 _TINY = 1e-30  # added to areas, so that those of faces without any count alike
 
 
-@dataclass(frozen=True)
-class FaceLooks:
-    """Looks of all faces of a mesh.
-
-    Attributes
-    ----------
-    colour : (f, 3) float16
-        Linear, the mean over what is not transparent.
-    transmission : (f,) float16
-        Fraction of scattered light that leaves on the other side; NaN where nobody knows.
-    coverage : (f,) float16
-        Fraction that is not transparent.
-    roughness : (f,) float16
-        Of the gloss of each face's material.
-    """
-
-    colour: NDArray[np.float16]
-    transmission: NDArray[np.float16]
-    coverage: NDArray[np.float16]
-    roughness: NDArray[np.float16]
+#: Of all faces (f,) of a mesh: linear ``colour`` (f, 3), the mean over what is not transparent; ``transmission``, the
+#: fraction of scattered light that leaves on the other side, NaN where nobody knows; ``coverage``, the fraction that is
+#: not transparent; and ``roughness`` of the gloss.
+FaceLooks = dict[str, NDArray[np.float16]]
 
 
 class FaceReader:
     """Reads looks of faces; images and means of materials are kept from one mesh to the next.
 
+    Images are forgotten when they take too much memory.
+
+    Parameters
+    ----------
+    most : int
+        See `pyramid_of`.
+
     Attributes
     ----------
     warnings : list of str
         What the artist should know, each once.
+    curves : dict of int to ndarray
+        Tables of ramps, see `NodeValues`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST_TEXELS) -> None:
         self.warnings: list[str] = []
-        self.known = Known()
+        self.curves: dict[int, NDArray[np.float32]] = {}
+        self._most = most
+        self._pyramids: dict[tuple[bpy.types.Image, bool], Pyramid | None] = {}
+
+    def pyramid(self, image: bpy.types.Image, weighted: bool) -> Pyramid | None:
+        """The pyramid of an image, see `pyramid_of`."""
+        key = image, weighted
+        if key not in self._pyramids:
+            if sum(p.texels.nbytes for p in self._pyramids.values() if p is not None) > _MOST_BYTES:
+                self._pyramids.clear()
+            self._pyramids[key] = pyramid_of(image, weighted, self._most)
+        return self._pyramids[key]
 
     def prepare(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> MeshLooks:
         """Read all that the looks of a mesh follow from, so that it need not be there any more afterwards."""
-        made = MeshLooks(mesh, materials, self.known)
+        made = MeshLooks(mesh, materials, self)
         self.warn(problem for plan in made.plans for problem in plan.problems)
         return made
 
     def warn(self, problems: Iterable[str]) -> None:
         """Add those warnings that are new."""
-        for problem in problems:
-            if problem not in self.warnings:
-                self.warnings.append(problem)
+        self.warnings += [problem for problem in dict.fromkeys(problems) if problem not in self.warnings]
 
 
 class MeshLooks:
@@ -367,18 +511,17 @@ class MeshLooks:
 
     Attributes
     ----------
-    materials : list of bpy.types.Material or None
     plans : list of Plan
         One for each material.
     """
 
-    def __init__(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], known: Known) -> None:
+    def __init__(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], reader: FaceReader) -> None:
         maps = mesh.uv_layers
         first = next((layer.name for layer in maps if layer.active_render), maps[0].name if len(maps) else "")
         types = {a.name: a.data_type for a in mesh.attributes if a.domain in _DOMAINS and a.data_type in _TYPES}
-        self._known, self._layers = known, MeshLayers(first, types)
         self.materials = materials
-        self.plans = [_plan_of(material, self._layers, known) for material in materials]
+        layers = MeshLayers(first, types)
+        self.plans = [_plan_of(material, layers, reader) for material in materials]
         self._values: dict[str, tuple[str, NDArray]] = {}
         for name in {name for plan in self.plans for name in plan.names}:
             attribute = mesh.attributes[name]
@@ -405,7 +548,6 @@ class MeshLooks:
 
         Parameters
         ----------
-        faces : int
         positions : (v, 3) float32
         loops : (t, 3) int32
             Corners of each triangle.
@@ -413,7 +555,8 @@ class MeshLooks:
         face : (t,) int32
             Ascending.
         """
-        made = FaceLooks(np.zeros((faces, 3), np.float16), *(np.ones(faces, np.float16) for _ in range(3)))
+        made = {name: np.ones(faces, np.float16) for name in ("transmission", "coverage", "roughness")}
+        made["colour"] = np.zeros((faces, 3), np.float16)
         if not any(plan.names for plan in self.plans):
             constant = np.array([plan.constant for plan in self.plans])
             for low in range(0, faces, _TRIANGLES):
@@ -440,15 +583,15 @@ class MeshLooks:
     def _write(self, made: FaceLooks, faces: slice, values: NDArray[np.floating], slot: NDArray[np.int32]) -> None:
         """Means over what is not transparent, from those over whole faces (n, 5)."""
         plain = np.array([plan.constant[1:4] / max(plan.constant[0], _LEAST) for plan in self.plans], np.float32)
-        known = np.array([plan.known for plan in self.plans])
+        known = np.array([plan.is_known for plan in self.plans])
         cover, colour, through = values[:, 0], values[:, 1:4], values[:, 4]
         light = luminance(colour.T)
         passed = np.divide(through, light, out=np.zeros_like(light), where=light > 1e-6)
         colour = np.where((cover > _LEAST)[:, None], colour / np.maximum(cover, _LEAST)[:, None], plain[slot])
-        made.colour[faces] = np.clip(colour, 0, 1)
-        made.coverage[faces] = np.clip(cover, 0, 1)
-        made.roughness[faces] = np.array([roughness_of(material) for material in self.materials])[slot]
-        made.transmission[faces] = np.where(known[slot], np.clip(passed, 0, 1), np.nan)
+        made["colour"][faces] = np.clip(colour, 0, 1)
+        made["coverage"][faces] = np.clip(cover, 0, 1)
+        made["roughness"][faces] = np.array([roughness_of(material) for material in self.materials])[slot]
+        made["transmission"][faces] = np.where(known[slot], np.clip(passed, 0, 1), np.nan)
 
     def _triangles(
         self, loops: NDArray, verts: NDArray, face: NDArray[np.int32], slot: NDArray[np.int32], most: int
@@ -460,7 +603,7 @@ class MeshLooks:
             rows = slice(None) if len(self.plans) == 1 else np.flatnonzero(slot == number)
             if plan.names:
                 corners = {name: self._corners(name, loops[rows], verts[rows], face[rows]) for name in plan.names}
-                values[rows] = plan.sampled(corners, self._layers, self._known, most)
+                values[rows] = plan.sampled(corners, most)
         return values
 
     def _corners(self, name: str, loops: NDArray, verts: NDArray, face: NDArray) -> NDArray[np.float32]:
@@ -494,14 +637,13 @@ class Looks:
     """Reads means of whole materials; each image is read once, and only some of its pixels."""
 
     def __init__(self) -> None:
-        self._known = Known(Pyramids(_FEW_TEXELS))
+        self._reader = FaceReader(_FEW_TEXELS)
 
     def of(self, material: bpy.types.Material | None, attributes: dict[str, NDArray]) -> Look:
         """Look of a material.
 
         Parameters
         ----------
-        material : bpy.types.Material, optional
         attributes : mapping of str to (n, k) float32
             Of the mesh that wears it, for those that take their colour from one.
         """
@@ -509,25 +651,29 @@ class Looks:
             return Look()
         types = {name: 'FLOAT2' if values.shape[1] == 2 else 'FLOAT_VECTOR' for name, values in attributes.items()}
         means = {name: values.mean(axis=0, dtype=np.float64) for name, values in attributes.items()}
-        plan = _plan_of(material, MeshLayers("", types, means), self._known)
+        plan = _plan_of(material, MeshLayers("", types, means), self._reader)
         cover, *colour, through = plan.constant.astype(np.float64).tolist()
         colour = np.clip(np.array(colour) / max(cover, _LEAST), 0, 1)
         passed = np.clip(through / max(float(luminance(colour * cover)), 1e-6), 0, 1)
-        return Look(tuple(colour.tolist()), float(passed) if plan.known else np.nan, cover)
+        return Look(tuple(colour.tolist()), float(passed) if plan.is_known else np.nan, cover)
 
 
-def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, known: Known) -> Plan:
+def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, reader: FaceReader) -> Plan:
     """Evaluate a material once where everything has its mean, and note what that takes."""
-    if material is None:
-        return Plan("", [], np.array([1.0, *GREY, 0.0], np.float32))
-    plan = Plan(material.name, [], np.array([1.0, *np.clip(material.diffuse_color[:3], 0, 1), 0.0], np.float32))
-    plan.shade = SurfaceShaders(material, plan.tell).at
-    probe = _Probe(plan, layers, known)
-    found = plan.shade(NodeValues(probe, known.curves))
-    plan.known = found is not None
-    if found is not None:
-        plan.constant = _means_of(found)[0]
-        plan.uneven |= len(probe.images) > 1
+    seen = np.array(GREY if material is None else np.clip(material.diffuse_color[:3], 0, 1), np.float32)
+    name = "" if material is None else material.name
+    plan = Plan(name, layers, reader, seen, np.array([1.0, *seen, 0.0], np.float32), is_known=material is None)
+    output = None if material is None else active_output(tree_in_use(material), 'OUTPUT_MATERIAL')
+    surface = None if output is None else find_socket(output.inputs, "Surface")
+    if surface is not None and source_of(surface, ())[0] is None:
+        plan.tell(
+            f'Material "{name}" has no surface shader; its viewport color stands for it. Link a shader to the Surface '
+            "of its Material Output"
+        )
+    elif surface is not None:
+        plan.surface, plan.is_known = surface, True
+        plan.constant = _means_of(NodeValues(plan, reader.curves).shader(surface))[0]
+        plan.uneven |= len(plan.images) > 1
     return plan
 
 

@@ -18,7 +18,7 @@ from ..compat import disable_bump_correction
 from .bark import bark_group, bark_version, place_group
 from .blade import HAIRY, WAXY, blade_group, blade_version, paler, sheen
 from .microsphere import WHITE, scatter_group
-from .nodes import Graph, find_socket, surface_material
+from .nodes import Graph, Term, surface_material
 
 PROXY = "TetFlora proxy"
 SPHERE = "TetFlora microsphere"
@@ -53,7 +53,7 @@ def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> b
     def build(graph: Graph, material: bpy.types.Material) -> None:
         colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
         given = {name.replace("_", " ").title(): value for name, value in looks.items()}
-        blade = graph.node("ShaderNodeGroup", {"Colour": colour, **given}, node_tree=blade_group(kind)).outputs
+        blade = graph.outputs("ShaderNodeGroup", {"Colour": colour, **given}, node_tree=blade_group(kind))
         near = {
             "Colour": WHITE,
             "Transmission": transmission,
@@ -63,9 +63,9 @@ def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> b
             "Gloss Roughness": blade["Roughness"],
             "Normal": blade["Normal"],
         }
-        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+        normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
         plain = {"Colour": colour, "Transmission": transmission, "Normal": normal}
-        scattered = graph.node("ShaderNodeLightPath").outputs["Is Diffuse Ray"]
+        scattered = graph.outputs("ShaderNodeLightPath")["Is Diffuse Ray"]
         _lead_out(graph, graph.mix(scattered, _scattered(graph, near), _scattered(graph, plain)))
         disable_bump_correction(material)
 
@@ -94,13 +94,12 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
         colour = graph.attribute("tf_colour", "Color")
-        bark = graph.node("ShaderNodeGroup", {"Colour": colour}, node_tree=bark_group(character)).outputs
+        bark = graph.outputs("ShaderNodeGroup", {"Colour": colour}, node_tree=bark_group(character))
         dull = {"Transmission": 0.0, "Gloss": 0.0}
-        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+        normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
         young = _scattered(graph, {**dull, "Colour": colour, "Normal": normal})
         # Light that was scattered before meets the plain bark: nobody sees a pattern in it.
-        first = graph.math('SUBTRACT', 1.0, graph.node("ShaderNodeLightPath").outputs["Is Diffuse Ray"])
-        shown = graph.math('MULTIPLY', bark["Shown"], first)
+        shown = bark["Shown"] * (1.0 - graph.outputs("ShaderNodeLightPath")["Is Diffuse Ray"])
         for engine, tone in (('CYCLES', graph.scaled(bark["Colour"], bark["Gain"])), ('EEVEE', bark["Colour"])):
             old = _scattered(graph, {**dull, "Colour": tone, "Normal": bark["Normal"]})
             _lead_out(graph, graph.mix(shown, young, old), engine=engine)
@@ -132,20 +131,19 @@ def proxy_material(own: bool = False) -> bpy.types.Material:
     """
 
     def build(graph: Graph, _material: bpy.types.Material) -> None:
-        geometry = graph.node("ShaderNodeNewGeometry").outputs
+        geometry = graph.outputs("ShaderNodeNewGeometry")
         plain = _proxy_looks(graph, geometry["Normal"])
         if own:
             _lead_out(graph, _principled(graph))
             return
-        side = graph.math('MULTIPLY_ADD', geometry["Backfacing"], 2.0, -1.0)
-        leaf = graph.math('GREATER_THAN', plain["Transmission"], 0.0)
+        side = geometry["Backfacing"] * 2.0 + -1.0
         sides = {
             **plain,
-            "Reflected Tint": paler(graph, graph.math('MULTIPLY', side, leaf)),
+            "Reflected Tint": paler(side * (plain["Transmission"] > 0.0)),
             "Gloss": sheen(graph, side, plain["Gloss"]),
-            "Gloss Roughness": graph.math('MULTIPLY_ADD', geometry["Backfacing"], HAIRY, WAXY),
+            "Gloss Roughness": geometry["Backfacing"] * HAIRY + WAXY,
         }
-        scattered = graph.node("ShaderNodeLightPath").outputs["Is Diffuse Ray"]
+        scattered = graph.outputs("ShaderNodeLightPath")["Is Diffuse Ray"]
         _lead_out(graph, graph.mix(scattered, _scattered(graph, sides), _scattered(graph, plain)))
 
     return surface_material(ASSET_PROXY if own else PROXY, _PROXY_VERSION, build)
@@ -160,9 +158,9 @@ def sphere_material(own: bool = False) -> bpy.types.Material:
     """
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
-        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+        normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
         shader = _principled(graph) if own else _scattered(graph, _proxy_looks(graph, normal))
-        _lead_out(graph, shader, graph.math('MULTIPLY', graph.attribute("radius", "Fac"), 2.0))
+        _lead_out(graph, shader, graph.attribute("radius", "Fac") * 2.0)
         material.thickness_mode = 'SLAB'
 
     return surface_material(ASSET_SPHERE if own else SPHERE, _SPHERE_VERSION, build)
@@ -182,18 +180,11 @@ def baked_material() -> bpy.types.Material:
     """
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
-        geometry = graph.node("ShaderNodeNewGeometry").outputs
-        side = graph.node(
-            "ShaderNodeMix",
-            {
-                "Factor_Float": geometry["Backfacing"],
-                "A_Color": graph.attribute(FRONT, "Color"),
-                "B_Color": graph.attribute(BACK, "Color"),
-            },
-            data_type='RGBA',
-        )
-        seen = graph.node("ShaderNodeEmission", {"Color": find_socket(side.outputs, "Result_Color"), "Strength": 1.0})
-        camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
+        geometry = graph.outputs("ShaderNodeNewGeometry")
+        front, back = graph.attribute(FRONT, "Color"), graph.attribute(BACK, "Color")
+        side = graph.mixed(geometry["Backfacing"], front, back)
+        seen = graph.node("ShaderNodeEmission", {"Color": side, "Strength": 1.0})
+        camera = graph.outputs("ShaderNodeLightPath")["Is Camera Ray"]
         scattered = _scattered(graph, _proxy_looks(graph, geometry["Normal"]))
         _lead_out(graph, graph.mix(camera, scattered, seen))
         cycles = getattr(material, "cycles", None)  # there only while the Cycles add-on is enabled
@@ -206,11 +197,11 @@ def baked_material() -> bpy.types.Material:
 def _proxy_looks(graph: Graph, normal: Any) -> dict[str, Any]:
     """What proxies feed the scatter group with: gloss where light goes through, as in leaves."""
     colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
-    gloss = graph.math('MULTIPLY', graph.math('GREATER_THAN', transmission, 0.0), GLOSS)
+    gloss = (transmission > 0.0) * GLOSS
     return {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": normal}
 
 
-def _principled(graph: Graph) -> bpy.types.Node:
+def _principled(graph: Graph) -> Term:
     """What stands for the artist's materials: Fresnel's gloss, which is most of what leaves show against the light."""
     colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
     front = graph.node(

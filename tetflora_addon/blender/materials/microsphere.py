@@ -4,18 +4,24 @@
 
 The cloud has no thickness: whoever uses the group decides what is transparent. It returns exactly as much light as it
 takes from uniform surroundings, whatever the renderer samples: lamps, a constant world, an image of the sky, surfaces.
+
+Shells are proxy tetrahedra drawn as such a cloud of constant density (paper, section 7). The scene's lights illuminate
+"TetFlora shell"; "TetFlora baked shell" emits baked light.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import reduce
+from math import tau
 from typing import Any
 
 import bpy
 
 from ...light import scattering
 from ...light.scattering import GLOSS, GLOSS_ROUGHNESS
-from ..compat import loses_summed_lobes
-from .nodes import LEAF_GREEN, Graph, find_socket, shader_group
+from ..compat import blend_in_mesh_order, disable_bump_correction, loses_summed_lobes
+from .nodes import LEAF_GREEN, Graph, Term, node_group, surface_material
 
 MICROSPHERE = "TetFlora Microsphere"
 SCATTER = "TetFlora Scatter"
@@ -72,120 +78,83 @@ def microsphere_group() -> bpy.types.NodeTree:
         ("Roundness", 'Float', 1.0, UNIT, about),
         ("Facing", 'Vector', (0.0, 0.0, 0.0), None, facing),
     )
-    return shader_group(MICROSPHERE, _VERSION, inputs, ENGINES, _shaders)
+    return node_group(MICROSPHERE, _VERSION, inputs, ENGINES, _shaders)
 
 
-def _shaders(graph: Graph, given: Any) -> dict[str, bpy.types.NodeSocket]:
+def _shaders(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
     """Both engines' shaders from the same lobes."""
-    geometry = graph.node("ShaderNodeNewGeometry").outputs
+    geometry = graph.outputs("ShaderNodeNewGeometry")
     incoming, face = geometry["Incoming"], geometry["True Normal"]
-    back = graph.scaled(given["Colour"], given["p"])
-    transmission = given["Transmission"]
-    through = graph.vector('SCALE', graph.tinted(back, given["Through Tint"]), transmission)
-    back = graph.vector('SCALE', back, graph.math('SUBTRACT', 1.0, transmission))
+    back, transmission = graph.scaled(given["Colour"], given["p"]), given["Transmission"]
+    through = graph.tinted(back, given["Through Tint"]) * transmission
+    back = back * (1.0 - transmission)
 
     particle = particle_normal(graph, given, geometry)
     axis = graph.vector('NORMALIZE', given["Normal"])
-    plane = graph.vector('SCALE', axis, _sign(graph, axis, incoming))
-    width = _highlight_width(graph, given)
+    plane = axis * ((graph.vector('DOT_PRODUCT', axis, incoming) < 0.0) * -2.0 + 1.0)
+    # Phong's exponent as the width of a microfacet distribution: α = √(1 / (2 spear + 1)).
+    width = (given["spear"] * 2.0 + 1.0) ** -0.5
     gloss, kept = _gloss_weight(graph, given, (plane, incoming, face), width)
-    weights = {
-        'particle': graph.math('SUBTRACT', 1.0, given["Plane"]),
-        'plane': graph.math('SUBTRACT', given["Plane"], kept),
-    }
     full, simple, lobes = [], [], []
-    beyond: dict[str, list] = {'near': [], 'far': []}
-    for name, normal in (('particle', particle), ('plane', plane)):
-        reflected, transmitted = (graph.vector('SCALE', colour, weights[name]) for colour in (back, through))
+    for normal, weight in ((particle, 1.0 - given["Plane"]), (plane, given["Plane"] - kept)):
+        reflected, transmitted = back * weight, through * weight
         simple += _sheet(graph, reflected, transmitted, normal)
         # Towards the face's own side; where that turns the plane away from the viewer, both sides change places.
         facing = graph.vector('DOT_PRODUCT', normal, face)
-        turned = graph.math('LESS_THAN', facing, 0.0)
-        normal = graph.vector('SCALE', normal, graph.math('MULTIPLY_ADD', turned, -2.0, 1.0))
-        near, far = _swapped(graph, reflected, transmitted, turned)
+        turned = facing < 0.0
+        normal = normal * (turned * -2.0 + 1.0)
+        change = (transmitted - reflected) * turned
+        near, far = reflected + change, transmitted - change
         full += _sheet(graph, near, far, normal)
-        lost = graph.math('MULTIPLY_ADD', graph.math('ABSOLUTE', facing), -0.5, 0.5)
-        beyond['near'].append(graph.vector('SCALE', far, lost))
-        beyond['far'].append(graph.vector('SCALE', near, lost))
-        lobes.append((near, far, normal, lost))
+        lobes.append((near, far, normal, abs(facing) * -0.5 + 0.5))
     highlight = _highlight(graph, plane, gloss, width)
     if loses_summed_lobes():
         sheet, share = _one_of(graph, lobes, given["Plane"])
-        seen = _highlight(graph, plane, graph.math('MULTIPLY', gloss, share), width)
+        seen = _highlight(graph, plane, gloss * share, width)
         return {"Cycles": _sum(graph, [*sheet, seen]), "EEVEE": _sum(graph, [*simple, highlight])}
-    full += _sheet(graph, *(graph.vector('ADD', *beyond[side]) for side in ('near', 'far')), face)
+    (near, far, _, lost), (near_too, far_too, _, lost_too) = lobes
+    full += _sheet(graph, far * lost + far_too * lost_too, near * lost + near_too * lost_too, face)
     return {"Cycles": _sum(graph, [*full, highlight]), "EEVEE": _sum(graph, [*simple, highlight])}
 
 
-def _one_of(graph: Graph, lobes: list[tuple], planes: Any) -> tuple[list[bpy.types.Node], Any]:
+def _one_of(graph: Graph, lobes: list[tuple[Term, ...]], planes: Term) -> tuple[list[bpy.types.Node], Term]:
     """A sheet around one normal: particle or plane by chance, divided by its probability; and the highlight's factor.
 
     What the horizon cuts off of one lobe of a normal is added to the other, with which it has no direction in common.
     """
-    where = graph.node("ShaderNodeNewGeometry").outputs["Position"]
-    noise = graph.node("ShaderNodeTexWhiteNoise", {"Vector": where, "W": 2.0}, noise_dimensions='4D')
-    flat = graph.math('LESS_THAN', find_socket(noise.outputs, "Value"), planes)
-    near, far, normal, lost = (_chosen(graph, *pair, flat) for pair in zip(*lobes, strict=True))
-    chance = graph.math('ABSOLUTE', graph.math('SUBTRACT', graph.math('SUBTRACT', 1.0, flat), planes))
+    where = graph.outputs("ShaderNodeNewGeometry")["Position"]
+    noise = graph.outputs("ShaderNodeTexWhiteNoise", {"Vector": where, "W": 2.0}, noise_dimensions='4D')
+    flat = noise["Value"] < planes
+    # A number is chosen as vectors are.
+    near, far, normal, lost = (
+        graph.vector('ADD', first, graph.vector('SCALE', graph.vector('SUBTRACT', second, first), flat))
+        for first, second in zip(*lobes, strict=True)
+    )
     # Never chosen where it is 0 but for rounding.
-    share = graph.math('DIVIDE', 1.0, graph.math('MAXIMUM', chance, 1e-6))
+    share = 1.0 / graph.math('MAXIMUM', abs(1.0 - flat - planes), 1e-6)
     added = graph.math('DIVIDE', lost, graph.math('SUBTRACT', 1.0, lost))
-    both = [
-        graph.vector('SCALE', graph.vector('ADD', own, graph.vector('SCALE', other, added)), share)
-        for own, other in ((near, far), (far, near))
-    ]
-    return _sheet(graph, *both, normal), graph.math('MULTIPLY', share, flat)
+    return _sheet(graph, (near + far * added) * share, (far + near * added) * share, normal), share * flat
 
 
-def _chosen(graph: Graph, first: Any, second: Any, which: Any) -> bpy.types.NodeSocket:
-    """The first of two vectors where `which` is 0, the second where it is 1."""
-    return graph.vector('ADD', first, graph.vector('SCALE', graph.vector('SUBTRACT', second, first), which))
-
-
-def particle_normal(graph: Graph, given: Any, geometry: Any) -> bpy.types.NodeSocket:
+def particle_normal(graph: Graph, given: dict[str, Any], geometry: dict[str, Term]) -> Term:
     """Normal m of the particle that was hit.
 
     The points of a sphere that a viewer sees have normals with density cos / π around him: those of I + q, with q
     anywhere on a sphere of radius 1 (Roundness times that, to leave some of them turned to the viewer).
     """
-    noise = graph.node("ShaderNodeTexWhiteNoise", {"Vector": geometry["Position"], "W": 1.0}, noise_dimensions='4D')
-    random = graph.node("ShaderNodeSeparateXYZ", {"Vector": noise.outputs["Color"]}).outputs
-    height = graph.math('MULTIPLY_ADD', random[0], 2.0, -1.0)
-    radius = graph.math(
-        'SQRT',
-        graph.math('MAXIMUM', graph.math('MULTIPLY_ADD', height, graph.math('MULTIPLY', height, -1.0), 1.0), 0.0),
-    )
-    turn = graph.math('MULTIPLY', random[1], 6.283185307179586)
-    around = graph.node(
-        "ShaderNodeCombineXYZ",
-        {
-            "X": graph.math('MULTIPLY', radius, graph.math('COSINE', turn)),
-            "Y": graph.math('MULTIPLY', radius, graph.math('SINE', turn)),
-            "Z": height,
-        },
-    )
+    inputs = {"Vector": geometry["Position"], "W": 1.0}
+    random = graph.parts(graph.outputs("ShaderNodeTexWhiteNoise", inputs, noise_dimensions='4D')["Color"])
+    height = random[0] * 2.0 + -1.0
+    radius = graph.math('SQRT', graph.math('MAXIMUM', height * -height + 1.0, 0.0))
+    turn = random[1] * tau
+    around = graph.xyz(radius * graph.math('COSINE', turn), radius * graph.math('SINE', turn), height)
     # A little less than 1, so that the sum is never zero.
-    reach = graph.math('MULTIPLY', given["Roundness"], 0.999)
-    seen = graph.vector('ADD', geometry["Incoming"], graph.vector('SCALE', around, reach))
-    unset = graph.math('LESS_THAN', graph.vector('LENGTH', given["Facing"]), 0.5)
-    seen = graph.vector('SCALE', seen, unset)
-    own = graph.vector('SCALE', given["Facing"], graph.math('SUBTRACT', 1.0, unset))
-    return graph.vector('NORMALIZE', graph.vector('ADD', seen, own))
+    seen = geometry["Incoming"] + around * graph.math('MULTIPLY', given["Roundness"], 0.999)
+    unset = graph.vector('LENGTH', given["Facing"]) < 0.5
+    return graph.vector('NORMALIZE', seen * unset + given["Facing"] * (1.0 - unset))
 
 
-def _sign(graph: Graph, first: Any, second: Any) -> bpy.types.NodeSocket:
-    """1 where two vectors lie on one side, else −1."""
-    away = graph.math('LESS_THAN', graph.vector('DOT_PRODUCT', first, second), 0.0)
-    return graph.math('MULTIPLY_ADD', away, -2.0, 1.0)
-
-
-def _swapped(graph: Graph, first: Any, second: Any, turned: Any) -> tuple[Any, Any]:
-    """Both colours, in the other order where `turned` is 1."""
-    change = graph.vector('SCALE', graph.vector('SUBTRACT', second, first), turned)
-    return graph.vector('ADD', first, change), graph.vector('SUBTRACT', second, change)
-
-
-def _sheet(graph: Graph, near: Any, far: Any, normal: Any) -> list[bpy.types.Node]:
+def _sheet(graph: Graph, near: Term, far: Term, normal: Term) -> list[bpy.types.Node]:
     """Cosine lobes around a normal, of one colour on its side and of another on the other."""
     return [
         graph.node("ShaderNodeBsdfDiffuse", {"Color": near, "Normal": normal}),
@@ -193,12 +162,9 @@ def _sheet(graph: Graph, near: Any, far: Any, normal: Any) -> list[bpy.types.Nod
     ]
 
 
-def _highlight_width(graph: Graph, given: Any) -> bpy.types.NodeSocket:
-    """Phong's exponent as the width of a microfacet distribution: α = √(1 / (2 spear + 1))."""
-    return graph.math('POWER', graph.math('MULTIPLY_ADD', given["spear"], 2.0, 1.0), -0.5)
-
-
-def _gloss_weight(graph: Graph, given: Any, directions: tuple[Any, Any, Any], width: Any) -> tuple[Any, Any]:
+def _gloss_weight(
+    graph: Graph, given: dict[str, Term], directions: tuple[Term, Term, Term], width: Term
+) -> tuple[Term, Term]:
     """Fraction of all light that the highlight gets, Plane · s, and what of it is left above the face's horizon.
 
     Planes whose highlight would dip under the face have none. What the horizon cuts off of the others, the plane
@@ -206,19 +172,17 @@ def _gloss_weight(graph: Graph, given: Any, directions: tuple[Any, Any, Any], wi
     means over planes, faces and viewers of sampled lobes, within .02 for α from .13 to .45.
     """
     plane, incoming, face = directions
-    mirrored = graph.vector('SCALE', plane, graph.math('MULTIPLY', graph.vector('DOT_PRODUCT', plane, incoming), 2.0))
-    height = graph.vector('DOT_PRODUCT', graph.vector('SUBTRACT', mirrored, incoming), face)
+    mirrored = plane * (graph.vector('DOT_PRODUCT', plane, incoming) * 2.0)
+    height = graph.vector('DOT_PRODUCT', mirrored - incoming, face)
     lowest = graph.math('MINIMUM', height, graph.vector('DOT_PRODUCT', plane, face))
     scale = 1.0 / (_CLEAR - _GLANCING)
-    clear = graph.math('MULTIPLY_ADD', lowest, scale, -_GLANCING * scale)
-    clear = graph.math('MINIMUM', graph.math('MAXIMUM', clear, 0.0), 1.0)
-    weight = graph.math('MULTIPLY', graph.math('MULTIPLY', given["Plane"], given["s"]), clear)
-    rate = graph.math('MULTIPLY', graph.math('POWER', width, -0.66), -1.3)
-    cut = graph.math('MULTIPLY', graph.math('EXPONENT', graph.math('MULTIPLY', height, rate)), -0.29)
-    return weight, graph.math('MULTIPLY_ADD', weight, cut, weight)
+    clear = graph.math('MINIMUM', graph.math('MAXIMUM', lowest * scale + -_GLANCING * scale, 0.0), 1.0)
+    weight = given["Plane"] * given["s"] * clear
+    cut = graph.math('EXPONENT', height * (width**-0.66 * -1.3)) * -0.29
+    return weight, weight * cut + weight
 
 
-def _highlight(graph: Graph, normal: Any, weight: Any, width: Any) -> bpy.types.NodeSocket:
+def _highlight(graph: Graph, normal: Term, weight: Term, width: Term) -> Term:
     """White reflection around a normal; light that bounces among facets counts, or up to a third would be lost.
 
     Its weight is no colour: grey facets would absorb at each bounce.
@@ -226,15 +190,12 @@ def _highlight(graph: Graph, normal: Any, weight: Any, width: Any) -> bpy.types.
     inputs = {"Color": (1.0, 1.0, 1.0, 1.0), "Roughness": graph.math('SQRT', width), "Normal": normal}
     shader = graph.node("ShaderNodeBsdfAnisotropic", inputs, distribution='MULTI_GGX')
     # Mixed with nothing.
-    return graph.node("ShaderNodeMixShader", {"Fac": weight, "Shader_001": shader}).outputs[0]
+    return Term(graph, graph.node("ShaderNodeMixShader", {"Fac": weight, "Shader_001": shader}).outputs[0])
 
 
-def _sum(graph: Graph, shaders: list[Any]) -> bpy.types.NodeSocket:
+def _sum(graph: Graph, shaders: list[Any]) -> Any:
     """All shaders together; their colours hold the weights."""
-    total = shaders[0]
-    for shader in shaders[1:]:
-        total = graph.node("ShaderNodeAddShader", {"Shader": total, "Shader_001": shader}).outputs[0]
-    return total
+    return reduce(lambda a, b: graph.node("ShaderNodeAddShader", {"Shader": a, "Shader_001": b}), shaders)
 
 
 def scatter_group() -> bpy.types.NodeTree:
@@ -268,4 +229,223 @@ def scatter_group() -> bpy.types.NodeTree:
         gloss = graph.node("ShaderNodeBsdfAnisotropic", {"Color": WHITE, "Roughness": roughness, "Normal": normal})
         return {"Shader": graph.mix(given["Gloss"], sheet, gloss)}
 
-    return shader_group(SCATTER, _SCATTER_VERSION, inputs, [("Shader", 'Shader')], build)
+    return node_group(SCATTER, _SCATTER_VERSION, inputs, [("Shader", 'Shader')], build)
+
+
+SHELL = "TetFlora Shell"
+SHELL_MATERIAL = "TetFlora shell"
+BAKED_SHELL = "TetFlora Baked Shell"
+BAKED_SHELL_MATERIAL = "TetFlora baked shell"
+
+# With the group within.
+_GROUP_VERSION = 2 + loses_summed_lobes()
+_MATERIAL_VERSION = 2 + loses_summed_lobes()
+_BAKED_VERSION = 1
+
+# Longer than any cell, for faces that the ray runs away from, metres.
+_NEVER = 1e9
+# A slope under which the ray runs along a face, 1/m.
+_ALONG = 1e-9
+# An eye nearer to the exit face than this fraction of the way through the cell is inside of the cell.
+_INSIDE = 0.999
+# Optical depth under which the weights of both ends are taken from their series; both forms are within 1e-5 there.
+_THIN = 0.05
+
+
+def shell_group() -> bpy.types.NodeTree:
+    """The group "TetFlora Shell": everything between the attributes of ``shell_buffers`` and a shader."""
+    inputs = (
+        *LOBE_INPUTS,
+        ("Roundness", 'Float', 1.0, UNIT, "0: particles face the viewer; 1: they are round"),
+        ("Variation", 'Float', 0.05, UNIT, "Variation of lightness between cells"),
+        ("Stochastic", 'Float', 1.0, UNIT, "1: samples are opaque or clear, much faster"),
+    )
+
+    def build(graph: Graph, given: Any) -> dict[str, Any]:
+        geometry = graph.outputs("ShaderNodeNewGeometry")
+        inputs = {name: given[name] for name in ("p", "s", "spear", "Through Tint", "Roundness")}
+        inputs["Colour"] = _varied_colour(graph, given["Variation"])
+        inputs["Transmission"] = graph.attribute("tf_transmission", "Fac")
+        inputs["Normal"] = graph.attribute("tf_normal", "Vector")
+        inputs["Plane"] = graph.attribute("tf_plane", "Fac")
+        spheres = graph.outputs("ShaderNodeGroup", inputs, node_tree=microsphere_group())
+        clear = graph.node("ShaderNodeBsdfTransparent")
+        shaders = {}
+        for engine, path in _paths(graph, geometry).items():
+            opacity = 1.0 - path.transmittance
+            # EEVEE blends opacity as it is; what it draws by chance, it draws so by itself.
+            alpha = _decided(graph, opacity, geometry, given["Stochastic"]) if engine == "Cycles" else opacity
+            shaders[engine] = graph.mix(alpha, clear, spheres[engine])
+        return shaders
+
+    return node_group(SHELL, _GROUP_VERSION, inputs, ENGINES, build)
+
+
+def baked_shell_group() -> bpy.types.NodeTree:
+    """The group "TetFlora Baked Shell": light that a cell gives off, and how much of what is behind passes through.
+
+    Notes
+    -----
+    With constant density, and the scattered radiance J linear between where the ray enters (J₀) and leaves (J₁), a
+    cell of optical depth τ = κℓ adds B = w₀ J₀ + w₁ J₁ to T = e^{−τ} times what is behind it (paper, section 7), where
+    w₁ = (1 − e^{−τ}(1 + τ)) / τ and w₀ = 1 − (1 − e^{−τ}) / τ.
+    """
+    inputs = [("Strength", 'Float', 1.0, (0.0, 1000.0), "Multiplies the baked light")]
+
+    def build(graph: Graph, given: Any) -> dict[str, Any]:
+        geometry = graph.outputs("ShaderNodeNewGeometry")
+        lights = [graph.attribute(f"tf_light{k}", "Vector") for k in range(4)]
+        shaders = {}
+        for engine, path in _paths(graph, geometry).items():
+            first, last = _end_weights(graph, path.depth)
+            parts = []
+            for light, level, slope in zip(lights, path.levels, path.slopes, strict=True):
+                # λ at the hit and at the other end, each with its weight; the near end is where the ray came from.
+                there = path.length * slope * -1.0 + level
+                change = (there - level) * path.leaving
+                near, far = level + change, there - change
+                parts.append(light * (far * last + near * first))
+            total = sum(parts[1:], parts[0])
+            emission = graph.node("ShaderNodeEmission", {"Color": total, "Strength": given["Strength"]})
+            grey = graph.xyz(*[path.transmittance] * 3)
+            clear = graph.node("ShaderNodeBsdfTransparent", {"Color": grey})
+            # Not a mix, which would make the emission weaker by the opacity that it contains already.
+            added = graph.node("ShaderNodeAddShader", {"Shader": emission, "Shader_001": clear})
+            shaders[engine] = added.outputs[0]
+        return shaders
+
+    return node_group(BAKED_SHELL, _BAKED_VERSION, inputs, ENGINES, build)
+
+
+def shell_material() -> bpy.types.Material:
+    """Material "TetFlora shell" of the mesh that `emission.shells.shell_buffers` describes, for Cycles and EEVEE.
+
+    A ray meets two faces a cell: the scene's ``cycles.transparent_max_bounces`` has to allow for that. EEVEE blends
+    faces in their order in the mesh: give ``shell_buffers`` the cells' ranks.
+    """
+    return surface_material(SHELL_MATERIAL, _MATERIAL_VERSION, _builder(shell_group))
+
+
+def baked_shell_material() -> bpy.types.Material:
+    """Material "TetFlora baked shell": the light of ``shell_buffers(light=...)``, without noise, unlit."""
+    return surface_material(BAKED_SHELL_MATERIAL, _BAKED_VERSION, _builder(baked_shell_group))
+
+
+def _builder(group: Any) -> Any:
+    """What leads a group's two outputs to those of a material."""
+
+    def build(graph: Graph, material: bpy.types.Material) -> None:
+        shell = graph.outputs("ShaderNodeGroup", node_tree=group())
+        # EEVEE otherwise takes the whole mesh's extent for the thickness of each cell, and halves what passes through.
+        thin = graph.value(0.0)
+        for engine, name in (('CYCLES', "Cycles"), ('EEVEE', "EEVEE")):
+            graph.node("ShaderNodeOutputMaterial", {"Surface": shell[name], "Thickness": thin}, target=engine)
+        disable_bump_correction(material)
+        blend_in_mesh_order(material)
+
+    return build
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The ray's way through the cell, from the face that was hit.
+
+    Attributes
+    ----------
+    length : Term
+        Metres inside the cell that count at this face.
+    transmittance, depth : Term
+        e^{−κℓ}, and κℓ.
+    levels, slopes : list of Term
+        The four barycentric coordinates at the hit, in the order of the vertices, and what they lose a metre.
+    leaving : Term
+        1 on the faces where the ray leaves.
+    """
+
+    length: Term
+    transmittance: Term
+    depth: Term
+    levels: list[Term]
+    slopes: list[Term]
+    leaving: Term
+
+
+def _paths(graph: Graph, geometry: dict[str, Term]) -> dict[str, _Path]:
+    """The ray's way through the cell for each engine, which differ in how they tell how far the eye is.
+
+    Along ω = −incoming a barycentric coordinate falls by ∇λ·incoming a metre; the ray leaves where the first reaches
+    zero. The coordinate of the entry face itself rises and never counts. On exit faces the same backwards gives where
+    the ray has entered. Faces where it enters carry the whole way; faces where it leaves carry none, unless the ray
+    began in the cell: then all of its length counts.
+    """
+    incoming, leaving = geometry["Incoming"], geometry["Backfacing"]
+    direction = incoming * (leaving * -2.0 + 1.0)
+    levels = list(graph.parts(graph.attribute("tf_bary", "Vector")))
+    slopes = [graph.vector('DOT_PRODUCT', graph.attribute(f"tf_g{k}", "Vector"), direction) for k in (1, 2, 3)]
+    levels.insert(0, 1.0 - (levels[0] + levels[1] + levels[2]))
+    slopes.insert(0, -(slopes[0] + slopes[1] + slopes[2]))
+    exits = []
+    for level, slope in zip(levels, slopes, strict=True):
+        distance = graph.math('MAXIMUM', level, 0.0) / graph.math('MAXIMUM', slope, _ALONG)
+        exits.append((slope < _ALONG) * _NEVER + distance)
+    whole = graph.math('MINIMUM', graph.math('MINIMUM', *exits[:2]), graph.math('MINIMUM', *exits[2:]))
+    # Where nothing was hit but by rounding, no length is better than an endless one.
+    whole = whole * (whole < _NEVER)
+    extinction = _extinction(graph, incoming)
+    entering = 1.0 - leaving
+    paths = {}
+    # Cycles's ray begins at the eye, or at what scattered it; passing through shells does not end it.
+    ray = graph.outputs("ShaderNodeLightPath")["Ray Length"]
+    for engine, eye in (("Cycles", ray), ("EEVEE", _eye_distance(graph, incoming))):
+        length = entering * whole + (eye < whole * _INSIDE) * leaving * eye
+        # A flat cell has no gradients and thus no exit; it has no extinction either.
+        depth = length * extinction
+        paths[engine] = _Path(length, graph.math('EXPONENT', -depth), depth, levels, slopes, leaving)
+    return paths
+
+
+def _eye_distance(graph: Graph, incoming: Term) -> Term:
+    """Distance from the eye along the ray; from the camera's plane if it is orthographic. Endless in shadow maps."""
+    camera = graph.outputs("ShaderNodeCameraData")
+    ways = {"vector_type": 'VECTOR', "convert_from": 'CAMERA', "convert_to": 'WORLD'}
+    towards = graph.node("ShaderNodeVectorTransform", {"Vector": camera["View Vector"]}, **ways)
+    distance = abs(graph.vector('DOT_PRODUCT', towards, incoming)) * camera["View Distance"]
+    return graph.outputs("ShaderNodeLightPath")["Is Shadow Ray"] * _NEVER + distance
+
+
+def _extinction(graph: Graph, incoming: Term) -> Term:
+    """κ(ω) = √(ωᵀSω), 1/m (SGGX; Heitz et al. 2015)."""
+    x, y, z = graph.parts(incoming)
+    diagonal = graph.vector('DOT_PRODUCT', graph.attribute("tf_s0", "Vector"), incoming * incoming)
+    mixed = graph.vector('DOT_PRODUCT', graph.attribute("tf_s1", "Vector"), graph.xyz(x * y, x * z, y * z))
+    return graph.math('SQRT', graph.math('MAXIMUM', mixed * 2.0 + diagonal, 0.0))
+
+
+def _end_weights(graph: Graph, depth: Term) -> tuple[Term, Term]:
+    """Weights w₀ and w₁ of the light at the near and the far end; by series where τ is small."""
+    thin, some = depth < _THIN, graph.math('MAXIMUM', depth, _THIN)
+    clear = graph.math('EXPONENT', -some)
+    mean = (1.0 - clear) / some
+    weights = []
+    # τ/2 − τ²/6 + τ³/24 and τ/2 − τ²/3 + τ³/8
+    for value, (second, third) in zip((1.0 - mean, mean - clear), ((-1 / 6, 1 / 24), (-1 / 3, 1 / 8)), strict=True):
+        series = (depth * (depth * third + second) + 0.5) * depth
+        weights.append((series - value) * thin + value)
+    return weights[0], weights[1]
+
+
+def _varied_colour(graph: Graph, amount: Term) -> Term:
+    """The cell's colour, lighter or darker by up to `amount`; over many cells the mean stays."""
+    factor = (graph.attribute("tf_random", "Fac") * 2.0 + -1.0) * amount + 1.0
+    return graph.scaled(graph.attribute("tf_colour", "Color"), factor)
+
+
+def _decided(graph: Graph, opacity: Term, geometry: dict[str, Term], stochastic: Term) -> Term:
+    """Opacity, or all or nothing by chance with the same mean.
+
+    Opacity between 0 and 1 makes Cycles trace shadows through the whole stack at every hit. A decision by white noise
+    of the position that was hit has the same mean, since no two samples hit the same point, and costs a twelfth.
+    """
+    noise = graph.outputs("ShaderNodeTexWhiteNoise", {"Vector": geometry["Position"]}, noise_dimensions='3D')
+    # This form of the mean is exactly 0 or 1 where stochastic is 1.
+    return (noise["Value"] < opacity) * stochastic + opacity * (1.0 - stochastic)

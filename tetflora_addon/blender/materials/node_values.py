@@ -1,24 +1,188 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The numbers and colours that flow into a shader, at many points of a surface at once.
+"""Shaders and nodes of materials, evaluated by numpy at points of a surface.
 
 Nodes that only a renderer knows let the first color that feeds them pass; where none does, as in noise, they count with
 one half. What depends on the direction of a ray, or on which instance it is, counts with its mean.
+
+Numbers are arrays (p, k), colours (3, p, k); what is the same everywhere is (1, 1) and (3, 1, 1).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
 from mathutils import Euler
 from numpy.typing import NDArray
 
-from .colour_maths import BLENDS, MATHS, STEPS, Values, hue_saturation, luminance, map_range
-from .image_pyramids import Pyramid
-from .nodes import find_socket
+from .nodes import SNOW, find_socket
+
+Values = NDArray[np.float32]
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+
+
+def luminance(colour: Values) -> Values:
+    """Lightness (p, k) of linear Rec. 709."""
+    return np.tensordot(_LUMINANCE, colour, axes=1)
+
+
+def _ratio(a: Values, b: Values) -> Values:
+    return np.divide(a, b, out=np.zeros(np.broadcast_shapes(a.shape, b.shape), np.float32), where=b != 0)
+
+
+def _mod(a: Values, b: Values) -> Values:
+    return a - np.trunc(_ratio(a, b)) * b
+
+
+def _wrap(a: Values, high: Values, low: Values) -> Values:
+    span = high - low
+    return np.where(span != 0, a - span * np.floor(_ratio(a - low, span)), low)
+
+
+def _ping_pong(a: Values, b: Values) -> Values:
+    turns = _ratio(a - b, 2 * b)
+    return np.where(b != 0, np.abs((turns - np.floor(turns)) * b * 2 - b), 0)
+
+
+#: Operations of nodes *Math* and, for each component, *Vector Math*; with as many operands as they need.
+MATHS: dict[str, Callable[..., Values]] = {
+    'ADD': lambda a, b: a + b,
+    'SUBTRACT': lambda a, b: a - b,
+    'MULTIPLY': lambda a, b: a * b,
+    'DIVIDE': _ratio,
+    'MULTIPLY_ADD': lambda a, b, c: a * b + c,
+    'POWER': lambda a, b: np.where((a > 0) | (b == np.rint(b)), np.power(np.where(a == 0, 1e-30, a), b), 0),
+    'LOGARITHM': lambda a, b: _ratio(np.log(np.maximum(a, 1e-30)), np.log(np.maximum(b, 1e-30))),
+    'SQRT': lambda a: np.sqrt(np.maximum(a, 0)),
+    'INVERSE_SQRT': lambda a: _ratio(np.float32(1), np.sqrt(np.maximum(a, 0))),
+    'ABSOLUTE': np.abs,
+    'EXPONENT': lambda a: np.exp(np.minimum(a, 80)),
+    'MINIMUM': np.minimum,
+    'MAXIMUM': np.maximum,
+    'LESS_THAN': lambda a, b: (a < b).astype(np.float32),
+    'GREATER_THAN': lambda a, b: (a > b).astype(np.float32),
+    'SIGN': np.sign,
+    'COMPARE': lambda a, b, c: (np.abs(a - b) <= np.maximum(c, 1e-5)).astype(np.float32),
+    'ROUND': lambda a: np.floor(a + np.float32(0.5)),
+    'FLOOR': np.floor,
+    'CEIL': np.ceil,
+    'TRUNC': np.trunc,
+    'FRACT': lambda a: a - np.floor(a),
+    'FRACTION': lambda a: a - np.floor(a),
+    'MODULO': _mod,
+    'FLOORED_MODULO': lambda a, b: a - np.floor(_ratio(a, b)) * b,
+    'WRAP': _wrap,
+    'SNAP': lambda a, b: np.floor(_ratio(a, b)) * b,
+    'PINGPONG': _ping_pong,
+    'SINE': np.sin,
+    'COSINE': np.cos,
+    'RADIANS': np.deg2rad,
+    'DEGREES': np.rad2deg,
+}
+#: Operations whose mean over a piece of an image is far from that of the mean.
+STEPS = {'LESS_THAN', 'GREATER_THAN', 'COMPARE', 'SIGN', 'ROUND', 'FLOOR', 'CEIL', 'TRUNC', 'FRACT', 'FRACTION'}
+STEPS |= {'MODULO', 'FLOORED_MODULO', 'WRAP', 'SNAP', 'PINGPONG', 'POWER', 'MINIMUM', 'MAXIMUM'}
+
+
+def _overlay(a: Values, b: Values, t: Values) -> Values:
+    low = a * ((1 - t) + 2 * t * b)
+    return np.where(a < 0.5, low, 1 - ((1 - t) + 2 * t * (1 - b)) * (1 - a))
+
+
+def _burn(a: Values, b: Values, t: Values) -> Values:
+    under = 1 - t + t * b
+    return np.where(under <= 0, 0, np.clip(1 - _ratio(1 - a, np.broadcast_to(under, a.shape)), 0, 1))
+
+
+def _dodge(a: Values, b: Values, t: Values) -> Values:
+    under = 1 - t * b
+    return np.where(a == 0, 0, np.where(under <= 0, 1, np.minimum(_ratio(a, under), 1)))
+
+
+def _hue_of(a: Values, b: Values, t: Values) -> Values:
+    first, second = to_hsv(a), to_hsv(b)
+    other = from_hsv(np.stack(np.broadcast_arrays(second[0], first[1], first[2])))
+    return np.where(second[1] != 0, (1 - t) * a + t * other, a)
+
+
+def _saturation_of(a: Values, b: Values, t: Values) -> Values:
+    first, second = to_hsv(a), to_hsv(b)
+    other = (1 - t) * first[1] + t * second[1]
+    return np.where(first[1] != 0, from_hsv(np.stack(np.broadcast_arrays(first[0], other, first[2]))), a)
+
+
+def _value_of(a: Values, b: Values, t: Values) -> Values:
+    first, second = to_hsv(a), to_hsv(b)
+    return from_hsv(np.stack(np.broadcast_arrays(first[0], first[1], (1 - t) * first[2] + t * second[2])))
+
+
+def _colour_of(a: Values, b: Values, t: Values) -> Values:
+    first, second = to_hsv(a), to_hsv(b)
+    other = from_hsv(np.stack(np.broadcast_arrays(second[0], second[1], first[2])))
+    return np.where(second[1] != 0, (1 - t) * a + t * other, a)
+
+
+#: Ways to mix two colours by a factor.
+BLENDS: dict[str, Callable[[Values, Values, Values], Values]] = {
+    'MIX': lambda a, b, t: a + t * (b - a),
+    'DARKEN': lambda a, b, t: a + t * (np.minimum(a, b) - a),
+    'MULTIPLY': lambda a, b, t: a * (1 - t + t * b),
+    'BURN': _burn,
+    'LIGHTEN': lambda a, b, t: a + t * (np.maximum(a, b) - a),
+    'SCREEN': lambda a, b, t: 1 - (1 - t + t * (1 - b)) * (1 - a),
+    'DODGE': _dodge,
+    'ADD': lambda a, b, t: a + t * b,
+    'OVERLAY': _overlay,
+    'SOFT_LIGHT': lambda a, b, t: (1 - t) * a + t * ((1 - a) * b * a + a * (1 - (1 - b) * (1 - a))),
+    'LINEAR_LIGHT': lambda a, b, t: a + t * (2 * b - 1),
+    'DIFFERENCE': lambda a, b, t: a + t * (np.abs(a - b) - a),
+    'EXCLUSION': lambda a, b, t: np.maximum(a + t * (a + b - 2 * a * b - a), 0),
+    'SUBTRACT': lambda a, b, t: a - t * b,
+    'DIVIDE': lambda a, b, t: np.where(b != 0, (1 - t) * a + t * _ratio(a, b), a),
+    'HUE': _hue_of,
+    'SATURATION': _saturation_of,
+    'COLOR': _colour_of,
+    'VALUE': _value_of,
+}
+
+
+def to_hsv(colour: Values) -> Values:
+    """Hue, saturation and value of RGB."""
+    most, least = colour.max(axis=0), colour.min(axis=0)
+    span = most - least
+    r, g, b = _ratio(most - colour, np.broadcast_to(span, colour.shape))
+    hue = np.where(colour[0] == most, b - g, np.where(colour[1] == most, 2 + r - b, 4 + g - r)) / 6
+    hue = np.where(span > 0, hue - np.floor(hue), 0)
+    return np.stack([hue, _ratio(span, most), most])
+
+
+def from_hsv(colour: Values) -> Values:
+    """RGB of hue, saturation and value."""
+    hue, saturation, value = colour
+    shift = np.array([0, 4, 2], np.float32).reshape(3, *[1] * hue.ndim)
+    turn = (hue * 6 + shift) % 6
+    return value * (1 - saturation * (1 - np.clip(np.abs(turn - 3) - 1, 0, 1)))
+
+
+def hue_saturation(colour: Values, hue: Values, saturation: Values, value: Values, factor: Values) -> Values:
+    """The node *Hue/Saturation/Value*."""
+    h, s, v = to_hsv(colour)
+    h = h + hue + np.float32(0.5)
+    made = from_hsv(np.stack(np.broadcast_arrays(h - np.floor(h), np.clip(s * saturation, 0, 1), v * value)))
+    return np.maximum(colour + factor * (made - colour), 0)
+
+
+def map_range(value: Values, low: Values, high: Values, to_low: Values, to_high: Values, kind: str) -> Values:
+    """The node *Map Range*, but for steps."""
+    x = _ratio(value - low, high - low)
+    if kind != 'LINEAR':
+        x = np.clip(x, 0, 1)
+        x = x * x * (3 - 2 * x) if kind == 'SMOOTHSTEP' else x * x * x * (x * (x * 6 - 15) + 10)
+    return to_low + x * (to_high - to_low)
+
 
 Stack = tuple[bpy.types.Node, ...]  # groups that the walk is in
 _CURVE = 1025  # points at which ramps and curves are known
@@ -41,42 +205,118 @@ class ImageMissing(Exception):
     """An image that cannot be read; the text tells the artist."""
 
 
-class SurfacePoints(Protocol):
-    """Places on a surface, (p, k): p in each of k triangles."""
+#: Shaders by the input of their colour, and what they let through of the light that they scatter.
+_SIMPLE = {
+    'BSDF_DIFFUSE': ("Color", 0.0),
+    'BSDF_TRANSLUCENT': ("Color", 1.0),
+    'BSDF_GLOSSY': ("Color", 0.0),
+    'BSDF_METALLIC': ("Base Color", 0.0),
+    'BSDF_SHEEN': ("Color", 0.0),
+    'BSDF_TOON': ("Color", 0.0),
+    'BSDF_GLASS': ("Color", 1.0),
+    'BSDF_REFRACTION': ("Color", 1.0),
+    'BSDF_HAIR': ("Color", 0.5),
+    'BSDF_HAIR_PRINCIPLED': ("Color", 0.5),
+    'SUBSURFACE_SCATTERING': ("Color", 0.5),
+    'EMISSION': ("Color", 0.0),
+}
 
-    def uv(self, name: str) -> tuple[Values, Values, Values]:
-        """Texture coordinates u and v, and the side (1, k) of what each place stands for; '' is the first map."""
 
-    def attribute(self, name: str) -> Values:
-        """A colour attribute (4, p, k)."""
+class Scattered(NamedTuple):
+    """What points of a surface do with light.
 
-    def is_map(self, name: str) -> bool:
-        """Whether an attribute holds texture coordinates."""
+    Attributes
+    ----------
+    cover : (p, k)
+        Fraction that is not transparent.
+    colour : (3, p, k)
+        Fraction of light that is scattered to either side; none where transparent.
+    through : (p, k)
+        Lightness of the part that leaves on the other side.
+    """
 
-    def pyramid(self, node: bpy.types.Node, scale: float) -> Pyramid:
-        """The image of a node, whose coordinates are stretched by a factor."""
+    cover: Values
+    colour: Values
+    through: Values
 
-    def uneven(self) -> None:
-        """Say that the mean of what comes out is not what comes out for the mean."""
 
-    def unknown(self) -> None:
-        """Say that only a renderer knows what comes out of a node."""
+_ONE, _NONE = np.ones((1, 1), np.float32), np.zeros((1, 1), np.float32)
+_BLACK = np.zeros((3, 1, 1), np.float32)
+_UNLIT = Scattered(_ONE, _BLACK, _NONE)
 
 
 class NodeValues:
-    """Evaluates sockets of node trees at some points.
+    """Evaluates a material at some points.
 
     Parameters
     ----------
-    points : SurfacePoints
+    points : face_looks.Plan
+        Of the material: its one point that stands for all, or points (p, k) of k triangles.
     curves : dict
         Ramps and curves as tables; kept from one call to the next.
     """
 
-    def __init__(self, points: SurfacePoints, curves: dict[int, NDArray[np.float32]]) -> None:
+    def __init__(self, points: Any, curves: dict[int, NDArray[np.float32]]) -> None:
         self._points, self._curves = points, curves
         self._images: dict[tuple[int, ...], tuple[Values, Values]] = {}
         self._scale, self._size = 1.0, np.zeros((1, 1), np.float32)
+
+    # Shaders by type.
+
+    def shader(self, socket: bpy.types.NodeSocket, stack: Stack = ()) -> Scattered:
+        """What all points do with light by the shader that feeds a socket."""
+        source, stack = source_of(socket, stack)
+        if source is None or not source.is_output:
+            return _UNLIT
+        node = source.node
+        if (simple := _SIMPLE.get(node.type)) is not None:
+            colour = self._tint(node, simple[0], stack)
+            if node.type == 'EMISSION':
+                colour = colour * self._part(node, "Strength", stack)
+            return _solid(_ONE, colour, np.full((1, 1), simple[1], np.float32))
+        work = getattr(self, f"_shade_{node.type.lower()}", None)
+        return _UNLIT if work is None else work(node, stack)
+
+    def _shade_bsdf_principled(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+        colour = self._tint(node, "Base Color", stack)
+        glass, inside = (self._part(node, f"{name} Weight", stack) for name in ("Transmission", "Subsurface"))
+        through = np.clip(np.maximum(glass, inside / 2), 0, 1)
+        return _solid(np.clip(self._part(node, "Alpha", stack), 0, 1), colour, through)
+
+    def _shade_eevee_specular(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+        gone = np.clip(self._part(node, "Transparency", stack), 0, 1)
+        return _solid(1 - gone, self._tint(node, "Base Color", stack), _NONE)
+
+    def _shade_bsdf_transparent(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+        return Scattered(1 - luminance(self._tint(node, "Color", stack)), _BLACK, _NONE)
+
+    def _shade_mix_shader(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+        if stack and stack[-1].node_tree.name.startswith(SNOW):  # looks are those without snow
+            return self.shader(find_socket(node.inputs, "Shader"), stack)
+        factor = np.clip(self._part(node, "Fac", stack), 0, 1)
+        a, b = (self.shader(find_socket(node.inputs, key), stack) for key in ("Shader", "Shader_001"))
+        return Scattered(*(x + factor * (y - x) for x, y in zip(a, b, strict=True)))
+
+    def _shade_add_shader(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+        a, b = (self.shader(find_socket(node.inputs, key), stack) for key in ("Shader", "Shader_001"))
+        # Light that either lets pass straight passes; more than all of it cannot.
+        return Scattered(np.clip(a.cover + b.cover - 1, 0, 1), a.colour + b.colour, a.through + b.through)
+
+    def _tint(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
+        try:
+            return np.clip(self.colour(node, key, stack), 0, 1)
+        except ImageMissing as error:
+            self._points.tell(str(error))
+            return self._points.viewport.reshape(3, 1, 1)
+
+    def _part(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
+        try:
+            return self.number(node, key, stack)
+        except ImageMissing as error:
+            self._points.tell(str(error))
+            return np.full((1, 1), {"Alpha": 1.0, "Strength": 1.0, "Fac": 0.5}.get(key, 0.0), np.float32)
+
+    # Sockets.
 
     def number(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
         """An input as a number (p, k)."""
@@ -113,7 +353,7 @@ class NodeValues:
         if node.type in {'RGB', 'VALUE'}:
             return _constant(node.outputs[0])
         with np.errstate(all="ignore"):
-            return _NODES.get(node.type, NodeValues._unknown)(self, node, socket, stack)
+            return getattr(self, f"_of_{node.type.lower()}", self._unknown)(node, socket, stack)
 
     def _image(self, node: bpy.types.Node, stack: Stack) -> tuple[Values, Values]:
         key = tuple(n.as_pointer() for n in (node, *stack))
@@ -134,7 +374,7 @@ class NodeValues:
         u, v, self._size = self._points.uv(name)
         return np.stack([u, v, np.zeros_like(u)])
 
-    # What nodes do, by type; each gets the node, the output that is asked for, and the groups it is in.
+    # What nodes do, by type; each gets the node, the output that is asked for, and the groups that it is in.
 
     def _unknown(self, node, socket, stack) -> Values:
         self._points.unknown()
@@ -142,13 +382,13 @@ class NodeValues:
             return self.colour(node, colours[0].identifier, stack)
         return np.full((1, 1) if socket.type == 'VALUE' else (3, 1, 1), 0.5, np.float32)
 
-    def _uv_map(self, node, _socket, _stack) -> Values:
+    def _of_uvmap(self, node, _socket, _stack) -> Values:
         return self._uv(node.uv_map)
 
-    def _coordinates(self, node, socket, stack) -> Values:
+    def _of_tex_coord(self, node, socket, stack) -> Values:
         return self._uv("") if socket.identifier == "UV" else self._unknown(node, socket, stack)
 
-    def _attribute(self, node, socket, stack) -> Values:
+    def _of_attribute(self, node, socket, stack) -> Values:
         if node.type == 'ATTRIBUTE' and node.attribute_type != 'GEOMETRY':
             return self._unknown(node, socket, stack)
         name = node.attribute_name if node.type == 'ATTRIBUTE' else node.layer_name
@@ -159,7 +399,7 @@ class NodeValues:
             return values[3]
         return values[:3].mean(axis=0) if socket.identifier == "Fac" else values[:3]
 
-    def _mapping(self, node, _socket, stack) -> Values:
+    def _of_mapping(self, node, _socket, stack) -> Values:
         vector = self.colour(node, "Vector", stack)
         shift, turn, scale = (self.colour(node, key, stack) for key in ("Location", "Rotation", "Scale"))
         shift, turn, scale = (values.mean(axis=(1, 2), keepdims=True) for values in (shift, turn, scale))
@@ -171,7 +411,7 @@ class NodeValues:
         self._scale *= float(np.sqrt(abs(np.linalg.det(linear[:2, :2]))))
         return np.tensordot(linear.astype(np.float32), vector, axes=1) + move
 
-    def _mix(self, node, socket, stack) -> Values:
+    def _of_mix(self, node, socket, stack) -> Values:
         kind = node.data_type
         if kind not in {'FLOAT', 'VECTOR', 'RGBA'}:
             return self._unknown(node, socket, stack)
@@ -186,36 +426,36 @@ class NodeValues:
         made = self._blend(node.blend_type if kind == 'RGBA' else 'MIX', a, b, factor)
         return np.clip(made, 0, 1) if kind == 'RGBA' and node.clamp_result else made
 
-    def _mix_rgb(self, node, _socket, stack) -> Values:
+    def _of_mix_rgb(self, node, _socket, stack) -> Values:
         a, b = self.colour(node, "Color1", stack), self.colour(node, "Color2", stack)
         made = self._blend(node.blend_type, a, b, np.clip(self.number(node, "Fac", stack), 0, 1))
         return np.clip(made, 0, 1) if node.use_clamp else made
 
     def _blend(self, kind: str, a: Values, b: Values, factor: Values) -> Values:
         if kind not in {'MIX', 'MULTIPLY', 'ADD', 'SUBTRACT', 'SCREEN', 'LINEAR_LIGHT'}:
-            self._points.uneven()
+            self._points.mark_uneven()
         return BLENDS[kind](a, b, factor)
 
-    def _hue_saturation(self, node, _socket, stack) -> Values:
+    def _of_hue_sat(self, node, _socket, stack) -> Values:
         keys = ("Hue", "Saturation", "Value", "Fac")
         return hue_saturation(self.colour(node, "Color", stack), *(self.number(node, key, stack) for key in keys))
 
-    def _gamma(self, node, _socket, stack) -> Values:
+    def _of_gamma(self, node, _socket, stack) -> Values:
         return np.maximum(self.colour(node, "Color", stack), 0) ** self.number(node, "Gamma", stack)
 
-    def _contrast(self, node, _socket, stack) -> Values:
+    def _of_brightcontrast(self, node, _socket, stack) -> Values:
         bright, contrast = self.number(node, "Bright", stack), self.number(node, "Contrast", stack)
         return np.maximum((1 + contrast) * self.colour(node, "Color", stack) + bright - contrast * 0.5, 0)
 
-    def _invert(self, node, _socket, stack) -> Values:
+    def _of_invert(self, node, _socket, stack) -> Values:
         colour, factor = self.colour(node, "Color", stack), self.number(node, "Fac", stack)
         return colour + factor * (1 - 2 * colour)
 
-    def _math(self, node, socket, stack) -> Values:
+    def _of_math(self, node, socket, stack) -> Values:
         made = self._compute(node, socket, [s for s in node.inputs if s.enabled], stack, self.number)
         return np.clip(made, 0, 1) if node.use_clamp else made
 
-    def _vector_math(self, node, socket, stack) -> Values:
+    def _of_vect_math(self, node, socket, stack) -> Values:
         if node.operation == 'SCALE':
             scale = self.number(node, "Scale", stack)
             self._scale *= abs(float(scale.mean()))
@@ -236,16 +476,16 @@ class NodeValues:
         if work is None:
             return self._unknown(node, socket, stack)
         if node.operation in STEPS:
-            self._points.uneven()
+            self._points.mark_uneven()
         return work(*(read(node, socket.identifier, stack) for socket in operands))
 
-    def _ramp(self, node, socket, stack) -> Values:
-        self._points.uneven()
+    def _of_valtorgb(self, node, socket, stack) -> Values:
+        self._points.mark_uneven()
         table = self._table(node, lambda x: node.color_ramp.evaluate(x))
         made = _looked_up(table, self.number(node, "Fac", stack))
         return made[3] if socket.identifier == "Alpha" else made[:3]
 
-    def _curve(self, node, _socket, stack) -> Values:
+    def _of_curve_rgb(self, node, _socket, stack) -> Values:
         mapping = node.mapping
         mapping.initialize()
         single = node.type == 'CURVE_FLOAT'
@@ -266,10 +506,10 @@ class NodeValues:
             self._curves[key] = np.array([list(value(x)) for x in np.linspace(0, 1, _CURVE).tolist()], np.float32)
         return self._curves[key]
 
-    def _map_range(self, node, socket, stack) -> Values:
+    def _of_map_range(self, node, socket, stack) -> Values:
         if node.data_type != 'FLOAT' or node.interpolation_type == 'STEPPED':
             return self._unknown(node, socket, stack)
-        self._points.uneven()
+        self._points.mark_uneven()
         keys = ("Value", "From Min", "From Max", "To Min", "To Max")
         values = [self.number(node, key, stack) for key in keys]
         made = map_range(*values, node.interpolation_type)
@@ -277,52 +517,28 @@ class NodeValues:
             made = np.clip(made, np.minimum(values[3], values[4]), np.maximum(values[3], values[4]))
         return made
 
-    def _clamp(self, node, _socket, stack) -> Values:
+    def _of_clamp(self, node, _socket, stack) -> Values:
         value, low, high = (self.number(node, key, stack) for key in ("Value", "Min", "Max"))
-        self._points.uneven()
+        self._points.mark_uneven()
         return np.minimum(np.maximum(value, low), high)
 
-    def _grey(self, node, _socket, stack) -> Values:
+    def _of_rgbtobw(self, node, _socket, stack) -> Values:
         return luminance(self.colour(node, "Color", stack))
 
-    def _separate(self, node, socket, stack) -> Values:
+    def _of_separate_color(self, node, socket, stack) -> Values:
         if getattr(node, "mode", 'RGB') != 'RGB':
             return self._unknown(node, socket, stack)
         part = [s.identifier for s in node.outputs].index(socket.identifier)
         return self.colour(node, node.inputs[0].identifier, stack)[part]
 
-    def _combine(self, node, socket, stack) -> Values:
+    def _of_combine_color(self, node, socket, stack) -> Values:
         if getattr(node, "mode", 'RGB') != 'RGB':
             return self._unknown(node, socket, stack)
         parts = [self.number(node, s.identifier, stack) for s in node.inputs[:3]]
         return np.stack(np.broadcast_arrays(*parts))
 
-
-_NODES: dict[str, Callable[..., Values]] = {
-    'UVMAP': NodeValues._uv_map,
-    'TEX_COORD': NodeValues._coordinates,
-    'ATTRIBUTE': NodeValues._attribute,
-    'VERTEX_COLOR': NodeValues._attribute,
-    'MAPPING': NodeValues._mapping,
-    'MIX': NodeValues._mix,
-    'MIX_RGB': NodeValues._mix_rgb,
-    'HUE_SAT': NodeValues._hue_saturation,
-    'GAMMA': NodeValues._gamma,
-    'BRIGHTCONTRAST': NodeValues._contrast,
-    'INVERT': NodeValues._invert,
-    'MATH': NodeValues._math,
-    'VECT_MATH': NodeValues._vector_math,
-    'VALTORGB': NodeValues._ramp,
-    'CURVE_RGB': NodeValues._curve,
-    'CURVE_FLOAT': NodeValues._curve,
-    'MAP_RANGE': NodeValues._map_range,
-    'CLAMP': NodeValues._clamp,
-    'RGBTOBW': NodeValues._grey,
-    'SEPARATE_COLOR': NodeValues._separate,
-    'SEPXYZ': NodeValues._separate,
-    'COMBINE_COLOR': NodeValues._combine,
-    'COMBXYZ': NodeValues._combine,
-}
+    _of_vertex_color, _of_curve_float = _of_attribute, _of_curve_rgb
+    _of_sepxyz, _of_combxyz = _of_separate_color, _of_combine_color
 
 
 def source_of(socket: bpy.types.NodeSocket, stack: Stack) -> tuple[bpy.types.NodeSocket | None, Stack]:
@@ -362,6 +578,11 @@ def _constant(socket: bpy.types.NodeSocket) -> Values:
     if hasattr(value, "__len__"):
         return np.array(value[:3], np.float32).reshape(3, 1, 1)
     return np.full((1, 1), float(value), np.float32)
+
+
+def _solid(cover: Values, colour: Values, through: Values) -> Scattered:
+    scattered = np.clip(colour, 0, 1) * cover
+    return Scattered(cover, scattered, luminance(scattered) * through)
 
 
 def _looked_up(table: NDArray[np.float32], place: Values) -> Values:

@@ -88,6 +88,74 @@ def get_or_create(
     return made
 
 
+class Term:
+    """A number or a vector within a graph: arithmetic with others, with numbers and tuples adds nodes.
+
+    A product of numbers waits for what is added to it: both together are one node.
+    """
+
+    def __init__(self, graph: Graph, socket: bpy.types.NodeSocket | None, factors: tuple[Any, ...] = ()) -> None:
+        self._graph, self._socket, self._factors = graph, socket, factors
+
+    @property
+    def socket(self) -> bpy.types.NodeSocket:
+        """The output that gives it."""
+        if self._socket is None:
+            self._socket = self._graph.math('MULTIPLY', *self._factors).socket
+        return self._socket
+
+    @property
+    def is_vector(self) -> bool:
+        """Whether it is a vector or a color."""
+        return self._socket is not None and self._socket.type != 'VALUE'
+
+    def _with(self, operation: str, *values: Any) -> Term:
+        vectors = any(isinstance(v, tuple) or (isinstance(v, Term) and v.is_vector) for v in values)
+        return (self._graph.vector if vectors else self._graph.math)(operation, *values)
+
+    def __add__(self, other: Any) -> Term:
+        for product, rest in ((self, other), (other, self)):
+            if isinstance(product, Term) and product._socket is None:
+                return self._graph.math('MULTIPLY_ADD', *product._factors, rest)
+        return self._with('ADD', self, other)
+
+    def __mul__(self, other: Any) -> Term:
+        vectors = [isinstance(v, tuple) or (isinstance(v, Term) and v.is_vector) for v in (self, other)]
+        if not any(vectors):
+            return Term(self._graph, None, (self, other))
+        vector, factor = (self, other) if vectors[0] else (other, self)
+        return self._graph.vector('MULTIPLY' if all(vectors) else 'SCALE', vector, factor)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __sub__(self, other: Any) -> Term:
+        return self._with('SUBTRACT', self, other)
+
+    def __rsub__(self, other: Any) -> Term:
+        return self._with('SUBTRACT', other, self)
+
+    def __truediv__(self, other: Any) -> Term:
+        return self._with('DIVIDE', self, other)
+
+    def __rtruediv__(self, other: Any) -> Term:
+        return self._with('DIVIDE', other, self)
+
+    def __pow__(self, other: Any) -> Term:
+        return self._with('POWER', self, other)
+
+    def __neg__(self) -> Term:
+        return self * -1.0
+
+    def __abs__(self) -> Term:
+        return self._with('ABSOLUTE', self)
+
+    def __lt__(self, other: Any) -> Term:
+        return self._with('LESS_THAN', self, other)
+
+    def __gt__(self, other: Any) -> Term:
+        return self._with('GREATER_THAN', self, other)
+
+
 class Graph:
     """A node tree under construction.
 
@@ -97,15 +165,17 @@ class Graph:
     Parameters
     ----------
     tree : bpy.types.NodeTree
-        Emptied first.
+    fresh : bool
+        Whether it is emptied first.
     """
 
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
+    def __init__(self, tree: bpy.types.NodeTree, fresh: bool = True) -> None:
         self.tree = tree
-        tree.nodes.clear()
+        if fresh:
+            tree.nodes.clear()
 
     def node(self, kind: str, inputs: dict[str, Any] | None = None, **settings: Any) -> bpy.types.Node:
-        """Add a node, set its properties, and link or set its inputs: a value, a socket, or a node's first output."""
+        """Add a node, set its properties, and link or set its inputs: a value, a term, a socket, or a node's first."""
         node = self.tree.nodes.new(kind)
         for key, value in settings.items():
             if getattr(node, key) != value:  # Blender looks through the whole tree after each change
@@ -114,33 +184,38 @@ class Graph:
             self.feed(find_socket(node.inputs, key), value)
         return node
 
+    def outputs(self, kind: str, inputs: dict[str, Any] | None = None, **settings: Any) -> dict[str, Term]:
+        """Outputs of a new node, by name and by identifier."""
+        terms = [(socket, Term(self, socket)) for socket in self.node(kind, inputs, **settings).outputs]
+        return {socket.name: term for socket, term in terms} | {socket.identifier: term for socket, term in terms}
+
     def feed(self, socket: bpy.types.NodeSocket, value: Any) -> None:
-        """Link a socket to another socket or to a node's first output, or set its value."""
+        """Link a socket to a term, to another socket or to a node's first output, or set its value."""
         if isinstance(value, bpy.types.Node):
             value = value.outputs[0]
-        if isinstance(value, bpy.types.NodeSocket):
-            self.tree.links.new(value, socket)
+        if isinstance(value, Term | bpy.types.NodeSocket):
+            self.tree.links.new(value.socket if isinstance(value, Term) else value, socket)
         elif not _has(socket, value):
             socket.default_value = value
 
-    def attribute(self, name: str, output: str) -> bpy.types.NodeSocket:
+    def attribute(self, name: str, output: str) -> Term:
         """Output ``'Color'``, ``'Vector'`` or ``'Fac'`` of a mesh attribute."""
-        return find_socket(self.node("ShaderNodeAttribute", attribute_name=name).outputs, output)
+        return self.outputs("ShaderNodeAttribute", attribute_name=name)[output]
 
-    def value(self, number: float) -> bpy.types.NodeSocket:
+    def value(self, number: float) -> Term:
         """A number for an input that has to be linked."""
         socket = self.node("ShaderNodeValue").outputs[0]
         socket.default_value = number
-        return socket
+        return Term(self, socket)
 
-    def math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
-        """Scalar operation on sockets or numbers."""
+    def math(self, operation: str, *values: Any) -> Term:
+        """Scalar operation on terms or numbers."""
         node = self.node("ShaderNodeMath", operation=operation)
         for socket, value in zip(node.inputs, values, strict=False):
             self.feed(socket, value)
-        return node.outputs[0]
+        return Term(self, node.outputs[0])
 
-    def vector(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
+    def vector(self, operation: str, *values: Any) -> Term:
         """Vector operation; the result is a number for ``'DOT_PRODUCT'``, ``'DISTANCE'`` and ``'LENGTH'``.
 
         The second operand of ``'SCALE'`` is the factor.
@@ -149,46 +224,51 @@ class Graph:
         names = ("Vector", "Scale") if operation == 'SCALE' else ("Vector", "Vector_001")
         for key, value in zip(names, values, strict=False):
             self.feed(find_socket(node.inputs, key), value)
-        return find_socket(node.outputs, "Value" if operation in {'DOT_PRODUCT', 'DISTANCE', 'LENGTH'} else "Vector")
+        number = operation in {'DOT_PRODUCT', 'DISTANCE', 'LENGTH'}
+        return Term(self, find_socket(node.outputs, "Value" if number else "Vector"))
 
-    def mix(self, factor: Any, first: Any, second: Any) -> bpy.types.NodeSocket:
+    def xyz(self, x: Any, y: Any, z: Any = 0.0) -> Term:
+        """A vector of three numbers."""
+        return Term(self, self.node("ShaderNodeCombineXYZ", {"X": x, "Y": y, "Z": z}).outputs[0])
+
+    def parts(self, vector: Any) -> tuple[Term, Term, Term]:
+        """Three numbers of a vector or a color."""
+        outputs = self.outputs("ShaderNodeSeparateXYZ", {"Vector": vector})
+        return outputs["X"], outputs["Y"], outputs["Z"]
+
+    def mix(self, factor: Any, first: Any, second: Any) -> Term:
         """Mix two shaders; factor 0 gives the first."""
         node = self.node("ShaderNodeMixShader", {"Fac": factor, "Shader": first, "Shader_001": second})
-        return node.outputs[0]
+        return Term(self, node.outputs[0])
 
-    def tinted(self, colour: Any, tint: Any) -> bpy.types.NodeSocket:
+    def mixed(self, factor: Any, a: Any, b: Any, **settings: Any) -> Term:
+        """Colours mixed; those that are no terms are (r, g, b)."""
+        inputs = {"Factor_Float": factor}
+        for key, colour in (("A_Color", a), ("B_Color", b)):
+            inputs[key] = (*colour[:3], 1.0) if isinstance(colour, tuple) else colour
+        return self.outputs("ShaderNodeMix", inputs, data_type='RGBA', **settings)["Result_Color"]
+
+    def tinted(self, colour: Any, tint: Any) -> Term:
         """Product of two colours, at most 1 so that no surface returns more light than it gets."""
-        node = self.node(
-            "ShaderNodeMix",
-            {"Factor_Float": 1.0, "A_Color": colour, "B_Color": tint},
-            data_type='RGBA',
-            blend_type='MULTIPLY',
-            clamp_result=True,
-        )
-        return find_socket(node.outputs, "Result_Color")
+        return self.mixed(1.0, colour, tint, blend_type='MULTIPLY', clamp_result=True)
 
-    def scaled(self, colour: Any, factor: Any) -> bpy.types.NodeSocket:
+    def scaled(self, colour: Any, factor: Any) -> Term:
         """Colour times a number, at most 1."""
         grey = self.node("ShaderNodeCombineColor", {"Red": factor, "Green": factor, "Blue": factor})
         return self.tinted(colour, grey)
 
-    def step(self, value: Any, low: Any, high: Any) -> bpy.types.NodeSocket:
+    def step(self, value: Any, low: Any, high: Any) -> Term:
         """0 under `low`, 1 over `high`, smooth between; falls where `low` is above `high`."""
         inputs = {"Value": value, "From Min": low, "From Max": high}
-        return self.node("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP').outputs[0]
+        return Term(self, self.node("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP').outputs[0])
 
-    def mixed(self, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
-        """Colours mixed; those that are no sockets are (r, g, b)."""
-        inputs = {"Factor_Float": factor}
-        for key, colour in (("A_Color", a), ("B_Color", b)):
-            inputs[key] = (*colour, 1.0) if isinstance(colour, tuple) else colour
-        return find_socket(self.node("ShaderNodeMix", inputs, data_type='RGBA').outputs, "Result_Color")
-
-    def noise(self, place: Any, detail: float, roughness: float) -> tuple[Any, Any]:
+    def noise(
+        self, place: Any, detail: float, roughness: float = 0.5, scale: float = 1.0, **settings: Any
+    ) -> tuple[Term, Term]:
         """Fractal noise from 0 to 1, .5 on average: a number and three."""
-        inputs = {"Vector": place, "Scale": 1.0, "Detail": detail, "Roughness": roughness}
-        outputs = self.node("ShaderNodeTexNoise", inputs).outputs
-        return find_socket(outputs, "Fac"), find_socket(outputs, "Color")
+        inputs = {"Vector": place, "Scale": scale, "Detail": detail, "Roughness": roughness}
+        outputs = self.outputs("ShaderNodeTexNoise", inputs, **settings)
+        return outputs["Fac"], outputs["Color"]
 
     def arrange(self) -> None:
         """Lay the nodes out in columns by their distance from the outputs, for whoever opens the editor."""
@@ -242,28 +322,24 @@ def _has(socket: bpy.types.NodeSocket, value: Any) -> bool:
     return isinstance(value, float | int) and isinstance(socket.default_value, float) and socket.default_value == value
 
 
-def smooth_step(graph: Graph, value: Any, low: Any, high: Any) -> bpy.types.NodeSocket:
-    """`Graph.step`."""
-    return graph.step(value, low, high)
-
-
-def shader_group(
+def node_group(
     name: str,
     version: int,
     inputs: Sequence[tuple],
     outputs: Sequence[tuple[str, str]],
-    build: Callable[[Graph, Any], dict[str, Any]],
+    build: Callable[[Graph, dict[str, Term]], dict[str, Any]],
+    kind: str = "Shader",
 ) -> bpy.types.NodeTree:
-    """A group of shader nodes, as `get_or_create` finds or makes it.
+    """A group of shader nodes, or of ``'Geometry'`` nodes, as `get_or_create` finds or makes it.
 
     Parameters
     ----------
     inputs : sequence of tuple
-        Name, kind (``'Float'``, ``'Color'``, ``'Vector'``), default, and if needed a range and a description.
+        Name, kind (``'Float'``, ``'Color'``, ``'Vector'``, ...), default, and if needed a range and a description.
     outputs : sequence of tuple
         Name and kind.
     build : callable
-        Gets the graph and the sockets of the inputs; returns what to link to the outputs, by name.
+        Gets the graph and the inputs by name; returns what to link to the outputs, by name.
     """
 
     def fill(tree: bpy.types.NodeTree) -> None:
@@ -272,14 +348,12 @@ def shader_group(
         for output, kind in outputs:
             tree.interface.new_socket(name=output, in_out='OUTPUT', socket_type=f"NodeSocket{kind}")
         graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs if inputs else ()
+        given = graph.outputs("NodeGroupInput") if inputs else {}
         graph.node("NodeGroupOutput", build(graph, given))
         graph.arrange()
 
-    def new(name: str) -> bpy.types.NodeTree:
-        return bpy.data.node_groups.new(name, "ShaderNodeTree")
-
-    return get_or_create(bpy.data.node_groups, name, version, new, fill)
+    groups = bpy.data.node_groups
+    return get_or_create(groups, name, version, lambda name: groups.new(name, f"{kind}NodeTree"), fill)
 
 
 def _add_input(

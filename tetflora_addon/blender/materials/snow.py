@@ -19,9 +19,18 @@ from typing import Any
 import bpy
 
 from .materials import ASSET_PROXY, ASSET_SPHERE, BAKED, PROXY, SPHERE
-from .microsphere import ENGINES, MICROSPHERE, UNIT, microsphere_group, particle_normal
-from .nodes import LEAF_GREEN, SNOW, Graph, find_socket, is_own, shader_group
-from .shell import BAKED_SHELL, BAKED_SHELL_MATERIAL, SHELL, SHELL_MATERIAL
+from .microsphere import (
+    BAKED_SHELL,
+    BAKED_SHELL_MATERIAL,
+    ENGINES,
+    MICROSPHERE,
+    SHELL,
+    SHELL_MATERIAL,
+    UNIT,
+    microsphere_group,
+    particle_normal,
+)
+from .nodes import LEAF_GREEN, SNOW, Graph, Term, is_own, node_group
 from .soil import is_soil
 
 AMOUNT = "TetFlora Snow Amount"
@@ -71,8 +80,14 @@ def fit(materials: Iterable[bpy.types.Material | None]) -> None:
     snowy = any(has_snow(scene) for scene in bpy.data.scenes)
     for material in set(materials) - {None}:
         own = is_own(material) or is_soil(material)
-        if own and material.node_tree is not None and not material.name.startswith(_OTHERS):
-            _fit_cloud(snowy) if material.name in _CLOUDS else _fit_surface(material, snowy)
+        if not own or material.node_tree is None or material.name.startswith(_OTHERS):
+            continue
+        if material.name in _CLOUDS:
+            _fit_cloud(snowy)
+        elif snowy:
+            add_snow(material, mark=True)
+        else:
+            _clear(material.node_tree)
 
 
 def fit_soils() -> None:
@@ -112,25 +127,19 @@ def snow_group() -> bpy.types.NodeTree:
         ("Twigs", 'Float', 0.0, UNIT, "1: what lets no light through is thin, as in proxies"),
     )
 
-    def build(graph: Graph, given: Any) -> dict[str, Any]:
-        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
-        upward = graph.node("ShaderNodeSeparateXYZ", {"Vector": normal}).outputs["Z"]
-        through = graph.attribute("tf_transmission", "Fac")
-        girth = graph.attribute("tf_girth", "Fac")
-        opaque = graph.math('LESS_THAN', through, 1e-6)
-        slight = graph.math('MULTIPLY', graph.math('GREATER_THAN', girth, 1e-6), graph.step(girth, _STOUT, 0.0))
-        unknown = graph.math('MULTIPLY', graph.math('LESS_THAN', girth, 1e-6), given["Twigs"])
-        thin = graph.math('MAXIMUM', slight, graph.math('MULTIPLY', unknown, opaque))
-        carry = graph.math('MULTIPLY', given["Carry"], graph.math('MULTIPLY_ADD', thin, _TWIG - 1.0, 1.0))
-        held = _held(graph, upward, carry)
-        above = graph.math('GREATER_THAN', upward, 0.0)
-        cover = graph.math('MULTIPLY', held, above)
-        kept = graph.math('MULTIPLY', held, graph.math('MAXIMUM', above, through))
-        colour = graph.vector('SCALE', given["Snow Color"], above)
-        snow = graph.node("ShaderNodeBsdfDiffuse", {"Color": colour, "Roughness": _ROUGH})
-        return {"Shader": graph.mix(kept, given["Shader"], snow), "Cover": cover}
+    def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
+        upward = graph.parts(graph.outputs("ShaderNodeNewGeometry")["Normal"])[2]
+        through, girth = graph.attribute("tf_transmission", "Fac"), graph.attribute("tf_girth", "Fac")
+        slight = (girth > 1e-6) * graph.step(girth, _STOUT, 0.0)
+        unknown = (girth < 1e-6) * given["Twigs"]
+        thin = graph.math('MAXIMUM', slight, unknown * (through < 1e-6))
+        held = _held(graph, upward, given["Carry"] * (thin * (_TWIG - 1.0) + 1.0))
+        above = upward > 0.0
+        kept = held * graph.math('MAXIMUM', above, through)
+        snow = graph.node("ShaderNodeBsdfDiffuse", {"Color": given["Snow Color"] * above, "Roughness": _ROUGH})
+        return {"Shader": graph.mix(kept, given["Shader"], snow), "Cover": held * above}
 
-    return shader_group(SNOW, _VERSION, inputs, (("Shader", 'Shader'), ("Cover", 'Float')), build)
+    return node_group(SNOW, _VERSION, inputs, (("Shader", 'Shader'), ("Cover", 'Float')), build)
 
 
 def _cloud_group() -> bpy.types.NodeTree:
@@ -138,36 +147,29 @@ def _cloud_group() -> bpy.types.NodeTree:
     inputs = (("Colour", 'Color', LEAF_GREEN), ("Transmission", 'Float', 0.0, UNIT))
     outputs = (("Colour", 'Color'), ("Transmission", 'Float'), ("Cover", 'Float'))
 
-    def build(graph: Graph, given: Any) -> dict[str, Any]:
-        geometry = graph.node("ShaderNodeNewGeometry").outputs
+    def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
+        geometry = graph.outputs("ShaderNodeNewGeometry")
         particle = particle_normal(graph, {"Roundness": 1.0, "Facing": (0.0, 0.0, 0.0)}, geometry)
         axis = graph.attribute("tf_normal", "Vector")
-        away = graph.math('LESS_THAN', graph.vector('DOT_PRODUCT', axis, geometry["Incoming"]), 0.0)
-        plane = graph.vector('SCALE', axis, graph.math('MULTIPLY_ADD', away, -2.0, 1.0))
+        away = graph.vector('DOT_PRODUCT', axis, geometry["Incoming"]) < 0.0
         held, cover = [], []
-        for normal in (particle, plane):
-            upward = graph.node("ShaderNodeSeparateXYZ", {"Vector": normal}).outputs["Z"]
+        for normal in (particle, axis * (away * -2.0 + 1.0)):
+            upward = graph.parts(normal)[2]
             held.append(_held(graph, upward, 1.0))
-            cover.append(graph.math('MULTIPLY', held[-1], graph.math('GREATER_THAN', upward, 0.0)))
+            cover.append(held[-1] * (upward > 0.0))
         share = graph.attribute("tf_plane", "Fac")
-        kept, white = (
-            graph.math('MULTIPLY_ADD', graph.math('SUBTRACT', second, first), share, first)
-            for first, second in (held, cover)
-        )
-        left = graph.math('SUBTRACT', 1.0, kept)
-        colour = graph.mixed(white, given["Colour"], _CLUSTER[:3])
-        return {"Colour": colour, "Transmission": graph.math('MULTIPLY', given["Transmission"], left), "Cover": white}
+        kept, white = ((second - first) * share + first for first, second in (held, cover))
+        colour = graph.mixed(white, given["Colour"], _CLUSTER)
+        return {"Colour": colour, "Transmission": given["Transmission"] * (1.0 - kept), "Cover": white}
 
-    return shader_group(CLOUD, _VERSION, inputs, outputs, build)
+    return node_group(CLOUD, _VERSION, inputs, outputs, build)
 
 
-def _held(graph: Graph, upward: Any, carry: Any) -> Any:
+def _held(graph: Graph, upward: Term, carry: Term | float) -> Term:
     """How white a place is on its side that faces up, 0 to 1, by the vertical component of its normal, of any sign."""
-    amount = graph.node("ShaderNodeGroup", node_tree=_amount_group()).outputs[0]
-    place = graph.vector('SCALE', graph.node("ShaderNodeNewGeometry").outputs["Position"], _PATCHES)
-    noise = graph.math('SUBTRACT', graph.noise(place, 2.0, 0.6)[0], 0.5)
-    caught = graph.math('MULTIPLY_ADD', noise, _UNEVEN, graph.math('ABSOLUTE', upward))
-    lying = graph.math('MULTIPLY', graph.math('MULTIPLY', amount, carry), caught)
+    amount = graph.outputs("ShaderNodeGroup", node_tree=_amount_group())["Snow"]
+    noise = graph.noise(graph.outputs("ShaderNodeNewGeometry")["Position"] * _PATCHES, 2.0, 0.6)[0] - 0.5
+    lying = amount * carry * (noise * _UNEVEN + abs(upward))
     return graph.step(lying, _WHITE - _SOFT, _WHITE + _SOFT)
 
 
@@ -187,14 +189,7 @@ def _amount_group() -> bpy.types.NodeTree:
         driver.expression = " * ".join(_PATHS)
         return {"Snow": number}
 
-    return shader_group(AMOUNT, _VERSION, (), (("Snow", 'Float'),), build)
-
-
-def _fit_surface(material: bpy.types.Material, snowy: bool) -> None:
-    if snowy:
-        add_snow(material, mark=True)
-    else:
-        _clear(material.node_tree)
+    return node_group(AMOUNT, _VERSION, (), (("Snow", 'Float'),), build)
 
 
 def _fit_cloud(snowy: bool) -> None:
@@ -216,27 +211,19 @@ def _fit_cloud(snowy: bool) -> None:
 
 def _cover_baked_shell(tree: bpy.types.NodeTree) -> None:
     """White particles that the lights of the scene illuminate, where there is snow, in place of baked light."""
-    end = next(node for node in tree.nodes if node.type == 'GROUP_OUTPUT')
-    cover = _group_node(tree, _cloud_group(), end, mark=True).outputs["Cover"]
+    end, before = next(node for node in tree.nodes if node.type == 'GROUP_OUTPUT'), set(tree.nodes)
+    graph = Graph(tree, fresh=False)
+    cover = graph.outputs("ShaderNodeGroup", node_tree=_cloud_group())["Cover"]
     for engine, _ in ENGINES:
         added = end.inputs[engine].links[0].from_node
-        through = added.inputs[1].links[0].from_node.inputs["Color"].links[0].from_socket
-        opacity = tree.nodes.new("ShaderNodeMath")
-        opacity.operation = 'SUBTRACT'
-        opacity.inputs[0].default_value = 1.0
-        tree.links.new(through, opacity.inputs[1])
-        lit = _group_node(tree, microsphere_group(), added, mark=True)
-        lit.inputs["Colour"].default_value, lit.inputs["s"].default_value = _CLUSTER, 0.0
-        tree.links.new(opacity.outputs[0], lit.inputs["p"])
-        for key, name, output in (("Normal", "tf_normal", "Vector"), ("Plane", "tf_plane", "Fac")):
-            attribute = tree.nodes.new("ShaderNodeAttribute")
-            attribute.attribute_name, attribute[_MARK] = name, True
-            tree.links.new(find_socket(attribute.outputs, output), lit.inputs[key])
-        mixed = tree.nodes.new("ShaderNodeMixShader")
-        opacity[_MARK] = mixed[_MARK] = True
-        _put_between(tree, added.inputs[0], mixed.inputs[1], mixed.outputs[0])
-        tree.links.new(cover, mixed.inputs[0])
-        tree.links.new(find_socket(lit.outputs, engine), mixed.inputs[2])
+        baked, clear = (socket.links[0].from_socket for socket in added.inputs)
+        through = Term(graph, clear.node.inputs["Color"].links[0].from_socket)
+        looks = {"Colour": _CLUSTER, "s": 0.0, "p": graph.math('SUBTRACT', 1.0, through)}
+        looks |= {"Normal": graph.attribute("tf_normal", "Vector"), "Plane": graph.attribute("tf_plane", "Fac")}
+        lit = graph.outputs("ShaderNodeGroup", looks, node_tree=microsphere_group())
+        graph.feed(added.inputs[0], graph.mix(cover, baked, lit[engine]))
+    for node in set(tree.nodes) - before:
+        node[_MARK] = True
 
 
 def _group_node(tree: bpy.types.NodeTree, group: bpy.types.NodeTree, before: Any, mark: bool) -> bpy.types.Node:

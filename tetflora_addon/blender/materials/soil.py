@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...arrays import srgb_of
 from ..compat import shader_tree
-from .nodes import Graph, find_socket
+from .nodes import Graph, Term
 
 #: On materials and images of the soil, so that they may be renamed.
 MARK = "tetflora_soil"
@@ -75,7 +75,6 @@ def soil_material(
 
     Parameters
     ----------
-    name : str
     colours : (rows, columns, 3) float64
         Linear RGB of soil and what lies on it; the first row is at the smallest y.
     green : (rows, columns) float64
@@ -124,63 +123,35 @@ def _image(name: str, colours: NDArray[np.float64], green: NDArray[np.float64]) 
 
 def _build(graph: Graph) -> None:
     """Soil: the map from above, crumbs and old leaves by noise, and green in patches as large as its fraction."""
-    place = graph.node("ShaderNodeNewGeometry").outputs["Position"]
-    low, size = (graph.node("ShaderNodeCombineXYZ", {"Z": z}) for z in (0.0, 1.0))
-    low.name = low.label = _PLACE
-    size.name = size.label = _SIZE
-    across = graph.vector('DIVIDE', graph.vector('SUBTRACT', place, low), size)
-    ground = graph.node(
-        "ShaderNodeTexImage", {"Vector": across}, interpolation='Cubic', extension='EXTEND', projection='FLAT'
-    )
-    ground.name = ground.label = _MAP
-    broad, fine = _noise(graph, place, 1.3, 4.0), _noise(graph, place, 24.0, 6.0)
-    leaves = graph.node("ShaderNodeTexVoronoi", {"Vector": _bent(graph, place, fine), "Scale": 26.0, "Randomness": 1.0})
-    each = graph.node("ShaderNodeSeparateColor", {"Color": leaves.outputs["Color"]}).outputs
+    place = graph.outputs("ShaderNodeNewGeometry")["Position"]
+    low, size = (_named(graph, name, "ShaderNodeCombineXYZ", {"Z": z}) for name, z in ((_PLACE, 0.0), (_SIZE, 1.0)))
+    inputs = {"Vector": graph.vector('DIVIDE', place - low["Vector"], size["Vector"])}
+    options = {"interpolation": 'Cubic', "extension": 'EXTEND', "projection": 'FLAT'}
+    ground = _named(graph, _MAP, "ShaderNodeTexImage", inputs, **options)
+    broad, fine = graph.noise(place, 4.0, scale=1.3)[0], graph.noise(place, 6.0, scale=24.0)[0]
+    moved = fine * 0.03 + -0.015  # a little, so that cells get ragged outlines
+    inputs = {"Vector": place + graph.xyz(moved, moved, moved), "Scale": 26.0, "Randomness": 1.0}
+    leaves = graph.outputs("ShaderNodeTexVoronoi", inputs)["Color"]
+    each = graph.outputs("ShaderNodeSeparateColor", {"Color": leaves})
     # All factors are 1 on average, so that the mean is that of the map.
-    tone = graph.math('MULTIPLY_ADD', each["Red"], 0.9, 0.55)
-    tone = graph.math('MULTIPLY', tone, graph.math('MULTIPLY_ADD', fine, 1.7, 0.15))
-    tone = graph.math('MULTIPLY', tone, graph.math('MULTIPLY_ADD', broad, 0.7, 0.65))
-    warm = graph.math('MULTIPLY_ADD', each["Green"], 0.3, -0.15)
-    tint = graph.node(
-        "ShaderNodeCombineColor",
-        {"Red": graph.math('ADD', 0.9, warm), "Green": 0.9, "Blue": graph.math('SUBTRACT', 0.9, warm)},
-    )
-    brown = graph.scaled(graph.tinted(ground.outputs["Color"], tint), graph.math('MULTIPLY', tone, 1.1))
-    growth = graph.node("ShaderNodeRGB")
-    growth.name = growth.label = _GREEN
-    grown = graph.scaled(growth.outputs[0], graph.math('MULTIPLY_ADD', fine, 1.6, 0.2))
+    tone = (each["Red"] * 0.9 + 0.55) * (fine * 1.7 + 0.15) * (broad * 0.7 + 0.65)
+    warm = each["Green"] * 0.3 + -0.15
+    tint = graph.node("ShaderNodeCombineColor", {"Red": warm + 0.9, "Green": 0.9, "Blue": 0.9 - warm})
+    brown = graph.scaled(graph.tinted(ground["Color"], tint), tone * 1.1)
+    grown = graph.scaled(_named(graph, _GREEN, "ShaderNodeRGB")["Color"], fine * 1.6 + 0.2)
     # Noise is close to normally distributed around a half: from where the fraction says, the ground is green.
-    patches = graph.math('MULTIPLY_ADD', broad, 0.5, graph.math('MULTIPLY', _noise(graph, place, 7.0, 5.0), 0.5))
-    edge = graph.math('MULTIPLY_ADD', ground.outputs["Alpha"], -0.4, 0.7)
-    share = graph.node(
-        "ShaderNodeMapRange",
-        {
-            "Value": graph.math('SUBTRACT', patches, edge),
-            "From Min": -0.05,
-            "From Max": 0.05,
-            "To Min": 0.0,
-            "To Max": 0.85,
-        },
-        interpolation_type='SMOOTHSTEP',
-    ).outputs[0]
-    colour = graph.node("ShaderNodeMix", {"Factor_Float": share, "A_Color": brown, "B_Color": grown}, data_type='RGBA')
-    height = graph.math('MULTIPLY_ADD', each["Blue"], 0.6, fine)
+    patches = broad * 0.5 + graph.noise(place, 5.0, scale=7.0)[0] * 0.5
+    inputs = {"Value": patches - (ground["Alpha"] * -0.4 + 0.7), "From Min": -0.05, "From Max": 0.05, "To Max": 0.85}
+    share = graph.outputs("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP')["Result"]
+    height = each["Blue"] * 0.6 + fine
     bump = graph.node("ShaderNodeBump", {"Strength": 0.8, "Distance": 0.025, "Height": height})
-    surface = graph.node(
-        "ShaderNodeBsdfPrincipled",
-        {"Base Color": find_socket(colour.outputs, "Result_Color"), "Roughness": 0.95, "Normal": bump},
-    )
-    level = next((s for s in surface.inputs if s.name in ("Specular IOR Level", "Specular")), None)
-    if level is not None:
-        level.default_value = 0.15
+    looks = {"Base Color": graph.mixed(share, brown, grown), "Roughness": 0.95, "Normal": bump}
+    surface = graph.node("ShaderNodeBsdfPrincipled", {**looks, "Specular IOR Level": 0.15})
     graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
 
 
-def _noise(graph: Graph, place: Any, scale: float, detail: float) -> Any:
-    return graph.node("ShaderNodeTexNoise", {"Vector": place, "Scale": scale, "Detail": detail}).outputs[0]
-
-
-def _bent(graph: Graph, place: Any, noise: Any) -> Any:
-    """Places moved a little by noise, so that cells get ragged outlines."""
-    moved = graph.math('MULTIPLY_ADD', noise, 0.03, -0.015)
-    return graph.vector('ADD', place, graph.node("ShaderNodeCombineXYZ", {"X": moved, "Y": moved, "Z": moved}))
+def _named(
+    graph: Graph, name: str, kind: str, inputs: dict[str, Any] | None = None, **settings: Any
+) -> dict[str, Term]:
+    """Outputs of a node by which the soil is brought up to date later."""
+    return graph.outputs(kind, inputs, name=name, label=name, **settings)

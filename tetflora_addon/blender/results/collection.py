@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from typing import TypeVar
 
 import bpy
+from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty, StringProperty
 
 from ...buffers import MeshBuffers, PointBuffers
 from ...species.species import Species
@@ -15,11 +16,13 @@ from ..materials import snow
 from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
 from ..scene.looks import LIKE
+from ..species.catalogue import SpeciesChoice
 from .meshes import mesh_steps, point_object
 from .output import (
     KIND,
     PURPOSE,
     SOURCE,
+    SWITCHES,
     dress,
     dress_collection,
     keep_materials,
@@ -48,7 +51,6 @@ class Results:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     purpose : {'VIEW', 'RENDER'}
     mark : str
         Suffix of all names, where there are results of several cameras at the same time.
@@ -168,8 +170,6 @@ class Results:
 
         Parameters
         ----------
-        name : str
-        made : bpy.types.Object
         kind : str
             See `output.KIND`.
         sources : sequence of bpy.types.ID
@@ -272,3 +272,92 @@ def leave_out_of_file() -> None:
             mark_runtime(collection, runtime)
             if runtime and collection[PURPOSE] == 'VIEW':
                 keep_materials(collection)
+
+
+_COMMON = {"update": lambda self, _context: dress_results(self.id_data), "options": set()}
+
+
+def _replaced(kind: str) -> dict:
+    return {
+        "name": f"{kind} Material",
+        "description": (
+            f"Your material for the {kind.lower()} of this species, used instead of TetFlora's and kept when refining. "
+            "Proxies keep the colors of the species"
+        ),
+        "type": bpy.types.Material,
+    }
+
+
+class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
+    """Output settings of one species."""
+
+    pass_index: IntProperty(
+        name="Pass Index",
+        description="Object index of this species' meshes and proxies, for compositing masks",
+        default=1,
+        min=0,
+        max=32767,
+        **_COMMON,
+    )
+    light_group: StringProperty(
+        name="Light Group",
+        description="Light group of this species' meshes and proxies; if empty, that of all results",
+        **_COMMON,
+    )
+    leaf: PointerProperty(**_replaced("Leaf"))
+    blossom: PointerProperty(**_replaced("Blossom"))
+    bark: PointerProperty(**_replaced("Bark"))
+
+
+class TetFloraOutput(bpy.types.PropertyGroup):
+    """Output settings of all results."""
+
+    save_results: BoolProperty(
+        name="Save Results in File",
+        description=(
+            "Save the meshes made by Refine in the file. Otherwise files stay as small as their plants, and Refine "
+            "makes the same meshes again"
+        ),
+        default=False,
+        **_COMMON,
+    )
+    show_viewport: BoolProperty(
+        name="Show Results in Viewports",
+        description="Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
+        default=True,
+        **_COMMON,
+    )
+    show_render: BoolProperty(
+        name="Show Results in Renders",
+        description="Show meshes and proxies in renders",
+        default=True,
+        **_COMMON,
+    )
+    camera: BoolProperty(**SWITCHES["camera"], **_COMMON)
+    diffuse: BoolProperty(**SWITCHES["diffuse"], **_COMMON)
+    glossy: BoolProperty(**SWITCHES["glossy"], **_COMMON)
+    transmission: BoolProperty(**SWITCHES["transmission"], **_COMMON)
+    volume_scatter: BoolProperty(**SWITCHES["volume_scatter"], **_COMMON)
+    shadow: BoolProperty(**SWITCHES["shadow"], **_COMMON)
+    pass_index: IntProperty(
+        name="Pass Index",
+        description="Object index of all meshes and proxies, except for species with their own",
+        default=0,
+        min=0,
+        max=32767,
+        **_COMMON,
+    )
+    light_group: StringProperty(
+        name="Light Group",
+        description="Light group of all meshes and proxies; matters where they emit light, as with baked lighting",
+        **_COMMON,
+    )
+    species: CollectionProperty(
+        name="Species",
+        description="Species with their own pass index, light group or materials",
+        type=TetFloraSpeciesOutput,
+    )
+    species_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+
+
+CLASSES = (TetFloraSpeciesOutput, TetFloraOutput)

@@ -17,7 +17,7 @@ import bpy
 from ...emission.forms import AUTOMATIC, MICROSPHERES, MICROSURFACES, SHELLS, EmissionForm
 from ..compat import EEVEE_ENGINES
 from ..materials.materials import baked_material, proxy_material, sphere_material
-from ..materials.shell import baked_shell_material, shell_material
+from ..materials.microsphere import baked_shell_material, shell_material
 
 #: The form of new scenes, and of scenes whose own form is not registered.
 DEFAULT = 'AUTOMATIC'

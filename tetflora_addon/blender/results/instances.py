@@ -5,6 +5,10 @@
 Nothing is copied: materials, modifiers and attributes are those of the original because it is the original. Geometry
 nodes turn the vertices of a mesh into instances, because they show what is hidden, excluded or linked as well, and
 take any matrix: mirrored, stretched, sheared.
+
+An object is hidden as a whole when results replace its instances. What it shows besides, such as the ground, a stand-in
+shows: it has the same data, materials and modifiers, and one more that drops instances; of particle systems it has the
+hair. What a simulation made is copied as it is now.
 """
 
 from __future__ import annotations
@@ -12,7 +16,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Protocol
+from typing import Any
 
 import bpy
 import numpy as np
@@ -21,9 +25,12 @@ from numpy.typing import NDArray
 from ..attributes import read, write
 from ..compat import set_node_input
 from ..main_thread import in_main_thread
-from ..materials.nodes import Graph, find_socket, get_or_create
+from ..materials.nodes import Graph, Term, find_socket, node_group
 from ..scene.looks import look_like
+from ..scene.objects import geometry_of
 from .collection import Results
+from .hiding import artists_flags, forget_marks
+from .output import STAND_IN
 
 #: Attributes of points: where each instance stands, and which of several objects it shows.
 MATRIX, PICK = "tf_matrix", "tf_pick"
@@ -53,7 +60,6 @@ def add_instances(
 
     Parameters
     ----------
-    results : Results
     name : str
         Of the new object, ending in a number.
     source : bpy.types.Object or bpy.types.Collection
@@ -133,21 +139,8 @@ def add_cluster(
     return made
 
 
-class Bare(Protocol):
-    """Geometry that nodes instance and that is no object's own.
-
-    Attributes
-    ----------
-    name : str
-    geometry : bpy.types.GeometrySet
-    """
-
-    name: str
-    geometry: bpy.types.GeometrySet
-
-
-def carrier_of(results: Results, target: Bare) -> Source:
-    """Something to instance for geometry that is no object's: an object with a copy of it, made once for a result.
+def carrier_of(results: Results, target: Any) -> Source:
+    """Something to instance for a target whose geometry is no object's: an object with a copy, made once for a result.
 
     A collection of such objects where the geometry is more than one mesh; its instances are instances there too.
     """
@@ -229,50 +222,34 @@ def _instancer(
 
 def _group(kind: str) -> bpy.types.NodeTree:
     """Geometry nodes that turn points into instances of an object, of a collection, or of the objects of one."""
-    socket = "Object" if kind == 'OBJECT' else "Collection"
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        for name, in_out, socket_type in (
-            ("Geometry", 'INPUT', "Geometry"),
-            (_SOURCE, 'INPUT', socket),
-            ("Geometry", 'OUTPUT', "Geometry"),
-        ):
-            tree.interface.new_socket(name=name, in_out=in_out, socket_type=f"NodeSocket{socket_type}")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs
+    def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
         if kind == 'OBJECT':
-            info = graph.node("GeometryNodeObjectInfo", {"Object": given[_SOURCE]}, transform_space='ORIGINAL')
-            find_socket(info.inputs, "As Instance").default_value = True
-            shown = find_socket(info.outputs, "Geometry")
+            inputs = {"Object": given[_SOURCE], "As Instance": True}
+            shown = graph.outputs("GeometryNodeObjectInfo", inputs, transform_space='ORIGINAL')["Geometry"]
         else:
-            info = graph.node("GeometryNodeCollectionInfo", {"Collection": given[_SOURCE]}, transform_space='ORIGINAL')
-            for key in ("Separate Children", "Reset Children"):
-                find_socket(info.inputs, key).default_value = kind == 'CHILDREN'
-            shown = find_socket(info.outputs, "Instances")
+            inputs = {
+                "Collection": given[_SOURCE],
+                **dict.fromkeys(("Separate Children", "Reset Children"), kind == 'CHILDREN'),
+            }
+            shown = graph.outputs("GeometryNodeCollectionInfo", inputs, transform_space='ORIGINAL')["Instances"]
         # Points lose their matrices, or instances would keep them as well. Only here: to remove them from instances, or
         # to do anything to what these show, would turn objects into plain geometry.
         bare = graph.node("GeometryNodeRemoveAttribute", {"Geometry": given["Geometry"], "Name": MATRIX})
         pick = graph.node("FunctionNodeInputInt")
         if kind == 'CHILDREN':
             pick = graph.node("GeometryNodeInputNamedAttribute", {"Name": PICK}, data_type='INT')
-        placed = graph.node("GeometryNodeInstanceOnPoints", {"Points": bare, "Instance": shown, "Instance Index": pick})
-        find_socket(placed.inputs, "Pick Instance").default_value = True  # the source, not a geometry that holds it
+        # "Pick Instance": the source, not a geometry that holds it.
+        inputs = {"Points": bare, "Instance": shown, "Instance Index": pick, "Pick Instance": True}
+        placed = graph.node("GeometryNodeInstanceOnPoints", inputs)
         stored = graph.node("GeometryNodeInputNamedAttribute", {"Name": MATRIX}, data_type='FLOAT4X4')
-        number = graph.node("GeometryNodeInputIndex")
-        matrix = graph.node(
-            "GeometryNodeSampleIndex",
-            {"Geometry": given["Geometry"], "Value": stored, "Index": number},
-            data_type='FLOAT4X4',
-            domain='POINT',
-        )
+        inputs = {"Geometry": given["Geometry"], "Value": stored, "Index": graph.node("GeometryNodeInputIndex")}
+        matrix = graph.node("GeometryNodeSampleIndex", inputs, data_type='FLOAT4X4', domain='POINT')
         turned = graph.node("GeometryNodeSetInstanceTransform", {"Instances": placed, "Transform": matrix})
-        graph.node("NodeGroupOutput", {"Geometry": turned})
-        graph.arrange()
+        return {"Geometry": turned}
 
-    def new(name: str) -> bpy.types.NodeTree:
-        return bpy.data.node_groups.new(name, "GeometryNodeTree")
-
-    return get_or_create(bpy.data.node_groups, _NAMES[kind], _VERSION, new, build)
+    inputs = (("Geometry", 'Geometry'), (_SOURCE, 'Object' if kind == 'OBJECT' else 'Collection'))
+    return node_group(_NAMES[kind], _VERSION, inputs, (("Geometry", 'Geometry'),), build, 'Geometry')
 
 
 def _collection(results: Results, name: str, objects: Sequence[bpy.types.Object]) -> bpy.types.Collection:
@@ -292,3 +269,117 @@ def _natural(name: str) -> list[tuple[bool, int, str]]:
     """Key to sort names as Blender does: numbers within count as such, and case does not."""
     parts = re.split(r"(\d+)", name.casefold())
     return [(p.isdigit(), int(p) if p.isdigit() else 0, p) for p in parts if p]
+
+
+_BARE_VERSION = 1
+_BARE_NAME = "TetFlora Without Instances"
+_SIMULATED = {'CLOTH', 'SOFT_BODY', 'FLUID', 'DYNAMIC_PAINT'}
+_INSTANCED = {'OBJECT', 'COLLECTION'}
+_TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder")
+
+
+def add_stand_in(
+    results: Results, name: str, original: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> bpy.types.Object | None:
+    """Add what an object shows besides instances to the results; None if that is nothing.
+
+    Parameters
+    ----------
+    name : str
+        Of the new object, ending in a number.
+    original : bpy.types.Object
+        Of this file or of a library; shown or hidden.
+    depsgraph : bpy.types.Depsgraph
+        In which it is shown.
+    """
+    if not shows_itself(original, depsgraph):
+        return None
+    name = results.name_for(name)
+    if _is_simulated(original):
+        evaluated = original.evaluated_get(depsgraph)
+        mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+        mesh.name = name
+        results.hold(mesh, name)
+        made = bpy.data.objects.new(name, mesh)
+        made.matrix_world = evaluated.matrix_world
+        for number, slot in enumerate(original.material_slots):
+            if slot.link == 'OBJECT':
+                made.material_slots[number].link = 'OBJECT'
+                made.material_slots[number].material = slot.material
+    else:
+        made = original.copy()
+        made.name = name
+        flags = artists_flags(original)
+        forget_marks(made)
+        made.hide_render, made.hide_viewport = flags
+        for switch in _TURNED_OFF:
+            if getattr(made.tetflora, switch, False):
+                setattr(made.tetflora, switch, False)
+        _drop_instances(made)
+    look_like(made, original, results.owners.get(original))
+    return results.add_object(name, made, STAND_IN, placed=True)
+
+
+def shows_itself(original: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether an object has geometry that renders besides its instances."""
+    instances = original.instance_type in {'VERTS', 'FACES', 'COLLECTION'} or len(original.particle_systems)
+    if instances and not original.show_instancer_for_render:
+        return any(_is_hair(system) for system in original.particle_systems)
+    geometry = geometry_of(original, depsgraph)
+    if geometry is None:
+        return len(getattr(original.data, "polygons", ())) > 0
+    mesh, curves, points = (getattr(geometry, kind) for kind in ("mesh", "curves", "pointcloud"))
+    return (
+        (mesh is not None and len(mesh.polygons) > 0)
+        or (curves is not None and len(curves.curves) > 0)
+        or (points is not None and len(points.points) > 0)
+        or geometry.volume is not None
+        or any(_is_hair(system) for system in original.particle_systems)
+    )
+
+
+def _is_hair(system: bpy.types.ParticleSystem) -> bool:
+    return system.settings.render_type == 'PATH'
+
+
+def _is_simulated(original: bpy.types.Object) -> bool:
+    """Whether a copy would not be as the object is: its modifiers remember earlier frames."""
+    groups = {m.node_group for m in original.modifiers if m.type == 'NODES' and m.node_group is not None}
+    waiting = list(groups)
+    while waiting:
+        for node in waiting.pop().nodes:
+            if node.bl_idname == "GeometryNodeSimulationOutput":
+                return True
+            inner = getattr(node, "node_tree", None)
+            if inner is not None and inner not in groups:
+                groups.add(inner)
+                waiting.append(inner)
+    return any(modifier.type in _SIMULATED for modifier in original.modifiers)
+
+
+def _drop_instances(made: bpy.types.Object) -> None:
+    made.instance_type = 'NONE'
+    for modifier in list(made.modifiers):
+        if modifier.type == 'PARTICLE_SYSTEM' and modifier.particle_system.settings.render_type in _INSTANCED:
+            made.modifiers.remove(modifier)
+    nodes = [n for n, modifier in enumerate(made.modifiers) if modifier.type == 'NODES']
+    if nodes:
+        modifier = made.modifiers.new("Without Instances", 'NODES')
+        modifier.node_group = _bare_group()
+        # Not at the end: adaptive subdivision has to be the last one.
+        made.modifiers.move(len(made.modifiers) - 1, nodes[-1] + 1)
+
+
+def _bare_group() -> bpy.types.NodeTree:
+    """Geometry nodes that pass on all but instances."""
+
+    def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
+        parts = graph.node("GeometryNodeSeparateComponents", {"Geometry": given["Geometry"]})
+        joined = graph.node("GeometryNodeJoinGeometry")
+        for part in parts.outputs:
+            if part.name != "Instances":
+                graph.feed(find_socket(joined.inputs, "Geometry"), part)
+        return {"Geometry": joined}
+
+    whole = (("Geometry", 'Geometry'),)
+    return node_group(_BARE_NAME, _BARE_VERSION, whole, whole, build, 'Geometry')

@@ -30,7 +30,6 @@ class Baking:
 
     Parameters
     ----------
-    sources : Sources
     leaves : bool
         Whether real leaves, blossoms and bark get baked light as well.
     """
@@ -109,9 +108,6 @@ def write_proxies(
 
     Parameters
     ----------
-    results : Results
-    form : ProxyForm
-    refined : Refined
     statistics : Statistics
         Gets the number of faces or points, and their memory.
     baking : Baking, optional

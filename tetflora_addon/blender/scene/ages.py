@@ -101,11 +101,6 @@ def relative_heights(identifier: str, years: NDArray[np.floating]) -> NDArray[np
     return np.where(years > 0.0, found, 1.0)
 
 
-def grown_species(scene: bpy.types.Scene, kind: str, species: Species) -> Species:
-    """The species of a kind of plant at its age and the scene's years; the same where both are 0."""
-    return kind_species(species, kind, years_of(scene))
-
-
 def kind_species(species: Species, kind: str, years: float = 0.0) -> Species:
     """A species as plants of a kind are after so many years."""
     age, dead = age_of(kind), dead_of(kind)

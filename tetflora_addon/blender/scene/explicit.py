@@ -23,8 +23,7 @@ from ..attributes import face_offsets, members, read, values_of, world_matrix
 from ..materials.face_looks import Looks
 from ..materials.nodes import is_ours
 from .looks import LayerLooks
-from .objects import SURFACE_TYPES, materials_of, may_instance, renderable_objects
-from .scatterers import scatters
+from .objects import SURFACE_TYPES, materials_of, may_instance, renderable_objects, scatters
 
 #: Of the property `is_explicit`.
 EXPLICIT_PROPERTY = {
@@ -47,7 +46,6 @@ class Explicit:
 
     Attributes
     ----------
-    meshes : Meshes
     materials : list of list of bpy.types.Material or None
         Slots of each surface.
     originals : list of bpy.types.Object

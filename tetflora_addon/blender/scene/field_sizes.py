@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ..attributes import values_of
 from .field_points import FieldPoints, Points, joined, point_count, refuse
+from .motion import bags_of, curves_of
 from .own_ages import Lives, Sizes
 
 HEIGHT = "tf_height"
@@ -99,23 +100,14 @@ def has_history(obj: bpy.types.Object) -> bool:
 
 def year_curves(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
     """Curves of keys of a stand's year."""
-    return [curve for bag in _channels(obj) for curve in bag.fcurves if curve.data_path == YEAR_PATH]
+    return [curve for curve in curves_of(obj) if curve.data_path == YEAR_PATH]
 
 
 def clear_years(obj: bpy.types.Object) -> None:
     """Remove all keys of a stand's year."""
-    for bag in _channels(obj):
+    for bag in bags_of(obj):
         for curve in [curve for curve in bag.fcurves if curve.data_path == YEAR_PATH]:
             bag.fcurves.remove(curve)
-
-
-def _channels(obj: bpy.types.Object) -> list[bpy.types.ActionChannelbag]:
-    animation = obj.animation_data
-    if animation is None or animation.action is None or animation.action_slot is None:
-        return []
-    slot = animation.action_slot.handle
-    strips = [strip for layer in animation.action.layers for strip in layer.strips]
-    return [bag for strip in strips for bag in strip.channelbags if bag.slot_handle == slot]
 
 
 def year_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:

@@ -212,7 +212,6 @@ def write_field(
     species : (n,) int32
         Index into ``identifiers``.
     seed : (n,) int32
-    identifiers : sequence of str
     forms : sequence of objects or None, optional
         Form of each kind.
     ages : (n,) float, optional
@@ -254,14 +253,13 @@ def quaternions(frame: NDArray[np.float64]) -> NDArray[np.float64]:
     (Shepperd, Journal of Guidance and Control, 1978).
     """
     r = frame
-    w = np.stack([1 + r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2], *(_axis(r, i) for i in range(3))], axis=1)
+    trace = np.trace(r, axis1=1, axis2=2)
+    w = np.stack(
+        [1 + r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2], *(1.0 + 2.0 * r[:, i, i] - trace for i in range(3))], axis=1
+    )
     a, b, c = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
     d, e, f = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
     rows = ((w[:, 0], a, b, c), (a, w[:, 1], d, e), (b, d, w[:, 2], f), (c, e, f, w[:, 3]))
     ways = np.stack([np.stack(row, axis=1) for row in rows], axis=1)
     best = ways[np.arange(len(r)), np.argmax(w, axis=1)]
     return best / np.linalg.norm(best, axis=1, keepdims=True)
-
-
-def _axis(r: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    return 1.0 + 2.0 * r[:, axis, axis] - np.trace(r, axis1=1, axis2=2)

@@ -8,7 +8,9 @@ feeds its colour. Blender's skies cannot be evaluated outside of a render; a few
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -34,36 +36,7 @@ _ELEVATIONS = (2.0, 10.0, 30.0, 60.0, 90.0)
 # Radiance above the horizon M + B (z − ½) + C f, with z up and f towards the sun's azimuth; mean radiance D below it;
 # irradiance of the sun's disc. RGB each, measured in Cycles 5.2 (128 × 64 pixels) with the node's own defaults, such
 # that mean, irradiance of level ground and of what stands towards the sun are kept. 4.5 has the same within 2 %.
-_SKIES: dict[str, tuple[tuple[float, ...], ...]] = {
-    'SINGLE_SCATTERING': (
-        (1.28, 1.12, 0.882, -3.86, -2.3, -0.625, 1.4, 0.627, 0.152, 0.413, 0.134, 0.00129, 31.9, 11.2, 0.0904),
-        (2.9, 3.05, 2.99, -8.93, -7.47, -4.33, 3.82, 2.61, 1.31, 1.02, 0.616, 0.211, 107, 70.9, 31.1),
-        (3.12, 3.71, 4.56, -6.23, -6.47, -5.25, 3.28, 2.83, 2.42, 0.616, 0.499, 0.318, 141, 112, 79.8),
-        (2.62, 3.36, 4.65, -1.72, -2.43, -1.75, 1.47, 1.5, 1.69, 0.362, 0.343, 0.272, 150, 124, 99.3),
-        (2.43, 3.19, 4.56, -0.404, -1.03, -0.184, 0, 0, 0, 0.304, 0.297, 0.245, 153, 128, 104),
-    ),
-    'MULTIPLE_SCATTERING': (
-        (1.52, 1.36, 1.42, -4.95, -3.05, -1.4, 1.47, 0.677, 0.192, 0.132, 0.0577, 0.0359, 33.8, 10.6, 0.0694),
-        (3.22, 4.08, 5.2, -10.6, -10.5, -8.3, 3.43, 2.74, 1.69, 0.287, 0.261, 0.247, 108, 72.2, 32.5),
-        (3.75, 5.68, 8.55, -9.29, -11.6, -12.1, 2.41, 2.65, 2.82, 0.251, 0.31, 0.429, 149, 123, 87.2),
-        (3.96, 6.34, 10.1, -7.53, -9.84, -10.4, 1.1, 1.47, 1.98, 0.269, 0.351, 0.521, 161, 139, 110),
-        (4.04, 6.52, 10.5, -7.01, -9.09, -9.28, -0.0205, -0.0157, -0.00839, 0.282, 0.367, 0.549, 164, 142, 115),
-    ),
-    'PREETHAM': (
-        (0.391, 0.382, 0.302, -0.933, -0.717, -0.209, 0.358, 0.264, 0.102, 0.834, 0.612, 0.245, 0, 0, 0),
-        (0.439, 0.462, 0.486, -1.03, -0.828, -0.422, 0.442, 0.349, 0.225, 0.865, 0.672, 0.448, 0, 0, 0),
-        (0.457, 0.565, 0.864, -0.871, -0.75, -0.637, 0.45, 0.408, 0.474, 0.83, 0.725, 0.801, 0, 0, 0),
-        (0.397, 0.538, 0.877, -0.405, -0.329, -0.159, 0.227, 0.226, 0.301, 0.716, 0.672, 0.774, 0, 0, 0),
-        (0.415, 0.602, 1.06, -0.279, -0.194, 0.0505, 0, 0, 0, 0.778, 0.756, 0.938, 0, 0, 0),
-    ),
-    'HOSEK_WILKIE': (
-        (0.0289, 0.027, 0.0203, -0.073, -0.0498, -0.0157, 0.0124, 0.00743, 0.0032, 0.0561, 0.0286, 0.00605, 0, 0, 0),
-        (0.0493, 0.0617, 0.0678, -0.133, -0.133, -0.087, 0.0282, 0.0208, 0.0107, 0.106, 0.0979, 0.0557, 0, 0, 0),
-        (0.0603, 0.0921, 0.133, -0.133, -0.176, -0.18, 0.0301, 0.0307, 0.0278, 0.134, 0.169, 0.157, 0, 0, 0),
-        (0.0596, 0.0995, 0.167, -0.101, -0.148, -0.176, 0.0164, 0.02, 0.0242, 0.164, 0.204, 0.212, 0, 0, 0),
-        (0.0676, 0.108, 0.174, -0.104, -0.133, -0.164, 0, 0, 0, 0.0986, 0.201, 0.264, 0, 0, 0),
-    ),
-}
+_SKIES: dict[str, list[list[float]]] = json.loads(Path(__file__).with_name("skies.json").read_text(encoding="utf-8"))
 
 
 def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> tuple[Light, ...]:
@@ -137,7 +110,6 @@ class WorldLight:
 
     Attributes
     ----------
-    world : World
     suns : tuple of Light
         The sun's disc of a sky.
     note : str
@@ -190,7 +162,8 @@ def _surroundings(socket: bpy.types.NodeSocket, factor: float, notes: list[str])
     if not socket.is_linked:
         return World.plain(np.array(socket.default_value[:3]) * factor), ()
     above = list(upstream(socket))
-    turn = sum(_turn(n) for n in above if n.type == 'MAPPING')
+    turns = (node.inputs.get("Rotation") for node in above if node.type == 'MAPPING')
+    turn = sum(float(turn.default_value[2]) for turn in turns if turn is not None and not turn.is_linked)
     for node in above:
         if node.type == 'TEX_ENVIRONMENT' and node.image is not None and all(node.image.size):
             if node.projection != 'EQUIRECTANGULAR':
@@ -255,11 +228,6 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
         colour = disc * node.sun_intensity
         suns = (Light('SUN', np.zeros(3), -towards, float(node.sun_size), colour=colour),)
     return World.of(radiance), suns
-
-
-def _turn(node: bpy.types.Node) -> float:
-    rotation = node.inputs.get("Rotation")
-    return 0.0 if rotation is None or rotation.is_linked else float(rotation.default_value[2])
 
 
 def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Sources:

@@ -48,14 +48,18 @@ def moves(obj: bpy.types.Object | None) -> bool:
     return False
 
 
-def curves_of(obj: bpy.types.Object) -> Iterator[bpy.types.FCurve]:
-    """Curves of an object's action."""
-    animation = obj.animation_data
-    if animation is not None and animation.action is not None and animation.action_slot is not None:
-        for layer in animation.action.layers:
-            for strip in layer.strips:
-                bag = strip.channelbag(animation.action_slot)
-                yield from () if bag is None else bag.fcurves
+def bags_of(datablock: bpy.types.ID) -> list[bpy.types.ActionChannelbag]:
+    """What holds the curves of a datablock's action."""
+    animation = datablock.animation_data
+    if animation is None or animation.action is None or animation.action_slot is None:
+        return []
+    strips = [strip for layer in animation.action.layers for strip in layer.strips]
+    return [bag for strip in strips if (bag := strip.channelbag(animation.action_slot)) is not None]
+
+
+def curves_of(datablock: bpy.types.ID) -> Iterator[bpy.types.FCurve]:
+    """Curves of a datablock's action."""
+    return (curve for bag in bags_of(datablock) for curve in bag.fcurves)
 
 
 @contextmanager

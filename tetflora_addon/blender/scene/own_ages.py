@@ -64,7 +64,6 @@ class Lives:
 
     Attributes
     ----------
-    now : float
     year, height, dead : (n,) float64
         As of `Sizes`.
     first : (n,) int64

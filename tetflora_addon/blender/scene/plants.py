@@ -6,7 +6,10 @@ Plants whose species is an asset do not grow and are read apart, with all of the
 `objects` loop over plants, and only over those that are objects.
 """
 
+from __future__ import annotations
+
 from collections.abc import Container
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -14,24 +17,37 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SceneError
+from ...errors import SceneError, TetFloraError
 from ...growth.crown_forms import crown_forms
 from ...growth.hashing import child_key, key_of_seed
+from ...growth.seasons import is_gone
 from ...growth.seeds import Seeds
 from ...growth.wind import rotation_vectors
 from ..attributes import frames_of, world_matrix
+from ..settings import season_of
 from ..species.asset_species import asset_of, asset_species, find_asset, name_of
-from ..species.edits import catalogue
+from ..species.edits import catalogue, edited_infos, species_for
 from .ages import Part, classed
-from .fallen import gone_species
 from .fields import read_aged_field, read_field_matrices
-from .instances import name_keys
 from .looks import LayerLooks
 from .motion import exposure, moment, moves
-from .objects import Copies, copies_of, may_instance, may_take_part, renderable_objects
+from .objects import Copies, copies_of, is_drop, may_instance, may_take_part, name_keys, renderable_objects
 from .own_ages import stored_ages
-from .scatterers import is_drop
 from .skeletons import kind_of, kind_of_choice, species_of, with_look
+
+
+def gone_species(scene: bpy.types.Scene) -> set[str]:
+    """Identifiers of those that populations of the scene strew, or that its file holds."""
+    group, season = scene.tetflora, season_of(scene)
+    names = set(edited_infos())
+    names |= {e.species for p in group.populations for e in p.mix if e.habitat == 'FALLEN'}
+    found = set()
+    for name in names:
+        with suppress(TetFloraError):  # which is told elsewhere
+            if is_gone(species_for(scene, name), season):
+                found.add(name)
+    return found
+
 
 _NAMED = 3  # objects that a message names before it only counts
 
@@ -40,14 +56,25 @@ class NoPlantsError(SceneError):
     """There is nothing to refine; a render may go on without a message."""
 
 
-def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Seeds:
+def read_plants(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
     """Enabled plants of a view layer that render: single ones by name, then instances, then fields.
 
     Plants and fields that collections or geometry nodes instance take part; each instance becomes an individual of its
     own.
 
     A plant has the direction of its z axis, the azimuth of its x axis, and the mean of its absolute scales: plants are
-    neither stretched nor mirrored.
+    neither stretched nor mirrored. With motion blur they are where they are in the middle of the exposure, and have
+    their motion.
+
+    Returns
+    -------
+    seeds : Seeds
+    owners : tuple of (str, int)
+        Names of the objects that they belong to, in their order, each with the number of its own.
+    unknown : str
+        Names plants of which nobody has the species: they are left out, unless there are no others.
 
     Raises
     ------
@@ -56,17 +83,6 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
     SceneError
         No plant is of a species that the catalogue has, or one has a scale of 0, or a transform that is not a number;
         the message names the objects.
-    """
-    return read_plants_of(scene, depsgraph, view_layer)[0]
-
-
-def read_plants_of(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
-    """The same, and the names of the objects that they belong to, in their order, each with the number of its own.
-
-    With motion blur they are where they are in the middle of the exposure, and have their motion. The text names plants
-    among them of which nobody has the species: they are left out, unless there are no others.
     """
     read = partial(_read_plants, scene, depsgraph, view_layer)
     if not (scene.render.use_motion_blur and any(map(moves, filter(may_take_part, bpy.data.objects)))):
@@ -105,7 +121,7 @@ def _read_plants(
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
     for c in enabled:
-        if _is_plant(c) and _species(c.owner) not in assets:
+        if _is_plant(c) and c.owner.tetflora.species not in assets:
             given.append((looks.of(c.owner, c.instancer), (c.owner.name, *_copied_plants(c))))
     for obj in own:
         if obj.tetflora.is_field and obj.tetflora.enabled:
@@ -131,21 +147,15 @@ def _read_plants(
     owners = [(part[0], len(part[1])) for _, part in read]
     owners[: len(alike)] = [(obj.name, 1) for some in alike.values() for obj in some]
     aged = classed(scene, [part for _, part in read])
-    seen = [(name, _seen_as(seeds, look)) for (look, _), (name, seeds) in zip(read, aged, strict=True)]
+    seen = [
+        replace(seeds, identifiers=tuple(with_look(kind, look) for kind in seeds.identifiers))
+        for (look, _), (_, seeds) in zip(read, aged, strict=True)
+    ]
     return _merged(seen), tuple(owners), f"Left out {_unknown(odd)}" if odd else ""
-
-
-def _seen_as(seeds: Seeds, look: str) -> Seeds:
-    """Plants with a look."""
-    return replace(seeds, identifiers=tuple(with_look(kind, look) for kind in seeds.identifiers))
 
 
 def _is_plant(copies: Copies) -> bool:
     return copies.owner.tetflora.is_plant and copies.geometry is None
-
-
-def _species(plant: bpy.types.Object) -> str:
-    return plant.tetflora.species
 
 
 def _grown(part: Part, assets: Container[str]) -> Part:
@@ -217,9 +227,9 @@ def read_asset_plants(
         found.append(AssetPlants(species, (obj,), name_keys([obj]).view(np.int64), placed))
     copies = [c for c in copies_of([o for o in objects if may_instance(o)], depsgraph) if c.owner.tetflora.enabled]
     for c in copies:
-        if _is_plant(c) and _species(c.owner) in assets:
+        if _is_plant(c) and c.owner.tetflora.species in assets:
             seed = child_key(key_of_seed(c.owner.tetflora.seed), c.keys).view(np.int64)
-            found.append(AssetPlants(_species(c.owner), (c.owner,), seed, c.matrices))
+            found.append(AssetPlants(c.owner.tetflora.species, (c.owner,), seed, c.matrices))
     read = [(obj, world_matrix(obj, depsgraph)[None], None, None) for obj in fields]
     read += [(c.owner, c.matrices, c.keys, c.geometry) for c in copies if c.owner.tetflora.is_field]
     for obj, matrices, keys, geometry in read:
@@ -295,16 +305,16 @@ def _placed(
     return Seeds(kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
 
 
-def _merged(read: list[tuple[str, Seeds]]) -> Seeds:
-    """Plants of all objects, each with its name, as one, with the kinds that occur."""
+def _merged(read: list[Seeds]) -> Seeds:
+    """Plants of all objects as one, with the kinds that occur."""
     tables = []
-    for _, seeds in read:
+    for seeds in read:
         occurring = np.bincount(seeds.species, minlength=len(seeds.identifiers)) > 0
         tables.append({i: seeds.identifiers[i] for i in np.flatnonzero(occurring).tolist()})
     identifiers = tuple(sorted({kind for table in tables for kind in table.values()}))
     number = {kind: i for i, kind in enumerate(identifiers)}
-    parts, formed = [], any(seeds.crown is not None for _, seeds in read)
-    for (_, seeds), table in zip(read, tables, strict=True):
+    parts, formed = [], any(seeds.crown is not None for seeds in read)
+    for seeds, table in zip(read, tables, strict=True):
         to_all = np.zeros(len(seeds.identifiers), np.int32)
         to_all[list(table)] = [number[kind] for kind in table.values()]
         crown = crown_forms(len(seeds)) if formed and seeds.crown is None else seeds.crown

@@ -40,6 +40,7 @@ _TRUSTED = 0.0 if bpy.app.background else 1.0
 _icons: dict[tuple[str, str], tuple[float, int]] = {}  # by species and season
 _kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
 thumbnails = Pictures()
+register = thumbnails.register
 
 
 def thumbnail_file(identifier: str, season: str = "") -> Path | None:
@@ -92,11 +93,6 @@ def _icon_of_asset(asset: TetFloraAssetSpecies) -> int:
         found.image_size = PICTURE_SIDE, PICTURE_SIDE
         found.image_pixels_float.foreach_set(pixels.astype(np.float32).ravel() / 255.0)
     return found.icon_id
-
-
-def register() -> None:
-    """Open an empty collection of thumbnails."""
-    thumbnails.register()
 
 
 def unregister() -> None:

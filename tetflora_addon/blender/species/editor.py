@@ -7,15 +7,303 @@ The properties store nothing. They read the JSON of the chosen species and write
 """
 
 from collections.abc import Callable
-from math import degrees, radians
+from math import degrees, isfinite, radians
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
+from ...errors import SpeciesError, readable
+from ...leaves.models import LEAF_MODELS
 from ...parameters import Key
 from ...species.schema import LENGTH_HIGH, ORDER_KEYS
-from .values import WholeSpecies, number_in, rounded, value_of, write, write_range
+from ...species.skeletons import MAX_ORDERS
+from ...species.species import BARKS, QUALITY_LIMITS
+from .catalogue import SpeciesChoice
+from .edits import catalogue, change_species, species_data, species_for, tell_listeners
+
+#: Items of ``leaf_form`` and ``blossom_form`` that are no built-in model.
+OBJECT_LEAF, OWN_LEAF, NO_LEAF = "OBJECT", "OWN", "NONE"
+_SIGNIFICANT = 6  # digits of a slider's single precision that count
+_kept: dict[tuple[str, ...], list[tuple[str, str, str, int]]] = {}  # Blender keeps no copy of the strings of items
+
+
+def present_species(editor: bpy.types.PropertyGroup) -> str:
+    """Identifier of the species that the editor shows; what the drop-down shows when none was chosen yet."""
+    return editor.species or next(iter(catalogue()), "")
+
+
+def _data_of(editor: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """The decoded species that the editor shows; empty where there is none that could be shown."""
+    try:
+        return species_data(editor.id_data, present_species(editor))
+    except SpeciesError:
+        return {}
+
+
+def _orders_in(data: dict[str, Any]) -> list[dict[str, Any]]:
+    orders = data.get("orders")
+    return orders if isinstance(orders, list) and all(isinstance(o, dict) for o in orders) else []
+
+
+def orders_of(editor: bpy.types.PropertyGroup) -> list[dict[str, Any]]:
+    """Decoded orders of the species that the editor shows; empty where there is none that could be shown."""
+    return _orders_in(_data_of(editor))
+
+
+def parts_of(editor: bpy.types.PropertyGroup) -> list[dict[str, Any]]:
+    """The orders, and after them the short shoot of species that have one."""
+    data = _data_of(editor)  # looked up once: each slider of the panel asks for it at each redraw
+    orders, spur = _orders_in(data), data.get("spur")
+    return orders + ([spur] if isinstance(spur, dict) and orders else [])
+
+
+def present_order(editor: bpy.types.PropertyGroup) -> int:
+    """Index among `parts_of` of what the sliders show."""
+    return _order_in(editor, parts_of(editor))
+
+
+def _order_in(editor: bpy.types.PropertyGroup, parts: list[dict[str, Any]]) -> int:
+    return max(min(editor.order_index, len(parts) - 1), 0)
+
+
+def order_label(index: int, order: dict[str, Any], spur: bool = False) -> str:
+    """A line of the list of orders."""
+    name = "Short shoots" if spur else ("Trunk", "Branches", "Twigs")[index] if index < 3 else f"Order {index}"
+    counts = [f"{text} {what}" for what in ("branches", "leaves") if (text := _count(order.get(what)))]
+    number = "+" if spur else index
+    return f"{number}  {name}: {', '.join(counts)}" if counts else f"{number}  {name}"
+
+
+def _count(value: Any) -> str:
+    try:
+        mean, variation = map(float, value)
+    except (TypeError, ValueError):
+        return ""
+    return f"{mean:g}" if mean + variation > 0 else ""
+
+
+def value_of(editor: bpy.types.PropertyGroup, name: str) -> Any:
+    """Value of a key of the shown order as JSON; the default if the file does not give it."""
+    parts, key = parts_of(editor), ORDER_KEYS[name]
+    index = _order_in(editor, parts)
+    if parts and name in parts[index]:
+        return parts[index][name]
+    try:
+        # Some defaults follow from other keys, and only the reader knows how.
+        species = species_for(editor.id_data, present_species(editor))
+        return getattr(species.orders[index] if index < len(species.orders) else species.spur, name)
+    except (SpeciesError, AttributeError):
+        return key.default
+
+
+def species_value(editor: bpy.types.PropertyGroup, name: str, default: Any) -> Any:
+    """Value of a key of the whole species as JSON."""
+    return _data_of(editor).get(name, default)
+
+
+def set_species_value(editor: bpy.types.PropertyGroup, name: str, value: Any) -> None:
+    """Write a key of the whole species; None takes it out."""
+
+    def change(data: dict[str, Any]) -> None:
+        data[name] = value
+        if value is None:
+            del data[name]
+
+    change_species(editor.id_data, present_species(editor), change)
+
+
+def number_in(value: Any, *path: int) -> float:
+    """A number inside nested lists; 0 where there is none. A range may be written as its mean alone."""
+    if path and isinstance(value, int | float):
+        return 0.0 if path[0] else number_in(value)
+    try:
+        for step in path:
+            value = value[step]
+        number = float(value)
+    except (TypeError, ValueError, IndexError, KeyError):
+        return 0.0
+    return number if isfinite(number) else 0.0
+
+
+def rounded(value: float) -> float:
+    """A slider's value without the noise of single precision."""
+    return float(f"{value:.{_SIGNIFICANT}g}")
+
+
+def write(editor: bpy.types.PropertyGroup, name: str, value: Any) -> None:
+    """Write a key of the shown order; Blender swallows errors of setters, so the panel has to show them."""
+    index = present_order(editor)
+    if len(parts_of(editor)) > index:
+
+        def change(data: dict[str, Any]) -> None:
+            orders = data["orders"]
+            (orders[index] if index < len(orders) else data["spur"])[name] = value
+
+        change_species(editor.id_data, present_species(editor), change)
+
+
+def write_range(editor: bpy.types.PropertyGroup, name: str, part: int, value: float) -> None:
+    """Write the mean (0) or the variation (1) of a range of the shown order."""
+    old = value_of(editor, name)
+    write(editor, name, [value if i == part else rounded(number_in(old, i)) for i in (0, 1)])
+
+
+def _order_items(editor: bpy.types.PropertyGroup, _context: Any) -> list[tuple[str, str, str, int]]:
+    orders = len(orders_of(editor))
+    labels = tuple(order_label(i, part, i >= orders) for i, part in enumerate(parts_of(editor)[: MAX_ORDERS + 1]))
+    if labels not in _kept:
+        if len(_kept) > 256:  # every number on the way of a slider is another text
+            _kept.clear()
+        _kept[labels] = [(str(i), text, "Edit the branches of this order", i) for i, text in enumerate(labels)] or [
+            ("0", "No orders", "This species cannot be read", 0)
+        ]
+    return _kept[labels]
+
+
+_LEAF_ITEMS = [
+    *((name, name.capitalize(), f"{m.polygons} faces", i) for i, (name, m) in enumerate(LEAF_MODELS.items())),
+    (OBJECT_LEAF, "Mesh Object", "Mesh object of this file, one unit long along +Y", len(LEAF_MODELS)),
+    (OWN_LEAF, "From Species File", "Polygons from the species file, or several forms", len(LEAF_MODELS) + 1),
+]  # fmt: skip
+_BLOSSOM_ITEMS = [*_LEAF_ITEMS, (NO_LEAF, "None", "The species has no blossoms or fruit", len(_LEAF_ITEMS))]
+
+
+def _forms(editor: bpy.types.PropertyGroup, kind: str) -> dict[str, Any]:
+    """The only form of a kind of leaf as JSON; empty where there are several, or none."""
+    forms = species_value(editor, kind, {})
+    return forms if isinstance(forms, dict) else {}
+
+
+def _form(editor: bpy.types.PropertyGroup, kind: str) -> str:
+    form = _forms(editor, kind)
+    if "object" in form:
+        return OBJECT_LEAF
+    if kind == "blossom" and species_value(editor, kind, None) is None:
+        return NO_LEAF
+    return model if (model := form.get("model")) in LEAF_MODELS and "outline" not in form else OWN_LEAF
+
+
+def _set_form(editor: bpy.types.PropertyGroup, kind: str, identifier: str) -> None:
+    if identifier == OBJECT_LEAF:
+        set_species_value(editor, kind, {"object": str(_forms(editor, kind).get("object") or kind.capitalize())})
+    elif identifier == NO_LEAF:
+        set_species_value(editor, kind, None)
+    elif identifier != OWN_LEAF:  # polygons cannot be invented here
+        set_species_value(editor, kind, {"model": identifier})
+
+
+def _form_property(kind: str, items: list[tuple[str, str, str, int]], name: str, description: str) -> Any:
+    return EnumProperty(
+        name=name,
+        description=description,
+        items=items,
+        get=lambda self: next(i for key, _, _, i in items if key == _form(self, kind)),
+        set=lambda self, number: _set_form(self, kind, items[number][0]),
+        options={'SKIP_SAVE'},
+    )
+
+
+def _object_property(kind: str) -> Any:
+    return StringProperty(
+        name=f"{kind.capitalize()} Object",
+        description=f"Mesh object used as the {kind}: stalk at the origin, pointing along +Y, upper side facing +Z",
+        get=lambda self: readable(str(_forms(self, kind).get("object", ""))),
+        set=lambda self, value: set_species_value(self, kind, {"object": value}),
+        options={'SKIP_SAVE'},
+    )
+
+
+def _number(key: str, name: str, description: str, default: float = 0.0, **options: Any) -> Any:
+    """A number of the whole species; from 0 to 1 unless the options say otherwise."""
+    return FloatProperty(
+        name=name,
+        description=description,
+        default=default,
+        get=lambda self: number_in(species_value(self, key, default)),
+        set=lambda self, value: set_species_value(self, key, rounded(value)),
+        options={'SKIP_SAVE'},
+        **(options or {"min": 0.0, "max": 1.0, "subtype": 'FACTOR'}),
+    )
+
+
+def _text(key: str, name: str, description: str) -> Any:
+    return StringProperty(
+        name=name,
+        description=description,
+        get=lambda self: readable(str(species_value(self, key, ""))),
+        set=lambda self, value: set_species_value(self, key, value),
+        options={'SKIP_SAVE'},
+    )
+
+
+_THROUGH = "Fraction of the light scattered by a {} that passes through it"
+
+
+class WholeSpecies(SpeciesChoice):
+    """Properties of the editor that do not come from the keys of an order."""
+
+    takes_assets = False  # there is nothing to edit in them
+
+    order_index: IntProperty(name="Active Order", min=0, options={'HIDDEN'})
+    order: EnumProperty(
+        name="Order",
+        description="Generation of branches to edit: 0 is the trunk, 1 grows on the trunk",
+        items=_order_items,
+        get=present_order,
+        set=lambda self, number: setattr(self, "order_index", number),
+        options={'SKIP_SAVE'},
+    )
+    preview_seed: IntProperty(
+        name="Seed",
+        description="Individual of the species to show in the preview",
+        default=1,
+        min=0,
+        update=lambda _self, _context: tell_listeners(),
+        options=set(),
+    )
+    species_name: _text("name", "Name", "Name shown in menus; the identifier that plants refer to does not change")
+    species_description: _text("description", "Description", "Tooltip of the species in menus, in one sentence")
+    leaf_form: _form_property("leaf", _LEAF_ITEMS, "Leaf Model", "Shape of each leaf")
+    leaf_object: _object_property("leaf")
+    leaf_transmission: _number("leaf_transmission", "Leaf Translucency", _THROUGH.format("leaf"), 0.4)
+    blossom_form: _form_property(
+        "blossom", _BLOSSOM_ITEMS, "Blossom Model", "Shape of blossoms or fruit, used by orders of this Leaf Kind"
+    )
+    blossom_object: _object_property("blossom")
+    blossom_transmission: _number("blossom_transmission", "Blossom Translucency", _THROUGH.format("blossom"), 0.4)
+    exact: BoolProperty(
+        name="Exact Plant",
+        description="Make all plants of the species identical: ignore variation and seeds",
+        get=lambda self: species_value(self, "exact", False) is True,
+        set=lambda self, value: set_species_value(self, "exact", value),
+        options={'SKIP_SAVE'},
+    )
+    bark: EnumProperty(
+        name="Bark",
+        description="Pattern of the bark",
+        items=[(name, name.capitalize(), "", number) for number, name in enumerate(BARKS)],
+        get=lambda self: BARKS.index(value) if (value := species_value(self, "bark", BARKS[0])) in BARKS else 0,
+        set=lambda self, number: set_species_value(self, "bark", BARKS[number]),
+        options={'SKIP_SAVE'},
+    )
+    quality: _number(
+        "quality",
+        "Quality",
+        "Polygon multiplier for this species: below 1 fewer, larger leaves; above 1 more, finer ones",
+        1.0,
+        min=QUALITY_LIMITS[0],
+        max=QUALITY_LIMITS[1],
+        soft_min=0.02,
+        soft_max=10.0,
+        precision=3,
+    )
+    habit: _number(
+        "habit",
+        "Forest Habit",
+        "0: trees that stand free; 1: those of a dense stand, with bare, slender trunks and narrow crowns",
+    )
+
 
 #: Added to a key's name for the property of a range's second number.
 VARIATION = "_variation"
@@ -45,14 +333,8 @@ def _soft_high(key: Key) -> float:
 
 def _float_options(key: Key, low: float, high: float) -> dict[str, Any]:
     if key.unit == "degrees":
-        return {
-            "min": radians(low),
-            "max": radians(high),
-            "subtype": 'ANGLE',
-            "unit": 'ROTATION',
-            "step": 100,
-            "precision": 4,
-        }
+        angle = {"subtype": 'ANGLE', "unit": 'ROTATION', "step": 100, "precision": 4}
+        return {"min": radians(low), "max": radians(high), **angle}
     options: dict[str, Any] = {"min": low, "max": high, "soft_max": min(_soft_high(key), high), "precision": 3}
     if key.unit == "m":
         options |= {"subtype": 'DISTANCE', "unit": 'LENGTH', "step": 1}
@@ -101,67 +383,56 @@ def _single(name: str, key: Key) -> dict[str, Any]:
     }
 
 
+def _common(name: str, key: Key) -> dict[str, Any]:
+    return {"name": _label(name), "description": _description(name, key), "options": set()}
+
+
 def _integer(name: str, key: Key) -> dict[str, Any]:
     made = IntProperty(
-        name=_label(name),
-        description=_description(name, key),
         min=int(key.low),
         max=int(key.high),
         get=lambda self: int(min(max(number_in(value_of(self, name)), key.low), key.high)),
         set=lambda self, value: write(self, name, value),
-        options=set(),
+        **_common(name, key),
     )
     return {name: made}
 
 
 def _colour(name: str, key: Key) -> dict[str, Any]:
-    return {name + suffix: _colour_part(name, key, part) for part, suffix in enumerate(("", VARIATION))}
+    """A color, or that of a mean and its variation."""
+    if key.kind == "rgb":
+        return {name: _tone(name, (), _common(name, key))}
+    varies = {"name": f"{_label(name)} Variation", "description": f"{_VARIES}: {key.meaning}", "options": set()}
+    return {name: _tone(name, (0,), _common(name, key)), name + VARIATION: _tone(name, (1,), varies)}
 
 
-def _rgb(name: str, key: Key) -> dict[str, Any]:
-    made = FloatVectorProperty(
-        name=_label(name),
-        description=_description(name, key),
-        subtype='COLOR',
-        size=3,
-        min=0.0,
-        max=1.0,
-        get=lambda self: tuple(number_in(value_of(self, name), c) for c in range(3)),
-        set=lambda self, value: write(self, name, [rounded(c) for c in value]),
-        options=set(),
-    )
-    return {name: made}
-
-
-def _colour_part(name: str, key: Key, part: int) -> Any:
-    def set_part(self: bpy.types.PropertyGroup, value: Any) -> None:
-        old = value_of(self, name)
-        new = [[rounded(number_in(old, i, c)) for c in range(3)] for i in (0, 1)]
-        new[part] = [rounded(c) for c in value]
-        write(self, name, new)
-
+def _tone(name: str, part: tuple[int, ...], said: dict[str, Any]) -> Any:
     return FloatVectorProperty(
-        name=_label(name) + (" Variation" if part else ""),
-        description=f"{_VARIES}: {key.meaning}" if part else _description(name, key),
         subtype='COLOR',
         size=3,
         min=0.0,
         max=1.0,
-        get=lambda self: tuple(number_in(value_of(self, name), part, c) for c in range(3)),
-        set=set_part,
-        options=set(),
+        get=lambda self: tuple(number_in(value_of(self, name), *part, c) for c in range(3)),
+        set=lambda self, value: _write_colour(self, name, part, value),
+        **said,
     )
+
+
+def _write_colour(group: bpy.types.PropertyGroup, name: str, part: tuple[int, ...], value: Any) -> None:
+    new = [rounded(c) for c in value]
+    if part:
+        old = value_of(group, name)
+        new = [new if i in part else [rounded(number_in(old, i, c)) for c in range(3)] for i in (0, 1)]
+    write(group, name, new)
 
 
 def _choice(name: str, key: Key) -> dict[str, Any]:
     choices = key.choices
     made = EnumProperty(
-        name=_label(name),
-        description=_description(name, key),
         items=[(choice, _label(choice), "", number) for number, choice in enumerate(choices)],
         get=lambda self: choices.index(value) if (value := value_of(self, name)) in choices else 0,
         set=lambda self, number: write(self, name, choices[number]),
-        options=set(),
+        **_common(name, key),
     )
     return {name: made}
 
@@ -171,7 +442,7 @@ _MAKERS: dict[str, Callable[[str, Key], dict[str, Any]]] = {
     "number": _single,
     "integer": _integer,
     "colour": _colour,
-    "rgb": _rgb,
+    "rgb": _colour,
     "choice": _choice,
 }
 

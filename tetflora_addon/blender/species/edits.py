@@ -4,7 +4,13 @@
 
 The text is what a species file holds, so it passes the same checks, and a key that comes in another version of the
 format needs no migration of its own. `species_for` is the one door: refinement, previews and panels load through it.
+
+Blender links and appends collections without the scene that has the species. So whenever a file is written, collections
+get a page of each species of their plants that is not shipped: edited, made here, litter, or of the user's own folder.
+Pages of linked collections are read where they are; those of appended ones become edits of the scene.
 """
+
+from __future__ import annotations
 
 import copy
 import json
@@ -12,7 +18,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -25,6 +31,7 @@ from ...errors import NAME, SpeciesError, readable
 from ...files import is_identifier, json_of
 from ...species.catalogue import (
     SpeciesInfo,
+    builtin_folder,
     checked_identifier,
     in_order,
     info_of,
@@ -35,10 +42,10 @@ from ...species.catalogue import (
 from ...species.schema import species_file, species_from_json
 from ...species.species import Species
 from ..preferences import species_folders
-from ..runtime import Listeners
+from ..runtime import Handlers, Listeners
 from .asset_species import asset_infos, find_asset, name_of, refuse_asset
 
-#: Custom property of collections: JSON of species by their identifiers, see `travel`.
+#: Custom property of collections: JSON of species by their identifiers, see `pack`.
 PAGES = "tetflora_pages"
 _FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
 
@@ -126,7 +133,6 @@ def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpecies
     ----------
     scene : bpy.types.Scene or None
         Looked at before the file's other scenes: a species is the same in all of them unless two scenes disagree.
-    identifier : str
     """
     return next((edit for edit in _edits(scene) if edit.identifier == identifier), None)
 
@@ -263,7 +269,6 @@ def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[di
     ----------
     scene : bpy.types.Scene
         Receives the edit if no scene of the file has one yet.
-    identifier : str
     change : callable
         Changes the decoded JSON that it is given. What comes of it need not be valid; `problem_of` tells.
 
@@ -377,3 +382,45 @@ def edited_infos() -> dict[str, SpeciesInfo]:
 
 
 CLASSES = (TetFloraSpeciesEdit,)
+
+
+def pack(_path: object = None, _other: object = None) -> None:
+    """Before a file is written: bring the pages of its collections up to date."""
+    shipped = builtin_folder()
+    own = {name for name, info in listed().items() if info.path.parent != shipped}
+    own |= {edit.identifier for edit in edits_of_scenes(None)}
+    for collection in bpy.data.collections:
+        if collection.library is not None or not (own or PAGES in collection):
+            continue
+        needed = set(_species_in(collection))
+        # What came by another way, such as Make Local, goes on.
+        pages = {page.identifier: page.text for page in pages_of(collection) if page.identifier in needed}
+        for name in sorted(own & needed):
+            with suppress(SpeciesError):  # broken, which is told elsewhere
+                pages[name] = json.dumps(species_data(None, name), ensure_ascii=False)
+        text = json.dumps(pages, ensure_ascii=False)
+        if collection.get(PAGES, "{}") != text:
+            collection[PAGES] = text
+
+
+def _species_in(collection: bpy.types.Collection) -> Iterator[str]:
+    for group in (obj.tetflora for obj in collection.objects):
+        if group.is_plant or group.is_field:
+            yield group.species
+            yield from (entry.species for entry in group.field_species)
+
+
+def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> None:
+    """After Append: what its plants are becomes this file's, unless the scene has something of that name."""
+    scene = bpy.context.scene
+    for item in context.import_items:
+        if isinstance(item.id, bpy.types.Collection) and item.id.library is None:
+            for page in pages_of(item.id):
+                if all(page.identifier != edit.identifier for edit in edits_of_scenes(scene)):
+                    with suppress(ValueError, SpeciesError):
+                        store_species(scene, page.identifier, json.loads(page.text))
+
+
+_HANDLERS = Handlers(save_pre=pack, blend_import_post=_on_import)
+register: Callable[[], None] = _HANDLERS.register
+unregister: Callable[[], None] = _HANDLERS.unregister

@@ -18,7 +18,6 @@ from hashlib import blake2b
 
 import bpy
 
-from ...camera.camera import Camera
 from ...errors import TetFloraError
 from ...jobs import Pace, Progress
 from ..job import refine
@@ -31,8 +30,8 @@ from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
 from ..runtime import GoneError, Handlers, call_off, call_soon, redraw, with_uid
+from ..scene.camera import view_camera
 from ..scene.field_sizes import stand_years
-from ..scene.view import view_camera
 from ..settings import season_of, wind_of, years_of
 from .state import camera_now
 
@@ -168,7 +167,7 @@ def _begin(scene: bpy.types.Scene) -> bool:
     """Start the job if what it depends on has changed."""
     layer = _view_layer(scene)
     layer.update()
-    camera = _view(scene)
+    camera = view_camera(scene) if scene.tetflora.follow_viewport else None
     digest = scene_digest(scene, layer.depsgraph, layer, camera)
     if _done.get(scene.session_uid) == digest and has_results(scene):
         _state.message = ""
@@ -200,11 +199,6 @@ def _slice(scene: bpy.types.Scene) -> bool:
         _state.message = text
         redraw()
     return True
-
-
-def _view(scene: bpy.types.Scene) -> Camera | None:
-    """What to refine for if not for the scene's camera."""
-    return view_camera(scene) if scene.tetflora.follow_viewport else None
 
 
 def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:

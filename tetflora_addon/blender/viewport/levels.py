@@ -28,9 +28,8 @@ from ..runtime import Handlers, JobData, call_off, call_soon, guarded, redraw
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
 from ..scene.field_sizes import stand_years
-from ..scene.objects import taking_part
-from ..scene.plants import NoPlantsError, read_asset_plants, read_plants_of
-from ..scene.scatterers import is_drop
+from ..scene.objects import is_drop, taking_part
+from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
 from ..scene.sizes import measure_of
 from ..settings import season_of, years_of
 from ..species import edits
@@ -128,7 +127,7 @@ def _shapes_of(
         size = crown.radius, crown.base, crown.height
         crowns.append(simple_crowns(plants.matrices, size, crown.colour, boxes=make is bounds_of_plants))
     try:
-        seeds, _, of(scene).message = read_plants_of(scene, depsgraph, depsgraph.view_layer)
+        seeds, _, of(scene).message = read_plants(scene, depsgraph, depsgraph.view_layer)
     except NoPlantsError:
         if not crowns:
             raise

@@ -23,7 +23,8 @@ from ..job.plant_mesh import expected_polygons, plant_mesh, plant_parts, single_
 from ..materials.nodes import is_ours, tag
 from ..results.leaf_objects import resolved_species
 from ..runtime import Handlers, call_off, call_soon, redraw, with_uid
-from ..species import edits, values
+from ..species import edits
+from ..species.editor import present_species
 
 NAME = "TetFlora preview"
 #: Polygons that a preview has at most, about: what is rebuilt while a slider moves.
@@ -86,7 +87,7 @@ def refresh() -> None:
         return
     begin = time.perf_counter()
     editor = scene.tetflora.species_editor
-    identifier = values.present_species(editor)
+    identifier = present_species(editor)
     try:
         depsgraph = scene.view_layers[0].depsgraph or bpy.context.evaluated_depsgraph_get()
         seeds = single_seed(identifier, editor.preview_seed)

@@ -165,16 +165,15 @@ def plants_wanted(scene: bpy.types.Scene) -> None:
         listeners.notify()
 
 
-def _redraw(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    redraw()
-
-
 def _plants_changed(group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     plants_wanted(group.id_data)
 
 
 def _freeze_changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get)
+
+
+_SHOWN = {"options": set(), "update": lambda _group, _context: redraw()}
 
 
 class TetFloraPreview(bpy.types.PropertyGroup):
@@ -189,15 +188,13 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         min=0,
         soft_max=24,
         max=1000,
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     wires: BoolProperty(
         name="Tetrahedra",
         description="Draw the edges of tetrahedra that contain plants",
         default=True,
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     colour: EnumProperty(
         name="Color By",
@@ -219,8 +216,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             ),
         ),
         default='FORM',
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     projected: BoolProperty(
         name="Translucent",
@@ -229,8 +225,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             "first, as many as keep the viewport responsive"
         ),
         default=False,
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     forms: EnumProperty(
         name="Show",
@@ -242,8 +237,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             ('SPLIT', "To Split", "Tetrahedra that the next level splits", 8),
         ),
         default={'EXPLICIT', 'PROXY', 'HIDDEN', 'SPLIT'},
-        options={'ENUM_FLAG'},
-        update=_redraw,
+        **{**_SHOWN, "options": {'ENUM_FLAG'}},
     )
     plants: EnumProperty(
         name="Plants",
@@ -261,8 +255,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         name="Statistics",
         description="Show the level and the numbers of tetrahedra and polygons in the corner of the viewport",
         default=True,
-        options=set(),
-        update=_redraw,
+        **_SHOWN,
     )
     freeze: BoolProperty(
         name="Freeze Camera",
