@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -26,7 +26,7 @@ from ..placing.plant_objects import remove_fields
 from ..placing.population_data import fill_population
 from ..placing.populations import add_population, free_name, make_plants_steps, remove_population
 from ..placing.rules import set_grounds
-from ..runtime import GoneError, JobData, guarded, is_there
+from ..runtime import GoneError, JobData, is_there, job
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
 from ..stands.growing import GrownStand, again_steps, is_stand
 from .biome import Biome, find_biome, layers_of, pages_of, set_limits
@@ -60,7 +60,9 @@ class Added:
     kept: list[str]
 
 
+@job("Adding the biome")
 def add_biome_steps(
+    data: JobData,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     biome: Biome,
@@ -75,18 +77,7 @@ def add_biome_steps(
         It needs a species that the catalog does not have, or no layer finds any place; or something was deleted
         meanwhile.
     """
-    data = JobData("Adding the biome", scene)
     data.add_objects(grounds)
-    return guarded(data, _add_steps(scene, depsgraph, biome, grounds, seed))
-
-
-def _add_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    biome: Biome,
-    grounds: Sequence[bpy.types.Object],
-    seed: int,
-) -> Generator[Progress, object, Added]:
     yield Progress(0.0, "Reading the biome")
     with _restored(scene):
         renamed = _own_species(scene, biome)
@@ -101,7 +92,11 @@ def _add_steps(
         if "path_max" in biome.limits:
             made.paths = make_line(scene, f"{made.name} line", grounds)
         group.biomes_index = len(group.biomes) - 1
-        grown = yield from _grow(scene, depsgraph, uid, biome, renamed, grounds, seed)
+        stands = [layer for layer in biome.layers if layer["kind"] == "stand"]
+        grown = yield from _grown(
+            [layer["name"] for layer in stands],
+            lambda number: grow_layer_steps(scene, depsgraph, uid, stands[number], renamed, grounds, seed),
+        )
         for number, layer in enumerate(biome.layers):
             if layer["kind"] == "stand":
                 continue
@@ -120,8 +115,9 @@ def _add_steps(
         return (yield from _plant(scene, depsgraph, uid, *grown))
 
 
+@job("Planting the biome")
 def plant_biome_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, biome: bpy.types.PropertyGroup
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, biome: bpy.types.PropertyGroup
 ) -> Generator[Progress, object, Added]:
     """Plant all layers of a biome again by their settings, but frozen ones and stands of which a year is kept.
 
@@ -130,28 +126,11 @@ def plant_biome_steps(
     SceneError
         No layer finds any place.
     """
-    data, uid = JobData("Planting the biome", scene), biome.uid
+    uid = biome.uid
     data.add_objects(entry.object for entry in biome.grounds if is_there(entry.object))
-    return guarded(data, _plant_again(scene, depsgraph, uid))
-
-
-def _grow(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    uid: str,
-    biome: Biome,
-    renamed: Mapping[str, str],
-    grounds: Sequence[bpy.types.Object],
-    seed: int,
-) -> Generator[Progress, object, tuple[list[tuple[str, int]], list[str]]]:
-    """Stands of a new biome; as `_grown`."""
-    layers = [layer for layer in biome.layers if layer["kind"] == "stand"]
-    return (
-        yield from _grown(
-            [layer["name"] for layer in layers],
-            lambda number: grow_layer_steps(scene, depsgraph, uid, layers[number], renamed, grounds, seed),
-        )
-    )
+    fields = growing_of(scene, uid)
+    grown = yield from _grown([field.name for field in fields], lambda n: again_steps(scene, depsgraph, fields[n]))
+    return (yield from _plant(scene, depsgraph, uid, *grown))
 
 
 def _grown(
@@ -172,14 +151,6 @@ def _grown(
             continue
         made.append((name, grown.plants))
     return made, bare
-
-
-def _plant_again(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str
-) -> Generator[Progress, object, Added]:
-    fields = growing_of(scene, uid)
-    grown = yield from _grown([field.name for field in fields], lambda n: again_steps(scene, depsgraph, fields[n]))
-    return (yield from _plant(scene, depsgraph, uid, *grown))
 
 
 def _plant(

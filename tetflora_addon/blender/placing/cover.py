@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import bpy
@@ -26,7 +27,7 @@ from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
 from ...species.fallen import KIND, leaves_page
 from ...species.litter import FALLEN
 from ..materials.soil import SHADED, lay_soil
-from ..runtime import JobData, guarded, is_there
+from ..runtime import JobData, is_there, job
 from ..scene.crowns import crown_for, crown_steps
 from ..species.edits import catalogue, revert_species, species_data, species_for, store_species
 from ..worker import steps_in_thread
@@ -94,13 +95,15 @@ def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None
     return next((p for p in scene.tetflora.populations if p.uid == active.covers), active)
 
 
+@job("Covering the ground")
 def cover_steps(
+    data: JobData,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     population: bpy.types.PropertyGroup,
     soil: bool = True,
     grounds: Iterable[bpy.types.Object] | None = None,
-    masks: Mapping[str, Any] | None = None,
+    masks: Mapping[str, Any] = MappingProxyType({}),
 ) -> Generator[Progress, object, Covered]:
     """Cover the ground of a population.
 
@@ -123,19 +126,6 @@ def cover_steps(
     SceneError
         It has no ground or no plants above it, or the cover is frozen; or something was deleted meanwhile.
     """
-    data = JobData("Covering the ground", scene)
-    return guarded(data, _cover_steps(data, scene, depsgraph, population, soil, grounds, masks or {}))
-
-
-def _cover_steps(
-    data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    population: bpy.types.PropertyGroup,
-    soil: bool,
-    grounds: Iterable[bpy.types.Object] | None,
-    masks: Mapping[str, Any],
-) -> Generator[Progress, object, Covered]:
     yield (progress := Progress(0.0, UNDER))
     uid = population.uid or ANYBODY
     found = cover_of(scene, uid)

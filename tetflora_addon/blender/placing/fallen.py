@@ -17,7 +17,7 @@ from ...jobs import Progress
 from ...planting.canopy import Canopy
 from ...planting.cover import FULL
 from ...species.fallen import KIND, shed_share
-from ..runtime import JobData, guarded
+from ..runtime import JobData, job
 from ..scene.crowns import crown_for, crown_steps
 from ..species.edits import species_for
 from .canopy import canopy_of, standing
@@ -29,8 +29,9 @@ NAME = "Fallen leaves"
 _SQUARE = 0.976  # mean square of the scales of a cover's plants
 
 
+@job("Strewing leaves")
 def strew_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup
 ) -> Generator[Progress, object, Made | None]:
     """Strew the leaves that fall in autumn under a population; None where nothing above sheds its leaves.
 
@@ -42,13 +43,6 @@ def strew_steps(
     SceneError
         It has no ground, or the leaves are frozen; or something was deleted meanwhile.
     """
-    data = JobData("Strewing leaves", scene)
-    return guarded(data, _strew_steps(data, scene, depsgraph, population))
-
-
-def _strew_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup
-) -> Generator[Progress, object, Made | None]:
     yield (progress := Progress(0.0, UNDER))
     uid = population.uid or ANYBODY
     found = cover_of(scene, uid, fallen=True)

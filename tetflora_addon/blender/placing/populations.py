@@ -23,7 +23,7 @@ from ...jobs import Progress
 from ...planting.ages import plant_ages
 from ...planting.places import Placement
 from ..assets.marks import measure_all
-from ..runtime import JobData, guarded, is_there
+from ..runtime import JobData, is_there, job
 from ..scene.crowns import crown_steps
 from ..scene.fields import fields_of, stored_size
 from ..scene.own_ages import MOST_YEARS
@@ -121,8 +121,9 @@ def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, populati
     return at_once(make_plants_steps(scene, depsgraph, population))
 
 
+@job("Placing plants")
 def make_plants_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
 ) -> Generator[Progress, object, Made]:
     """Place a population's plants by its settings, in place of those that it has.
 
@@ -133,12 +134,6 @@ def make_plants_steps(
     SceneError
         It is frozen, or no plants can be placed by its settings, as the message says; or it was deleted meanwhile.
     """
-    return guarded(data := JobData("Placing plants", scene), _make_plants_steps(data, scene, depsgraph, population))
-
-
-def _make_plants_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
-) -> Generator[Progress, object, Made]:
     progress, uid = Progress(0.0, "Reading the ground"), population.uid
     yield progress
     refuse_frozen(population)

@@ -24,7 +24,7 @@ from ..attributes import write
 from ..placing.plant_objects import link_field
 from ..placing.terrain import read_ground
 from ..placing.zones import zoned
-from ..runtime import JobData, guarded, is_there
+from ..runtime import JobData, is_there, job
 from ..scene.field_points import read_points
 from ..scene.field_sizes import (
     FIT,
@@ -100,7 +100,9 @@ def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup)
         entry.species, entry.planted, entry.rain = name, planted, rain
 
 
+@job("Growing the stand")
 def new_stand_steps(
+    data: JobData,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     grounds: Iterable[bpy.types.Object],
@@ -116,30 +118,7 @@ def new_stand_steps(
     TetFloraError
         No ground, a species that the catalogue does not have, or settings with which nothing grows.
     """
-    grounds = list(grounds)
-    data = JobData("Growing the stand", scene, depsgraph.view_layer)
-    data.add_objects(grounds)
-    return guarded(data, _new_stand_steps(data, scene, depsgraph, grounds, name, fill))
-
-
-def again_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, field: bpy.types.Object
-) -> Generator[Progress, object, GrownStand]:
-    """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
-    grounds = [e.object for e in field.tetflora.stand.grounds if e.object is not None and scene in e.object.users_scene]
-    data = JobData("Growing the stand", scene, depsgraph.view_layer)
-    data.add_objects([*grounds, field])
-    return guarded(data, _again_steps(data, scene, depsgraph, field, grounds))
-
-
-def _new_stand_steps(
-    data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    grounds: list[bpy.types.Object],
-    name: str,
-    fill: Callable[[bpy.types.PropertyGroup], None] | None,
-) -> Generator[Progress, object, GrownStand]:
+    data.add_objects(grounds := list(grounds))
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
     field = write_field(name, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ())
     mesh, made = field.data, False
@@ -164,6 +143,16 @@ def _new_stand_steps(
                 bpy.data.objects.remove(field)
             if is_there(mesh) and not mesh.users:
                 bpy.data.meshes.remove(mesh)
+
+
+@job("Growing the stand")
+def again_steps(
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, field: bpy.types.Object
+) -> Generator[Progress, object, GrownStand]:
+    """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
+    grounds = [e.object for e in field.tetflora.stand.grounds if e.object is not None and scene in e.object.users_scene]
+    data.add_objects([*grounds, field])
+    return (yield from _again_steps(data, scene, depsgraph, field, grounds))
 
 
 def _again_steps(
