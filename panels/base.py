@@ -27,6 +27,21 @@ def split_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
     return panel.layout
 
 
+def section(
+    layout: bpy.types.UILayout,
+    title: str,
+    closed: bool = True,
+    switch: tuple[bpy.types.bpy_struct, str] | None = None,
+) -> bpy.types.UILayout | None:
+    """Begin a section of a panel, with the property that turns it on in its header; None while it is closed."""
+    header, body = layout.panel(title, default_closed=closed)
+    if switch is not None:
+        header.use_property_split = False
+        header.prop(*switch, text="")
+    header.label(text=title)
+    return body
+
+
 def draw_message(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = 'ERROR') -> None:
     """A text over several lines, because Blender does not wrap; a letter is some 7 pixels wide at a scale of 1."""
     letters = context.region.width / (7.0 * (context.preferences.system.ui_scale or 1.0))  # 0 without a window
@@ -60,44 +75,51 @@ def draw_properties(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, *na
         layout.prop(owner, name)
 
 
-def draw_limits(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, name: str, *more: str) -> bpy.types.UILayout:
-    """Draw least and most of something, and more of it, in a column; returns that."""
-    column = layout.column(align=True)
-    column.prop(owner, f"{name}_min")
-    for part in ("max", *more):
-        column.prop(owner, f"{name}_{part}", text=part.capitalize())
-    return column
-
-
-def draw_vertex_group(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct) -> bpy.types.Object | None:
-    """Draw the vertex group of the first ground; returns that."""
+def draw_where(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> None:
+    """Draw where on its ground a population, biome or stand is: masks, limits and curves, as far as it has them."""
+    known = owner.bl_rna.properties
     ground = next((entry.object for entry in owner.grounds if entry.object is not None), None)
-    if ground is not None:
-        layout.prop_search(owner, "vertex_group", ground, "vertex_groups")
-    else:
-        layout.prop(owner, "vertex_group")
-    return ground
-
-
-def draw_mask(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct) -> None:
-    """Draw vertex group and image of a population or biome."""
     row = layout.row(align=True)
-    ground = draw_vertex_group(row, owner)
-    row.prop(owner, "invert_group", text="", icon='ARROW_LEFTRIGHT')
-    row = layout.row(align=True)
-    row.prop(owner, "image")
-    row.prop(owner, "invert_image", text="", icon='ARROW_LEFTRIGHT')
-    if owner.image is not None and ground is not None and ground.type == 'MESH':
-        layout.prop_search(owner, "uv_layer", ground.data, "uv_layers")
-    elif owner.image is not None:
-        layout.prop(owner, "uv_layer")
-
-
-def draw_paths(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct) -> None:
-    """Draw areas and paths of a population or stand."""
-    draw_properties(layout, owner, "areas", "paths")
+    _draw_search(row, owner, "vertex_group", ground, "vertex_groups")
+    if "image" in known:
+        row.prop(owner, "invert_group", text="", icon='ARROW_LEFTRIGHT')
+        row = layout.row(align=True)
+        row.prop(owner, "image")
+        row.prop(owner, "invert_image", text="", icon='ARROW_LEFTRIGHT')
+        if owner.image is not None:
+            mesh = ground.data if ground is not None and ground.type == 'MESH' else None
+            _draw_search(layout, owner, "uv_layer", mesh, "uv_layers")
+    if "use_altitude" in known:
+        layout.prop(owner, "use_altitude")
+        if owner.use_altitude:
+            _draw_limits(layout, owner, "altitude")
+    _draw_limits(layout, owner, "slope")
+    _draw_limits(layout, owner, "wetness")
+    draw_properties(layout, owner, *(name for name in ("areas", "paths") if name in known))
     if owner.paths is not None:
-        layout.prop(owner, "path_distance")
+        _draw_limits(layout, owner, "path")
+
+
+def _draw_search(
+    layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str, place: bpy.types.ID | None, names: str
+) -> None:
+    """Draw a name to choose from those of a datablock, or to type where there is none."""
+    if place is not None:
+        layout.prop_search(owner, name, place, names)
+    else:
+        layout.prop(owner, name)
+
+
+def _draw_limits(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str) -> None:
+    """Draw the limits of something as far as they are there, and how soft they are; that only matters to limits."""
+    known, column = owner.bl_rna.properties, layout.column(align=True)
+    ends = [end for end in ("min", "max") if f"{name}_{end}" in known]
+    for part in (*ends, *(part for part in ("falloff", "softness", "distance") if f"{name}_{part}" in known)):
+        row = column.row()
+        row.active = part != "softness" or any(
+            getattr(owner, f"{name}_{end}") != getattr(known[f"{name}_{end}"], f"hard_{end}") for end in ends
+        )
+        row.prop(owner, f"{name}_{part}", **({} if part in (*ends[:1], "distance") else {"text": part.capitalize()}))
 
 
 class Button(NamedTuple):
@@ -123,6 +145,41 @@ def draw_buttons(layout: bpy.types.UILayout, *buttons: Button | None) -> None:
             layout.separator()
         else:
             button.draw(layout)
+
+
+def draw_list(
+    layout: bpy.types.UILayout,
+    kind: type[bpy.types.UIList],
+    owner: bpy.types.PropertyGroup,
+    entries: str,
+    *buttons: Button,
+    rows: int = 2,
+) -> bpy.types.UILayout:
+    """Draw a list of an owner, with buttons beside it; returns the column of these."""
+    row = layout.row()
+    row.template_list(kind.__name__, "", owner, entries, owner, f"{entries}_index", rows=rows)
+    column = row.column(align=True)
+    draw_buttons(column, *buttons)
+    return column
+
+
+class LayerList:
+    """Mix-in for lists of what grows on the ground: a name, how many plants, and an icon for what they are in."""
+
+    icon: str
+
+    @staticmethod
+    def state(item: bpy.types.PropertyGroup) -> tuple[int, str]:
+        """Number of plants, and an icon."""
+        raise NotImplementedError
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "name", text="", emboss=False, icon=self.icon)
+        right = row.row()
+        right.alignment = 'RIGHT'
+        number, icon = self.state(item)
+        right.label(text=f"{number:,}", icon=icon)
 
 
 class _SpeciesList:
@@ -156,11 +213,9 @@ class _SpeciesList:
     @classmethod
     def draw_in(cls, layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> None:
         """Draw the list of an owner, with buttons to add and remove."""
-        row = layout.row()
-        row.template_list(cls.__name__, "", owner, cls.entries, owner, f"{cls.entries}_index", rows=2)
-        column = row.column(align=True)
-        for action in ('ADD', 'REMOVE'):
-            Button(TETFLORA_OT_edit_list, action, "", {"which": cls.which, "action": action}).draw(column)
+        values = [{"which": cls.which, "action": action} for action in ('ADD', 'REMOVE')]
+        buttons = (Button(TETFLORA_OT_edit_list, one["action"], "", one) for one in values)
+        draw_list(layout, cls, owner, cls.entries, *buttons)
 
 
 class TETFLORA_UL_mix(_SpeciesList, bpy.types.UIList):

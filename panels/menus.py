@@ -90,15 +90,6 @@ class TETFLORA_MT_place_plant(_SpeciesMenu, bpy.types.Menu):
     operator = TETFLORA_OT_place_plant
 
 
-#: Buttons that panels have as well.
-PLANT_TOOLS = (
-    Button(TETFLORA_OT_reseed, 'FILE_REFRESH'),
-    Button(TETFLORA_OT_select_species, 'RESTRICT_SELECT_OFF', "Select All of This Species"),
-)
-CONVERSIONS = (
-    Button(TETFLORA_OT_make_field, 'POINTCLOUD_DATA'),
-    Button(TETFLORA_OT_split_field, 'OUTLINER_OB_EMPTY'),
-)
 _POPULATE = Button(TETFLORA_OT_populate, 'OUTLINER_OB_POINTCLOUD', "Populate with Plants")
 _PAINT = Button(TETFLORA_OT_paint_plants, 'BRUSH_DATA')
 _DROP = Button(TETFLORA_OT_drop_to_ground, 'TRIA_DOWN_BAR')
@@ -142,7 +133,8 @@ class TETFLORA_MT_object(bpy.types.Menu):
             Button(TETFLORA_OT_refine_scatter, 'OUTLINER_OB_POINTCLOUD', "Refine Scatter or Keep It Plain"),
             Button(TETFLORA_OT_use_as_form, 'CURVE_DATA'),
             Button(TETFLORA_OT_mark_field, 'POINTCLOUD_DATA', "Use or Stop Using as Field of Plants"),
-            *CONVERSIONS,
+            Button(TETFLORA_OT_make_field, 'POINTCLOUD_DATA'),
+            Button(TETFLORA_OT_split_field, 'OUTLINER_OB_EMPTY'),
             None,
             _PAINT,
         )
@@ -161,7 +153,8 @@ class TETFLORA_MT_object(bpy.types.Menu):
         draw_species_menu(layout)
         draw_buttons(
             layout,
-            *PLANT_TOOLS,
+            Button(TETFLORA_OT_reseed, 'FILE_REFRESH'),
+            Button(TETFLORA_OT_select_species, 'RESTRICT_SELECT_OFF', "Select All of This Species"),
             Button(TETFLORA_OT_make_plant_mesh, 'OUTLINER_OB_MESH'),
             Button(TETFLORA_OT_remove_plants, 'X', "Remove Selected Plants", {"which": 'SELECTED'}),
             Button(TETFLORA_OT_remove_plants, 'TRASH', "Remove All Plants", {"which": 'ALL'}),

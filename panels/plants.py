@@ -1,14 +1,12 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plants: the active plant or field, and operators for the selected ones."""
+"""Plants: the active plant or field; operators for the selected ones are in the Object menu."""
 
 import bpy
 
 from ..operators.add import TETFLORA_OT_use_as_form
 from ..operators.assets import TETFLORA_OT_stop_using_as_species, TETFLORA_OT_use_as_species
 from ..operators.marks import TETFLORA_OT_mark_field
-from ..operators.plants import TETFLORA_OT_remove_plants
-from ..operators.refine import TETFLORA_OT_make_plant_mesh
 from ..tetflora_addon.blender.assets.marks import is_species
 from ..tetflora_addon.blender.scene.ages import stage_text
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
@@ -17,16 +15,8 @@ from ..tetflora_addon.blender.scene.own_ages import has_ages
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES
 from ..tetflora_addon.blender.species.asset_species import name_of
 from ..tetflora_addon.blender.species.edits import catalogue
-from .base import (
-    Button,
-    SidebarPanel,
-    TETFLORA_UL_field_species,
-    draw_below,
-    draw_buttons,
-    draw_properties,
-    split_layout,
-)
-from .menus import CONVERSIONS, PLANT_TOOLS, TETFLORA_MT_add_plant, draw_species_menu
+from .base import Button, SidebarPanel, TETFLORA_UL_field_species, draw_below, draw_properties, split_layout
+from .menus import TETFLORA_MT_add_plant
 
 
 class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
@@ -95,23 +85,4 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         column.prop(field, "age")
 
 
-class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
-    """Operators for many plants at once; closed by default to keep the panels below in sight."""
-
-    bl_label = "Selected Plants"
-    bl_parent_id = "TETFLORA_PT_plants"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        column = self.layout.column(align=True)
-        draw_species_menu(column)
-        mesh = Button(TETFLORA_OT_make_plant_mesh, 'OUTLINER_OB_MESH', "Convert to Meshes")
-        draw_buttons(column, *PLANT_TOOLS, mesh, *CONVERSIONS)
-        draw_buttons(
-            self.layout.column(align=True),
-            Button(TETFLORA_OT_remove_plants, 'X', "Remove Selected", {"which": 'SELECTED'}),
-            Button(TETFLORA_OT_remove_plants, 'TRASH', "Remove All Plants", {"which": 'ALL'}),
-        )
-
-
-CLASSES = (TETFLORA_PT_plants, TETFLORA_PT_selected_plants)
+CLASSES = (TETFLORA_PT_plants,)

@@ -28,30 +28,29 @@ from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.viewport import points
 from .base import (
     Button,
+    LayerList,
     SidebarPanel,
     TETFLORA_UL_mix,
     draw_below,
     draw_buttons,
-    draw_limits,
-    draw_mask,
+    draw_list,
     draw_message,
-    draw_paths,
     draw_properties,
+    draw_where,
+    section,
     shown_length,
     split_layout,
 )
 
 
-class TETFLORA_UL_populations(bpy.types.UIList):
+class TETFLORA_UL_populations(LayerList, bpy.types.UIList):
     """A population's name, how many plants it has, and whether it is frozen or an update would change it."""
 
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
-        row = layout.row(align=True)
-        row.prop(item, "name", text="", emboss=False, icon='OUTLINER_OB_POINTCLOUD')
-        right = row.row()
-        right.alignment = 'RIGHT'
-        icon = 'FREEZE' if item.frozen else 'FILE_REFRESH' if is_outdated(item) else 'NONE'
-        right.label(text=f"{item.made:,}", icon=icon)
+    icon = 'OUTLINER_OB_POINTCLOUD'
+
+    @staticmethod
+    def state(item: bpy.types.PropertyGroup) -> tuple[int, str]:
+        return item.made, 'FREEZE' if item.frozen else 'FILE_REFRESH' if is_outdated(item) else 'NONE'
 
 
 class TETFLORA_MT_populations(bpy.types.Menu):
@@ -80,7 +79,10 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
         group, settings = context.scene.tetflora, shown_population(context.scene)
-        _draw_populations(layout, group)
+        buttons = [Button(TETFLORA_OT_add_population, 'ADD', ""), Button(TETFLORA_OT_remove_population, 'REMOVE', "")]
+        buttons, rows = (buttons, 3) if group.populations else (buttons[:1], 1)
+        beside = draw_list(layout, TETFLORA_UL_populations, group, "populations", *buttons, rows=rows)
+        beside.menu(TETFLORA_MT_populations.__name__, text="", icon='DOWNARROW_HLT')
         if settings.uid:
             row = layout.row(align=True)
             Button(TETFLORA_OT_update_population, 'FILE_REFRESH', "Update").draw(row)
@@ -106,87 +108,59 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
         marked = active is not None and active.tetflora.is_occluder
         text, icon = ("Occluder", 'CHECKMARK') if marked else ("Mark as Occluder", 'MOD_MASK')
         Button(TETFLORA_OT_mark_occluder, icon, text).draw(layout, depress=marked)
+        for title, draw in _SECTIONS.items():
+            # What to plant is the first question.
+            if body := section(layout, title, closed=title != "Species"):
+                body.active = not settings.frozen
+                draw(body, settings)
 
 
-class _PartOfPopulate(SidebarPanel):
-    """Mix-in for panels within Populate, closed at first."""
-
-    bl_parent_id = "TETFLORA_PT_populate"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        settings = shown_population(context.scene)
-        layout.active = not settings.frozen
-        self.draw_settings(layout, settings)
-
-
-class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
-    """Which species, and which of them are companions."""
-
-    bl_label = "Species"
-    bl_options = set()  # open: what to plant is the first question
-
-    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        TETFLORA_UL_mix.draw_in(layout, settings)
-        if not settings.mix:
-            known = catalogue()
-            text = f"Default: {next(iter(known.values())).name}" if known else "The catalog has no species"
-            layout.label(text=text, icon='INFO')
-        elif 0 <= settings.mix_index < len(settings.mix):
-            entry = settings.mix[settings.mix_index]
-            layout.prop(entry, "companion_choice")
-            if entry.companion:
-                draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")
-            layout.prop(entry, "habitat")
+def _draw_species(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    TETFLORA_UL_mix.draw_in(layout, settings)
+    if not settings.mix:
+        known = catalogue()
+        text = f"Default: {next(iter(known.values())).name}" if known else "The catalog has no species"
+        layout.label(text=text, icon='INFO')
+    elif 0 <= settings.mix_index < len(settings.mix):
+        entry = settings.mix[settings.mix_index]
+        layout.prop(entry, "companion_choice")
+        if entry.companion:
+            draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")
+        layout.prop(entry, "habitat")
 
 
-class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
-    """On which ground."""
-
-    bl_label = "Placement"
-
-    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        draw_limits(layout, settings, "slope")
-        column = layout.column(align=True)
-        column.prop(settings, "aspect")
-        column.prop(settings, "aspect_spread", text="Spread")
-        layout.prop(settings, "use_altitude")
-        if settings.use_altitude:
-            draw_limits(layout, settings, "altitude", "falloff")
-        row = draw_limits(layout, settings, "wetness").row()
-        row.active = settings.wetness_min > 0.0 or settings.wetness_max < 1.0
-        row.prop(settings, "wetness_softness", text="Softness")
-        layout.prop(settings, "edge_falloff")
-        draw_mask(layout, settings)
-        draw_paths(layout, settings)
+def _draw_placement(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    draw_where(layout, settings)
+    column = layout.column(align=True)
+    column.prop(settings, "aspect")
+    column.prop(settings, "aspect_spread", text="Spread")
+    layout.prop(settings, "edge_falloff")
 
 
-class TETFLORA_PT_populate_arrangement(_PartOfPopulate, bpy.types.Panel):
-    """How far from each other."""
-
-    bl_label = "Spacing"
-
-    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        _draw_distance(layout, settings)
-        layout.prop(settings, "clumping")
-        if settings.clumping:
-            layout.prop(settings, "clump_size")
+def _draw_spacing(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    _draw_distance(layout, settings)
+    layout.prop(settings, "clumping")
+    if settings.clumping:
+        layout.prop(settings, "clump_size")
 
 
-class TETFLORA_PT_populate_size(_PartOfPopulate, bpy.types.Panel):
-    """How large, how upright, and how old."""
+def _draw_size(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
+    draw_properties(layout, settings, "scale_at_top", "tilt")
+    column = layout.column(align=True)
+    column.prop(settings, "age")
+    row = column.row()
+    row.active = settings.age > 0.0
+    row.prop(settings, "age_spread", slider=True)
 
-    bl_label = "Size and Age"
 
-    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
-        draw_properties(layout, settings, "scale_at_top", "tilt")
-        column = layout.column(align=True)
-        column.prop(settings, "age")
-        row = column.row()
-        row.active = settings.age > 0.0
-        row.prop(settings, "age_spread", slider=True)
+#: Sections of Populate by title.
+_SECTIONS = {
+    "Species": _draw_species,
+    "Placement": _draw_placement,
+    "Spacing": _draw_spacing,
+    "Size and Age": _draw_size,
+}
 
 
 def _distance(settings: bpy.types.PropertyGroup) -> str:
@@ -204,18 +178,6 @@ def _draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
         right.label(text=_distance(settings))
     else:
         layout.prop(settings, "min_distance", text=" ")
-
-
-def _draw_populations(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    row = layout.row()
-    rows = 3 if group.populations else 1
-    name = TETFLORA_UL_populations.__name__
-    row.template_list(name, "", group, "populations", group, "populations_index", rows=rows)
-    column = row.column(align=True)
-    column.operator(TETFLORA_OT_add_population.bl_idname, text="", icon='ADD')
-    if group.populations:
-        column.operator(TETFLORA_OT_remove_population.bl_idname, text="", icon='REMOVE')
-    column.menu(TETFLORA_MT_populations.__name__, text="", icon='DOWNARROW_HLT')
 
 
 def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -272,9 +234,5 @@ CLASSES = (
     TETFLORA_UL_populations,
     TETFLORA_MT_populations,
     TETFLORA_PT_populate,
-    TETFLORA_PT_populate_species,
-    TETFLORA_PT_populate_where,
-    TETFLORA_PT_populate_arrangement,
-    TETFLORA_PT_populate_size,
     TETFLORA_PT_brush,
 )

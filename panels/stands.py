@@ -16,9 +16,9 @@ from .base import (
     Button,
     SidebarPanel,
     TETFLORA_UL_stand_species,
-    draw_paths,
     draw_properties,
-    draw_vertex_group,
+    draw_where,
+    section,
     split_layout,
 )
 
@@ -52,39 +52,12 @@ class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
             layout.label(text="Default: a mixed wood of central Europe", icon='INFO')
         elif 0 <= stand.species_index < len(stand.species):
             draw_properties(layout.column(align=True), stand.species[stand.species_index], "planted", "rain")
+        if body := section(layout, "Site"):
+            draw_properties(body.column(align=True), stand, "warmth", "winter")
+            draw_properties(body.column(align=True), stand, "moisture", "relief", "fertility")
+            draw_where(body, stand)
+        if body := section(layout, "Detail"):
+            draw_properties(body, stand, "interval", "least_height", "cell", "open_edges")
 
 
-class _PartOfStand(SidebarPanel):
-    """Mix-in for panels within Grow a Stand, closed at first."""
-
-    bl_parent_id = "TETFLORA_PT_stand"
-    bl_options = {'DEFAULT_CLOSED'}
-
-
-class TETFLORA_PT_stand_site(_PartOfStand, bpy.types.Panel):
-    """Climate, soil, and where plants can stand."""
-
-    bl_label = "Site"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        stand = shown_stand(context)
-        draw_properties(layout.column(align=True), stand, "warmth", "winter")
-        draw_properties(layout.column(align=True), stand, "moisture", "relief", "fertility")
-        layout.prop(stand, "slope_max")
-        draw_vertex_group(layout, stand)
-        draw_paths(layout, stand)
-
-
-class TETFLORA_PT_stand_detail(_PartOfStand, bpy.types.Panel):
-    """How finely the stand is computed and recorded."""
-
-    bl_label = "Detail"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        draw_properties(
-            split_layout(self).column(), shown_stand(context), "interval", "least_height", "cell", "open_edges"
-        )
-
-
-CLASSES = (TETFLORA_PT_stand, TETFLORA_PT_stand_site, TETFLORA_PT_stand_detail)
+CLASSES = (TETFLORA_PT_stand,)
