@@ -12,7 +12,7 @@ from ..operators.biomes import (
     TETFLORA_OT_save_biome,
     TETFLORA_OT_update_biome,
 )
-from ..tetflora_addon.blender.biomes.biome import active_biome, layers_of
+from ..tetflora_addon.blender.biomes.files import active_biome, layers_of
 from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of
 from ..tetflora_addon.blender.placing.rules import awaits_update
 from .base import Button, LayerList, SidebarPanel, draw_buttons, draw_list, draw_where, section, split_layout

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 import bpy
 
@@ -23,15 +24,15 @@ from ...species.fallen import KIND as FALLEN_LEAVES
 from ...species.litter import FALLEN
 from ..placing.cover import fallen_from
 from ..placing.plant_objects import remove_fields
-from ..placing.population_data import fill_population
+from ..placing.population_data import fill_population, set_setting
 from ..placing.populations import add_population, free_name, make_plants_steps, remove_population
 from ..placing.rules import set_grounds
 from ..runtime import GoneError, JobData, is_there, job
+from ..scene.field_sizes import has_history
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
-from ..stands.growing import GrownStand, again_steps, is_stand
-from .biome import Biome, find_biome, layers_of, pages_of, set_limits
+from ..stands.growing import GrownStand, again_steps, is_stand, new_stand_steps
+from .files import Biome, find_biome, layers_of, pages_of, stand_settings, stands_of
 from .ground import lay_biome_soil, make_line
-from .stands import grow_layer_steps, growing_of
 
 _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
 
@@ -88,14 +89,18 @@ def add_biome_steps(
         made.data = json.dumps({"ground": biome.ground, "season": biome.season}, ensure_ascii=False)
         for obj in grounds:
             made.grounds.add().object = obj
-        set_limits(made, biome.limits)
+        for key, value in biome.limits.items():
+            set_setting(made, key, value)
+        made.use_altitude = bool({"altitude_min", "altitude_max"} & biome.limits.keys())
         if "path_max" in biome.limits:
             made.paths = make_line(scene, f"{made.name} line", grounds)
         group.biomes_index = len(group.biomes) - 1
         stands = [layer for layer in biome.layers if layer["kind"] == "stand"]
         grown = yield from _grown(
             [layer["name"] for layer in stands],
-            lambda number: grow_layer_steps(scene, depsgraph, uid, stands[number], renamed, grounds, seed),
+            lambda n: new_stand_steps(
+                scene, depsgraph, grounds, stands[n]["name"], partial(_fill_stand, stands[n], uid, renamed, seed)
+            ),
         )
         for number, layer in enumerate(biome.layers):
             if layer["kind"] == "stand":
@@ -265,6 +270,25 @@ def _restored(scene: bpy.types.Scene) -> Iterator[None]:
             for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
                 revert_species(identifier)
         raise
+
+
+def growing_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
+    """Those of them that have their years, and may be grown again: *Keep Year* makes a stand the artist's own."""
+    return [obj for obj in stands_of(scene, uid) if has_history(obj) and not (obj.library or obj.data.library)]
+
+
+def _fill_stand(
+    layer: Mapping[str, Any], uid: str, renamed: Mapping[str, str], seed: int, stand: bpy.types.PropertyGroup
+) -> None:
+    """Give a stand the settings of a checked layer."""
+    for name in stand_settings():
+        if name in layer:
+            set_setting(stand, name, layer[name])
+    stand.biome, stand.seed = uid, (stand.seed + seed) % 2**31
+    for part in layer["species"]:
+        entry = stand.species.add()
+        for key, value in part.items():
+            setattr(entry, key, renamed.get(value, value) if key == "species" else value)
 
 
 def remove_biome(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> int:

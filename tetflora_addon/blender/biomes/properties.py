@@ -2,12 +2,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Biomes of a scene: where each lies, and which comes first. Its layers are populations that know its identity."""
 
+from typing import Any
+
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, PointerProperty, StringProperty
 
+from ...files import json_of
 from ...planting.zones import Limits
 from ..placing.properties import GroundMask, TetFloraGround, listeners
 from ..settings import properties_of
+
+#: Ground: linear RGB of bare soil and of turf, the share that turf hides; and the shape of ground that is made for it:
+#: hills in meters, slope in degrees, depth of a brook's valley in meters. Least and most of each number.
+GROUND = {
+    "earth": ((0.036, 0.025, 0.016), 0.0, 1.0),
+    "turf": ((0.05, 0.08, 0.02), 0.0, 1.0),
+    "turf_share": (0.0, 0.0, 1.0),
+    "hills": (2.0, 0.0, 30.0),
+    "slope": (0.0, 0.0, 45.0),
+    "valley": (0.0, 0.0, 30.0),
+}
 
 
 def _notify(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
@@ -50,6 +64,15 @@ class TetFloraBiome(bpy.types.PropertyGroup, GroundMask, _Limits):
         type=bpy.types.Collection,
         **_LIVE,
     )
+
+
+def data_of(biome: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """What a biome keeps of its file beside its layers; nothing where that cannot be read."""
+    try:
+        data = json_of(biome.data) if biome.data else {}
+    except ValueError:
+        data = {}
+    return data if isinstance(data, dict) else {}
 
 
 CLASSES = (TetFloraBiome,)

@@ -15,8 +15,7 @@ from ..file_library import MAX_FILE_BYTES, as_text
 from ..placing.rules import active_population, grounds_of
 from ..species.edits import new_identifier
 from . import library
-from .biome import active_biome, layers_of
-from .files import biome_data, checked, read_biome
+from .files import active_biome, biome_data, checked, layers_of, read_biome
 
 #: Pixels of a picture, and its quality as a JPEG.
 _SIDES, _QUALITY = (320, 200), 82

@@ -46,8 +46,8 @@ IDENTITY = {
     *("mix_index", "distance_from", "covers", "biome"),
 }
 _DIGITS = 4  # of erased places: tenths of a millimetre
-_ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance")
-_HABITAT = ("habitat", "shed_by")
+#: Settings of a species of a mixture.
+ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance", "habitat", "shed_by")
 
 
 def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
@@ -62,9 +62,7 @@ def fingerprint(population: bpy.types.PropertyGroup) -> str:
     """
     values: list[Any] = [[e.object.name_full for e in population.grounds if e.object is not None]]
     for entry in population.mix:
-        values.append([getattr(entry, name) for name in _ENTRY])
-        if entry.habitat != 'ANYWHERE':
-            values.append([entry.habitat, entry.shed_by])
+        values.append([getattr(entry, name) for name in ENTRY])
     for name, default in _defaults(type(population)):
         value = distance_of(population) if name == "min_distance" else getattr(population, name)
         if isinstance(value, bpy.types.ID):
@@ -109,7 +107,7 @@ def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGro
 
 def copy_entry(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
     """Let an entry of a mixture be as another."""
-    for name in (*_ENTRY, *_HABITAT):
+    for name in ENTRY:
         setattr(target, name, getattr(source, name))
 
 
