@@ -7,9 +7,13 @@ from collections.abc import Generator
 import bpy
 from bpy.props import BoolProperty
 
-from ..tetflora_addon.blender.placing.cover import Covered, cover_steps, covered_population
-from ..tetflora_addon.blender.placing.fallen import strew_steps
-from ..tetflora_addon.blender.placing.ground_snow import cover_with_snow
+from ..tetflora_addon.blender.placing.cover import (
+    Covered,
+    cover_steps,
+    cover_with_snow,
+    covered_population,
+    strew_steps,
+)
 from ..tetflora_addon.blender.placing.rules import active_population
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.jobs import Progress
