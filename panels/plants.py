@@ -13,6 +13,7 @@ from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.scene.objects import has_nodes
 from ..tetflora_addon.blender.scene.own_ages import has_ages
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES
+from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.species.asset_species import name_of
 from ..tetflora_addon.blender.species.edits import catalogue
 from .base import Button, SidebarPanel, TETFLORA_UL_field_species, draw_below, draw_properties, split_layout
@@ -73,8 +74,8 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     TETFLORA_UL_field_species.draw_in(column, field)
     if not kinds:
         column.prop(field, "species_choice")
-    elif 0 <= field.field_species_index < len(kinds):
-        column.prop(kinds[field.field_species_index], "form")
+    elif entry := active_in(field, "field_species"):
+        column.prop(entry, "form")
     for species in {entry.species for entry in kinds} or {field.species}:
         if species not in catalogue():
             column.label(text=f'"{name_of(species)}" is not in the catalog', icon='ERROR')

@@ -24,6 +24,7 @@ from ..operators.populations import (
 from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
 from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
+from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.viewport import points
 from .base import (
@@ -121,8 +122,7 @@ def _draw_species(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
         known = catalogue()
         text = f"Default: {next(iter(known.values())).name}" if known else "The catalog has no species"
         layout.label(text=text, icon='INFO')
-    elif 0 <= settings.mix_index < len(settings.mix):
-        entry = settings.mix[settings.mix_index]
+    elif entry := active_in(settings, "mix"):
         layout.prop(entry, "companion_choice")
         if entry.companion:
             draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")

@@ -12,7 +12,7 @@ from ..operators.refine import TETFLORA_OT_keep_results
 from ..operators.year import TETFLORA_OT_set_season
 from ..tetflora_addon.blender.job.forecast import polygons_text, seconds_text
 from ..tetflora_addon.blender.placing.plant_objects import plant_collections
-from ..tetflora_addon.blender.settings import date_text
+from ..tetflora_addon.blender.settings import active_in, date_text
 from ..tetflora_addon.blender.viewport import state
 from .base import (
     SidebarPanel,
@@ -103,8 +103,7 @@ def _draw_passes(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     layout.prop(output, "pass_index")
     layout.prop_search(output, "light_group", layer, "lightgroups")
     TETFLORA_UL_output_species.draw_in(layout, output)
-    if 0 <= output.species_index < len(output.species):
-        entry = output.species[output.species_index]
+    if entry := active_in(output, "species"):
         layout.prop(entry, "pass_index")
         layout.prop_search(entry, "light_group", layer, "lightgroups")
         for name in ("leaf", "blossom", "bark"):

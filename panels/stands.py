@@ -11,6 +11,7 @@ from ..operators.stands import (
     TETFLORA_OT_keep_year,
 )
 from ..tetflora_addon.blender.scene.field_sizes import has_history
+from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.stands.growing import is_stand, shown_stand
 from .base import (
     Button,
@@ -50,8 +51,8 @@ class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
         TETFLORA_UL_stand_species.draw_in(layout, stand)
         if not stand.species:
             layout.label(text="Default: a mixed wood of central Europe", icon='INFO')
-        elif 0 <= stand.species_index < len(stand.species):
-            draw_properties(layout.column(align=True), stand.species[stand.species_index], "planted", "rain")
+        elif entry := active_in(stand, "species"):
+            draw_properties(layout.column(align=True), entry, "planted", "rain")
         if body := section(layout, "Site"):
             draw_properties(body.column(align=True), stand, "warmth", "winter")
             draw_properties(body.column(align=True), stand, "moisture", "relief", "fertility")

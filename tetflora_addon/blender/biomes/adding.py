@@ -29,6 +29,7 @@ from ..placing.populations import add_population, free_name, make_plants_steps, 
 from ..placing.rules import set_grounds
 from ..runtime import GoneError, JobData, is_there, job
 from ..scene.field_sizes import has_history
+from ..settings import with_identity
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
 from ..stands.growing import GrownStand, again_steps, is_stand, new_stand_steps
 from .files import Biome, find_biome, layers_of, pages_of, stand_settings, stands_of
@@ -172,7 +173,7 @@ def _plant(
     layers, bare = list(stands), list(without)
     for number, name in enumerate(names):
         depsgraph.update()  # plants of the layers before shade the ground, and keep others away
-        population = _layer(scene, name)
+        population = with_identity(scene.tetflora.populations, name)
         if population is None:
             continue
         for entry in population.mix:
@@ -199,10 +200,6 @@ def _plant(
     grounds = [entry.object for entry in biome.grounds if entry.object is not None] if biome is not None else []
     kept = lay_biome_soil(scene, depsgraph, grounds) if grounds else []
     return Added(biome.name if biome is not None else "", layers, bare, kept)
-
-
-def _layer(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
-    return next((population for population in scene.tetflora.populations if population.uid == uid), None)
 
 
 def _within(

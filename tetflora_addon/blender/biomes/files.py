@@ -34,6 +34,7 @@ from ..placing.population_data import (
     value_for,
 )
 from ..placing.zones import limits_of_zone
+from ..settings import active_in, with_identity
 from ..species.edits import find_edit, species_data
 from ..stands.growing import is_stand
 from ..stands.properties import TetFloraStand, TetFloraStandEntry
@@ -178,13 +179,12 @@ def _stand_data(stand: bpy.types.Object) -> dict[str, Any]:
 
 def find_biome(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
     """A biome of a scene by its identity."""
-    return next((biome for biome in scene.tetflora.biomes if biome.uid == uid), None)
+    return with_identity(scene.tetflora.biomes, uid)
 
 
 def active_biome(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
     """The biome that buttons act on; None where there is none."""
-    group = scene.tetflora
-    return group.biomes[group.biomes_index] if 0 <= group.biomes_index < len(group.biomes) else None
+    return active_in(scene.tetflora, "biomes")
 
 
 def layers_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.PropertyGroup]:

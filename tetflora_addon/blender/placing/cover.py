@@ -31,6 +31,7 @@ from ..materials.snow import add_snow
 from ..materials.soil import SHADED, lay_soil
 from ..runtime import JobData, is_there, job
 from ..scene.crowns import crown_for, crown_steps
+from ..settings import with_identity
 from ..species.edits import catalogue, revert_species, species_data, species_for, store_species
 from ..worker import steps_in_thread
 from .canopy import canopy_of, floor_steps, is_cover, shedder_of, standing
@@ -95,7 +96,7 @@ def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None
     active = active_population(scene)
     if active is None or not active.covers:
         return active
-    return next((p for p in scene.tetflora.populations if p.uid == active.covers), active)
+    return with_identity(scene.tetflora.populations, active.covers) or active
 
 
 @job("Covering the ground")
@@ -129,18 +130,8 @@ def cover_steps(
     SceneError
         It has no ground or no plants above it, or the cover is frozen; or something was deleted meanwhile.
     """
-    yield (progress := Progress(0.0, _UNDER))
     uid = population.uid or ANYBODY
-    found = cover_of(scene, uid)
-    if found is not None:
-        refuse_frozen(found)
-    grounds = grounds_of(scene, population) if grounds is None else list(grounds)
-    if not grounds:
-        raise SceneError(
-            f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
-        )
-    data.add_objects(grounds)
-    yield from crown_steps(progress, scene, standing(scene))
+    grounds = yield from _begun(data, scene, population, grounds)
     population = _again(data, scene, population, uid)
     own = {name: getattr(population, name) for name in MASKS} | dict(masks)
     ground = read_ground(grounds, depsgraph, **own)
@@ -159,6 +150,28 @@ def cover_steps(
             made = yield from _scaled(steps, _PLANTING)
         bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
     return Covered(made, bare)
+
+
+def _begun(
+    data: JobData,
+    scene: bpy.types.Scene,
+    population: bpy.types.PropertyGroup,
+    grounds: Iterable[bpy.types.Object] | None = None,
+    fallen: bool = False,
+) -> Generator[Progress, object, list[bpy.types.Object]]:
+    """See whether a population can have a cover, and measure what stands above; returns its ground, or that given."""
+    yield (progress := Progress(0.0, _UNDER))
+    found = cover_of(scene, population.uid or ANYBODY, fallen)
+    if found is not None:
+        refuse_frozen(found)
+    grounds = grounds_of(scene, population) if grounds is None else list(grounds)
+    if not grounds:
+        raise SceneError(
+            f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
+        )
+    data.add_objects(grounds)
+    yield from crown_steps(progress, scene, standing(scene))
+    return grounds
 
 
 def _again(
@@ -226,9 +239,8 @@ def _add_cover(
     """A population for the cover, on the same ground and within the same limits; the covered one stays active."""
     index, uid = scene.tetflora.populations_index, population.uid
     cover = add_population(scene, grounds, name=name)
-    populations = scene.tetflora.populations
     # Fetched again: adding to a list moves what is in it.
-    source = next((p for p in populations if p.uid == uid), None)
+    source = with_identity(scene.tetflora.populations, uid)
     if source is not None:
         copy_settings(source, cover)
         scene.tetflora.populations_index = index
@@ -354,16 +366,8 @@ def strew_steps(
     SceneError
         It has no ground, or the leaves are frozen; or something was deleted meanwhile.
     """
-    yield (progress := Progress(0.0, _UNDER))
     uid = population.uid or ANYBODY
-    found = cover_of(scene, uid, fallen=True)
-    if found is not None:
-        refuse_frozen(found)
-    grounds = grounds_of(scene, population)
-    if not grounds:
-        raise SceneError(f'"{population.name}" has no ground in this scene')
-    data.add_objects(grounds)
-    yield from crown_steps(progress, scene, standing(scene))
+    grounds = yield from _begun(data, scene, population, fallen=True)
     population = _again(data, scene, population, uid)
     with _restored(scene, uid, fallen=True):
         canopy, above = canopy_of(scene, depsgraph)

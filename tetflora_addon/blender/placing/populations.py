@@ -28,6 +28,7 @@ from ..scene.crowns import crown_steps
 from ..scene.fields import fields_of, stored_size
 from ..scene.own_ages import MOST_YEARS
 from ..scene.skeletons import aged_kind
+from ..settings import with_identity
 from ..worker import at_once, call_in_thread
 from .canopy import is_cover, standing
 from .plant_objects import (
@@ -183,7 +184,7 @@ def make_plants_steps(
 
 def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraPopulation:
     """A population, fetched again: adding to the list moves what is in it."""
-    found = next((p for p in scene.tetflora.populations if p.uid == uid), None)
+    found = with_identity(scene.tetflora.populations, uid)
     if found is None:
         data.stop("its population was deleted")
         data.check()
@@ -236,9 +237,9 @@ def reroll_steps(
     try:
         return (yield from make_plants_steps(scene, depsgraph, population))
     except BaseException:  # an error, or Esc
-        for found in scene.tetflora.populations if is_there(scene) else ():
-            if found.uid == uid:
-                found.seed = old
+        found = with_identity(scene.tetflora.populations, uid) if is_there(scene) else None
+        if found is not None:
+            found.seed = old
         raise
 
 

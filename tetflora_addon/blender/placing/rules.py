@@ -31,7 +31,7 @@ from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
-from ..settings import check_limits
+from ..settings import active_in, check_limits
 from ..species.catalogue import default_species
 from ..species.edits import catalogue, unknown_text
 from .canopy import not_of_covers, read_suits
@@ -113,9 +113,7 @@ def copy_entry(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup)
 
 def active_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
     """The population that buttons act on; None where there is none."""
-    settings = scene.tetflora
-    number = settings.populations_index
-    return settings.populations[number] if 0 <= number < len(settings.populations) else None
+    return active_in(scene.tetflora, "populations")
 
 
 def shown_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup:

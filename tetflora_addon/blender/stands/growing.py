@@ -255,26 +255,28 @@ def _replace(
     """Give a field the records in place of its points."""
     given = position, rotation, np.ones(len(records)), records.species, records.seed
     other = write_field(NAME, *given, names)
-    values = {
-        "tf_height": records.height,
-        "tf_diameter": records.diameter,
-        "tf_crown_width": records.crown_width,
-        "tf_crown_base": records.crown_base,
-        "tf_dead": records.dead,
-        OFFSET: np.pad(records.offset, ((0, 0), (0, 1))),
-        YEAR: records.year,
-        PLANT: records.plant,
-    }
-    for name, column in values.items():
-        write(other.data, name, column, data_type=SIZE_ATTRIBUTES[name])
-    old, field.data = field.data, other.data
+    sizes = (records.height, records.diameter, records.crown_width, records.crown_base, records.dead, records.offset)
     field.matrix_world = other.matrix_world.copy()
+    _hand_over(other, field, {**_size_columns(*sizes), YEAR: records.year, PLANT: records.plant})
     group = field.tetflora
     forms = {entry.species: entry.form for entry in group.field_species}
     group.field_species.clear()
     for name in names:
         entry = group.field_species.add()
         entry.species, entry.form = name, forms.get(name)
+
+
+def _size_columns(*sizes: NDArray) -> dict[str, NDArray]:
+    """Attributes of height, diameter, width and base of the crown, share that is dead, and offset (n, 2) of plants."""
+    names = ("tf_height", "tf_diameter", "tf_crown_width", "tf_crown_base", "tf_dead", OFFSET)
+    return {**dict(zip(names, sizes, strict=True)), OFFSET: np.pad(sizes[-1], ((0, 0), (0, 1)))}
+
+
+def _hand_over(other: bpy.types.Object, field: bpy.types.Object, columns: dict[str, NDArray]) -> None:
+    """Give a field the points of another, which goes, and columns of sizes."""
+    for name, column in columns.items():
+        write(other.data, name, column, data_type=SIZE_ATTRIBUTES[name])
+    old, field.data = field.data, other.data
     bpy.data.objects.remove(other)
     if not old.users:
         bpy.data.meshes.remove(old)
@@ -292,29 +294,19 @@ def keep_year(field: bpy.types.Object) -> int:
     if not has_history(field):
         raise SceneError(f'"{field.name}" has no years; select a stand that was grown')
     group, parts = field.tetflora, [field.data]
-    points, sizes, records = (
-        read_points(field, field_kinds(field), parts),
-        read_sizes(field, parts),
-        read_records(field, parts),
-    )
-    points, sizes = in_year(points, sizes, records, group.stand_year, False)
+    points, sizes = read_points(field, field_kinds(field), parts), read_sizes(field, parts)
+    points, sizes = in_year(points, sizes, read_records(field, parts), group.stand_year, False)
     number = len(points.species)
     if not number:
         raise SceneError(f'"{field.name}" has no plants in this year; choose another')
     turn = quaternions(np.moveaxis(points.rotation, 2, 0))
     own = points.species.astype(np.int32), points.seed.astype(np.int32)
     other = write_field(field.data.name, points.position, turn, points.scale.mean(axis=0), *own, ())
-    for name, column in _stored(sizes).items():
-        write(other.data, name, column, data_type=SIZE_ATTRIBUTES[name])
     # `write_field` counts from a corner near the points; here they stay in the field's own space.
     write(other.data, "position", points.position)
-    old, field.data, group.seed = field.data, other.data, 0
-    bpy.data.objects.remove(other)
-    if not old.users:
-        bpy.data.meshes.remove(old)
-    field.display_type = 'TEXTURED'
+    _hand_over(other, field, _stored(sizes))
+    field.display_type, group.seed = 'TEXTURED', 0
     clear_years(field)
-    field.update_tag()
     return number
 
 
@@ -322,14 +314,7 @@ def _stored(sizes: Sizes | None) -> dict[str, NDArray]:
     """Attributes of sizes that say anything."""
     if sizes is None:
         return {}
-    found = {
-        "tf_height": sizes.height,
-        "tf_diameter": sizes.diameter,
-        "tf_crown_width": sizes.width,
-        "tf_crown_base": sizes.base,
-        "tf_dead": sizes.dead,
-        OFFSET: np.pad(sizes.offset, ((0, 0), (0, 1))),
-    }
+    found = _size_columns(sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead, sizes.offset)
     found = {name: column for name, column in found.items() if column.any()}
     if (sizes.fit != 1.0).any():
         found[FIT] = np.pad(sizes.fit, ((0, 0), (0, 1)))
