@@ -32,7 +32,6 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
     It is stored as an empty with a species and seed; Refine or rendering creates its branches and leaves.
     """
 
-    bl_idname = "tetflora.add_plant"
     bl_label = "Add Plant"
     needs = (in_object_mode,)
 
@@ -80,7 +79,6 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
     The form is no longer rendered.
     """
 
-    bl_idname = "tetflora.use_as_form"
     bl_label = "Make Plant from Form"
     needs = (
         in_object_mode,
@@ -121,7 +119,6 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
     Existing objects remain: if the scene is not empty, a new scene is added.
     """
 
-    bl_idname = "tetflora.first_forest"
     bl_label = "First Forest"
     needs = (in_object_mode,)
 
@@ -163,7 +160,6 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
     Each plant is an empty, or a vertex of one mesh if there are many.
     """
 
-    bl_idname = "tetflora.populate"
     bl_label = "Populate"
     needs = (in_object_mode, ground_selected)
 
@@ -274,11 +270,3 @@ def parse_weights(text: str) -> dict[str, float]:
         except ValueError:
             raise SceneError(f'"{part}" is not a species with a weight; write for example {identifier}:2') from None
     return weights
-
-
-CLASSES = (
-    TETFLORA_OT_add_plant,
-    TETFLORA_OT_use_as_form,
-    TETFLORA_OT_first_forest,
-    TETFLORA_OT_populate,
-)

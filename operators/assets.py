@@ -62,7 +62,6 @@ class TETFLORA_OT_use_as_species(_OnAssets, bpy.types.Operator):
     They are offered wherever species are, in this file. Use again after a change of their shape.
     """
 
-    bl_idname = "tetflora.use_as_species"
     bl_label = "Use as Species"
     nothing = "Select objects with faces, or a collection in the Outliner, first"
 
@@ -111,7 +110,6 @@ class TETFLORA_OT_use_as_species(_OnAssets, bpy.types.Operator):
 class TETFLORA_OT_stop_using_as_species(_OnAssets, bpy.types.Operator):
     """Use the selected objects or collections as species no more. Plants of them stay, and need another species."""
 
-    bl_idname = "tetflora.stop_using_as_species"
     bl_label = "Stop Using as Species"
     nothing = "Select an object that is used as a species first"
 
@@ -147,7 +145,6 @@ class TETFLORA_OT_refine_scatter(Reporting, bpy.types.Operator):
     The objects go on scattering by their own rules. Use again to keep the scatter plain.
     """
 
-    bl_idname = "tetflora.refine_scatter"
     bl_label = "Refine Scatter"
 
     action: action_property("Refine what the objects scatter", "Keep the scatter plain, as it is without TetFlora")
@@ -196,6 +193,3 @@ class TETFLORA_OT_refine_scatter(Reporting, bpy.types.Operator):
         text = f"{counted(instances, 'instance')} of {counted(len(assets), 'asset')} will be refined"
         text += f"; {counted(left, 'instance')} without faces will not show in results" if left else ""
         return self.done(f"{text}; {wrong[0]}" if wrong else text)
-
-
-CLASSES = (TETFLORA_OT_use_as_species, TETFLORA_OT_stop_using_as_species, TETFLORA_OT_refine_scatter)

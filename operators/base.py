@@ -25,12 +25,16 @@ Need = Callable[[bpy.types.Context], str]
 
 
 class Tool:
-    """Mix-in for operators: the docstring is the tooltip, and `needs` decides whether the operator is available."""
+    """Mix-in for operators: the identifier follows from the class's name, the docstring is the tooltip, and `needs`
+    decides whether the operator is available.
+    """
 
     needs: tuple[Need, ...] = ()
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        if cls.__name__.startswith("TETFLORA_OT_"):
+            cls.bl_idname = cls.__name__.replace("TETFLORA_OT_", "tetflora.", 1)
         if "bl_description" not in vars(cls):
             cls.bl_description = " ".join((cls.__doc__ or "").split()).removesuffix(".")
 

@@ -59,7 +59,6 @@ class TETFLORA_OT_add_biome(_Planting, bpy.types.Operator):
     Without a selected mesh, a hectare of land is made at the 3D cursor.
     """
 
-    bl_idname = "tetflora.add_biome"
     bl_label = "Add Biome"
     needs = (in_object_mode,)
 
@@ -111,7 +110,6 @@ class TETFLORA_OT_update_biome(_Planting, bpy.types.Operator):
     Frozen layers, and stands of which a year is kept, stay as they are.
     """
 
-    bl_idname = "tetflora.update_biome"
     bl_label = "Update Biome"
     needs = (in_object_mode, _biome_exists)
     cancelled = "Stopped; layers that were done already keep their new plants"
@@ -139,7 +137,6 @@ class TETFLORA_OT_remove_biome(Reporting, bpy.types.Operator):
     Plants of frozen layers, and stands of which a year is kept, remain, and so does the ground.
     """
 
-    bl_idname = "tetflora.remove_biome"
     bl_label = "Remove Biome"
     needs = (in_object_mode, _biome_exists)
 
@@ -156,7 +153,6 @@ class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
     biome, the populations on the ground of the active population.
     """
 
-    bl_idname = "tetflora.save_biome"
     bl_label = "Save as Biome"
     needs = (need(lambda context: saved_populations(context.scene), "Add a biome or populate a ground first"),)
     bl_options = {'REGISTER'}
@@ -182,7 +178,6 @@ class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
 class TETFLORA_OT_import_biome(Reporting, bpy.types.Operator, ImportHelper):
     """Copy a biome's file to your folder of biomes, with the picture of the same name beside it."""
 
-    bl_idname = "tetflora.import_biome"
     bl_label = "Import Biome"
     bl_options = {'REGISTER'}
 
@@ -201,7 +196,6 @@ class TETFLORA_OT_import_biome(Reporting, bpy.types.Operator, ImportHelper):
 class TETFLORA_OT_delete_biome(Reporting, bpy.types.Operator):
     """Delete the file of the chosen biome from your folder of biomes. Built-in biomes remain. This cannot be undone."""
 
-    bl_idname = "tetflora.delete_biome"
     bl_label = "Delete from My Biomes"
     bl_options = {'REGISTER'}
     needs = (
@@ -216,13 +210,3 @@ class TETFLORA_OT_delete_biome(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         return self.done(f"{OWN_FILES.delete(context.scene.tetflora.new_biome).name} deleted")
-
-
-CLASSES = (
-    TETFLORA_OT_add_biome,
-    TETFLORA_OT_update_biome,
-    TETFLORA_OT_remove_biome,
-    TETFLORA_OT_save_biome,
-    TETFLORA_OT_import_biome,
-    TETFLORA_OT_delete_biome,
-)

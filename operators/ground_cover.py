@@ -27,7 +27,6 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
     The cover is a population of its own; use again to renew it after changes above.
     """
 
-    bl_idname = "tetflora.ground_cover"
     bl_label = "Ground Cover"
     needs = (
         in_object_mode,
@@ -71,7 +70,6 @@ class TETFLORA_OT_ground_snow(Reporting, bpy.types.Operator):
     Soil of Ground Cover needs none of it.
     """
 
-    bl_idname = "tetflora.ground_snow"
     bl_label = "Snow on Ground"
     needs = (
         in_object_mode,
@@ -83,6 +81,3 @@ class TETFLORA_OT_ground_snow(Reporting, bpy.types.Operator):
         if not found:
             return self.refused("The materials of the ground have snow already")
         return self.done(f"{counted(len(found), 'material')} can have snow; set Snow under Year and Age")
-
-
-CLASSES = (TETFLORA_OT_ground_cover, TETFLORA_OT_ground_snow)

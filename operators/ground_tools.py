@@ -171,7 +171,6 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
     The wheel rotates, Ctrl and the wheel scale; each plant is one undo step; Esc finishes.
     """
 
-    bl_idname = "tetflora.place_plant"
     bl_label = "Place Plants by Clicking"
 
     species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
@@ -246,6 +245,3 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
         turn = np.degrees(self._turn)
         context.workspace.status_text_set(_KEYS.format(name=name, turn=turn, scale=self._scale))
         redraw()
-
-
-CLASSES = (TETFLORA_OT_place_plant,)

@@ -95,7 +95,6 @@ class TETFLORA_OT_mark_explicit(Marking, bpy.types.Operator):
     Use again to unmark.
     """
 
-    bl_idname = "tetflora.mark_explicit"
     bl_label = "Refine These Meshes"
     mark, nothing, marked = "is_explicit", "Select meshes, or objects that instance them, first", "{} will be refined"
 
@@ -111,7 +110,6 @@ class TETFLORA_OT_mark_occluder(Marking, bpy.types.Operator):
     Use again to unmark.
     """
 
-    bl_idname = "tetflora.mark_occluder"
     bl_label = "Mark as Occluder"
     mark, nothing, marked = "is_occluder", "Select meshes first", "{} marked as occluder"
 
@@ -133,7 +131,6 @@ class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
     The attributes species, seed, rotation and scale define the plants. Use again to turn it off.
     """
 
-    bl_idname = "tetflora.mark_field"
     bl_label = "Use as Field of Plants"
     needs = (
         need(
@@ -161,7 +158,6 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
     This keeps Blender fast with many plants; parents, constraints and animation of single plants are lost.
     """
 
-    bl_idname = "tetflora.make_field"
     bl_label = "Convert Plants to Field"
     needs = (in_object_mode, plants_selected)
 
@@ -186,7 +182,6 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
 class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
     """Make an empty of each plant of the selected fields."""
 
-    bl_idname = "tetflora.split_field"
     bl_label = "Convert Field to Objects"
     needs = (
         in_object_mode,
@@ -213,7 +208,6 @@ class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
 class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
     """Add an entry to a list of species, or remove the active one."""
 
-    bl_idname = "tetflora.edit_list"
     bl_label = "Edit List"
     bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
 
@@ -271,13 +265,3 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         if self.which == 'STAND':
             return shown_stand(context), "species"
         return context.scene.tetflora, "leaf_objects"
-
-
-CLASSES = (
-    TETFLORA_OT_mark_explicit,
-    TETFLORA_OT_mark_occluder,
-    TETFLORA_OT_mark_field,
-    TETFLORA_OT_make_field,
-    TETFLORA_OT_split_field,
-    TETFLORA_OT_edit_list,
-)

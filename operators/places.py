@@ -115,7 +115,6 @@ class _Raster(_Importing):
 class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
     """Make ground from a raster of elevations: an ASCII grid, a GeoTIFF or a PNG with a world file."""
 
-    bl_idname = "tetflora.import_terrain"
     bl_label = "Import Terrain"
 
     most: IntProperty(
@@ -173,7 +172,6 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
     They stand on the selected meshes, or on imported terrain.
     """
 
-    bl_idname = "tetflora.import_inventory"
     bl_label = "Import Tree Inventory"
 
     filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.geojson;*.json", options={'HIDDEN'})
@@ -292,7 +290,6 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
     They stand on the selected meshes, or on imported terrain.
     """
 
-    bl_idname = "tetflora.import_canopy"
     bl_label = "Import Canopy Height"
 
     species: StringProperty(
@@ -339,7 +336,6 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
     They lie on the selected meshes, or on imported terrain. Populations can be limited to them.
     """
 
-    bl_idname = "tetflora.import_outlines"
     bl_label = "Import Outlines"
 
     filter_glob: StringProperty(default="*.geojson;*.json", options={'HIDDEN'})
@@ -356,11 +352,3 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
 
     def finish(self, _context: bpy.types.Context, result: Drawn) -> set[str]:
         return self.done(f"Outlines imported: {told(result.number)}")
-
-
-CLASSES = (
-    TETFLORA_OT_import_terrain,
-    TETFLORA_OT_import_canopy,
-    TETFLORA_OT_import_inventory,
-    TETFLORA_OT_import_outlines,
-)

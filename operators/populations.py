@@ -59,7 +59,6 @@ class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
     Adjust the settings, then click Update.
     """
 
-    bl_idname = "tetflora.add_population"
     bl_label = "Add Population"
     needs = (in_object_mode, ground_selected)
 
@@ -88,7 +87,6 @@ class TETFLORA_OT_update_population(_Placing, bpy.types.Operator):
     keep their space.
     """
 
-    bl_idname = "tetflora.update_population"
     bl_label = "Update Population"
     needs = _REPLACING
 
@@ -100,7 +98,6 @@ class TETFLORA_OT_update_population(_Placing, bpy.types.Operator):
 class TETFLORA_OT_reroll_population(_Placing, bpy.types.Operator):
     """Place the plants of the active population with a new seed, for a different arrangement."""
 
-    bl_idname = "tetflora.reroll_population"
     bl_label = "Re-roll Population"
     needs = _REPLACING
 
@@ -115,7 +112,6 @@ class TETFLORA_OT_freeze_population(Reporting, bpy.types.Operator):
     Use again to unfreeze: the next update then replaces the plants, with all your changes.
     """
 
-    bl_idname = "tetflora.freeze_population"
     bl_label = "Freeze Population"
     needs = _ACTIVE
 
@@ -129,7 +125,6 @@ class TETFLORA_OT_freeze_population(Reporting, bpy.types.Operator):
 class TETFLORA_OT_remove_population(Reporting, bpy.types.Operator):
     """Remove the active population and its plants. Plants of a frozen population remain."""
 
-    bl_idname = "tetflora.remove_population"
     bl_label = "Remove Population"
     needs = _ACTIVE
 
@@ -150,7 +145,6 @@ class TETFLORA_OT_remove_population(Reporting, bpy.types.Operator):
 class TETFLORA_OT_select_population(Reporting, bpy.types.Operator):
     """Select the plants of the active population, or its field."""
 
-    bl_idname = "tetflora.select_population"
     bl_label = "Select Population"
     needs = _ACTIVE
 
@@ -165,7 +159,6 @@ class TETFLORA_OT_select_population(Reporting, bpy.types.Operator):
 class TETFLORA_OT_set_population_ground(Reporting, bpy.types.Operator):
     """Use the selected meshes as ground of the active population. Click Update to place its plants."""
 
-    bl_idname = "tetflora.set_population_ground"
     bl_label = "Use Selected Meshes"
     needs = (*_ACTIVE, ground_selected)
 
@@ -181,7 +174,6 @@ class TETFLORA_OT_forget_erased(Reporting, bpy.types.Operator):
     Click Update to place them.
     """
 
-    bl_idname = "tetflora.forget_erased"
     bl_label = "Clear Erased Places"
     needs = (
         *_ACTIVE,
@@ -203,7 +195,6 @@ class TETFLORA_OT_preview_population(Reporting, bpy.types.Operator):
     Creates no objects.
     """
 
-    bl_idname = "tetflora.preview_population"
     bl_label = "Preview Points"
     bl_options = {'REGISTER'}
 
@@ -218,7 +209,6 @@ class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper
     Plants are not exported.
     """
 
-    bl_idname = "tetflora.export_populations"
     bl_label = "Export Populations"
     needs = (need(lambda context: context.scene.tetflora.populations, "Add a population first"),)
     bl_options = {'REGISTER'}
@@ -242,7 +232,6 @@ class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper
     They grow on meshes with the names in the file, or else on the selected meshes.
     """
 
-    bl_idname = "tetflora.import_populations"
     bl_label = "Import Populations"
 
     filename_ext = ENDING
@@ -257,18 +246,3 @@ class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper
             return self.done(f"{added}; click Update to place plants")
         self.report({'WARNING'}, readable(f"{added}; missing in this file and left empty: {', '.join(missing)}"))
         return {'FINISHED'}
-
-
-CLASSES = (
-    TETFLORA_OT_add_population,
-    TETFLORA_OT_update_population,
-    TETFLORA_OT_reroll_population,
-    TETFLORA_OT_freeze_population,
-    TETFLORA_OT_remove_population,
-    TETFLORA_OT_select_population,
-    TETFLORA_OT_set_population_ground,
-    TETFLORA_OT_forget_erased,
-    TETFLORA_OT_preview_population,
-    TETFLORA_OT_export_populations,
-    TETFLORA_OT_import_populations,
-)

@@ -38,7 +38,6 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
     Takes as long as the first part of Refine; Esc cancels and keeps the previous levels.
     """
 
-    bl_idname = "tetflora.preview_levels"
     bl_label = "Compute Levels"
     needs = (_camera_found,)
     bl_options = {'REGISTER'}  # nothing in the file changes but the level that is shown
@@ -59,7 +58,6 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
 class TETFLORA_OT_forget_levels(Reporting, bpy.types.Operator):
     """Remove the levels from viewports and memory. The file does not change."""
 
-    bl_idname = "tetflora.forget_levels"
     bl_label = "Clear Levels"
     bl_options = set()
     needs = (
@@ -76,7 +74,6 @@ class TETFLORA_OT_look_through(Reporting, bpy.types.Operator):
     camera.
     """
 
-    bl_idname = "tetflora.look_through"
     bl_label = "Look Through Camera"
     bl_options = set()
     needs = (
@@ -106,6 +103,3 @@ def look_from(space: bpy.types.SpaceView3D, camera: Camera) -> None:
     if camera.kind == "PERSP":
         space.lens = min(max(_VIEWPORT / max(right - left, top - bottom), 1.0), 250.0)
     region.view_matrix = matrix.inverted()
-
-
-CLASSES = (TETFLORA_OT_preview_levels, TETFLORA_OT_forget_levels, TETFLORA_OT_look_through)

@@ -46,7 +46,6 @@ species_shown = need(lambda context: shown(context) in catalogue(), "Choose a sp
 class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
     """Duplicate the shown species. The copy belongs to this file until you save it to your species."""
 
-    bl_idname = "tetflora.duplicate_species"
     bl_label = "Duplicate as New Species"
     needs = (species_shown,)
 
@@ -93,7 +92,6 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
     Deletes a species that exists only in this file.
     """
 
-    bl_idname = "tetflora.revert_species"
     bl_label = "Revert"
     needs = (need(lambda context: find_edit(context.scene, shown(context)), "The species has no changes to revert"),)
 
@@ -110,7 +108,6 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
 class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
     """Add or remove an order of branches or the short shoots of the species."""
 
-    bl_idname = "tetflora.edit_orders"
     bl_label = "Edit Orders"
     needs = (species_shown,)
 
@@ -177,7 +174,6 @@ class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
     It replaces a built-in species of the same identifier, and an earlier version of your own.
     """
 
-    bl_idname = "tetflora.save_species"
     bl_label = "Save to My Species"
     needs = (species_shown,)
     bl_options = {'REGISTER'}
@@ -190,7 +186,6 @@ class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
 class TETFLORA_OT_load_species(Reporting, bpy.types.Operator, ImportHelper):
     """Copy a species file to your species folder, to use it in all files."""
 
-    bl_idname = "tetflora.load_species"
     bl_label = "Load Species"
 
     filename_ext = ENDING
@@ -208,7 +203,6 @@ class TETFLORA_OT_load_species(Reporting, bpy.types.Operator, ImportHelper):
 class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
     """Export the species to a file, to share it. The file name is the identifier of the species."""
 
-    bl_idname = "tetflora.export_species"
     bl_label = "Export Species"
     needs = (species_shown,)
     bl_options = {'REGISTER'}
@@ -230,7 +224,6 @@ class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
 class TETFLORA_OT_delete_species(Reporting, bpy.types.Operator):
     """Delete the file of the species from your species folder. Built-in species remain. This cannot be undone."""
 
-    bl_idname = "tetflora.delete_species"
     bl_label = "Delete from My Species"
     needs = (need(lambda context: own_file(shown(context)), "The species has no file in your species folder"),)
     bl_options = {'REGISTER'}
@@ -249,7 +242,6 @@ class TETFLORA_OT_preview_species(Reporting, bpy.types.Operator):
     It is never rendered or saved. Use again to hide it.
     """
 
-    bl_idname = "tetflora.preview_species"
     bl_label = "Preview Species"
     needs = (lambda context: "" if species.shown_in(context.scene) else species_shown(context),)
     # No undo: the preview is no part of the file.
@@ -266,7 +258,6 @@ class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
     Assets refer to species by name: using them requires TetFlora and the same species.
     """
 
-    bl_idname = "tetflora.create_asset_library"
     bl_label = "Create Asset Library"
     bl_options = {'REGISTER'}
 
@@ -290,16 +281,3 @@ class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
         shown = self.add_library and add_to_preferences(path.parent)
         more = "; folder added to the asset libraries" if shown else ""
         return self.done(f"{counted(number, 'plant')} written to {path}{more}")
-
-
-CLASSES = (
-    TETFLORA_OT_duplicate_species,
-    TETFLORA_OT_revert_species,
-    TETFLORA_OT_edit_orders,
-    TETFLORA_OT_save_species,
-    TETFLORA_OT_load_species,
-    TETFLORA_OT_export_species,
-    TETFLORA_OT_delete_species,
-    TETFLORA_OT_preview_species,
-    TETFLORA_OT_create_asset_library,
-)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import bpy
 from bpy.utils import units
 
-from ..operators.marks import TETFLORA_OT_edit_list
 from ..tetflora_addon.blender.species.catalogue import FALLBACK_ICON, icon_of
 
 
@@ -125,7 +124,7 @@ def _draw_limits(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, nam
 class Button(NamedTuple):
     """An operator in a menu or panel, with another text than its label where one is given."""
 
-    operator: type[bpy.types.Operator]
+    operator: str
     icon: str
     text: str | None = None
     values: dict[str, object] = {}
@@ -133,7 +132,7 @@ class Button(NamedTuple):
     def draw(self, layout: bpy.types.UILayout, **options: object) -> None:
         """Draw it, with further options of ``UILayout.operator``."""
         text = {} if self.text is None else {"text": self.text}
-        made = layout.operator(self.operator.bl_idname, icon=self.icon, **text, **options)
+        made = layout.operator(f"tetflora.{self.operator}", icon=self.icon, **text, **options)
         for name, value in self.values.items():
             setattr(made, name, value)
 
@@ -214,7 +213,7 @@ class _SpeciesList:
     def draw_in(cls, layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> None:
         """Draw the list of an owner, with buttons to add and remove."""
         values = [{"which": cls.which, "action": action} for action in ('ADD', 'REMOVE')]
-        buttons = (Button(TETFLORA_OT_edit_list, one["action"], "", one) for one in values)
+        buttons = (Button("edit_list", one["action"], "", one) for one in values)
         draw_list(layout, cls, owner, cls.entries, *buttons)
 
 
@@ -246,12 +245,3 @@ class TETFLORA_UL_stand_species(_SpeciesList, bpy.types.UIList):
     """A species of a stand and its share of what is planted."""
 
     which, entries, beside = 'STAND', "species", "planted"
-
-
-CLASSES = (
-    TETFLORA_UL_mix,
-    TETFLORA_UL_stand_species,
-    TETFLORA_UL_leaf_objects,
-    TETFLORA_UL_field_species,
-    TETFLORA_UL_output_species,
-)

@@ -4,14 +4,6 @@
 
 import bpy
 
-from ..operators.biomes import (
-    TETFLORA_OT_add_biome,
-    TETFLORA_OT_delete_biome,
-    TETFLORA_OT_import_biome,
-    TETFLORA_OT_remove_biome,
-    TETFLORA_OT_save_biome,
-    TETFLORA_OT_update_biome,
-)
 from ..tetflora_addon.blender.biomes.files import active_biome, layers_of
 from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of
 from ..tetflora_addon.blender.placing.rules import awaits_update
@@ -29,7 +21,7 @@ class TETFLORA_MT_add_biome(bpy.types.Menu):
         for info in biomes().values():
             number = icon_of(info)
             icon = {"icon_value": number} if number else {"icon": FALLBACK_ICON}
-            layout.operator(TETFLORA_OT_add_biome.bl_idname, text=info.name, **icon).biome = info.identifier
+            layout.operator("tetflora.add_biome", text=info.name, **icon).biome = info.identifier
 
 
 class TETFLORA_MT_biomes(bpy.types.Menu):
@@ -40,9 +32,9 @@ class TETFLORA_MT_biomes(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         draw_buttons(
             self.layout,
-            Button(TETFLORA_OT_save_biome, 'FILE_TICK', "Save as Biome..."),
-            Button(TETFLORA_OT_import_biome, 'IMPORT', "Import Biome..."),
-            Button(TETFLORA_OT_delete_biome, 'TRASH'),
+            Button("save_biome", 'FILE_TICK', "Save as Biome..."),
+            Button("import_biome", 'IMPORT', "Import Biome..."),
+            Button("delete_biome", 'TRASH'),
         )
 
 
@@ -70,20 +62,12 @@ class TETFLORA_PT_biomes(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.prop(group, "new_biome", text="")
         row.menu(TETFLORA_MT_biomes.__name__, text="", icon='DOWNARROW_HLT')
-        Button(TETFLORA_OT_add_biome, 'ADD', values={"biome": group.new_biome}).draw(layout)
+        Button("add_biome", 'ADD', values={"biome": group.new_biome}).draw(layout)
         if not group.biomes:
             return
-        draw_list(layout, TETFLORA_UL_biomes, group, "biomes", Button(TETFLORA_OT_remove_biome, 'REMOVE', ""))
-        Button(TETFLORA_OT_update_biome, 'FILE_REFRESH').draw(layout)
+        draw_list(layout, TETFLORA_UL_biomes, group, "biomes", Button("remove_biome", 'REMOVE', ""))
+        Button("update_biome", 'FILE_REFRESH').draw(layout)
         biome = active_biome(context.scene)
         if biome is not None and (body := section(split_layout(self), "Where")):
             body.prop(biome, "gives_way")
             draw_where(body, biome)
-
-
-CLASSES = (
-    TETFLORA_MT_add_biome,
-    TETFLORA_MT_biomes,
-    TETFLORA_UL_biomes,
-    TETFLORA_PT_biomes,
-)

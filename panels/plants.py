@@ -4,9 +4,6 @@
 
 import bpy
 
-from ..operators.add import TETFLORA_OT_use_as_form
-from ..operators.assets import TETFLORA_OT_stop_using_as_species, TETFLORA_OT_use_as_species
-from ..operators.marks import TETFLORA_OT_mark_field
 from ..tetflora_addon.blender.assets.marks import is_species
 from ..tetflora_addon.blender.scene.ages import stage_text
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
@@ -49,12 +46,12 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
         # A mesh with faces is ground or something else, as a rule; the Object menu offers these for it too.
         faces = active.type == 'MESH' and len(active.data.polygons) > 0
         if active.type in FORM_TYPES and not faces:
-            layout.operator(TETFLORA_OT_use_as_form.bl_idname, icon='CURVE_DATA')
+            layout.operator("tetflora.use_as_form", icon='CURVE_DATA')
         field = active.tetflora.is_field
         if field or (active.type in FIELD_TYPES and (not faces or has_nodes(active))):
             text = "Field of Plants" if field else "Use as Field of Plants"
             icon = 'CHECKMARK' if field else 'POINTCLOUD_DATA'
-            Button(TETFLORA_OT_mark_field, icon, text).draw(layout, depress=field)
+            Button("mark_field", icon, text).draw(layout, depress=field)
 
 
 def _draw_asset(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
@@ -62,8 +59,8 @@ def _draw_asset(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     if is_species(obj):
         row = layout.row(align=True)
         row.label(text="Used as a species", icon='CHECKMARK')
-        Button(TETFLORA_OT_use_as_species, 'FILE_REFRESH', "").draw(row)
-        Button(TETFLORA_OT_stop_using_as_species, 'X', "").draw(row)
+        Button("use_as_species", 'FILE_REFRESH', "").draw(row)
+        Button("stop_using_as_species", 'X', "").draw(row)
 
 
 def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
@@ -84,6 +81,3 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         column.label(text="Age by attribute", icon='INFO')
     else:
         column.prop(field, "age")
-
-
-CLASSES = (TETFLORA_PT_plants,)

@@ -4,23 +4,6 @@
 
 import bpy
 
-from ..operators.add import TETFLORA_OT_populate
-from ..operators.brush import TETFLORA_OT_paint_plants
-from ..operators.ground_cover import TETFLORA_OT_ground_cover, TETFLORA_OT_ground_snow
-from ..operators.marks import TETFLORA_OT_mark_occluder
-from ..operators.populations import (
-    TETFLORA_OT_add_population,
-    TETFLORA_OT_export_populations,
-    TETFLORA_OT_forget_erased,
-    TETFLORA_OT_freeze_population,
-    TETFLORA_OT_import_populations,
-    TETFLORA_OT_preview_population,
-    TETFLORA_OT_remove_population,
-    TETFLORA_OT_reroll_population,
-    TETFLORA_OT_select_population,
-    TETFLORA_OT_set_population_ground,
-    TETFLORA_OT_update_population,
-)
 from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
 from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
@@ -62,13 +45,13 @@ class TETFLORA_MT_populations(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         draw_buttons(
             self.layout,
-            Button(TETFLORA_OT_select_population, 'RESTRICT_SELECT_OFF'),
-            Button(TETFLORA_OT_remove_population, 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
-            Button(TETFLORA_OT_forget_erased, 'LOOP_BACK'),
-            Button(TETFLORA_OT_ground_snow, 'FREEZE'),
+            Button("select_population", 'RESTRICT_SELECT_OFF'),
+            Button("remove_population", 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
+            Button("forget_erased", 'LOOP_BACK'),
+            Button("ground_snow", 'FREEZE'),
             None,
-            Button(TETFLORA_OT_import_populations, 'IMPORT', "Import..."),
-            Button(TETFLORA_OT_export_populations, 'EXPORT', "Export..."),
+            Button("import_populations", 'IMPORT', "Import..."),
+            Button("export_populations", 'EXPORT', "Export..."),
         )
 
 
@@ -80,18 +63,18 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
         group, settings = context.scene.tetflora, shown_population(context.scene)
-        buttons = [Button(TETFLORA_OT_add_population, 'ADD', ""), Button(TETFLORA_OT_remove_population, 'REMOVE', "")]
+        buttons = [Button("add_population", 'ADD', ""), Button("remove_population", 'REMOVE', "")]
         buttons, rows = (buttons, 3) if group.populations else (buttons[:1], 1)
         beside = draw_list(layout, TETFLORA_UL_populations, group, "populations", *buttons, rows=rows)
         beside.menu(TETFLORA_MT_populations.__name__, text="", icon='DOWNARROW_HLT')
         if settings.uid:
             row = layout.row(align=True)
-            Button(TETFLORA_OT_update_population, 'FILE_REFRESH', "Update").draw(row)
-            Button(TETFLORA_OT_reroll_population, 'MOD_NOISE', "Re-roll").draw(row)
-            Button(TETFLORA_OT_freeze_population, 'FREEZE', "Freeze").draw(row, depress=settings.frozen)
-            Button(TETFLORA_OT_ground_cover, 'OUTLINER_OB_CURVES').draw(layout)
+            Button("update_population", 'FILE_REFRESH', "Update").draw(row)
+            Button("reroll_population", 'MOD_NOISE', "Re-roll").draw(row)
+            Button("freeze_population", 'FREEZE', "Freeze").draw(row, depress=settings.frozen)
+            Button("ground_cover", 'OUTLINER_OB_CURVES').draw(layout)
         else:
-            Button(TETFLORA_OT_populate, 'OUTLINER_OB_POINTCLOUD', "Populate Selected Meshes").draw(layout)
+            Button("populate", 'OUTLINER_OB_POINTCLOUD', "Populate Selected Meshes").draw(layout)
         _draw_status(context, layout, settings)
         column = layout.column()
         column.active = not settings.frozen
@@ -108,7 +91,7 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
         active = context.active_object
         marked = active is not None and active.tetflora.is_occluder
         text, icon = ("Occluder", 'CHECKMARK') if marked else ("Mark as Occluder", 'MOD_MASK')
-        Button(TETFLORA_OT_mark_occluder, icon, text).draw(layout, depress=marked)
+        Button("mark_occluder", icon, text).draw(layout, depress=marked)
         for title, draw in _SECTIONS.items():
             # What to plant is the first question.
             if body := section(layout, title, closed=title != "Species"):
@@ -188,7 +171,7 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, setting
     # In the place of the other text: a line that comes and goes would move the slider away from under the mouse.
     text = points.status(settings)
     row.label(text=f"Update: {text}" if waiting else text, icon='FILE_REFRESH' if waiting else 'INFO')
-    Button(TETFLORA_OT_preview_population, 'HIDE_OFF' if shown else 'HIDE_ON', "").draw(row, depress=shown)
+    Button("preview_population", 'HIDE_OFF' if shown else 'HIDE_ON', "").draw(row, depress=shown)
     for text in points.complaints(settings):
         draw_message(context, layout, text)
 
@@ -201,7 +184,7 @@ def _draw_grounds(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     left.alignment = 'RIGHT'
     left.label(text="Ground")
     row.label(text=", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None")
-    layout.operator(TETFLORA_OT_set_population_ground.bl_idname, icon='MESH_GRID')
+    layout.operator("tetflora.set_population_ground", icon='MESH_GRID')
     layout.prop(settings, "ground_collection", text="Collection")
 
 
@@ -217,7 +200,7 @@ class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.scale_y = 1.4
         for mode, name, _, icon, _ in MODES:
-            Button(TETFLORA_OT_paint_plants, icon, name, {"mode": mode}).draw(row, depress=settings.mode == mode)
+            Button("paint_plants", icon, name, {"mode": mode}).draw(row, depress=settings.mode == mode)
         column = layout.column(align=True)
         draw_properties(column, settings, "radius", "density")
         column.prop(settings, "strength", slider=True)
@@ -228,11 +211,3 @@ class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
             column.prop(settings, "species_choice", text=" ")
         draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
         draw_properties(layout.column(), settings, "store", "seed")
-
-
-CLASSES = (
-    TETFLORA_UL_populations,
-    TETFLORA_MT_populations,
-    TETFLORA_PT_populate,
-    TETFLORA_PT_brush,
-)

@@ -6,10 +6,7 @@ from math import isclose
 
 import bpy
 
-from ..operators.add import TETFLORA_OT_first_forest
-from ..operators.assets import TETFLORA_OT_refine_scatter
 from ..operators.marks import can_be_explicit
-from ..operators.refine import TETFLORA_OT_clear, TETFLORA_OT_refine
 from ..tetflora_addon.blender.job.forecast import forecast_text, memory_text
 from ..tetflora_addon.blender.job.render import render_errors
 from ..tetflora_addon.blender.placing.first_forest import is_first_forest
@@ -48,7 +45,7 @@ class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
         column = self.layout.column()
         row = column.row()
         row.scale_y = 1.6
-        row.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
+        row.operator("tetflora.first_forest", icon='WORLD')
         column.label(text="Then click Refine and press F12")
 
 
@@ -61,8 +58,8 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         layout, settings = self.layout, context.scene.tetflora
         row = layout.row(align=True)
         row.scale_y = 1.4
-        row.operator(TETFLORA_OT_refine.bl_idname, icon='MOD_DECIM')
-        row.operator(TETFLORA_OT_clear.bl_idname, icon='TRASH')
+        row.operator("tetflora.refine", icon='MOD_DECIM')
+        row.operator("tetflora.clear", icon='TRASH')
         if settings.auto_refine:  # a line of its own also while nothing is done: what comes and goes moves all below
             draw_message(context, layout, auto.message() or "Refine Automatically is on", 'SORTTIME')
         for error in render_errors()[-1:]:
@@ -119,7 +116,7 @@ def _draw_scatter(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     else:
         marked = is_scatter(obj)
         text, icon = ("Refine Scatter", 'CHECKBOX_HLT' if marked else 'CHECKBOX_DEHLT')
-        Button(TETFLORA_OT_refine_scatter, icon, text).draw(layout, depress=marked)
+        Button("refine_scatter", icon, text).draw(layout, depress=marked)
 
 
 def _draw_memory(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -191,9 +188,3 @@ def _draw_animation(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     draw_properties(column, settings, "cell_length", "cell_turn", "kept_memory")
     column.prop(scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
     layout.prop(settings, "anchored")
-
-
-CLASSES = (
-    TETFLORA_PT_first,
-    TETFLORA_PT_refine,
-)

@@ -7,9 +7,6 @@ from functools import lru_cache
 
 import bpy
 
-from ..operators.preview import TETFLORA_OT_forget_levels, TETFLORA_OT_look_through, TETFLORA_OT_preview_levels
-from ..operators.refine import TETFLORA_OT_keep_results
-from ..operators.year import TETFLORA_OT_set_season
 from ..tetflora_addon.blender.job.forecast import polygons_text, seconds_text
 from ..tetflora_addon.blender.placing.plant_objects import plant_collections
 from ..tetflora_addon.blender.settings import active_in, date_text
@@ -48,7 +45,7 @@ class TETFLORA_MT_seasons(bpy.types.Menu):
     bl_label = "Season"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        self.layout.operator_enum(TETFLORA_OT_set_season.bl_idname, "season")
+        self.layout.operator_enum("tetflora.set_season", "season")
 
 
 class TETFLORA_PT_year(SidebarPanel, bpy.types.Panel):
@@ -90,7 +87,7 @@ class TETFLORA_PT_output(SidebarPanel, bpy.types.Panel):
             column = layout.column(heading=collection.name)
             column.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)
             column.prop(collection, "hide_render", text="Renders", toggle=False, invert_checkbox=True)
-        layout.operator(TETFLORA_OT_keep_results.bl_idname, icon='MESH_DATA')
+        layout.operator("tetflora.keep_results", icon='MESH_DATA')
         if body := section(layout, "Ray Visibility"):
             draw_properties(body, output, "camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
         if body := section(layout, "Passes and Materials"):
@@ -128,10 +125,10 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
             if preview is not None and preview.message:
                 draw_message(context, column, preview.message)
         row = layout.row(align=True)
-        row.operator(TETFLORA_OT_preview_levels.bl_idname, icon='MOD_REMESH')
-        row.operator(TETFLORA_OT_forget_levels.bl_idname, text="", icon='X')
+        row.operator("tetflora.preview_levels", icon='MOD_REMESH')
+        row.operator("tetflora.forget_levels", text="", icon='X')
         layout.prop(settings, "freeze")
-        layout.operator(TETFLORA_OT_look_through.bl_idname, icon='VIEW_CAMERA')
+        layout.operator("tetflora.look_through", icon='VIEW_CAMERA')
         if preview is None or preview.levels is None:
             return
         column = layout.column()
@@ -229,13 +226,3 @@ class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
             grid = body.grid_flow(row_major=True, columns=5, even_columns=False, align=True)
             for text in (text for row in (("Pass", "Tetrahedra", "To Split", "Polygons", "s"), *steps) for text in row):
                 grid.label(text=text)
-
-
-CLASSES = (
-    TETFLORA_MT_seasons,
-    TETFLORA_PT_year,
-    TETFLORA_PT_wind,
-    TETFLORA_PT_output,
-    TETFLORA_PT_preview,
-    TETFLORA_PT_statistics,
-)

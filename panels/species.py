@@ -4,17 +4,6 @@
 
 import bpy
 
-from ..operators.species import (
-    TETFLORA_OT_create_asset_library,
-    TETFLORA_OT_delete_species,
-    TETFLORA_OT_duplicate_species,
-    TETFLORA_OT_edit_orders,
-    TETFLORA_OT_export_species,
-    TETFLORA_OT_load_species,
-    TETFLORA_OT_preview_species,
-    TETFLORA_OT_revert_species,
-    TETFLORA_OT_save_species,
-)
 from ..tetflora_addon.blender.species.catalogue import own_file
 from ..tetflora_addon.blender.species.editor import VARIATION
 from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skipped_files
@@ -39,13 +28,13 @@ class TETFLORA_MT_species_files(bpy.types.Menu):
         layout.operator_context = 'INVOKE_DEFAULT'
         draw_buttons(
             layout,
-            Button(TETFLORA_OT_save_species, 'FILE_TICK'),
-            Button(TETFLORA_OT_load_species, 'IMPORT'),
-            Button(TETFLORA_OT_export_species, 'EXPORT'),
+            Button("save_species", 'FILE_TICK'),
+            Button("load_species", 'IMPORT'),
+            Button("export_species", 'EXPORT'),
             None,
-            Button(TETFLORA_OT_delete_species, 'TRASH'),
+            Button("delete_species", 'TRASH'),
             None,
-            Button(TETFLORA_OT_create_asset_library, 'ASSET_MANAGER'),
+            Button("create_asset_library", 'ASSET_MANAGER'),
         )
 
 
@@ -64,8 +53,8 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.use_property_split = False
         row.prop(editor, "species_choice", text="")
-        row.operator(TETFLORA_OT_duplicate_species.bl_idname, text="", icon='DUPLICATE')
-        row.operator(TETFLORA_OT_revert_species.bl_idname, text="", icon='LOOP_BACK')
+        row.operator("tetflora.duplicate_species", text="", icon='DUPLICATE')
+        row.operator("tetflora.revert_species", text="", icon='LOOP_BACK')
         row.menu(TETFLORA_MT_species_files.__name__, text="", icon='DOWNARROW_HLT')
         if find_edit(scene, identifier) is not None:
             layout.label(text="Edited in this file", icon='GREASEPENCIL')
@@ -79,7 +68,7 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         shown = species.shown_in(scene)
         row = layout.row(align=True)
         row.use_property_split = False
-        Button(TETFLORA_OT_preview_species, 'HIDE_OFF' if shown else 'HIDE_ON', "Preview").draw(row, depress=shown)
+        Button("preview_species", 'HIDE_OFF' if shown else 'HIDE_ON', "Preview").draw(row, depress=shown)
         row.prop(editor, "preview_seed")
         text, failed = species.message()
         if shown and text and text != problem:
@@ -114,7 +103,7 @@ def _draw_orders(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup) ->
     row.column(align=True).prop(editor, "order", expand=True)
     buttons = row.column(align=True)
     for action, icon in (('ADD', 'ADD'), ('REMOVE', 'REMOVE'), ('SPUR', 'OUTLINER_OB_FORCE_FIELD')):
-        Button(TETFLORA_OT_edit_orders, icon, "", {"action": action}).draw(buttons)
+        Button("edit_orders", icon, "", {"action": action}).draw(buttons)
     _draw_keys(layout, editor, leaves=False)
 
 
@@ -138,9 +127,3 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
             row.prop(editor, name + VARIATION, text="")
         if key.kind == "colour":
             column.separator()
-
-
-CLASSES = (
-    TETFLORA_MT_species_files,
-    TETFLORA_PT_species,
-)

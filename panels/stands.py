@@ -4,12 +4,6 @@
 
 import bpy
 
-from ..operators.stands import (
-    TETFLORA_OT_animate_growth,
-    TETFLORA_OT_grow_again,
-    TETFLORA_OT_grow_stand,
-    TETFLORA_OT_keep_year,
-)
 from ..tetflora_addon.blender.scene.field_sizes import has_history
 from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.stands.growing import is_stand, shown_stand
@@ -42,11 +36,11 @@ class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
                 column.prop(active.tetflora, "stand_year", text=text, slider=True)
                 layout.prop(active.tetflora, "stand_smooth")
                 row = layout.row(align=True)
-                Button(TETFLORA_OT_animate_growth, 'KEYFRAME').draw(row)
-                Button(TETFLORA_OT_keep_year, 'PINNED').draw(row)
-            Button(TETFLORA_OT_grow_again, 'FILE_REFRESH').draw(layout)
+                Button("animate_growth", 'KEYFRAME').draw(row)
+                Button("keep_year", 'PINNED').draw(row)
+            Button("grow_again", 'FILE_REFRESH').draw(layout)
         else:
-            Button(TETFLORA_OT_grow_stand, 'TIME', "Grow Stand on Selected Meshes").draw(layout)
+            Button("grow_stand", 'TIME', "Grow Stand on Selected Meshes").draw(layout)
         draw_properties(layout.column(), stand, "years", "density", "recruits", "outside", "seed")
         TETFLORA_UL_stand_species.draw_in(layout, stand)
         if not stand.species:
@@ -59,6 +53,3 @@ class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
             draw_where(body, stand)
         if body := section(layout, "Detail"):
             draw_properties(body, stand, "interval", "least_height", "cell", "open_edges")
-
-
-CLASSES = (TETFLORA_PT_stand,)

@@ -69,6 +69,16 @@ class Listeners(list):
             listener(*arguments)
 
 
+def classes_in(modules: Iterable[object], *kinds: type) -> tuple[type, ...]:
+    """Classes that modules define and that are of some of Blender's kinds, in their order."""
+    return tuple(
+        cls
+        for module in modules
+        for cls in getattr(module, "__dict__", {}).values()
+        if isinstance(cls, type) and issubclass(cls, kinds) and cls.__module__ == module.__name__
+    )
+
+
 def call_soon(function: Callable[[], float | None], seconds: float) -> None:
     """Call a function of a module by a timer, once for all requests until then; from any thread, as of a render."""
     if not on_main_thread():

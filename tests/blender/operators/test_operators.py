@@ -5,16 +5,20 @@
 from __future__ import annotations
 
 import json
+import re
 
 import bpy
 import pytest
 
 import operators
+from devtools import build
 from operators import ground_tools
 from panels import results
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tetflora_addon.blender.job import refine, render
 from tetflora_addon.blender.results.collection import has_results
+
+_NAMED = re.compile(r'(?:\bButton\(\s*"|"tetflora\.|\boperator = ")(\w+)"')  # operators of buttons in a source text
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -40,6 +44,14 @@ def test_every_class_of_operators_is_registered_under_its_own_name(blender):
     registered = {name for name in dir(bpy.types) if name.startswith("TETFLORA_OT_")}
     assert {cls.__name__ for cls in classes} == registered
     assert all(cls.bl_idname == cls.__name__.replace("TETFLORA_OT_", "tetflora.") for cls in classes)
+
+
+def test_every_button_has_an_operator(blender):
+    texts = [path.read_text(encoding="utf-8") for path in (build.ROOT / "panels").glob("*.py")]
+    named = {name for text in texts for name in _NAMED.findall(text)}
+    known = {cls.bl_idname.removeprefix("tetflora.") for cls in operators.CLASSES}
+    assert len(named & known) > 50
+    assert sorted(named - known) == []
 
 
 def test_add_plant_stands_at_the_cursor_with_another_seed_each_time():
