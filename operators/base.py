@@ -39,8 +39,13 @@ class Tool:
             cls.bl_description = " ".join((cls.__doc__ or "").split()).removesuffix(".")
 
     @classmethod
+    def missing(cls, context: bpy.types.Context) -> str:
+        """Why the operator is not available; an empty text where it is."""
+        return next(filter(None, (need(context) for need in cls.needs)), "")
+
+    @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        reason = next(filter(None, (need(context) for need in cls.needs)), "")
+        reason = cls.missing(context)
         if reason:
             cls.poll_message_set(reason)
         return not reason

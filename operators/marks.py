@@ -67,10 +67,8 @@ class Marking(Reporting):
         return [o for o in context.selected_objects if cls.fits(o) or getattr(o.tetflora, cls.mark)]
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not cls._chosen(context):
-            cls.poll_message_set(cls.nothing)
-        return bool(cls._chosen(context))
+    def missing(cls, context: bpy.types.Context) -> str:
+        return "" if cls._chosen(context) else cls.nothing
 
     def run(self, context: bpy.types.Context) -> set[str]:
         chosen = self._chosen(context)

@@ -140,8 +140,7 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
 class _Trees(_Importing):
     """Mix-in for those that make fields of trees."""
 
-    def planted(self, context: bpy.types.Context, result: Planted) -> set[str]:
-        """Report; the operator's result."""
+    def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
         select_only(context, [result.object])
         parts = [f"{counted(result.number, 'tree')} imported"]
         inventory = result.inventory
@@ -280,9 +279,6 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
             crop=(self.crop, self.crop_size),
         )
 
-    def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
-        return self.planted(context, result)
-
 
 class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
     """Make a field of the trees that a canopy height model shows, each with its height and the width of its crown.
@@ -325,9 +321,6 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
             self.shift,
             self.new_origin,
         )
-
-    def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
-        return self.planted(context, result)
 
 
 class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):

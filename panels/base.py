@@ -97,6 +97,7 @@ def draw_where(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> No
     draw_properties(layout, owner, *(name for name in ("areas", "paths") if name in known))
     if owner.paths is not None:
         _draw_limits(layout, owner, "path")
+        draw_properties(layout, owner, *({"path_distance"} & set(known.keys())))
 
 
 def _draw_search(
@@ -112,13 +113,17 @@ def _draw_search(
 def _draw_limits(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str) -> None:
     """Draw the limits of something as far as they are there, and how soft they are; that only matters to limits."""
     known, column = owner.bl_rna.properties, layout.column(align=True)
-    ends = [end for end in ("min", "max") if f"{name}_{end}" in known]
-    for part in (*ends, *(part for part in ("falloff", "softness", "distance") if f"{name}_{part}" in known)):
+    ends = [f"{name}_{end}" for end in ("min", "max") if f"{name}_{end}" in known]
+    softness = f"{name}_softness"
+    draw_properties(column, owner, *ends[:1])
+    for part in ends[1:]:
+        column.prop(owner, part, text="Max")
+    if softness in known:
         row = column.row()
-        row.active = part != "softness" or any(
-            getattr(owner, f"{name}_{end}") != getattr(known[f"{name}_{end}"], f"hard_{end}") for end in ends
-        )
-        row.prop(owner, f"{name}_{part}", **({} if part in (*ends[:1], "distance") else {"text": part.capitalize()}))
+        row.active = any(getattr(owner, end) != getattr(known[end], f"hard_{end[-3:]}") for end in ends)
+        row.prop(owner, softness, text="Softness")
+    if f"{name}_falloff" in known:
+        column.prop(owner, f"{name}_falloff", text="Falloff")
 
 
 class Button(NamedTuple):

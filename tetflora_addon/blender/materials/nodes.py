@@ -97,12 +97,13 @@ class Graph:
     Parameters
     ----------
     tree : bpy.types.NodeTree
-        Emptied first.
+        Emptied first, unless ``clear`` is false.
     """
 
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
+    def __init__(self, tree: bpy.types.NodeTree, clear: bool = True) -> None:
         self.tree = tree
-        tree.nodes.clear()
+        if clear:
+            tree.nodes.clear()
 
     def node(self, kind: str, inputs: dict[str, Any] | None = None, **settings: Any) -> bpy.types.Node:
         """Add a node, set its properties, and link or set its inputs: a value, a socket, or a node's first output."""
