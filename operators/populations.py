@@ -22,7 +22,7 @@ from ..tetflora_addon.blender.placing.rules import active_population, copy_setti
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import readable
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, Tool, counted, in_object_mode, need, select_only
+from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only
 
 
 def selected_grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -40,17 +40,20 @@ _ACTIVE = (in_object_mode, _population_exists)
 _REPLACING = (*_ACTIVE, _not_frozen)
 
 
-def report_made(operator: Tool, made: Made) -> set[str]:
-    """Report how many plants there are, as what, and why not more; the operator's result."""
-    where = ""
-    if made.objects and made.objects[0].tetflora.is_field:
-        where = f' in the field "{made.objects[0].name}"'
-    if made.reason:
-        operator.report({'WARNING'}, f"{counted(made.number, 'plant')} of {made.wanted:,} placed{where}: {made.reason}")
-        return {'FINISHED'}
-    returned = f"; {counted(made.returned, 'deleted plant')} restored" if made.returned else ""
-    erased = f"; {made.erased:,} omitted where you erased" if made.erased else ""
-    return operator.done(f"{counted(made.number, 'plant')} placed{where}{returned}{erased}")
+class Placing(ModalJob):
+    """Mix-in for operators that place the plants of a population."""
+
+    def finish(self, _context: bpy.types.Context, result: Made) -> set[str]:
+        where = ""
+        if result.objects and result.objects[0].tetflora.is_field:
+            where = f' in the field "{result.objects[0].name}"'
+        placed = f"{counted(result.number, 'plant')} of {result.wanted:,} placed{where}: {result.reason}"
+        if result.reason:
+            self.report({'WARNING'}, placed)
+            return {'FINISHED'}
+        returned = f"; {counted(result.returned, 'deleted plant')} restored" if result.returned else ""
+        erased = f"; {result.erased:,} omitted where you erased" if result.erased else ""
+        return self.done(f"{counted(result.number, 'plant')} placed{where}{returned}{erased}")
 
 
 class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
@@ -73,14 +76,7 @@ class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class _Placing(ModalJob):
-    """Mix-in for operators that place the plants of the active population."""
-
-    def finish(self, _context: bpy.types.Context, result: Made) -> set[str]:
-        return report_made(self, result)
-
-
-class TETFLORA_OT_update_population(_Placing, bpy.types.Operator):
+class TETFLORA_OT_update_population(Placing, bpy.types.Operator):
     """Place the plants of the active population again according to its settings.
 
     Plants that you moved, changed or deleted are replaced too, except where you erased with the brush; other plants
@@ -95,7 +91,7 @@ class TETFLORA_OT_update_population(_Placing, bpy.types.Operator):
         return make_plants_steps(context.scene, depsgraph, active_population(context.scene))
 
 
-class TETFLORA_OT_reroll_population(_Placing, bpy.types.Operator):
+class TETFLORA_OT_reroll_population(Placing, bpy.types.Operator):
     """Place the plants of the active population with a new seed, for a different arrangement."""
 
     bl_label = "Re-roll Population"

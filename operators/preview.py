@@ -19,13 +19,7 @@ _VIEWPORT = 72.0
 
 
 def _frozen(scene: bpy.types.Scene) -> Camera | None:
-    preview = state.find(scene)
-    return None if preview is None else preview.frozen
-
-
-def _levels_of(scene: bpy.types.Scene) -> Levels | None:
-    preview = state.find(scene)
-    return None if preview is None else preview.levels
+    return getattr(state.find(scene), "frozen", None)
 
 
 _camera_found = need(lambda context: context.scene.camera is not None or _frozen(context.scene) is not None, NO_CAMERA)
@@ -61,7 +55,10 @@ class TETFLORA_OT_forget_levels(Reporting, bpy.types.Operator):
     bl_label = "Clear Levels"
     bl_options = set()
     needs = (
-        need(lambda context: _levels_of(context.scene) is not None, "No levels to clear; click Compute Levels first"),
+        need(
+            lambda context: getattr(state.find(context.scene), "levels", None) is not None,
+            "No levels to clear; click Compute Levels first",
+        ),
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:

@@ -60,6 +60,11 @@ def properties_of(settings: type, **common: Any) -> SimpleNamespace:
     return made
 
 
+def settings_in(settings: type, **common: Any) -> type:
+    """A mix-in for property groups with all settings of a dataclass, as `properties_of`."""
+    return type(settings.__name__, (), {"__annotations__": vars(properties_of(settings, **common))})
+
+
 def with_identity(groups: Iterable[bpy.types.PropertyGroup], uid: str) -> bpy.types.PropertyGroup | None:
     """The population or biome of an identity; None where there is none."""
     return next((group for group in groups if group.uid == uid), None)
@@ -146,13 +151,7 @@ def set_quality(group: bpy.types.PropertyGroup, number: int) -> None:
         setattr(group, name, value)
 
 
-class EngineSettings:
-    """The engine's settings, field by field."""
-
-    __annotations__ = vars(properties_of(RefinementSettings))
-
-
-class RefinementProperties(EngineSettings):
+class RefinementProperties(settings_in(RefinementSettings)):
     """Refinement settings of a scene: the engine's, quality, and the look of shells."""
 
     quality: EnumProperty(

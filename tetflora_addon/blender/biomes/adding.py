@@ -11,15 +11,15 @@ import json
 import uuid
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import bpy
 
 from ...errors import SceneError, TetFloraError
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress, mapped
+from ...jobs import Progress, part_of
 from ...species.fallen import KIND as FALLEN_LEAVES
 from ...species.litter import FALLEN
 from ..placing.cover import fallen_from
@@ -36,9 +36,6 @@ from .files import Biome, find_biome, layers_of, pages_of, stand_settings, stand
 from .ground import lay_biome_soil, make_line
 
 _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
-
-
-_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -148,7 +145,7 @@ def _grown(
         begin, end = (_STANDS * n / len(names) for n in (number, number + 1))
         try:
             with closing(grow(number)) as steps:
-                grown = yield from _within(steps, begin, end, name)
+                grown = yield from part_of(steps, begin, end, name)
         except GoneError:
             raise
         except TetFloraError as error:
@@ -182,7 +179,7 @@ def _plant(
         begin, end = (first + n / len(names) * (1.0 - _SOIL - first) for n in (number, number + 1))
         try:
             with closing(make_plants_steps(scene, depsgraph, population)) as steps:
-                made = yield from _within(steps, begin, end, title)
+                made = yield from part_of(steps, begin, end, title)
         except GoneError:
             raise
         except SceneError as error:
@@ -200,14 +197,6 @@ def _plant(
     grounds = [entry.object for entry in biome.grounds if entry.object is not None] if biome is not None else []
     kept = lay_biome_soil(scene, depsgraph, grounds) if grounds else []
     return Added(biome.name if biome is not None else "", layers, bare, kept)
-
-
-def _within(
-    steps: Generator[Progress, object, _Result], begin: float, end: float, title: str
-) -> Generator[Progress, object, _Result]:
-    """Steps that are a part of others."""
-    part = end - begin
-    return mapped(steps, lambda s: replace(s, fraction=begin + part * s.fraction, message=f"{title}: {s.message}"))
 
 
 def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:

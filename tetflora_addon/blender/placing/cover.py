@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError, TetFloraError
 from ...files import is_identifier
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress, mapped
+from ...jobs import Progress, mapped, part_of
 from ...planting.canopy import Canopy
 from ...planting.cover import FULL, Floor, Habitat, Stratum, covered, tinted
 from ...species.fallen import KIND, leaves_page, shed_share
@@ -147,7 +147,7 @@ def cover_steps(
         found = cover_of(scene, uid) or _add_cover(scene, population, grounds, masks)
         _mix(found, parts, ground.map_area)
         with closing(make_plants_steps(scene, depsgraph, found)) as steps:
-            made = yield from _scaled(steps, _PLANTING)
+            made = yield from part_of(steps, _PLANTING, 1.0)
         bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
     return Covered(made, bare)
 
@@ -184,11 +184,6 @@ def _again(
 def _told(steps: Generator[float, object, Floor]) -> Generator[Progress, object, Floor]:
     """The maps, with their progress as a part of the whole."""
     return mapped(steps, lambda done: Progress(0.05 + (_PLANTING - 0.05) * done, _UNDER))
-
-
-def _scaled(steps: Generator[Progress, object, Made], begin: float) -> Generator[Progress, object, Made]:
-    """Steps that are the last part of others."""
-    return mapped(steps, lambda step: replace(step, fraction=begin + (1.0 - begin) * step.fraction))
 
 
 @contextmanager

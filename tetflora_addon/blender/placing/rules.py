@@ -208,25 +208,6 @@ def set_grounds(population: bpy.types.PropertyGroup, grounds: Iterable[bpy.types
         population.grounds.add().object = obj
 
 
-def place_population(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    population: bpy.types.PropertyGroup,
-    own: Collection[bpy.types.Object],
-    grounds: Sequence[bpy.types.Object] | None = None,
-    most: int | None = None,
-) -> tuple[Placement, tuple[str, ...]]:
-    """Find places for the plants of a population, which count through species; parameters as of `read_search`.
-
-    Raises
-    ------
-    SceneError
-        As `read_search`, or settings that leave no place.
-    """
-    search = read_search(scene, depsgraph, population, own, grounds, most)
-    return search.placement(), search.species
-
-
 @dataclass(frozen=True)
 class Search:
     """All that the places of a population's plants depend on, as it was read from Blender.

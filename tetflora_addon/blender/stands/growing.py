@@ -7,14 +7,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError, SpeciesError, TetFloraError
-from ...jobs import Progress, mapped
+from ...jobs import Progress, part_of
 from ...species.species import Species
 from ...stands.grow import StandSettings, grow
 from ...stands.guilds import Guild
@@ -206,9 +206,9 @@ def _again_steps(
 
 
 def _growing(site: StandSite, guilds: list[Guild], settings: StandSettings) -> Generator[Progress, object, Records]:
-    steps, (begin, part) = steps_in_thread(grow(site, guilds, settings), Progress(0.0, "Growing the stand")), _GROWING
-    with closing(steps):
-        return (yield from mapped(steps, lambda step: replace(step, fraction=begin + part * step.fraction)))
+    (begin, part) = _GROWING
+    with closing(steps_in_thread(grow(site, guilds, settings), Progress(0.0, "Growing the stand"))) as steps:
+        return (yield from part_of(steps, begin, begin + part))
 
 
 def _measuring(species: list[Species], records: Records) -> Generator[Progress, object, None]:
