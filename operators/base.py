@@ -3,10 +3,13 @@
 """What operators share: tooltips, conditions, reports, the selection, and work in steps between redraws."""
 
 from collections.abc import Callable, Generator
+from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy.props import StringProperty
 
+from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.plant_objects import plants_of
 from ..tetflora_addon.blender.runtime import remember
 from ..tetflora_addon.blender.worker import at_once
@@ -84,6 +87,18 @@ class Reporting(Tool):
     def run(self, context: bpy.types.Context) -> set[str]:
         """Do it; the result of ``execute``."""
         raise NotImplementedError
+
+
+class FileTool(Reporting):
+    """Mix-in for operators that read or write a JSON file which the artist chooses."""
+
+    filename_ext = ENDING
+    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
+
+    @property
+    def path(self) -> Path:
+        """The chosen file."""
+        return Path(bpy.path.abspath(self.filepath))
 
 
 def need(test: Callable[[bpy.types.Context], object], message: str) -> Need:

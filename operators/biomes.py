@@ -3,7 +3,6 @@
 """Add, plant again, remove and save biomes; import files of biomes and delete them."""
 
 from collections.abc import Generator
-from pathlib import Path
 
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
@@ -19,13 +18,12 @@ from ..tetflora_addon.blender.biomes.files import active_biome, read_biome
 from ..tetflora_addon.blender.biomes.ground import make_land
 from ..tetflora_addon.blender.biomes.library import NO_BIOME, OWN_FILES, biome_property, biomes
 from ..tetflora_addon.blender.biomes.saving import import_biome, save_biome, saved_populations
-from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
+from .base import FileTool, ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
 from .populations import selected_grounds
 
 _biome_exists = need(lambda context: active_biome(context.scene), "Add a biome first")
@@ -175,20 +173,18 @@ class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
         )
 
 
-class TETFLORA_OT_import_biome(Reporting, bpy.types.Operator, ImportHelper):
+class TETFLORA_OT_import_biome(FileTool, bpy.types.Operator, ImportHelper):
     """Copy a biome's file to your folder of biomes, with the picture of the same name beside it."""
 
     bl_label = "Import Biome"
     bl_options = {'REGISTER'}
 
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
     replace: BoolProperty(
         name="Replace", description="Replace your own biome of the same file name", options={'SKIP_SAVE'}
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        identifier = import_biome(Path(bpy.path.abspath(self.filepath)), self.replace)
+        identifier = import_biome(self.path, self.replace)
         context.scene.tetflora.new_biome = identifier
         return self.done(f'Biome "{biomes()[identifier].name}" imported; click Add Biome to use it')
 

@@ -5,7 +5,7 @@
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, StringProperty
 
 from ..tetflora_addon.blender.placing.plant_objects import (
     field_from_plants,
@@ -15,12 +15,10 @@ from ..tetflora_addon.blender.placing.plant_objects import (
 )
 from ..tetflora_addon.blender.placing.populations import adopt, collection_of, owner_of
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES
-from ..tetflora_addon.blender.placing.rules import shown_population
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
 from ..tetflora_addon.blender.scene.objects import SURFACE_TYPES, may_instance
 from ..tetflora_addon.blender.species.catalogue import default_species
 from ..tetflora_addon.blender.species.edits import catalogue
-from ..tetflora_addon.blender.stands.growing import shown_stand
 from .base import Reporting, counted, in_object_mode, need, plants_selected, select_only, selected_plants
 
 
@@ -209,17 +207,10 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
     bl_label = "Edit List"
     bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
 
-    which: EnumProperty(
-        name="List",
-        description="List to edit",
-        items=(
-            ('MIX', "Species", "Species to populate with"),
-            ('LEAVES', "Leaf Objects", "Meshes that replace leaves"),
-            ('OUTPUT', "Output", "Species with their own pass index, light group or materials"),
-            ('FIELD', "Field Species", "Species of the active field of plants"),
-            ('STAND', "Stand", "Species of the stand"),
-        ),
+    owner: StringProperty(
+        name="Owner", description="Where in the context the owner of the list is, such as scene.tetflora.populate"
     )
+    entries: StringProperty(name="List", description="Name of the list")
     action: EnumProperty(
         name="Action",
         description="Change to make",
@@ -234,10 +225,11 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         return properties.bl_rna.properties["action"].enum_items[properties.action].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        owner, name = self._list(context)
-        if owner is None:
-            return self.failed("The active object must be a field of plants; select one")
-        entries, index = getattr(owner, name), f"{name}_index"
+        try:
+            owner, index = context.path_resolve(self.owner), f"{self.entries}_index"
+            entries = getattr(owner, self.entries)
+        except (AttributeError, ValueError):
+            return self.failed(f'There is no list "{self.entries}" of "{self.owner}"; click the buttons beside a list')
         if self.action == 'ADD':
             present = {entry.species for entry in entries}
             species = next((s for s in catalogue() if s not in present), None) or default_species()
@@ -250,16 +242,3 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         entries.remove(active)
         setattr(owner, index, max(min(active, len(entries) - 1), 0))
         return {'FINISHED'}
-
-    def _list(self, context: bpy.types.Context) -> tuple[bpy.types.PropertyGroup | None, str]:
-        """The list's owner, and its name there."""
-        if self.which == 'FIELD':
-            active = context.active_object
-            return (active.tetflora if active is not None and active.tetflora.is_field else None), "field_species"
-        if self.which == 'OUTPUT':
-            return context.scene.tetflora.output, "species"
-        if self.which == 'MIX':
-            return shown_population(context.scene), "mix"
-        if self.which == 'STAND':
-            return shown_stand(context), "species"
-        return context.scene.tetflora, "leaf_objects"

@@ -3,13 +3,12 @@
 """Add, change and remove populations of plants; write them to files and read them."""
 
 from collections.abc import Generator
-from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import BoolProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..tetflora_addon.blender.placing.population_files import ENDING, read_populations, write_populations
+from ..tetflora_addon.blender.placing.population_files import read_populations, write_populations
 from ..tetflora_addon.blender.placing.populations import (
     Made,
     add_population,
@@ -22,7 +21,7 @@ from ..tetflora_addon.blender.placing.rules import active_population, copy_setti
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import readable
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only
+from .base import FileTool, ModalJob, Reporting, counted, in_object_mode, need, select_only
 
 
 def selected_grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -199,7 +198,7 @@ class TETFLORA_OT_preview_population(Reporting, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper):
+class TETFLORA_OT_export_populations(FileTool, bpy.types.Operator, ExportHelper):
     """Export the settings of the populations in this scene to a file, for use in other scenes.
 
     Plants are not exported.
@@ -209,8 +208,6 @@ class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper
     needs = (need(lambda context: context.scene.tetflora.populations, "Add a population first"),)
     bl_options = {'REGISTER'}
 
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
     only_active: BoolProperty(name="Only Active", description="Export the active population only")
 
     def run(self, context: bpy.types.Context) -> set[str]:
@@ -218,11 +215,11 @@ class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper
         chosen = list(settings.populations)
         if self.only_active:
             chosen = chosen[settings.populations_index :][:1]
-        path = write_populations(chosen, Path(bpy.path.abspath(self.filepath)))
+        path = write_populations(chosen, self.path)
         return self.done(f"{counted(len(chosen), 'population')} written to {path}")
 
 
-class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper):
+class TETFLORA_OT_import_populations(FileTool, bpy.types.Operator, ImportHelper):
     """Import populations from a file, without plants; click Update for each.
 
     They grow on meshes with the names in the file, or else on the selected meshes.
@@ -230,12 +227,8 @@ class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper
 
     bl_label = "Import Populations"
 
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
-
     def run(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath))
-        number, missing = read_populations(context.scene, path, selected_grounds(context))
+        number, missing = read_populations(context.scene, self.path, selected_grounds(context))
         points.schedule()
         added = f"{counted(number, 'population')} added"
         if not missing:

@@ -9,7 +9,6 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
 from ..tetflora_addon.blender.placing.plant_objects import assign_species
 from ..tetflora_addon.blender.species.catalogue import (
@@ -32,7 +31,7 @@ from ..tetflora_addon.blender.species.values import orders_of, present_species
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.schema import DEFAULT_SPUR
 from ..tetflora_addon.species.skeletons import MAX_ORDERS
-from .base import Reporting, counted, need, selected_plants
+from .base import FileTool, Reporting, counted, need, selected_plants
 
 
 def shown(context: bpy.types.Context) -> str:
@@ -183,32 +182,27 @@ class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
         return self.done(f"Saved as {path}")
 
 
-class TETFLORA_OT_load_species(Reporting, bpy.types.Operator, ImportHelper):
+class TETFLORA_OT_load_species(FileTool, bpy.types.Operator, ImportHelper):
     """Copy a species file to your species folder, to use it in all files."""
 
     bl_label = "Load Species"
 
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
     replace: BoolProperty(
         name="Replace", description="Replace your own species of the same file name", options={'SKIP_SAVE'}
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        identifier = load_species_file(Path(bpy.path.abspath(self.filepath)), self.replace)
+        identifier = load_species_file(self.path, self.replace)
         context.scene.tetflora.species_editor.species = identifier
         return self.done(f'Species "{catalogue()[identifier].name}" loaded')
 
 
-class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
+class TETFLORA_OT_export_species(FileTool, bpy.types.Operator, ExportHelper):
     """Export the species to a file, to share it. The file name is the identifier of the species."""
 
     bl_label = "Export Species"
     needs = (species_shown,)
     bl_options = {'REGISTER'}
-
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.filepath:
@@ -217,8 +211,7 @@ class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         identifier = shown(context)
-        path = Path(bpy.path.abspath(self.filepath))
-        return self.done(f"Written to {write_species(context.scene, identifier, path)}")
+        return self.done(f"Written to {write_species(context.scene, identifier, self.path)}")
 
 
 class TETFLORA_OT_delete_species(Reporting, bpy.types.Operator):

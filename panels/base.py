@@ -191,8 +191,6 @@ class _SpeciesList:
 
     Attributes
     ----------
-    which : {'MIX', 'LEAVES', 'FIELD', 'OUTPUT'}
-        The list as the operator that edits it names it.
     entries : str
         Name of the owner's collection; that of the active index ends in ``_index``.
     beside : str
@@ -201,7 +199,6 @@ class _SpeciesList:
         Width of the species.
     """
 
-    which: str
     entries: str
     beside = ""
     fraction = 0.7
@@ -217,36 +214,37 @@ class _SpeciesList:
     @classmethod
     def draw_in(cls, layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> None:
         """Draw the list of an owner, with buttons to add and remove."""
-        values = [{"which": cls.which, "action": action} for action in ('ADD', 'REMOVE')]
-        buttons = (Button("edit_list", one["action"], "", one) for one in values)
+        place = "scene" if isinstance(owner.id_data, bpy.types.Scene) else "active_object"
+        given = {"owner": f"{place}.{owner.path_from_id()}", "entries": cls.entries}
+        buttons = (Button("edit_list", action, "", {**given, "action": action}) for action in ('ADD', 'REMOVE'))
         draw_list(layout, cls, owner, cls.entries, *buttons)
 
 
 class TETFLORA_UL_mix(_SpeciesList, bpy.types.UIList):
     """A species and its weight."""
 
-    which, entries, beside = 'MIX', "mix", "weight"
+    entries, beside = "mix", "weight"
 
 
 class TETFLORA_UL_leaf_objects(_SpeciesList, bpy.types.UIList):
     """A species and the mesh that replaces its leaf."""
 
-    which, entries, beside, fraction = 'LEAVES', "leaf_objects", "leaf", 0.5
+    entries, beside, fraction = "leaf_objects", "leaf", 0.5
 
 
 class TETFLORA_UL_field_species(_SpeciesList, bpy.types.UIList):
     """A number of the attribute species, and the species that it means."""
 
-    which, entries, fraction = 'FIELD', "field_species", 0.12
+    entries, fraction = "field_species", 0.12
 
 
 class TETFLORA_UL_output_species(_SpeciesList, bpy.types.UIList):
     """A species with output settings of its own."""
 
-    which, entries, beside = 'OUTPUT', "species", "pass_index"
+    entries, beside = "species", "pass_index"
 
 
 class TETFLORA_UL_stand_species(_SpeciesList, bpy.types.UIList):
     """A species of a stand and its share of what is planted."""
 
-    which, entries, beside = 'STAND', "species", "planted"
+    entries, beside = "species", "planted"

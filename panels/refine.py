@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine: buttons, state and settings of refinement; and First Forest, while the scene has no plants."""
+"""Refine: First Forest while the scene has no plants, then buttons, state and settings of refinement."""
 
 from math import isclose
 
@@ -31,24 +31,6 @@ from .results import made_of
 _FEW = 200  # objects to look through at every movement of the mouse; a larger scene is not a new one
 
 
-class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
-    """First forest: at the top of the tab while the scene has no plants."""
-
-    bl_label = "Get Started"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        scene = context.scene
-        return len(scene.objects) <= _FEW and not has_contents(scene)
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        column = self.layout.column()
-        row = column.row()
-        row.scale_y = 1.6
-        row.operator("tetflora.first_forest", icon='WORLD')
-        column.label(text="Then click Refine and press F12")
-
-
 class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
     """Refine: above the others, because the tab is longer than most screens are tall."""
 
@@ -56,6 +38,11 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.tetflora
+        if len(context.scene.objects) <= _FEW and not has_contents(context.scene):
+            column = layout.box().column()
+            column.scale_y = 1.6
+            Button("first_forest", 'WORLD').draw(column)
+            layout.label(text="Then click Refine and press F12")
         row = layout.row(align=True)
         row.scale_y = 1.4
         row.operator("tetflora.refine", icon='MOD_DECIM')

@@ -126,16 +126,16 @@ def test_mark_occluder_toggles_meshes_only():
 
 def test_lists_grow_and_shrink():
     settings = bpy.context.scene.tetflora
-    assert _ops().edit_list(which='MIX', action='REMOVE') == {'CANCELLED'}
+    assert _ops().edit_list(owner="scene.tetflora.populate", entries="mix", action='REMOVE') == {'CANCELLED'}
     for _ in range(3):
-        _ops().edit_list(which='MIX', action='ADD')
+        _ops().edit_list(owner="scene.tetflora.populate", entries="mix", action='ADD')
     species = [entry.species for entry in settings.populate.mix]
     assert len(set(species)) == 3
     assert settings.populate.mix_index == 2
     settings.populate.mix_index = 0
-    _ops().edit_list(which='MIX', action='REMOVE')
+    _ops().edit_list(owner="scene.tetflora.populate", entries="mix", action='REMOVE')
     assert [entry.species for entry in settings.populate.mix] == species[1:]
-    _ops().edit_list(which='LEAVES', action='ADD')
+    _ops().edit_list(owner="scene.tetflora", entries="leaf_objects", action='ADD')
     assert len(settings.leaf_objects) == 1
 
 

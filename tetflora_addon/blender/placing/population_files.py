@@ -30,7 +30,6 @@ from .populations import add_population
 from .properties import TetFloraPopulation
 from .rules import set_grounds
 
-ENDING = ".json"
 FORMAT = "TetFlora populations"
 VERSION = 1
 
