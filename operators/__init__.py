@@ -12,7 +12,6 @@ from . import (
     assets,
     biomes,
     brush,
-    ground_cover,
     ground_tools,
     marks,
     places,

@@ -14,10 +14,9 @@ from ..tetflora_addon.blender.biomes.adding import (
     plant_biome_steps,
     remove_biome,
 )
-from ..tetflora_addon.blender.biomes.files import active_biome, read_biome
+from ..tetflora_addon.blender.biomes.files import active_biome, import_biome, read_biome, save_biome, saved_populations
 from ..tetflora_addon.blender.biomes.ground import make_land
 from ..tetflora_addon.blender.biomes.library import NO_BIOME, OWN_FILES, biome_property, biomes
-from ..tetflora_addon.blender.biomes.saving import import_biome, save_biome, saved_populations
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.viewport import points

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
-from tetflora_addon.blender.biomes import adding, files, ground, library, saving
+from tetflora_addon.blender.biomes import adding, files, ground, library
 from tetflora_addon.blender.file_library import as_text
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.preferences import preferences
@@ -161,14 +161,14 @@ def test_what_is_saved_comes_back():
     given = small(limits={"slope_max": 42.0, "wetness_min": 0.25, "altitude_max": 30.0})
     add(given, land)
     scene().tetflora.biomes[0].wetness_min = 0.0
-    path = saving.save_biome(scene(), "Small", "For tests", picture=False, replace=False)
+    path = files.save_biome(scene(), "Small", "For tests", picture=False, replace=False)
     read = files.read_biome(library.biomes()["small"].path)
     assert path == library.biomes()["small"].path and library.biomes()["small"].is_own
     assert [{k: v for k, v in layer.items() if k != "seed"} for layer in read.layers] == given.layers
     assert read.limits == {"slope_max": 42.0, "altitude_max": 30.0} and read.ground == given.ground
     assert files.pages_of(scene(), read) == files.pages_of(scene(), given)
     with pytest.raises(SceneError, match="already has"):
-        saving.save_biome(scene(), "Small", "", picture=False, replace=False)
+        files.save_biome(scene(), "Small", "", picture=False, replace=False)
     library.OWN_FILES.delete("small")
     assert "small" not in library.biomes()
     with pytest.raises(SceneError, match="built-in"):
@@ -178,7 +178,7 @@ def test_what_is_saved_comes_back():
 def test_a_biome_whose_picture_another_program_has_open_stays(monkeypatch):
     """As Windows has it, where what is open cannot be deleted: it is there as a whole, or gone."""
     add(small(), add_mesh("ground", size=6.0))
-    path = saving.save_biome(scene(), "Small", "", picture=False, replace=False)
+    path = files.save_biome(scene(), "Small", "", picture=False, replace=False)
     picture, unlink = path.with_suffix(".png"), Path.unlink
     picture.write_bytes(b"")
 
@@ -205,7 +205,7 @@ def test_a_stand_is_a_layer():
     assert [name for name, _ in added.layers] == ["Birches", "Bushes", "Floor"] and added.layers[0][1] > 5
     (biome,) = scene().tetflora.biomes
     (field,) = files.stands_of(scene(), biome.uid)
-    path = saving.save_biome(scene(), "With a stand", "", picture=False, replace=False)
+    path = files.save_biome(scene(), "With a stand", "", picture=False, replace=False)
     assert files.read_biome(path).layers[0] == STAND
     biome.vertex_group = "west"
     number = len(field.data.vertices)
@@ -337,7 +337,7 @@ def test_broken_files_are_refused(tmp_path, data, said):
     path = tmp_path / "broken.json"
     path.write_text(json.dumps(data), encoding="utf-8")
     with pytest.raises(SceneError, match=r"broken\.json") as error:
-        saving.import_biome(path, replace=False)
+        files.import_biome(path, replace=False)
     assert said in str(error.value) and "broken" not in library.biomes()
 
 
