@@ -29,7 +29,7 @@ from ..scene.fields import fields_of, stored_size
 from ..scene.own_ages import MOST_YEARS
 from ..scene.skeletons import aged_kind
 from ..settings import with_identity
-from ..worker import at_once, call_in_thread
+from ..worker import call_in_thread
 from .canopy import is_cover, standing
 from .plant_objects import (
     POPULATION_MARK,
@@ -115,11 +115,6 @@ def own_objects(scene: bpy.types.Scene, population: TetFloraPopulation) -> list[
 def own_number(objects: Iterable[bpy.types.Object]) -> int:
     """How many plants there are in plants and fields."""
     return sum(stored_size(o) if o.tetflora.is_field else 1 for o in objects)
-
-
-def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation) -> Made:
-    """Place a population's plants at once; as `make_plants_steps`."""
-    return at_once(make_plants_steps(scene, depsgraph, population))
 
 
 @job("Placing plants")
