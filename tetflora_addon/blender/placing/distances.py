@@ -75,21 +75,17 @@ def distance_of(settings: bpy.types.PropertyGroup) -> float:
 
 def distance_to_draw(settings: bpy.types.PropertyGroup) -> float | None:
     """The same for panels: None for a moment, until the crowns of the species are known."""
-    return _suggestion(settings, crown_to_draw) if follows_species(settings) else settings.min_distance
+    return suggestion(settings, crown_to_draw) if follows_species(settings) else settings.min_distance
 
 
-def suggestion(settings: bpy.types.PropertyGroup) -> float:
+def suggestion(
+    settings: bpy.types.PropertyGroup, find: Callable[[bpy.types.Scene, str], Crown | None] = crown_for
+) -> float | None:
     """Distance in metres that suits the species of a population or brush.
 
-    Species are compiled at the first time, up to a tenth of a second each.
+    Species are compiled at the first time, up to a tenth of a second each. None where a crown is not found.
     """
-    return _suggestion(settings, crown_for)
-
-
-def _suggestion(
-    settings: bpy.types.PropertyGroup, find: Callable[[bpy.types.Scene, str], Crown | None]
-) -> float | None:
-    scene, of_brush = settings.id_data, _is_brush(settings)
+    scene, of_brush = settings.id_data, "strokes" in settings.bl_rna.properties
     try:
         weights = painted_weights(scene) if of_brush else weights_of(settings)
     except SpeciesError:  # an empty catalogue, of which Populate and the brush complain
@@ -102,10 +98,6 @@ def _suggestion(
     scale = (settings.scale_min + settings.scale_max) / 2.0
     suited = suggested_distance([crown.radius for crown in crowns], list(weights.values()), scale, density)
     return float(np.float32(suited))  # as Blender stores it, so that it is the same when the artist takes it over
-
-
-def _is_brush(settings: bpy.types.PropertyGroup) -> bool:
-    return "strokes" in settings.bl_rna.properties
 
 
 def choose(settings: bpy.types.PropertyGroup, by_species: bool) -> None:
