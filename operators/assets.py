@@ -82,9 +82,7 @@ class TETFLORA_OT_use_as_species(_OnAssets, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         found = chosen(context, self.collection)
         if not found:
-            return self.refused(
-                f'There is no collection "{self.collection}"' if self.collection else self.nothing,
-            )
+            return self.refused(f'There is no collection "{self.collection}"' if self.collection else self.nothing)
         depsgraph = context.evaluated_depsgraph_get()
         names, wrong = [], []
         for datablock in found:

@@ -161,9 +161,7 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
         selected = plants_of(context.selected_objects)
         plants = [o for o in selected_plants(context) if o.tetflora.enabled and not o.hide_render]
         if not plants:
-            return self.refused(
-                "The selected plants are disabled, hidden in renders, or linked; enable them first",
-            )
+            return self.refused("The selected plants are disabled, hidden in renders, or linked; enable them first")
         left = len(selected) - len(plants)
         owner = owner_of(context.scene, plants)
         home = collection_of(context.scene, owner) if owner else None

@@ -280,9 +280,7 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
     def finish(self, context: bpy.types.Context, result: Covered) -> set[str]:
         points.schedule()
         show_shapes(context.scene)
-        kept = ""
-        if result.bare:
-            kept = f'; "{result.bare[0]}" keeps its own material'
+        kept = f'; "{result.bare[0]}" keeps its own material' if result.bare else ""
         if not result.made.number:
             return self.refused(f"Nothing grows here: {result.made.reason}")
         return self.done(f"{counted(result.made.number, 'plant')} cover the ground{kept}")
