@@ -96,6 +96,7 @@ def build(scene: bpy.types.Scene, case: Case, size: tuple[int, int] = (WIDTH, HE
     add_camera(scene, case)
     add_light(scene)
     render = scene.render
+    render.engine = 'CYCLES'  # before plants are refined: engines draw spheres of different sizes
     render.resolution_x, render.resolution_y, render.resolution_percentage = *size, 100
     scene.tetflora.refine_at_render = False
     bpy.context.view_layer.update()

@@ -6,8 +6,11 @@ from __future__ import annotations
 
 import json
 import random
+import sqlite3
 import struct
 import zlib
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +28,10 @@ def tiff(
     extra: dict[int, tuple[int, list[Any] | bytes]] | None = None,
     order: str = "<",
     big: bool = False,
+    packed: tuple[int, Callable[[bytes], bytes]] = (1, bytes),
+    predictor: int = 1,
 ) -> bytes:
-    """A TIFF file of one strip without compression.
+    """A TIFF file of one strip.
 
     Parameters
     ----------
@@ -36,15 +41,19 @@ def tiff(
     order : {'<', '>'}
     big : bool
         BigTIFF.
+    packed : tuple
+        Number of a compression, and what compresses.
+    predictor : {1, 2, 3}
     """
     h, w = values.shape
     form = {"f": 3, "u": 1, "i": 2}[values.dtype.kind]
-    data = np.ascontiguousarray(values.astype(values.dtype.newbyteorder(order))).tobytes()
+    data = packed[1](_predicted(values, order, predictor))
     tags: dict[int, Any] = {
         256: (4, [w]),
         257: (4, [h]),
         258: (3, [8 * values.dtype.itemsize]),
-        259: (3, [1]),
+        259: (3, [packed[0]]),
+        317: (3, [predictor]) if predictor > 1 else None,
         262: (3, [1]),
         273: (4, [0]),
         277: (3, [1]),
@@ -76,6 +85,52 @@ def tiff(
     first = struct.pack(order + ("HHHQ" if big else "HI"), *((43, 8, 0, 16) if big else (42, 8)))
     count = struct.pack(order + ("Q" if big else "H"), len(tags))
     return mark + first + count + entries + (b"\0" * (8 if big else 4)) + blob + data
+
+
+def _predicted(values: NDArray, order: str, predictor: int) -> bytes:
+    """Bytes of values, or of differences along rows."""
+    size = values.dtype.itemsize
+    if predictor == 2:
+        whole = values.view(f"u{size}").copy()
+        whole[:, 1:] -= whole[:, :-1].copy()
+        values = whole
+    if predictor == 3:
+        rows = np.ascontiguousarray(values.astype(values.dtype.newbyteorder(">"))).view(np.uint8)
+        rows = rows.reshape(*values.shape, size).transpose(0, 2, 1).reshape(len(values), -1).copy()
+        rows[:, 1:] -= rows[:, :-1].copy()
+        return rows.tobytes()
+    return np.ascontiguousarray(values.astype(values.dtype.newbyteorder(order))).tobytes()
+
+
+def lzw(data: bytes) -> bytes:
+    """Compress as TIFF 6.0 says."""
+    bits, table, width, found = [f"{256:09b}"], {bytes([i]): i for i in range(256)}, 9, b""
+    number = 258
+    for byte in data:
+        longer = found + bytes([byte])
+        if longer in table:
+            found = longer
+            continue
+        bits.append(f"{table[found]:0{width}b}")
+        table[longer], number, found = number, number + 1, bytes([byte])
+        width = 9 + (number > 511) + (number > 1023) + (number > 2047)
+        if number == 4095:
+            bits.append(f"{256:012b}")
+            table, width, number = {bytes([i]): i for i in range(256)}, 9, 258
+    bits.append(f"{table[found]:0{width}b}")
+    number += 1
+    text = "".join(bits) + f"{257:0{9 + (number > 511) + (number > 1023) + (number > 2047)}b}"
+    return int(text.ljust(-(-len(text) // 8) * 8, "0"), 2).to_bytes(-(-len(text) // 8))
+
+
+def packbits(data: bytes) -> bytes:
+    """Compress as TIFF 6.0 says, by pieces of two kinds in turn."""
+    out = b""
+    for at in range(0, len(data), 100):
+        part = data[at : at + 100]
+        same = len(set(part)) == 1 and len(part) > 1
+        out += bytes([257 - len(part), part[0]]) if same else bytes([len(part) - 1]) + part
+    return out
 
 
 def geotiff(
@@ -135,6 +190,84 @@ def crowns(number: int = 24) -> NDArray[np.float32]:
     return np.where(out > 3.0, out, 0.0).astype(np.float32)
 
 
+def xyz(values: NDArray) -> str:
+    """A list of places and heights, from the south."""
+    return "".join(f"{EAST + i} {NORTH + j} {v:.2f}\n" for j, row in enumerate(values) for i, v in enumerate(row))
+
+
+def usgs(values: NDArray) -> bytes:
+    """An elevation model of the USGS in a zone of UTM, cells of 10 m."""
+    h, w = values.shape
+    head = bytearray(b" " * 1024)
+    for at, text in ((144, f"{1:6}{1:6}{1:6}{17:6}"), (528, f"{2:6}{2:6}{4:6}"), (852, f"{1:6}{w:6}")):
+        head[at : at + len(text)] = text.encode()
+    head[816:852] = b"".join(f"{v:12.5E}".encode() for v in (10.0, 10.0, 1.0))
+    out = bytes(head)
+    for i in range(w):
+        column = np.rint(values[::-1, i]).astype(int)
+        start = f"{1:6}{i + 1:6}{h:6}{1:6}" + "".join(f"{v:24.15E}" for v in (EAST + 10.0 * i, NORTH, 0.0, 0.0, 0.0))
+        out += (start + "".join(f"{v:6}" for v in column)).ljust(1024).encode()
+    return out
+
+
+def shapefile(*areas: Any) -> bytes:
+    """Areas, each a list of rings of places, the first clockwise."""
+    records = b""
+    for number, rings in enumerate(areas, 1):
+        points = [p for ring in rings for p in ring]
+        starts = np.cumsum([0, *map(len, rings[:-1])]).tolist()
+        box = (*np.min(points, axis=0), *np.max(points, axis=0))
+        body = struct.pack(f"<i4d2i{len(rings)}i", 5, *box, len(rings), len(points), *starts)
+        body += struct.pack(f"<{2 * len(points)}d", *(v for p in points for v in p))
+        records += struct.pack(">2i", number, len(body) // 2) + body
+    return (
+        struct.pack(">7i", 9994, 0, 0, 0, 0, 0, 50 + len(records) // 2)
+        + struct.pack("<2i8d", 1000, 5, *[0.0] * 8)
+        + records
+    )
+
+
+def dbase(**columns: list[str]) -> bytes:
+    """A table of texts of twenty letters."""
+    number = len(next(iter(columns.values())))
+    fields = b"".join(name.encode().ljust(11, b"\0") + b"C" + bytes(4) + bytes([20]) + bytes(15) for name in columns)
+    head = struct.pack("<4BIHH20x", 3, 120, 1, 1, number, 33 + len(fields), 1 + 20 * len(columns))
+    rows = b"".join(b" " + b"".join(str(c[i]).encode().ljust(20) for c in columns.values()) for i in range(number))
+    return head + fields + b"\r" + rows + b"\x1a"
+
+
+def geopackage(table: str, *rows: tuple[bytes, dict[str, str]], code: int = CODE) -> bytes:
+    """A GeoPackage with a layer of geometries in well-known binary, and a text of each under some names."""
+    names = list(rows[0][1])
+    with closing(sqlite3.connect(":memory:")) as base:
+        base.execute(
+            "CREATE TABLE gpkg_spatial_ref_sys (srs_name, srs_id, organization, organization_coordsys_id, definition)"
+        )
+        base.execute("INSERT INTO gpkg_spatial_ref_sys VALUES ('x', 7, 'EPSG', ?, '')", (code,))
+        base.execute("CREATE TABLE gpkg_geometry_columns (table_name, column_name, geometry_type_name, srs_id, z, m)")
+        base.execute("INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', 'GEOMETRY', 7, 0, 0)", (table,))
+        base.execute(f'CREATE TABLE "{table}" (fid, geom, {", ".join(names)})')
+        for number, (shape, tags) in enumerate(rows):
+            blob = b"GP\0\1" + struct.pack("<i", 7) + shape
+            base.execute(
+                f'INSERT INTO "{table}" VALUES ({", ".join("?" * (2 + len(names)))})', (number, blob, *tags.values())
+            )
+        base.commit()
+        return base.serialize()
+
+
+def binary_area(*rings: Any) -> bytes:
+    """An area as well-known binary."""
+    out = struct.pack("<BII", 1, 3, len(rings))
+    return out + b"".join(struct.pack(f"<I{2 * len(r)}d", len(r), *(v for p in r for v in p)) for r in rings)
+
+
+def _in_metres(size: float, east: float = 0.0) -> list[list[float]]:
+    """A square, clockwise."""
+    ring = [[0.0, 0.0], [0.0, size], [size, size], [size, 0.0], [0.0, 0.0]]
+    return [[EAST + east + x, NORTH + y] for x, y in ring]
+
+
 INVENTORY = (
     "id;Baumart;Höhe (m);Stammumfang [cm];Kronendurchmesser;Alter;X;Y\n"
     "1;Stiel-Eiche;14,5;210;11,0;90;500010,5;5316010,0\n"
@@ -174,9 +307,31 @@ FILES: dict[str, tuple[str, str, bytes]] = {
     "tiff": ("import_terrain", "float.tif", geotiff(hills(), 5.0)),
     "tiff_16": ("import_terrain", "whole.tif", geotiff(np.rint(hills()).astype(np.uint16), 5.0, order=">")),
     "big_tiff": ("import_canopy", "big.tif", geotiff(crowns(), big=True)),
+    "lzw": ("import_terrain", "lzw.tif", geotiff(hills(), 5.0, packed=(5, lzw), predictor=3)),
+    "deflate": ("import_terrain", "deflate.tif", geotiff(hills(), 5.0, packed=(8, zlib.compress), predictor=2)),
+    "packbits": (
+        "import_terrain",
+        "bits.tif",
+        geotiff(np.rint(hills()).astype(np.int16), 5.0, packed=(32773, packbits)),
+    ),
+    "hgt": ("import_terrain", "N48E009.hgt", np.rint(hills(12)).astype(">i2").tobytes()),
+    "xyz": ("import_terrain", "list.xyz", xyz(hills(12)).encode()),
+    "usgs": ("import_terrain", "usgs.dem", usgs(hills(8))),
     "png": ("import_terrain", "gray.png", png(np.rint(hills()).astype(np.uint16))),
     "csv": ("import_inventory", "trees.csv", INVENTORY.encode()),
     "points": ("import_inventory", "trees.geojson", collection(*TREES).encode()),
+    "lines": ("import_outlines", "map.geojsonl", b"\n".join(json.dumps(f).encode() for f in OUTLINES)),
+    "shape": ("import_outlines", "shape.shp", shapefile([_in_metres(50.0)], [_in_metres(9.0, 80.0)])),
+    "dbase": ("import_outlines", "dbase.dbf", dbase(fclass=["forest", "building"], height=["", "9.5"])),
+    "geopackage": (
+        "import_outlines",
+        "map.gpkg",
+        geopackage(
+            "areas",
+            (binary_area(_in_metres(50.0)), {"kind": "Wald"}),
+            (binary_area(_in_metres(9.0, 80.0)), {"kind": "Haus"}),
+        ),
+    ),
     "outlines": ("import_outlines", "map.geojson", collection(*OUTLINES).encode()),
 }
 #: The world file of images that have none within.
@@ -185,7 +340,7 @@ WORLD = b"5.0\n0.0\n0.0\n-5.0\n500000.0\n5316000.0\n"
 
 def mutated(rng: random.Random, content: bytes) -> bytes:
     """The content of a file with one to four things wrong."""
-    if content.startswith(b"{") and rng.random() < 0.7:
+    if content.startswith(b"{") and b"}\n{" not in content and rng.random() < 0.7:
         data = json.loads(content)
         for _ in range(rng.randint(1, 3)):
             data = _replaced(rng, data)
@@ -242,4 +397,8 @@ def write(folder: Path, kind: str, content: bytes | None = None) -> tuple[str, P
     path.write_bytes(usual if content is None else content)
     if path.suffix == ".png":
         path.with_suffix(".pgw").write_bytes(WORLD)
-    return operator, path
+    if path.suffix in (".shp", ".dbf"):
+        path.with_suffix(".prj").write_text("EPSG:25832")
+        other = "dbase" if path.suffix == ".shp" else "shape"
+        path.with_suffix(Path(FILES[other][1]).suffix).write_bytes(FILES[other][2])
+    return operator, path.with_suffix(".shp") if path.suffix == ".dbf" else path

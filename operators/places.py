@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Import real places: terrain, trees that were measured or seen from above, and outlines of a map."""
 
-from collections.abc import Generator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,21 +16,40 @@ from ..tetflora_addon.blender.places.columns import (
     columns_in,
     show_columns,
 )
-from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE
-from ..tetflora_addon.blender.places.outlines import Drawn, outline_steps, told
-from ..tetflora_addon.blender.places.rasters import PATTERN
-from ..tetflora_addon.blender.places.terrain import ImportedGround, terrain_steps
-from ..tetflora_addon.blender.places.trees import GENERIC, LEFT_OUT, Planted, canopy_steps, inventory_steps
+from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE, Import, Imported, Steps
+from ..tetflora_addon.blender.places.outlines import outline_steps
+from ..tetflora_addon.blender.places.terrain import PATTERN, terrain_steps
+from ..tetflora_addon.blender.places.trees import GENERIC, LEFT_OUT, canopy_steps, inventory_steps
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
 from ..tetflora_addon.errors import TetFloraError, readable
-from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.places.inventories import IMPERIAL, METRIC
-from ..tetflora_addon.places.species_names import told as names_told
+from ..tetflora_addon.places.layers import ENDINGS
+from ..tetflora_addon.places.outlines import KINDS
+from ..tetflora_addon.places.projection import PLAIN
 from .add import mix_in, parse_weights
-from .base import ModalJob, counted, in_object_mode, select_only
+from .base import ModalJob, in_object_mode, select_only
 from .populations import selected_grounds
 
-_UNLINKED = {'SKIP_SAVE'}
+_LAYERS = ";".join(f"*{ending}" for ending in ENDINGS)
+#: Settings that the next import does not begin with.
+_Bool, _Enum, _Float, _Int, _String = (
+    partial(kind, options={'SKIP_SAVE'})
+    for kind in (BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty)
+)
+
+
+def _file(text: str) -> Path | None:
+    """A file that was chosen beside the first; None for none."""
+    return Path(bpy.path.abspath(text)) if text else None
+
+
+def column_row(layout: bpy.types.UILayout, title: str, values: str, translate: bool = False) -> bpy.types.UILayout:
+    """Begin a row of the table of columns; what they are taken for, and the unit, come next."""
+    row = layout.split(factor=0.25)
+    row.label(text=title, translate=translate)
+    row = row.split(factor=0.45)
+    row.label(text=values, translate=translate)
+    return row
 
 
 class _Importing(ModalJob, ImportHelper):
@@ -38,26 +57,47 @@ class _Importing(ModalJob, ImportHelper):
 
     needs = (in_object_mode,)
 
-    code: IntProperty(
+    code: _Int(
         name="Coordinate System",
         description=(
-            "EPSG code of the coordinates in the file: 4326 for longitude and latitude, 326xx and 327xx for UTM, 3857 "
-            "for Web Mercator. 0 uses what the file says"
+            "EPSG code of the coordinates in the file, such as 4326 for longitude and latitude, or 25832 for a zone of "
+            "UTM. 0 uses what the file says"
         ),
         default=0,
         min=0,
         max=999_999,
-        options=_UNLINKED,
     )
-    new_origin: BoolProperty(
+    plain: _Bool(
+        name="Plain Meters",
+        description="Take coordinates for meters of a plane, whatever the file says of its coordinate system",
+    )
+    new_origin: _Bool(
         name="New Origin",
         description=(
             "Put the middle of this file at the world origin. Otherwise it lies where it is in relation to what was "
             "imported before"
         ),
-        options=_UNLINKED,
     )
 
+    crop: _Enum(
+        name="Crop",
+        description="What to leave out of a large area",
+        items=(
+            (WHOLE, "Nothing", "All of the file"),
+            (MIDDLE, "To Its Middle", "A square around the middle"),
+            (EXISTING, "To the Scene", "The selected meshes or imported terrain, or else all that the scene has"),
+        ),
+        default=WHOLE,
+    )
+    crop_size: _Float(
+        name="Side",
+        description="Side of the square",
+        default=2000.0,
+        min=1.0,
+        soft_max=20_000.0,
+        max=500_000.0,
+        unit='LENGTH',
+    )
     chosen: BoolProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
     _browsing = False
@@ -86,12 +126,27 @@ class _Importing(ModalJob, ImportHelper):
         """The chosen file."""
         return Path(bpy.path.abspath(self.filepath))
 
+    def order(self, context: bpy.types.Context, **others: Any) -> Import:
+        """What is to be imported."""
+        code = PLAIN if self.plain else self.code
+        selected, graph = tuple(selected_grounds(context)), context.evaluated_depsgraph_get()
+        crop = {"crop": self.crop, "side": self.crop_size}
+        return Import(context.scene, graph, self.path, code, self.new_origin, selected, **crop, **others)
+
+    def finish(self, context: bpy.types.Context, result: Imported) -> set[str]:
+        if result.object is not None:
+            select_only(context, [result.object])
+        self.report({'WARNING' if result.warning else 'INFO'}, readable("; ".join(result.told)))
+        return {'FINISHED'}
+
 
 class _Raster(_Importing):
-    """Mix-in for those that read rasters."""
+    """Mix-in for those that read rasters, or several tiles of one."""
 
     filter_glob: StringProperty(default=PATTERN, options={'HIDDEN'})
-    factor: FloatProperty(
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
+    directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
+    factor: _Float(
         name="Meters per Value",
         description="Factor on the values of the file: 0.3048 for feet, 0.1 for decimeters",
         default=1.0,
@@ -99,73 +154,55 @@ class _Raster(_Importing):
         soft_max=10.0,
         max=1e6,
         precision=4,
-        options=_UNLINKED,
     )
-    shift: FloatProperty(
+    shift: _Float(
         name="Height of 0",
         description="What is added to all values, meters",
         default=0.0,
         min=-20_000.0,
         max=20_000.0,
         unit='LENGTH',
-        options=_UNLINKED,
     )
+
+    def order(self, context: bpy.types.Context, **others: Any) -> Import:
+        """What is to be imported, with the other chosen files as tiles."""
+        folder = Path(bpy.path.abspath(self.directory)) if self.directory else self.path.parent
+        tiles = (folder / file.name for file in self.files if file.name)
+        tiles = tuple(tile for tile in tiles if tile != self.path)
+        return super().order(context, factor=self.factor, shift=self.shift, tiles=tiles, **others)
+
+    def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
+        """Settings of another call, with files by their names."""
+        found = super().as_keywords(ignore=(*ignore, "files"))
+        return found | {"files": [{"name": file.name} for file in self.files]}
 
 
 class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
-    """Make ground from a raster of elevations: an ASCII grid, a GeoTIFF or a PNG with a world file."""
+    """Make ground from a raster of elevations, or from several tiles of one."""
 
     bl_label = "Import Terrain"
 
-    most: IntProperty(
+    most: _Int(
         name="Most Faces",
         description="Number of faces at most; a finer raster is averaged in blocks",
         default=500_000,
         min=100,
         soft_max=4_000_000,
         max=20_000_000,
-        options=_UNLINKED,
+    )
+    image: _String(
+        name="Orthophoto",
+        description=(
+            "Image of the same place that becomes the color of the ground: GeoTIFF, or JPEG or PNG with a world file"
+        ),
+        subtype='FILE_PATH',
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, ImportedGround]:
-        return terrain_steps(context.scene, self.path, self.most, self.code, self.factor, self.shift, self.new_origin)
-
-    def finish(self, context: bpy.types.Context, result: ImportedGround) -> set[str]:
-        select_only(context, [result.object])
-        faces = counted(len(result.object.data.polygons), "face")
-        coarser = "; the file is finer, see Most Faces" if result.coarser else ""
-        return self.done(f'Ground "{result.object.name}" of {faces}, one every {result.step:.2f} m{coarser}')
+    def steps(self, context: bpy.types.Context) -> Steps:
+        return terrain_steps(self.order(context), self.most, _file(self.image))
 
 
-class _Trees(_Importing):
-    """Mix-in for those that make fields of trees."""
-
-    def finish(self, context: bpy.types.Context, result: Planted) -> set[str]:
-        select_only(context, [result.object])
-        parts = [f"{counted(result.number, 'tree')} imported"]
-        inventory = result.inventory
-        if inventory is not None and inventory.left_out:
-            parts.append(f"rows without a tree left out: {names_told(inventory.left_out)}")
-        if result.completed:
-            parts.append(f"heights of {result.completed:,} follow from trunk or crown")
-        if result.beside:
-            parts.append(f"{result.beside:,} stand beside the ground")
-        if result.kin:
-            parts.append(f"{result.kin.total():,} stand as their nearest kin: {names_told(result.kin)}")
-        parts += result.notes
-        if inventory is not None and inventory.skipped:
-            parts.append(f"{counted(inventory.skipped, 'broken row')} skipped, the first: {inventory.first}")
-        if result.unknown:
-            left = " and left out" if result.left_out else ""
-            parts.insert(1, f"{result.unknown.total():,} of unknown species{left}: {names_told(result.unknown, 25)}")
-        text = readable("; ".join(parts))
-        if not result.unknown and not (inventory is not None and inventory.skipped):
-            return self.done(text)
-        self.report({'WARNING'}, text)
-        return {'FINISHED'}
-
-
-class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
+class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
     """Make a field of the trees of an inventory, CSV or GeoJSON: species, place and sizes of each.
 
     They stand on the selected meshes, or on imported terrain.
@@ -173,8 +210,8 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
 
     bl_label = "Import Tree Inventory"
 
-    filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.geojson;*.json", options={'HIDDEN'})
-    units: EnumProperty(
+    filter_glob: StringProperty(default=f"*.csv;*.tsv;*.txt;{_LAYERS}", options={'HIDDEN'})
+    units: _Enum(
         name="Units",
         description="Units of columns that do not name theirs",
         items=(
@@ -182,9 +219,8 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
             (IMPERIAL, "Imperial", "Feet; trunks in inches"),
         ),
         default=METRIC,
-        options=_UNLINKED,
     )
-    unknown: EnumProperty(
+    unknown: _Enum(
         name="Unknown Species",
         description="What stands for trees whose species is not known here",
         items=(
@@ -193,45 +229,18 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
             (LEFT_OUT, "Leave Out", "No tree"),
         ),
         default=GENERIC,
-        options=_UNLINKED,
     )
-    species: EnumProperty(
-        name="Species", description="Species that stands for unknown ones", items=operator_items, options=_UNLINKED
-    )
-    skip: BoolProperty(
-        name="Skip Broken Rows",
-        description="Leave out rows with values that cannot be, instead of refusing the file",
-        options=_UNLINKED,
+    species: _Enum(name="Species", description="Species that stands for unknown ones", items=operator_items)
+    skip: _Bool(
+        name="Skip Broken Rows", description="Leave out rows with values that cannot be, instead of refusing the file"
     )
 
-    columns: StringProperty(
+    columns: _String(
         name="Columns",
         description=(
             "JSON object of what columns hold, for those whose titles and values do not tell it: "
             '{"Hoogte dm": "height", "X1": "crown_width ft", "X2": ""}'
         ),
-        options=_UNLINKED,
-    )
-    crop: EnumProperty(
-        name="Crop",
-        description="What to leave out of a large area",
-        items=(
-            (WHOLE, "Nothing", "All of the file"),
-            (MIDDLE, "To Its Middle", "A square around the middle"),
-            (EXISTING, "To the Scene", "The selected meshes or imported terrain, or else all that the scene has"),
-        ),
-        default=WHOLE,
-        options=_UNLINKED,
-    )
-    crop_size: FloatProperty(
-        name="Side",
-        description="Side of the square",
-        default=2000.0,
-        min=1.0,
-        soft_max=20_000.0,
-        max=500_000.0,
-        unit='LENGTH',
-        options=_UNLINKED,
     )
     table: CollectionProperty(type=TetFloraInventoryColumn, options={'HIDDEN', 'SKIP_SAVE'})
     active: IntProperty(options={'HIDDEN', 'SKIP_SAVE'})
@@ -255,32 +264,23 @@ class TETFLORA_OT_import_inventory(_Trees, bpy.types.Operator):
         layout = self.layout
         if self.table:
             rows = min(max(len(self.table), 4), 16)
+            heads = column_row(layout, "Column in the File", "Some of Its Values", translate=True)
+            heads.label(text="Taken For")
+            heads.label(text="Unit")
             layout.template_list(
                 "TETFLORA_UL_inventory_columns", "", self, "table", self, "active", rows=rows, maxrows=rows
             )
         layout.use_property_split = True
-        for name in ("units", "unknown", "species", "skip", "code", "new_origin", "crop", "crop_size"):
+        for name in ("units", "unknown", "species", "skip", "code", "plain", "new_origin", "crop", "crop_size"):
             if (name != "species" or self.unknown == 'SPECIES') and (name != "crop_size" or self.crop == MIDDLE):
                 layout.prop(self, name)
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
+    def steps(self, context: bpy.types.Context) -> Steps:
         chosen = self.species if self.unknown == 'SPECIES' and self.species != NO_SPECIES else self.unknown
-        return inventory_steps(
-            context.scene,
-            context.evaluated_depsgraph_get(),
-            self.path,
-            selected_grounds(context),
-            chosen,
-            self.code,
-            self.units,
-            self.skip,
-            self.new_origin,
-            columns=columns_in(self.columns),
-            crop=(self.crop, self.crop_size),
-        )
+        return inventory_steps(self.order(context), chosen, self.units, self.skip, columns_in(self.columns))
 
 
-class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
+class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
     """Make a field of the trees that a canopy height model shows, each with its height and the width of its crown.
 
     They stand on the selected meshes, or on imported terrain.
@@ -288,15 +288,14 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
 
     bl_label = "Import Canopy Height"
 
-    species: StringProperty(
+    species: _String(
         name="Species",
         description=(
             "Comma-separated identifiers of species with optional weights: beech:3, spruce. Empty for the species of "
             "Populate"
         ),
-        options=_UNLINKED,
     )
-    least: FloatProperty(
+    least: _Float(
         name="Smallest Tree",
         description="Lower canopy is left out",
         default=3.0,
@@ -304,44 +303,36 @@ class TETFLORA_OT_import_canopy(_Raster, _Trees, bpy.types.Operator):
         soft_max=10.0,
         max=100.0,
         unit='LENGTH',
-        options=_UNLINKED,
+    )
+    below: _String(
+        name="Ground Below",
+        description="Raster of the elevations of the ground, to subtract from those of a surface model; empty for none",
+        subtype='FILE_PATH',
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Planted]:
+    def steps(self, context: bpy.types.Context) -> Steps:
         self.species = self.species or mix_in(context.scene.tetflora.populate)
-        return canopy_steps(
-            context.scene,
-            context.evaluated_depsgraph_get(),
-            self.path,
-            selected_grounds(context),
-            parse_weights(self.species),
-            self.least,
-            self.code,
-            self.factor,
-            self.shift,
-            self.new_origin,
-        )
+        return canopy_steps(self.order(context), parse_weights(self.species), self.least, _file(self.below))
 
 
 class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
-    """Make curves of woods, meadows, water, roads and buildings from GeoJSON, with the keys of OpenStreetMap.
+    """Make curves of woods, meadows, water, roads and buildings from GeoJSON, a shapefile or a GeoPackage.
 
     They lie on the selected meshes, or on imported terrain. Populations can be limited to them.
     """
 
     bl_label = "Import Outlines"
 
-    filter_glob: StringProperty(default="*.geojson;*.json", options={'HIDDEN'})
+    filter_glob: StringProperty(default=_LAYERS, options={'HIDDEN'})
+    kind: _Enum(
+        name="Take All As",
+        description="What all areas and lines of the file are",
+        items=(
+            ('KEYS', "Told by Their Keys", "What each says that it is, by the keys of OpenStreetMap or others"),
+            *((kind.upper(), kind, f"All are {kind.lower()}") for kind in KINDS),
+        ),
+        default='KEYS',
+    )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, Any, Drawn]:
-        return outline_steps(
-            context.scene,
-            context.evaluated_depsgraph_get(),
-            self.path,
-            selected_grounds(context),
-            self.code,
-            self.new_origin,
-        )
-
-    def finish(self, _context: bpy.types.Context, result: Drawn) -> set[str]:
-        return self.done(f"Outlines imported: {told(result.number)}")
+    def steps(self, context: bpy.types.Context) -> Steps:
+        return outline_steps(self.order(context), "" if self.kind == 'KEYS' else self.kind.title())

@@ -4,6 +4,7 @@
 
 import bpy
 
+from ..operators.places import column_row
 from ..tetflora_addon.blender.places.origin import origin_of
 from ..tetflora_addon.errors import TetFloraError
 from .base import Button, SidebarPanel, draw_buttons, draw_message
@@ -21,10 +22,7 @@ class TETFLORA_UL_inventory_columns(bpy.types.UIList):
     """Columns of an inventory that is about to be imported."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
-        row = layout.split(factor=0.25)
-        row.label(text=item.name, translate=False)
-        row = row.split(factor=0.45)
-        row.label(text=item.values, translate=False)
+        row = column_row(layout, item.name, item.values)
         row.prop(item, "field", text="")
         row.prop(item, "unit", text="")
 
@@ -51,9 +49,9 @@ def draw_in_import_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> No
     """Entries in Blender's File > Import."""
     menu.layout.separator()
     for kind, ending, icon in (
-        ("import_terrain", "Terrain (.asc, .tif, .png)", 'RNDCURVE'),
-        ("import_canopy", "Canopy Height (.asc, .tif, .png)", 'OUTLINER_OB_POINTCLOUD'),
+        ("import_terrain", "Terrain (.tif, .asc, .hgt)", 'RNDCURVE'),
+        ("import_canopy", "Canopy Height (.tif, .asc, .xyz)", 'OUTLINER_OB_POINTCLOUD'),
         ("import_inventory", "Tree Inventory (.csv, .geojson)", 'SPREADSHEET'),
-        ("import_outlines", "Map Outlines (.geojson)", 'OUTLINER_OB_CURVE'),
+        ("import_outlines", "Map Outlines (.geojson, .shp, .gpkg)", 'OUTLINER_OB_CURVE'),
     ):
         Button(kind, icon, ending).draw(menu.layout)

@@ -20,7 +20,7 @@ from .areoles import spined
 from .blades import blade_surface
 from .bodies import closed_parts, rounded
 from .compounds import Compound, compound_surface
-from .models import LeafModel
+from .models import LeafModel, mean_silhouette
 from .needles import SPARSE, Needles, needle_surface
 from .outlines import Blade, distance_to_links
 from .surfaces import LeafSurface
@@ -35,7 +35,13 @@ _FINER = 0.75
 _DEARER = 1.35
 #: Faces with less than this as texture coordinate v, negative, are stems; their tints, of petioles and of shoots.
 _STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
-_THICKER = 1.5
+#: Steps of needles towards an area, the relative thickness from which on one tells how it grows with the thickness, and
+#: the power by which it is taken to grow before: shoots stay, and needles hide more of each other.
+_FITS, _FITTED, _GROWTH = 3, 0.01, 0.75
+#: Factors of thickness and width at most, and that of a width by which is seen how the area grows with it.
+_THINNEST, _THICKEST, _WIDER = 0.2, 8.0, 1.5
+#: Part of the light that a shoot sends on, about, and what needles are brighter by at most.
+_SCATTERED, _BRIGHTEST = 0.15, 2.0
 #: Divisions of closed parts, one more than at most.
 _ROUNDEST = 5
 #: Points on each edge of a coarse model at which its distance from the shape is measured.
@@ -78,19 +84,36 @@ def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: floa
     return blade_surface(shape, tolerance / (1.0 - shape.petiole), amount)
 
 
-def fitted(shape: Shape, tolerance: float, area: float, reach: float = np.inf, amount: float = 1.0) -> LeafSurface:
-    """Polygons of a shape within a tolerance, all variants of which have a one-sided area.
+def shown_area(shape: Shape, made: LeafSurface) -> float:
+    """One-sided area of flat leaves that would show as much as polygons of a shape: needles hide each other."""
+    return 2.0 * mean_silhouette(_model_of(made)) if isinstance(shape, Needles) else float(made.areas().mean())
 
-    None reaches farther than the model. Blades and leaflets become wider or narrower for the area, needles thicker.
+
+def fitted(shape: Shape, tolerance: float, area: float, reach: float = np.inf, amount: float = 1.0) -> LeafSurface:
+    """Polygons of a shape within a tolerance, which show as much as a flat leaf of a one-sided area.
+
+    None reaches farther than the model. All variants of blades and compound leaves have that area, as these become
+    wider or narrower. Needles hide each other: they become thicker until they show as much, turned all ways.
     """
     made = surface_of(shape, tolerance, amount)
     smaller = min(reach / float(np.linalg.norm(made.positions, axis=2).max()), 1.0)
-    if not isinstance(shape, Blade):  # the surface grows with the thickness or width almost evenly
-        mean, thick = made.areas().mean(), surface_of(shape, tolerance, amount, _THICKER).areas().mean()
-        factor = 1.0 + (_THICKER - 1.0) * (area / smaller**2 - mean) / (thick - mean)
-        made = surface_of(shape, tolerance, amount, float(np.clip(factor, 0.2, 8.0)))
+    factor, growth = 1.0, _GROWTH
+    if isinstance(shape, Needles):
+        shown = np.log(shown_area(shape, made))
+        for _ in range(_FITS):
+            step = (np.log(area / smaller**2) - shown) / growth
+            step = float(np.clip(step, np.log(_THINNEST / factor), np.log(_THICKEST / factor)))
+            factor *= np.exp(step)
+            made, before = surface_of(shape, tolerance, amount, factor), shown
+            shown = np.log(shown_area(shape, made))
+            growth = float(np.clip((shown - before) / step, 0.3, 1.0)) if abs(step) > _FITTED else growth
+    elif isinstance(shape, Compound):  # the surface grows with the width almost evenly
+        mean, wide = made.areas().mean(), surface_of(shape, tolerance, amount, _WIDER).areas().mean()
+        factor += (_WIDER - 1.0) * float((area / smaller**2 - mean) / (wide - mean))
+        made = surface_of(shape, tolerance, amount, min(max(factor, _THINNEST), _THICKEST))
     made = replace(made, positions=made.positions * smaller, error=made.error * smaller)
-    made = made.widened_to(area)
+    if not isinstance(shape, Needles):
+        made = made.widened_to(area)
     turn = np.radians(shape.turn)
     frame = np.array([[np.cos(turn), 0.0, np.sin(turn)], [0.0, 1.0, 0.0], [-np.sin(turn), 0.0, np.cos(turn)]])
     return made.moved(frame, np.zeros(3)) if shape.turn else made
@@ -143,9 +166,20 @@ def _each_level(model: LeafModel, shape: Shape) -> Iterator[LeafLevel]:
             break
         stem = made.uv[made.face_offsets[:-1] + 1, 1] < -_STEM
         stem |= made.uv[made.face_offsets[:-1], 1] < -_STEM
-        tint = np.where(stem[:, None], _TINTS[isinstance(shape, Needles)], 1.0).astype(np.float32)
+        tint = np.where(stem[:, None], _TINTS[isinstance(shape, Needles)], _brighter(shape, made)).astype(np.float32)
         yield LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error, tint)
         error = made.error
+
+
+def _brighter(shape: Shape, made: LeafSurface) -> float:
+    """What single leaves are brighter by than the polygons that stand for them all, as light is lost between them.
+
+    A shoot sends back w (1 - p) / (1 - p w) where its needles send back w: p of what one scatters meets another
+    (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform broadleaved and coniferous
+    canopies", 2005). The colour of a species is that of its shoots.
+    """
+    again = 1.0 - shown_area(shape, made) / float(made.areas().mean())
+    return min(1.0 / (1.0 - again * (1.0 - _SCATTERED)), _BRIGHTEST)
 
 
 def leaf_levels(model: LeafModel) -> tuple[LeafLevel, ...]:

@@ -253,14 +253,15 @@ def _folded(half_width: float, fold: float, droop: float) -> LeafModel:
 
 
 def _spray(blades: int, half_width: float) -> LeafModel:
-    """Narrow quads fanned out in a plane and tilted out of it: a bundle of needles."""
+    """Narrow quads fanned out in a plane, tilted out of it, and turned by turns: a bundle of needles."""
     positions, faces = [], []
     for i in range(blades):
         turn = np.radians(-55 + 110 * (i + 0.5) / blades)
         lift = 0.25 * (1 if i % 2 else -1)
         along = np.array([np.sin(turn), np.cos(turn), lift])
         along /= np.linalg.norm(along)
-        across = half_width * np.array([np.cos(turn), -np.sin(turn), 0.0])
+        across = np.array([np.cos(turn), -np.sin(turn), 0.0])
+        across = half_width / np.sqrt(2.0) * (across + (1 if i // 2 % 2 else -1) * np.cross(across, along))
         faces.append([4 * i + k for k in range(4)])
         positions += [0 * along - across, 0 * along + across, along + across, along - across]
     return leaf_model(np.array(positions), faces, np.tile([[0, 0], [1, 0], [1, 1], [0, 1]], (blades, 1)))
@@ -307,7 +308,7 @@ _COARSE: dict[str, LeafModel] = {
     "ovate": _folded(0.30, 0.08, 0.10),
     "round": _folded(0.42, 0.05, 0.06),
     "lanceolate": _folded(0.13, 0.03, 0.12),
-    "needles": _spray(4, 0.035),
+    "needles": _spray(4, 0.025),
     "lobed": _outlined(_LOBED, 0.16, 0.08),
     "maple": _outlined(_MAPLE, 0.14, 0.1),
     "deltoid": _outlined(_DELTOID, 0.14, 0.08),

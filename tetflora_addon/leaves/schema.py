@@ -14,7 +14,7 @@ from ..parameters import FileReader
 from .blades import check_outline
 from .bodies import closed_parts
 from .compounds import Compound
-from .levels import TOLERANCES, fitted, surface_of
+from .levels import TOLERANCES, fitted, shown_area, surface_of
 from .models import LEAF_MODELS, LeafModel, Spines, leaf_model
 from .needles import Needles
 from .outlines import Blade
@@ -133,9 +133,9 @@ def _read_leaflet(reader: FileReader, data: Any, where: str) -> Blade:
 
 
 def outlined_model(shape: Blade | Needles | Compound) -> LeafModel:
-    """The coarsest level of an outline that has no other: few faces, with the outline's own area."""
+    """The coarsest level of an outline that has no other: few faces, which show as much as the outline."""
     tolerance = TOLERANCES[0]
-    area = float(surface_of(shape, TOLERANCES[2], 0.0).areas().mean())
+    area = shown_area(shape, surface_of(shape, TOLERANCES[2], 0.0))
     made = fitted(shape, tolerance, area, amount=0.0)
     return LeafModel(
         np.round(made.positions[0], 6), made.corner_verts, made.face_offsets, made.uv.astype(np.float32), shape=shape

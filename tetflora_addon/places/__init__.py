@@ -1,3 +1,18 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Real places: elevation and canopy height, tree inventories and outlines from files; no Blender in it."""
+"""Real places: files of surveys and cities, coordinate systems, and trees seen from above.
+
+What reads a file raises an `OSError` if it cannot be read, and a `SceneError` if it is broken, which names the line,
+tag or feature. Texts called ``what`` or ``where`` begin messages of a `SceneError`, which says what to do.
+"""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+
+@cache
+def table(name: str) -> dict[str, Any]:
+    """What a JSON file of this room holds."""
+    return json.loads(Path(__file__).with_name(f"{name}.json").read_text(encoding="utf-8"))

@@ -10,13 +10,16 @@ highest neighbour, and from a summit that is no top to the top that hides it. No
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import dataclass
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SceneError
 from ..jobs import Progress
+from .projection import between
+from .rasters import Raster
 
 #: Crown width in metres: the first, and the second for each square metre of height (Popescu and Wynne, mixed stands).
 WINDOW = (2.51503, 0.00901)
@@ -24,6 +27,9 @@ WINDOW = (2.51503, 0.00901)
 _EDGE, _REACH = 0.3, 2.5
 _MOST_WINDOW = 20.0  # metres from a top within which others are looked for
 _LEAN = 0.6  # at most, how far the middle of a crown is from its top, in radii
+#: Metres: what no ground is that trees are measured from, what no tree is, and what is seldom the lowest of a canopy.
+_GROUND, _TALLEST, _NEAR = 60.0, 130.0, 8.0
+_ROWS = 256  # of a surface at a time
 _AROUND = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0))
 
 
@@ -46,6 +52,65 @@ class Trees:
     height: NDArray[np.float64]
     width: NDArray[np.float64]
     offset: NDArray[np.float64]
+
+
+def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
+    """Heights of a surface above the ground, where both are known: a canopy of two elevation models."""
+    if (surface.system.code == 0) != (ground.system.code == 0):
+        raise SceneError(f"{what}the coordinate system of one of the two rasters is not known; set Coordinate System")
+    h, w = surface.values.shape
+    out = np.empty((h, w), np.float32)
+    for top in range(0, h, _ROWS):
+        row = np.arange(top, min(top + _ROWS, h))
+        places = surface.places(np.tile(np.arange(w), len(row)), np.repeat(row, w))
+        cells = ground.cells(between(places, surface.system, ground.system))
+        inside = ((cells >= -0.5) & (cells <= np.array(ground.values.shape[::-1]) - 0.5)).all(axis=1)
+        below = np.where(inside, ground.at(*np.nan_to_num(cells).T), np.nan)
+        out[row] = surface.values[row] - below.reshape(len(row), w)
+    if not np.isfinite(out).any():
+        raise SceneError(f"{what}the two rasters have no place in common; choose another Ground Below")
+    return replace(surface, values=out)
+
+
+def checked_canopy(values: NDArray[np.float32], what: str) -> tuple[NDArray[np.float32], list[str]]:
+    """Canopy heights without what no tree can be, and what is to be told of them; elevations are refused."""
+    known = values[np.isfinite(values)]
+    low, high = np.percentile(known, (1.0, 99.0)).tolist()
+    if low > _GROUND:
+        raise SceneError(
+            f"{what}its values are from {known.min():,.0f} to {known.max():,.0f} m: elevations above the sea, and not "
+            "heights above the ground. Choose the elevations of the ground as Ground Below, or import it as "
+            "terrain"
+        )
+    if high > _TALLEST:
+        raise SceneError(
+            f"{what}its values are up to {known.max():,.0f} m, higher than any tree; if they are in centimeters, set "
+            "Meters per Value to 0.01; if they are elevations above the sea, choose those of the ground as Ground Below"
+        )
+    notes = []
+    if low > _NEAR:
+        notes.append(f"its lowest cells are {low:,.0f} m high; check that these are heights above the ground")
+    tall = values > _TALLEST
+    if tall.any():
+        notes.append(f"{int(tall.sum()):,} cells higher than {_TALLEST:g} m left out")
+    return np.where(tall, np.float32(np.nan), values), notes
+
+
+def without_areas(raster: Raster, areas: Sequence[NDArray[np.float64]]) -> tuple[Raster, int]:
+    """A raster with nothing known within areas (k, 2) in its own coordinates, and how many cells that are."""
+    h, w = raster.values.shape
+    inside = np.zeros((h, w), bool)
+    for area in areas:
+        ring = raster.cells(area)
+        (x1, y1), (x2, y2) = ring.T, np.roll(ring, -1, axis=0).T
+        rows = np.arange(max(int(np.ceil(y1.min())), 0), min(int(np.floor(y1.max())) + 1, h))
+        line, edge = np.nonzero((y1 > rows[:, None]) != (y2 > rows[:, None]))
+        crossed = x1[edge] + (rows[line] - y1[edge]) * (x2 - x1)[edge] / (y2 - y1)[edge]
+        turned = np.zeros((len(rows), w + 1), bool)  # from each border on, the other side
+        np.logical_xor.at(turned, (line, np.clip(np.ceil(crossed), 0, w).astype(np.int64)), True)
+        inside[rows] |= np.logical_xor.accumulate(turned, axis=1)[:, :-1]
+    values = np.where(inside, np.float32(np.nan), raster.values)
+    return replace(raster, values=values), int((inside & np.isfinite(raster.values)).sum())
 
 
 def find_trees(values: NDArray[np.float32], cell: float, least: float) -> Generator[Progress, object, Trees]:

@@ -10,35 +10,30 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, shown
-from .cells import NOTHING, NUMBER, RANGE, WORD, cells, place_in
-from .projection import LONGITUDE_LATITUDE, MOST_AWAY, System, between, place_about, system_of
+from . import table
+from .layers import ENDINGS
+from .projection import LONGITUDE_LATITUDE, MOST_AWAY, PLAIN, System, between, chosen_system, place_about
 from .species_names import KIND, is_name, key_of, species_named
-from .tables import Table, read_csv, read_points
-from .titles import FIELDS, NAMES, NEVER, Title, meaning, read_title, said_of
+from .tables import NOTHING, NUMBER, RANGE, WORD, Table, cells, place_in, read_csv, read_points
+from .titles import FIELDS, NAMES, NEVER, Title, read_title, said_of
 
 #: Largest value of each size, metres or years: taller than any tree that lives.
-_MOST = {
-    "height": 150.0,
-    "diameter": 15.0,
-    "girth": 48.0,
-    "crown_width": 100.0,
-    "crown_radius": 50.0,
-    "crown_base": 120.0,
-    "age": 10_000.0,
-}
+_MOST: dict[str, float] = table("titles")["most"]
 _TRUNKS = ("diameter", "girth")
 #: Medians without a unit, metres, beyond which it was centimetres, and beyond which millimetres.
 _SMALLER = {"diameter": (2.5, 150.0), "girth": (8.0, 500.0)}
 #: Years since the death of trees of which only is known that they are dead: twigs have fallen, limbs have not.
 DEAD_YEARS = 5.0
-_SPREAD = 2.0  # degrees within which all points of an inventory may lie that calls degrees x and y
+#: Degrees within which all points of an inventory may lie that calls degrees x and y; and meters that no plot has.
+_SPREAD, _NARROW = 2.0, 0.1
 #: Choices of units.
 METRIC, IMPERIAL = 'METRIC', 'IMPERIAL'
 _PREVIEWED, _SAMPLE, _SHOWN = 300, 60, 3  # rows that are looked at, values of them, and values that are shown
@@ -109,29 +104,14 @@ def read_inventory(
     columns : mapping, optional
         What columns hold by their titles, for those that are not to be told by title and values: one of `FIELDS`, with
         a unit if the title does not name it, such as ``height ft``; empty for none.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names line or feature, and column.
     """
-    table_ = _table(path, skip)
+    table_ = _table(path, skip, code=code)
     return _Reading(table_, units, skip, _chosen(table_, columns or {})).inventory(code)
 
 
 def preview(path: Path) -> list[Column]:
-    """Columns of a file as they are taken from its first rows.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken.
-    """
-    table_ = _table(path, True, _PREVIEWED)
+    """Columns of a file as they are taken from its first rows."""
+    table_ = _table(path, True, _PREVIEWED, PLAIN)
     taken = taken_for(table_, {})
     return [
         Column(title, taken[title].field, tuple(list(dict.fromkeys(filter(None, texts.tolist())))[:_SHOWN]))
@@ -139,11 +119,15 @@ def preview(path: Path) -> list[Column]:
     ]
 
 
-def _table(path: Path, skip: bool, most: int | None = None) -> Table:
-    read = read_points if path.suffix.lower() in (".geojson", ".json") else read_csv
-    found = read(path, skip, most)
+def _table(path: Path, skip: bool, most: int | None = None, code: int = 0) -> Table:
+    """Rows of a file, of which there is at least one."""
+    layer = path.suffix.lower() in ENDINGS
+    found = read_points(path, skip, most, code) if layer else read_csv(path, skip, most)
     if not len(found.numbers):
-        raise SceneError(found.first or f"{found.name}: it has no {'points' if found.points is not None else 'rows'}")
+        raise SceneError(
+            found.first
+            or f"{found.name}: it has no {'points' if found.points is not None else 'rows'}; choose another one"
+        )
     return found
 
 
@@ -152,7 +136,7 @@ def _chosen(table_: Table, columns: Mapping[str, str]) -> dict[str, Title]:
     found = {}
     for title, text in columns.items():
         name, _, unit = text.strip().partition(" ")
-        metres = meaning(f"height {unit}")[1] if unit else 0.0
+        metres = read_title(f"height {unit}").unit if unit else 0.0
         why = "no such column" if title not in table_.columns else ""
         if name not in FIELDS or (unit and not metres):
             why = why or f"{shown(text)} is none of {', '.join(filter(None, FIELDS))}"
@@ -175,6 +159,9 @@ def taken_for(table_: Table, chosen: Mapping[str, Title]) -> dict[str, Title]:
             if found[title].field in decided:
                 found[title] = found[title]._replace(field="")
     fields = {title.field for title in found.values()}
+    if "longitude" in fields and "latitude" not in fields:  # the German word for latitude is that for width, too
+        found |= {title: Title("latitude", 0.0, 1) for title in samples if title.lower() == "breite"}
+        fields = {title.field for title in found.values()}
     free = [title for title in samples if not found[title].field and found[title].doubt < NEVER]
     if table_.points is None and not ({"longitude", "latitude"} <= fields or {"x", "y"} <= fields or "place" in fields):
         _by_values(found, free, samples, "place", 0.9)
@@ -218,6 +205,8 @@ def _confirmed(title: Title, sample: NDArray[np.str_]) -> Title:
     if name in NAMES:
         doubtful = (title.doubt > 0 or name == "leaf") and _share(name, sample) < 0.3
         return none if numbers.all() or doubtful else title
+    if name == "planted":
+        return title if any(map(_YEAR.search, sample.tolist())) else none
     if name in _MOST:
         known = values[kinds == NUMBER]
         bare = len(known) > 0 and not (kinds == RANGE).any() and not units.any()
@@ -242,6 +231,7 @@ class _Reading:
                 self.found.setdefault(what.field, []).append((title, what))
 
     def inventory(self, code: int) -> Inventory:
+        """The trees of the table; refuses the file or leaves out rows."""
         self._leave_out()
         sizes = {name: self._size(name) for name in _MOST}
         for name, source, factor in (("diameter", "girth", 1.0 / math.pi), ("crown_width", "crown_radius", 2.0)):
@@ -254,7 +244,9 @@ class _Reading:
         points, system = self._points(code)
         names, index = self._names()
         if not self.good.any():
-            raise SceneError(self.first or f"{self.table.name}: none of its rows is a tree that can be used")
+            raise SceneError(
+                self.first or f"{self.table.name}: none of its rows is a tree that can be used; choose another one"
+            )
         kept = {name: values[self.good].astype(np.float32) for name, values in sizes.items()}
         if not any(values.any() for values in (kept["height"], kept["diameter"], kept["crown_width"], kept["age"])):
             self.notes.append("no column of heights, trunks or crowns: all trees are full-grown")
@@ -265,20 +257,18 @@ class _Reading:
             self.notes.append(f"columns not used: {', '.join(unused)}")
         skipped = int((~self.good).sum()) - self.left_out.total() + self.table.broken
         return Inventory(
-            names,
-            index[self.good],
-            points[self.good],
-            system,
-            kept,
-            self.notes,
-            skipped,
-            self.first,
-            self.left_out,
+            names, index[self.good], points[self.good], system, kept, self.notes, skipped, self.first, self.left_out
         )
 
     def _texts(self, title: str) -> NDArray[np.str_]:
+        """Texts of a column, which is one that is used."""
         self.used[title] = next(name for name, found in self.found.items() if title in dict(found))
         return self.table.columns[title]
+
+    def _each(self, title: str, what: Callable[[str], Any]) -> NDArray[Any]:
+        """What each text (n,) of a column says."""
+        distinct, index = np.unique(self._texts(title), return_inverse=True)
+        return np.array([what(text) for text in distinct.tolist()])[index]
 
     def _refuse(self, bad: NDArray[np.bool_], column: str, why: Callable[[int], str]) -> None:
         """Refuse the file, or leave out rows."""
@@ -300,9 +290,7 @@ class _Reading:
         """Leave out rows that are no trees, by what stands in place of a species or of their condition."""
         for name in ("status", *NAMES):
             for title, _ in self.found.get(name, ()):
-                distinct, index = np.unique(self._texts(title), return_inverse=True)
-                said = [_no_tree(text, name == "status") for text in distinct.tolist()]
-                what = np.array(said)[index]
+                what = self._each(title, partial(_no_tree, condition=name == "status"))
                 self.left_out.update(what[(what != "") & self.good].tolist())
                 self.good &= what == ""
 
@@ -359,58 +347,50 @@ class _Reading:
         if "planted" not in self.found:
             return np.zeros(len(self.good))
         title = self.found["planted"][0][0]
-        distinct, index = np.unique(self._texts(title), return_inverse=True)
-        years = [int(found[0]) if (found := _YEAR.search(text)) else 0 for text in distinct.tolist()]
+        years = self._each(title, lambda text: int(found[0]) if (found := _YEAR.search(text)) else 0)
         now = datetime.date.today().year
-        ages = np.array([max(now - year, 1) if year else 0 for year in years], np.float64)
         self.notes.append(f'ages from "{title}" to {now}')
-        return ages[index]
+        return np.where(years > 0, np.maximum(now - years, 1), 0).astype(np.float64)
 
     def _dead(self) -> NDArray[np.float64]:
         """Years since death, 0 for those alive."""
         years = np.zeros(len(self.good))
         for name in ("dead", "status", "name", "common"):
             for title, _ in self.found.get(name, ()):
-                distinct, index = np.unique(self._texts(title), return_inverse=True)
                 words = ("dead", "yes") if name == "dead" else ("dead",)
-                says = [said_of(text) in words and not species_named(text) for text in distinct.tolist()]
+                says = self._each(title, lambda text, words=words: said_of(text) in words and not species_named(text))
                 values = np.where(says, DEAD_YEARS, 0.0)
                 if name == "dead" and re.search("year|jahr|ann|año", title.lower()):
-                    values = np.nan_to_num(np.clip(cells(distinct)[0], 0.0, _MOST["age"]))
-                years = np.maximum(years, values[index])
+                    values = np.nan_to_num(np.clip(cells(self.table.columns[title])[0], 0.0, _MOST["age"]))
+                years = np.maximum(years, values)
         return years
 
     def _points(self, code: int) -> tuple[NDArray[np.float64], System]:
         """Coordinates and their system."""
-        name, given, found = self.table.name, self.table.points, self.found
-        pair = "coordinates"
-        if given is not None:
-            points, code = given, code or self.table.code
-        else:
-            metres = "x" in found and "y" in found
-            degrees = "longitude" in found and "latitude" in found
-            if not (metres or degrees or "place" in found):
+        name, points, system, pair = self.table.name, self.table.points, self.table.system, ("coordinates",)
+        if points is None:
+            degrees, metres, one = ("longitude", "latitude"), ("x", "y"), ("place",)
+            pair, *more = [pair for pair in (degrees, metres, one) if self.found.keys() >= set(pair)] or [()]
+            if not pair:
                 raise SceneError(
                     f"{name}: line 1: no columns of coordinates; name them x and y, or longitude and latitude"
                 )
-            if "place" in found and not degrees and not metres:
+            if metres in more and code and not chosen_system(code, System(), "").geographic:
+                pair = metres
+            if pair == one:
                 points, own = self._places()
-                pair, metres = "place", False
                 code = code or own
-                metres = not code and bool((np.abs(points[self.good]) > (360.0, 180.0)).any())
+                plain = (np.abs(points[self.good]) > (360.0, 180.0)).any()
             else:
-                metres = metres and (not degrees or (code and not system_of(code).geographic))
-                columns = ("x", "y") if metres else ("longitude", "latitude")
-                pair = columns[0]
-                points = np.stack([self._coordinate(column) for column in columns], axis=1)
-                if not metres and not code and len(low := points[self.good]) and np.median(np.abs(low[:, 1])) > 360.0:
-                    metres = True
+                points = np.stack([self._coordinate(column) for column in pair], axis=1)
+                plain = pair == metres
+                if not plain and not code and len(low := points[self.good]) and np.median(np.abs(low[:, 1])) > 360.0:
+                    plain = True
                     self.notes.append("longitude and latitude read as meters")
-            if metres and not code and _are_degrees(points[self.good]):
-                metres = False
+            if plain and not code and _are_degrees(points[self.good]):
+                plain = False
                 self.notes.append("x and y read as longitude and latitude")
-            code = code or (0 if metres else LONGITUDE_LATITUDE)
-        system = system_of(code, f"{name}: ") if code else System()
+            system = chosen_system(code or (0 if plain else LONGITUDE_LATITUDE), System(), f"{name}: ")
         if system.geographic:
             some = np.abs(points[self.good])
             if len(some) and 90.0 < np.median(some[:, 1]) <= 180.0 and np.median(some[:, 0]) <= 90.0:
@@ -418,10 +398,10 @@ class _Reading:
                 self.notes.append("coordinates read as latitude, longitude")
             self._refuse(
                 ~((points >= (-360.0, -90.0)) & (points <= (360.0, 90.0))).all(axis=1),
-                pair,
+                pair[0],
                 lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} are no longitude and latitude; set Coordinate System",
             )
-        self._refuse_far(points, system, pair)
+        self._refuse_far(points, system, pair[0])
         return points, system
 
     def _refuse_far(self, points: NDArray[np.float64], system: System, column: str) -> None:
@@ -455,6 +435,7 @@ class _Reading:
         return points, int(found[:, 2].max(initial=0.0))
 
     def _coordinate(self, column: str) -> NDArray[np.float64]:
+        """Numbers (n,) of a column of coordinates, in metres or degrees."""
         title, what = self.found[column][0]
         texts = self._texts(title)
         values, _, kinds = cells(texts)
@@ -490,7 +471,8 @@ def _are_degrees(points: NDArray[np.float64]) -> bool:
     """Whether coordinates that are called x and y are degrees: nobody lists trees of a plot so small."""
     if not len(points) or (np.abs(points) > (180.0, 90.0)).any():
         return False
-    return bool((np.ptp(points, axis=0) < _SPREAD).all() and (points != np.round(points, 3)).mean() > 0.5)
+    spread = np.ptp(points, axis=0).max()
+    return bool(spread < _SPREAD and ((points != np.round(points, 3)).mean() > 0.5 or 0.0 < spread < _NARROW))
 
 
 def _no_tree(text: str, condition: bool) -> str:
@@ -500,4 +482,5 @@ def _no_tree(text: str, condition: bool) -> str:
 
 
 def _away(metres: float) -> str:
+    """How far a row is from others, for messages."""
     return f"{metres / 1000.0:,.0f} km from" if math.isfinite(metres) else "too far from"

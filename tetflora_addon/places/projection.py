@@ -1,49 +1,341 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Coordinate systems: longitude and latitude, UTM, Web Mercator, and a plane about the middle of some data.
+"""Coordinate systems: any projected one by its EPSG code, longitude and latitude, and a plane about the middle of data.
 
-Transverse Mercator is Krüger's series to the fourth order in the third flattening, exact to a micrometre within
-3,000 km of the meridian (C. F. F. Karney, "Transverse Mercator with an accuracy of a few nanometers", Journal of
-Geodesy 85, 2011, equations 7 to 36). The ellipsoid is WGS 84; those of ETRS89 and NAD83 differ from it
-by a tenth of a millimetre.
+Figures of systems, ellipsoids and shifts of datums are in ``systems.json``, those of the EPSG Dataset (IOGP) as PROJ
+9.8 gives them; a shift is the first without a grid in the middle of a system's area, good to some metres at worst.
+
+Names of parameters are those of IOGP Publication 373-7-2 (2023), where the formulas stand in real numbers. Here a place
+is one complex number: isometric latitude + i longitude on the ellipsoid, and north + i east on the map. What keeps
+angles is an analytic function then, and its way back the inverse function. Transverse Mercator is Krüger's series to
+the fourth order in the third flattening, exact to a micrometre within 3,000 km of the meridian (C. F. F. Karney,
+"Transverse Mercator with an accuracy of a few nanometers", Journal of Geodesy 85, 2011, equations 7 to 36). In methods
+angles are radians, and longitudes count from their own meridian.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from math import asin, atan2, cos, exp, inf, log, sin, sqrt, tan, tanh
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError, readable
+from . import table
 
-#: EPSG code of longitude and latitude, and of Web Mercator.
-LONGITUDE_LATITUDE, WEB_MERCATOR = 4326, 3857
-_GEOGRAPHIC = {4326, 4258, 4269, 4979}
-_MERCATOR = {3857, 900913, 3785}
-#: First code, number of zones and first zone of UTM: WGS 84 north and south, ETRS89, NAD83.
-_UTM = ((32601, 60, 1, True), (32701, 60, 1, False), (25828, 11, 28, True), (26901, 23, 1, True))
+#: EPSG code of longitude and latitude, and what stands for a plane in metres in place of a code.
+LONGITUDE_LATITUDE, PLAIN = 4326, -1
+_HEIGHTS = {4937: 4258}  # systems with heights, by those without
+_Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
+_Way = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
+_STEPS = 5  # of Newton's method for latitudes, which doubles the digits each time
+_ROUNDS = 7  # each of which leaves a 150th of the error
+_HALF_PI = np.pi / 2.0
+#: Degrees from the meridian: beyond it nobody has a scene, and series come to an end.
+MOST_OFF = 40.0
 
-_A, _F = 6378137.0, 1.0 / 298.257223563
-_E2 = _F * (2.0 - _F)
-_N = _F / (2.0 - _F)
-_RADIUS = _A / (1.0 + _N) * (1.0 + _N**2 / 4.0 + _N**4 / 64.0)
-_ALPHA = (
-    _N / 2 - 2 * _N**2 / 3 + 5 * _N**3 / 16 + 41 * _N**4 / 180,
-    13 * _N**2 / 48 - 3 * _N**3 / 5 + 557 * _N**4 / 1440,
-    61 * _N**3 / 240 - 103 * _N**4 / 140,
-    49561 * _N**4 / 161280,
-)
-_BETA = (
-    _N / 2 - 2 * _N**2 / 3 + 37 * _N**3 / 96 - _N**4 / 360,
-    _N**2 / 48 + _N**3 / 15 - 437 * _N**4 / 1440,
-    17 * _N**3 / 480 - 37 * _N**4 / 840,
-    4397 * _N**4 / 161280,
-)
-_STEPS = 5  # of Newton's method for the latitude, which doubles the digits each time
-_UTM_SCALE, _FALSE_EAST, _FALSE_NORTH = 0.9996, 500_000.0, 10_000_000.0
-_MOST_OFF = 40.0  # degrees from the meridian: beyond it nobody has a scene, and series come to an end
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """Half of the longer axis in metres, and the inverse of the flattening."""
+
+    a: float = 6378137.0
+    inverse: float = 298.257223563
+
+    @cached_property
+    def e2(self) -> float:
+        """Square of the eccentricity."""
+        f = 1.0 / self.inverse
+        return f * (2.0 - f)
+
+    @cached_property
+    def e(self) -> float:
+        """Eccentricity."""
+        return sqrt(self.e2)
+
+    def isometric(self, latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Isometric latitude."""
+        return np.arcsinh(np.tan(latitude)) - self.e * np.arctanh(self.e * np.sin(latitude))
+
+    def of_isometric(self, psi: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Latitude from `isometric`."""
+        phi = np.zeros_like(psi)
+        for _ in range(_ROUNDS):
+            phi = np.arctan(np.sinh(psi + self.e * np.arctanh(self.e * np.sin(phi))))
+        return phi
+
+    def cosine(self, latitude: float) -> float:
+        """Radius of a parallel, over the longer half-axis."""
+        return cos(latitude) / sqrt(1.0 - self.e2 * sin(latitude) ** 2)
+
+    def authalic(self, latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Twice the area between equator and parallel, over what a radian has of it on a sphere."""
+        s = np.sin(latitude)
+        return (1.0 - self.e2) * (s / (1.0 - self.e2 * s * s) + np.arctanh(self.e * s) / self.e)
+
+    def of_authalic(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Latitude from `authalic`."""
+        phi = np.arcsin(np.clip(q / self.authalic(np.array(_HALF_PI)), -1.0, 1.0))
+        for _ in range(_STEPS):
+            slope = 2.0 * (1.0 - self.e2) * np.cos(phi) / (1.0 - self.e2 * np.sin(phi) ** 2) ** 2
+            phi = phi + (q - self.authalic(phi)) / np.maximum(slope, 1e-9)
+        return phi
+
+    def at(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Places (n, 3) on the ellipsoid, metres from the middle of the Earth."""
+        nu = self.a / np.sqrt(1.0 - self.e2 * np.sin(latitude) ** 2)
+        flat = nu * np.cos(latitude)
+        return np.stack(
+            [flat * np.cos(longitude), flat * np.sin(longitude), nu * (1.0 - self.e2) * np.sin(latitude)], axis=1
+        )
+
+    def of(self, places: NDArray[np.float64]) -> _Pair:
+        """Longitude and latitude of places (n, 3) near the ellipsoid."""
+        x, y, z = places.T
+        flat = np.hypot(x, y)
+        tangent = z / (flat * (1.0 - self.e2))
+        for _ in range(_STEPS):
+            nu = self.a / np.sqrt(1.0 - self.e2 * tangent**2 / (1.0 + tangent**2))
+            tangent = (z + self.e2 * nu * tangent / np.hypot(1.0, tangent)) / flat
+        return np.arctan2(y, x), np.arctan(tangent)
+
+
+WGS84 = Ellipsoid()
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A coordinate system.
+
+    Attributes
+    ----------
+    method : str
+        A key of `METHODS`, or ``geo`` for longitude and latitude.
+    ellipsoid : Ellipsoid
+    shift : tuple of 7 floats
+        To WGS 84: metres, seconds of arc, and parts in a million, as of a position vector.
+    meridian : float
+        Of longitude 0, degrees east of Greenwich.
+    unit : float
+        Metres.
+    parameters : tuple of floats
+        Degrees and metres, in the order that the method has them.
+    """
+
+    method: str
+    ellipsoid: Ellipsoid = WGS84
+    shift: tuple[float, ...] = (0.0,) * 7
+    meridian: float = 0.0
+    unit: float = 1.0
+    parameters: tuple[float, ...] = ()
+
+    @cached_property
+    def ways(self) -> tuple[Callable[..., _Pair], Callable[..., _Pair], float]:
+        """From longitude and latitude, back, and the meridian that longitudes count from, degrees."""
+        if self.method == "geo":
+            return lambda *place: np.degrees(place), lambda *place: np.radians(place), 0.0
+        (east, north), angles = self.parameters[-2:], np.radians(self.parameters[:-2])
+        if self.method in _SCALED:
+            angles[-1] = self.parameters[-3]
+        # Web Mercator takes figures of the ellipsoid for those of a sphere.
+        ell = Ellipsoid(self.ellipsoid.a, inf) if self.method == "web" else self.ellipsoid
+        forward, backward = METHODS[self.method](ell, *angles.tolist())
+        equal = self.method in ("aea", "laea")
+        latitudes = (ell.authalic, ell.of_authalic) if equal else (ell.isometric, ell.of_isometric)
+
+        def there(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+            place = forward(latitudes[0](latitude) + 1j * longitude)
+            return (place.imag + east) / self.unit, (place.real + north) / self.unit
+
+        def back(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
+            place = backward(y * self.unit - north + 1j * (x * self.unit - east))
+            return place.imag, latitudes[1](place.real)
+
+        return there, back, self.parameters[1] + self.meridian
+
+    @property
+    def _turned(self) -> NDArray[np.float64]:
+        """Matrix (3, 3) of the turn and the scale of the shift."""
+        x, y, z = np.radians(np.array(self.shift[3:6]) / 3600.0)
+        return (1.0 + 1e-6 * self.shift[6]) * np.array([[1.0, -z, y], [z, 1.0, -x], [-y, x, 1.0]])
+
+    def to_wgs84(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+        """Longitude and latitude on WGS 84 of those on the own datum."""
+        if not any(self.shift):
+            return longitude, latitude
+        return WGS84.of(self.ellipsoid.at(longitude, latitude) @ self._turned.T + self.shift[:3])
+
+    def from_wgs84(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+        """Longitude and latitude on the own datum of those on WGS 84."""
+        if not any(self.shift):
+            return longitude, latitude
+        places = WGS84.at(longitude, latitude) - self.shift[:3]
+        return self.ellipsoid.of(np.linalg.solve(self._turned, places.T).T)
+
+
+def _transverse(ell: Ellipsoid, foot: float, _meridian: float, scale: float) -> tuple[_Way, _Way]:
+    """Transverse Mercator."""
+    n = 1.0 / (2.0 * ell.inverse - 1.0)
+    radius = scale * ell.a / (1.0 + n) * (1.0 + n**2 / 4.0 + n**4 / 64.0)
+    alphas = (
+        n / 2 - 2 * n**2 / 3 + 5 * n**3 / 16 + 41 * n**4 / 180,
+        13 * n**2 / 48 - 3 * n**3 / 5 + 557 * n**4 / 1440,
+        61 * n**3 / 240 - 103 * n**4 / 140,
+        49561 * n**4 / 161280,
+    )
+    betas = (
+        n / 2 - 2 * n**2 / 3 + 37 * n**3 / 96 - n**4 / 360,
+        n**2 / 48 + n**3 / 15 - 437 * n**4 / 1440,
+        17 * n**3 / 480 - 37 * n**4 / 840,
+        4397 * n**4 / 161280,
+    )
+
+    def northing(q: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        zeta = np.arctan(np.sinh(q))
+        return radius * (zeta + sum(alpha * np.sin(2 * j * zeta) for j, alpha in enumerate(alphas, 1)))
+
+    start = float(northing(ell.isometric(np.array([foot])) + 0j)[0].real)
+
+    def backward(p: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        zeta = (p + start) / radius
+        return np.arcsinh(np.tan(zeta - sum(beta * np.sin(2 * j * zeta) for j, beta in enumerate(betas, 1))))
+
+    return lambda q: np.where(np.abs(q.imag) < np.radians(MOST_OFF), northing(q) - start, np.nan), backward
+
+
+def _cone(n: float, size: float, middle: float) -> tuple[_Way, _Way]:
+    """A conformal cone, whose apex is so far north of y = 0."""
+    # The apex itself has no logarithm.
+    return lambda q: middle - size * np.exp(-n * q), lambda p: -np.log((middle - p) / size + 1e-99) / n
+
+
+def _lambert(ell: Ellipsoid, foot: float, _meridian: float, *others: float) -> tuple[_Way, _Way]:
+    """Lambert's conformal cone, with one parallel and a scale, or with two."""
+    first, second = others if len(others) == 2 else (foot, foot)
+    scale = 1.0 if len(others) == 2 else others[0]
+    n, (psi, other, base) = sin(first), ell.isometric(np.array([first, second, foot])).tolist()
+    if abs(first - second) > 1e-9:
+        n = log(ell.cosine(first) / ell.cosine(second)) / (other - psi)
+    size = scale * ell.a * ell.cosine(first) * exp(n * psi) / n
+    return _cone(n, size, size * exp(-n * base))
+
+
+def _albers(ell: Ellipsoid, foot: float, _meridian: float, first: float, second: float) -> tuple[_Way, _Way]:
+    """Albers' cone, true to area; latitudes are authalic."""
+    m1, m2 = ell.cosine(first) ** 2, ell.cosine(second) ** 2
+    q1, q2, base = ell.authalic(np.array([first, second, foot])).tolist()
+    n = (m1 - m2) / (q2 - q1) if abs(first - second) > 1e-9 else sin(first)
+    c, size = m1 + n * q1, ell.a / n
+    middle = size * sqrt(c - n * base)
+
+    def backward(p: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        off = (middle - p) / size
+        return (c - np.abs(off) ** 2) / n - 1j * np.angle(off) / n
+
+    return lambda q: middle - size * np.sqrt(c - n * q.real) * np.exp(-1j * n * q.imag), backward
+
+
+def _mercator(ell: Ellipsoid, latitude: float, _meridian: float, scale: float | None = None) -> tuple[_Way, _Way]:
+    """Mercator, with a scale or a parallel that is true to it."""
+    radius = ell.a * (ell.cosine(latitude) if scale is None else scale)
+    return lambda q: radius * q, lambda p: p / radius
+
+
+def _double(ell: Ellipsoid, foot: float, _meridian: float, scale: float) -> tuple[_Way, _Way]:
+    """Oblique stereographic projection of a sphere, onto which the ellipsoid is projected before."""
+    e2, s = ell.e2, sin(foot)
+    size = 2.0 * scale * ell.a * sqrt(1.0 - e2) / (1.0 - e2 * s * s)
+    n = sqrt(1.0 + e2 * cos(foot) ** 4 / (1.0 - e2))
+    psi = float(ell.isometric(np.array(foot)))
+    start = tanh(n * psi)
+    shift = log((n + s) * (1.0 - start) / ((n - s) * (1.0 + start))) / 2.0
+    opposite = exp(-n * psi - shift)
+    return (
+        lambda q: size * np.expm1(n * (q - psi)) / (np.exp(n * q + shift) + opposite),
+        lambda p: (np.log((size + p * opposite) / (size * opposite - p)) - shift) / n,
+    )
+
+
+def _polar(ell: Ellipsoid, latitude: float, _meridian: float, scale: float | None = None) -> tuple[_Way, _Way]:
+    """Polar stereographic projection, with a scale or a parallel that is true to it."""
+    rim = sqrt((1.0 + ell.e) ** (1.0 + ell.e) * (1.0 - ell.e) ** (1.0 - ell.e))
+    if scale is None:
+        scale = ell.cosine(latitude) * rim * exp(abs(float(ell.isometric(np.array(latitude))))) / 2.0
+    side = -1.0 if latitude < 0.0 else 1.0
+    return _cone(side, side * 2.0 * ell.a * scale / rim, 0.0)
+
+
+def _azimuthal(ell: Ellipsoid, foot: float, _meridian: float) -> tuple[_Way, _Way]:
+    """Lambert's azimuthal projection, true to area; latitudes are authalic."""
+    whole, q = ell.authalic(np.array([_HALF_PI, foot])).tolist()
+    sine = q / whole
+    cosine, radius = sqrt(1.0 - sine**2), ell.a * sqrt(whole / 2.0)
+    d = ell.a * ell.cosine(foot) / (radius * cosine)
+
+    def forward(q: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        s = q.real / whole
+        flat = np.sqrt(np.maximum(1.0 - s * s, 0.0)) * np.exp(1j * q.imag)
+        b = radius * np.sqrt(2.0 / (1.0 + sine * s + cosine * flat.real))
+        return b / d * (cosine * s - sine * flat.real) + 1j * b * d * flat.imag
+
+    def backward(p: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        p = p.real * d + 1j * p.imag / d
+        off = 2.0 * np.arcsin(np.clip(np.abs(p) / (2.0 * radius), -1.0, 1.0))
+        p = p * np.sin(off) / np.maximum(np.abs(p), 1e-12)
+        turn = np.arctan2(p.imag, cosine * np.cos(off) - p.real * sine)
+        return whole * (np.cos(off) * sine + p.real * cosine) + 1j * turn
+
+    return forward, backward
+
+
+def _oblique(
+    ell: Ellipsoid, foot: float, _meridian: float, azimuth: float, skew: float, scale: float, middle: bool = False
+) -> tuple[_Way, _Way]:
+    """Hotine's oblique Mercator: that of a sphere, onto which the ellipsoid is projected before, turned about the point
+    where the initial line crosses the equator. ``middle``: lengths count from the centre (variant B), not from there.
+    """
+    e2, side = ell.e2, 1.0 if foot >= 0.0 else -1.0
+    b = sqrt(1.0 + e2 * cos(foot) ** 4 / (1.0 - e2))
+    radius = ell.a * scale * sqrt(1.0 - e2) / (1.0 - e2 * sin(foot) ** 2)
+    d = max(b * sqrt(1.0 - e2) / ell.cosine(foot) / (1.0 - e2 * sin(foot) ** 2), 1.0)
+    f = d + side * sqrt(d * d - 1.0)
+    tilt = asin(sin(azimuth) / d)
+    across = abs(azimuth - _HALF_PI) < 1e-9
+    # To the meridian in which the initial line crosses the equator.
+    lead = side * _HALF_PI if across else asin(max(min((f - 1.0 / f) / 2.0 * tan(tilt), 1.0), -1.0))
+    start = radius * lead if across else side * radius * atan2(sqrt(d * d - 1.0), cos(azimuth))
+    shift = log(f) - b * float(ell.isometric(np.array(foot))) + 1j * lead
+    start, turn, skewed = start * middle, complex(sin(tilt), cos(tilt)), complex(cos(skew), sin(skew))
+    return (
+        lambda q: skewed * (-2j * radius * np.arctanh(turn * np.tanh((b * q + shift) / 2.0)) - start),
+        lambda p: (2.0 * np.arctanh(np.tanh((p / skewed + start) * 0.5j / radius) / turn) - shift) / b,
+    )
+
+
+#: Functions that make the two ways of a method from its ellipsoid and angles, a factor last.
+METHODS: dict[str, Callable[..., tuple[_Way, _Way]]] = {
+    "tm": _transverse,
+    "lcc1": _lambert,
+    "lcc2": _lambert,
+    "aea": _albers,
+    "sterea": _double,
+    "stereA": _polar,
+    "stereB": _polar,
+    "mercA": _mercator,
+    "mercB": _mercator,
+    "web": lambda ell, *_: _mercator(ell, 0.0, 0.0),
+    "laea": _azimuthal,
+    "omercA": _oblique,
+    "omercB": lambda *given: _oblique(*given, True),
+}
+#: Those whose last parameter before the lengths is a factor.
+_SCALED = {"tm", "lcc1", "sterea", "stereA", "mercA", "omercA", "omercB"}
+#: Those that keep angles, and lengths to some thousandths where anybody uses them.
+TRUE = {"tm", "lcc1", "lcc2", "sterea", "omercA", "omercB"}
 
 
 @dataclass(frozen=True)
@@ -53,148 +345,134 @@ class System:
     Attributes
     ----------
     code : int
-        EPSG; 0 for a plane in metres of which nobody knows where on Earth it lies, -1 for one about a place.
+        EPSG; 0 for a plane in metres of which nobody knows where on Earth it lies, -1 for one about a place, -2 for one
+        that a file defines by itself.
     longitude, latitude : float
         The place, degrees.
+    own : Definition, optional
+        Of the file.
+    unit : float
+        Metres of plain coordinates, or of those that are taken for meters of the system.
     """
 
     code: int = 0
     longitude: float = 0.0
     latitude: float = 0.0
+    own: Definition | None = field(default=None, repr=False)
+    unit: float = 1.0
+
+    @property
+    def definition(self) -> Definition:
+        """Figures of a system that lies on Earth."""
+        if self.own is not None:
+            return self.own
+        if self.code == -1:
+            return _about(self.longitude, self.latitude)
+        return known_systems()[self.code]
 
     @property
     def geographic(self) -> bool:
         """Whether coordinates are longitude and latitude."""
-        return self.code in _GEOGRAPHIC
+        return self.code != 0 and self.definition.method == "geo"
 
     @property
     def metric(self) -> bool:
-        """Whether coordinates are true meters, but for four parts in ten thousand."""
-        return not self.geographic and self.code not in _MERCATOR
+        """Whether coordinates are true meters, but for some parts in a thousand."""
+        return self.code == -1 or (self.code > 0 and self.definition.method in TRUE and self.definition.unit == 1.0)
 
     @property
     def name(self) -> str:
         """For messages."""
         if self.code > 0:
             return f"EPSG:{self.code}"
-        return f"the plane about {self.latitude:.5f}, {self.longitude:.5f}" if self.code else "an unknown system"
+        return {
+            0: "plain meters" if self.unit == 1.0 else f"plain units of {self.unit:g} m",
+            -2: "the system that the file defines",
+        }.get(self.code, f"the plane about {self.latitude:.5f}, {self.longitude:.5f}")
+
+
+@cache
+def _about(longitude: float, latitude: float) -> Definition:
+    """Transverse Mercator about a place."""
+    return Definition("tm", parameters=(latitude, longitude, 1.0, 0.0, 0.0))
+
+
+@cache
+def known_systems() -> dict[int, Definition]:
+    """All systems that have an EPSG code here."""
+    data = table("systems")
+    ellipsoids, shifts = [Ellipsoid(*e) for e in data["ellipsoids"]], [tuple(s) for s in data["shifts"]]
+    found = {}
+    for method, ellipsoid, shift, meridian, unit, rows in data["systems"]:
+        own = Definition(method, ellipsoids[ellipsoid], shifts[shift], meridian, data["units"][unit])
+        for parameters, codes, *run in rows:
+            number, step = run or (1, [0.0] * len(parameters))
+            for k in range(number):
+                figures = tuple(round(a + k * b, 9) for a, b in zip(parameters, step, strict=True))
+                found.update(dict.fromkeys([code + k for code in codes], replace(own, parameters=figures)))
+    return found | {code: found[flat] for code, flat in _HEIGHTS.items()}
 
 
 def system_of(code: int, what: str = "") -> System:
-    """The system of an EPSG code.
-
-    Parameters
-    ----------
-    what : str
-        Begins the message, such as the name of a file.
-
-    Raises
-    ------
-    SceneError
-        It is none of those that are known here; says what to do.
-    """
-    if code in _GEOGRAPHIC | _MERCATOR or _utm(code):
+    """The system of an EPSG code, if it is known here."""
+    if code in known_systems():
         return System(code)
     raise SceneError(
-        f"{what}EPSG:{code} is none of the coordinate systems that TetFlora reads: longitude and latitude (4326), UTM "
-        "(326xx, 327xx, 258xx, 269xx) and Web Mercator (3857). Reproject it, for example with gdalwarp or ogr2ogr and "
-        "-t_srs EPSG:326xx, where xx is the UTM zone"
+        f"{what}EPSG:{code} is none of the coordinate systems that TetFlora reads. Set Coordinate System to another "
+        "code, reproject the file, for example with gdalwarp or ogr2ogr and -t_srs EPSG:4326, or turn on Plain Meters"
     )
 
 
+def chosen_system(code: int, own: System, what: str) -> System:
+    """The system of what an artist chose, which is an EPSG code, `PLAIN`, or 0 for the file's own."""
+    return System() if code == PLAIN else system_of(code or own.code, what) if code or own.code > 0 else own
+
+
+def may_be_degrees(points: ArrayLike) -> bool:
+    """Whether points (n, 2), of which there is one at least, can be longitude and latitude."""
+    points = np.array(points, np.float64).reshape(-1, 2)
+    return bool(len(points) and (np.abs(points) <= [360.0, 90.0]).all())
+
+
 def code_in(text: str) -> int | None:
-    """The EPSG code in a name such as ``urn:ogc:def:crs:EPSG::25832``; None where there is none."""
-    if re.search(r"CRS84\b", text):
+    """The EPSG code in a name such as ``urn:ogc:def:crs:EPSG::25832`` or an address; None where there is none."""
+    if re.search(r"CRS84h?\b", text):
         return LONGITUDE_LATITUDE
-    found = re.search(r"EPSG:(?:[\d.]*:)?(\d{4,6})$", text.strip(), re.IGNORECASE)
-    return int(found[1]) if found else None
+    found = re.search(r"\bEPSG\b[^\w]{1,2}(?:[\d.]*[:/#])?(?:[a-z]+#)?(\d{4,6})\W*$", text.strip(), re.IGNORECASE)
+    found = found or re.search(r"\bepsg\.xml#(\d{4,6})$|/epsg/(\d{4,6})/?$|\bEPSG:(\d{4,6})\b", text, re.IGNORECASE)
+    return int(next(filter(None, found.groups()))) if found else None
 
 
 def to_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Longitude and latitude in degrees, (n, 2), of points (n, 2) in a system that lies on Earth."""
-    points = np.asarray(points, np.float64)
-    if system.geographic:
+    """Longitude and latitude on WGS 84 in degrees, (n, 2), of points (n, 2) in a system that lies on Earth."""
+    points, own = system.unit * np.asarray(points, np.float64), system.definition
+    if own.method == "geo" and not any(own.shift):
         return points
-    if system.code in _MERCATOR:
-        x, y = (points / _A).T
-        return np.degrees(np.stack([x, np.arctan(np.sinh(y))], axis=1))
-    if system.code == -1:
-        foot = _forward(np.zeros(1), np.radians([system.latitude]))[1]
-        longitude, latitude = _backward(points[:, 0], points[:, 1] + foot)
-        return np.degrees(np.stack([longitude, latitude], axis=1)) + [system.longitude, 0.0]
-    meridian, north = _utm(system.code)
-    x, y = points[:, 0] - _FALSE_EAST, points[:, 1] - (0.0 if north else _FALSE_NORTH)
-    longitude, latitude = _backward(x / _UTM_SCALE, y / _UTM_SCALE)
-    return np.degrees(np.stack([longitude, latitude], axis=1)) + [meridian, 0.0]
+    _, back, meridian = own.ways
+    longitude, latitude = back(*points.T)
+    return np.degrees(np.stack(own.to_wgs84(longitude + np.radians(meridian), latitude), axis=1))
 
 
 def from_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (n, 2) of a system that lies on Earth, from longitude and latitude in degrees, (n, 2).
+    """Points (n, 2) of a system that lies on Earth, from longitude and latitude in degrees on WGS 84, (n, 2).
 
     What is too far from the system's meridian is nan.
     """
-    points = np.asarray(points, np.float64)
-    if system.geographic:
+    points, own = np.asarray(points, np.float64), system.definition
+    if own.method == "geo" and not any(own.shift):
         return points
-    longitude, latitude = np.radians(points).T
-    if system.code in _MERCATOR:
-        return _A * np.stack([longitude, np.arcsinh(np.tan(latitude))], axis=1)
-    meridian, north = (system.longitude, True) if system.code == -1 else _utm(system.code)
-    off = (points[:, 0] - meridian + 180.0) % 360.0 - 180.0
-    x, y = _forward(np.radians(np.where(np.abs(off) < _MOST_OFF, off, np.nan)), latitude)
-    if system.code == -1:
-        return np.stack([x, y - _forward(np.zeros(1), np.radians([system.latitude]))[1]], axis=1)
-    north_of = 0.0 if north else _FALSE_NORTH
-    return np.stack([_UTM_SCALE * x + _FALSE_EAST, _UTM_SCALE * y + north_of], axis=1)
+    longitude, latitude = own.from_wgs84(*np.radians(points).T)
+    there, _, meridian = own.ways
+    off = longitude - np.radians(meridian)
+    off = np.where(np.abs(off) <= np.pi, off, (off + np.pi) % (2.0 * np.pi) - np.pi)
+    return np.stack(there(off, latitude), axis=1) / system.unit
 
 
 def between(points: NDArray[np.float64], source: System, target: System) -> NDArray[np.float64]:
-    """Points (n, 2) of one system in another; both lie on Earth, or are the same."""
-    return points if source == target else from_degrees(target, to_degrees(source, points))
-
-
-def _utm(code: int) -> tuple[float, bool] | None:
-    """Central meridian in degrees, and whether it is a northern zone; None for other codes."""
-    for first, number, zone, north in _UTM:
-        if first <= code < first + number:
-            return 6.0 * (zone + code - first) - 183.0, north
-    return None
-
-
-def _forward(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-    """Metres east of the meridian and north of the equator; radians."""
-    conformal = _conformal(np.tan(latitude))
-    cosine = np.cos(longitude)
-    xi = np.arctan2(conformal, cosine)
-    eta = np.arcsinh(np.sin(longitude) / np.hypot(conformal, cosine))
-    along, across = xi, eta
-    for j, alpha in enumerate(_ALPHA, 1):
-        along = along + alpha * np.sin(2 * j * xi) * np.cosh(2 * j * eta)
-        across = across + alpha * np.cos(2 * j * xi) * np.sinh(2 * j * eta)
-    return _RADIUS * across, _RADIUS * along
-
-
-def _backward(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-    """Longitude from the meridian and latitude in radians, of metres east and north."""
-    along, across = y / _RADIUS, x / _RADIUS
-    xi, eta = along, across
-    for j, beta in enumerate(_BETA, 1):
-        xi = xi - beta * np.sin(2 * j * along) * np.cosh(2 * j * across)
-        eta = eta - beta * np.cos(2 * j * along) * np.sinh(2 * j * across)
-    wanted = np.sin(xi) / np.hypot(np.sinh(eta), np.cos(xi))
-    tangent = wanted / (1.0 - _E2)
-    for _ in range(_STEPS):
-        found = _conformal(tangent)
-        slope = (1.0 + (1.0 - _E2) * tangent**2) / ((1.0 - _E2) * np.hypot(1.0, found) * np.hypot(1.0, tangent))
-        tangent = tangent + (wanted - found) * slope
-    return np.arctan2(np.sinh(eta), np.cos(xi)), np.arctan(tangent)
-
-
-def _conformal(tangent: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Tangent of the conformal latitude, from that of the geographic one (Karney, equations 7 to 9)."""
-    e = np.sqrt(_E2)
-    sigma = np.sinh(e * np.arctanh(e * tangent / np.hypot(1.0, tangent)))
-    return tangent * np.hypot(1.0, sigma) - sigma * np.hypot(1.0, tangent)
+    """Points (n, 2) of one system in another; both lie on Earth, or both are plain."""
+    if source == target or source.code == target.code == 0:
+        return points * (source.unit / target.unit)
+    return from_degrees(target, to_degrees(source, points))
 
 
 @dataclass(frozen=True)
@@ -213,29 +491,26 @@ class MapOrigin:
     north: float
 
     def local(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
-        """Metres from the origin, (n, 2), of points (n, 2) of a system.
+        """Metres from the origin, (n, 2), of points (n, 2) of a system."""
+        local = self.offsets(points, system, what)
+        far = np.abs(local).max(initial=0.0)
+        if not far < MOST_AWAY:
+            away = f"{far / 1000.0:,.0f} km" if np.isfinite(far) else "too far"
+            raise SceneError(
+                f"{what}it reaches {away} from the middle of the scene; set Coordinate System to the EPSG code of the "
+                "file, or turn on New Origin to put it in the middle by itself"
+            )
+        return local
 
-        Raises
-        ------
-        SceneError
-            Nobody can tell where they lie, or they are too far away; ``what`` begins the message.
-        """
-        if system != self.system and 0 in (system.code, self.system.code):
+    def offsets(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
+        """Metres from the origin, (n, 2), of points (n, 2) of a system, however far."""
+        if (system.code == 0) != (self.system.code == 0):
             known, other = ("the scene", "the file") if system.code == 0 else ("the file", "the scene")
             raise SceneError(
                 f"{what}{known} lies on Earth, and the coordinate system of {other} is not known; set Coordinate "
                 "System to its EPSG code, or turn on New Origin"
             )
-        local = between(points, system, self.system) - [self.east, self.north]
-        far = np.abs(local).max(initial=0.0)
-        if not far < MOST_AWAY:
-            raise SceneError(
-                f"{what}lies {far / 1000.0:,.0f} km from what was imported before; set Coordinate System to the EPSG "
-                "code of the file, or turn on New Origin"
-                if np.isfinite(far)
-                else f"{what}lies too far from what was imported before; turn on New Origin"
-            )
-        return local
+        return between(points, system, self.system) - [self.east, self.north]
 
 
 #: Metres from the origin within which all of a scene must lie.
@@ -243,18 +518,27 @@ MOST_AWAY = 250_000.0
 
 
 def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float64], what: str = "") -> MapOrigin:
-    """The place for a scene whose first data lie between two corners, (2,) each; in whole metres.
-
-    Raises
-    ------
-    SceneError
-        They are no places on Earth.
-    """
+    """The place for a scene whose first data lie between two corners, (2,) each; in whole metres."""
     middle = (np.asarray(low, np.float64) + high) / 2.0
-    if system.metric:
-        east, north = np.round(middle).tolist()
-        return MapOrigin(system, east, north)
-    longitude, latitude = np.round(to_degrees(system, middle[None])[0], 6).tolist()
-    if not (abs(longitude) <= 360.0 and abs(latitude) < 89.0):
-        raise SceneError(readable(f"{what}{longitude:g}, {latitude:g} is no longitude and latitude with room about it"))
-    return MapOrigin(System(-1, longitude, latitude), 0.0, 0.0)
+    if system.metric or system.code == 0:
+        east, north = np.round(system.unit * middle).tolist()
+        place = MapOrigin(system if system.code else System(), east, north)
+    else:
+        longitude, latitude = np.round(to_degrees(system, middle[None])[0], 6).tolist()
+        if not (abs(longitude) <= 360.0 and abs(latitude) < 89.0):
+            raise SceneError(
+                readable(f"{what}{longitude:g}, {latitude:g} is no longitude and latitude with room about it")
+            )
+        place = MapOrigin(System(-1, longitude, latitude), 0.0, 0.0)
+    sides = between(
+        np.array([[low[0], middle[1]], [high[0], middle[1]], [middle[0], low[1]], [middle[0], high[1]]]),
+        system,
+        place.system,
+    )
+    width, depth = np.linalg.norm(sides[1::2] - sides[::2], axis=1) / 1000.0
+    if not max(width, depth) < 2.0 * MOST_AWAY / 1000.0:
+        raise SceneError(
+            f"{what}it is {width:,.0f} by {depth:,.0f} km large; choose a Crop, or crop it to "
+            f"{MOST_AWAY / 500.0:,.0f} km or less"
+        )
+    return place

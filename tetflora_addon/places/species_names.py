@@ -11,15 +11,14 @@ where German and Dutch join words: ``Sumpfeiche`` is an oak, ``pseudoacacia`` no
 
 from __future__ import annotations
 
-import json
 import re
 import unicodedata
 from collections.abc import Container, Iterator, Sequence
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import readable
+from . import table
 
 #: How sure a name is: the species itself, another of its genus, of nearest kin, or only conifer or broadleaf.
 SPECIES, GENUS, KIN, KIND = range(4)
@@ -32,6 +31,7 @@ _FIRST, _JOINING = {"fr", "es", "it"}, {"de", "nl"}
 #: Words that the former have between others, and adjectives that they put first.
 _LINKS = {"de", "du", "des", "d", "del", "della", "dei", "di", "do", "da", "a", "al", "aux", "la", "le", "les", "el"}
 _BEFORE = {"grand", "petit", "gran", "gros", "vrai", "faux", "fausse", "jeune", "arbre", "arbol", "albero", "grande"}
+_FALSE = {"faux", "fausse", "falso", "falsa", "false"}
 _AFTER = {"tree", "trees", "shrub", "bush", "baum", "strauch", "arbre", "arbol", "albero", "boom", "common", "other"}
 _LEAST = 4  # letters of a word that may be the end of another
 _LONG = 6  # letters of a genus that may be misspelt by one
@@ -44,29 +44,16 @@ class Match(NamedTuple):
     certainty: int
 
 
-class _Word(NamedTuple):
-    """What a common name means, and whether it may begin or end a longer one."""
-
-    match: Match
-    first: bool
-    last: bool
-
-
 class _Names(NamedTuple):
-    """The table as it is looked up; keys are joined words."""
+    """The table as it is looked up; keys are joined words. Common names may begin or end longer ones."""
 
     whole: dict[str, Match]
     genera: dict[str, Match]
     misspelt: dict[str, set[str]]
-    words: dict[str, _Word]
+    first: dict[str, Match]
+    last: dict[str, Match]
     endings: dict[str, Match]
     codes: dict[str, Match]
-
-
-@cache
-def table() -> dict[str, dict]:
-    """What `species_names.json` holds."""
-    return json.loads(Path(__file__).with_name("species_names.json").read_text(encoding="utf-8"))
 
 
 def words_of(name: str) -> list[str]:
@@ -95,14 +82,16 @@ def names_in(groups: dict[str, dict[str, str]], separator: str | None = None) ->
 
 
 def _shorter(word: str) -> Iterator[str]:
+    """A word, and without one of its letters after the first."""
     yield word
     yield from (word[:i] + word[i + 1 :] for i in range(1, len(word)))
 
 
 @cache
 def _known() -> _Names:
-    data = table()
-    known = _Names({}, {}, {}, {}, {}, {})
+    """The table, indexed by joined words."""
+    data = table("species_names")
+    known = _Names({}, {}, {}, {}, {}, {}, {})
     own = {words_of(name)[0] for names in data["species"].values() for name in names["scientific"]}
     for family, groups in data["families"].items():
         for kin, genus in names_in(groups):
@@ -117,18 +106,19 @@ def _known() -> _Names:
             known.whole.setdefault(key_of(name), Match(species, SPECIES))
     for species, names in data["kin"].items():
         known.whole.update((key_of(name), Match(species, KIN)) for name in names)
-    known.words.update((key, _Word(match, True, True)) for key, match in known.genera.items())
+    known.first.update(known.genera)
+    known.last.update(known.genera)
     for language, groups in data["common"].items():
         for genus, name in names_in(groups, ","):
             match = known.genera.get(key_of(genus)) or known.whole[key_of(genus)]
-            key, first = key_of(name), language in _FIRST
-            before = known.words.get(key, _Word(match, False, False))
-            known.words[key] = _Word(before.match, before.first or first, before.last or not first)
+            key = key_of(name)
             if language in _JOINING and len(key) >= _LEAST:
                 known.endings.setdefault(key, match)
+            way = known.first if language in _FIRST else known.last
+            way[key] = known.first.get(key) or known.last.get(key) or match
     for key, match in known.whole.items():
-        if len(key) > _LONG:
-            known.words.setdefault(key, _Word(match, True, True))
+        if len(key) > _LONG and key not in known.first and key not in known.last:
+            known.first[key] = known.last[key] = match
     for kind, names in data["kinds"].items():
         known.whole.update((key_of(name), Match(kind, KIND)) for name in names)
     scientific = [name.split()[:2] for names in data["species"].values() for name in names["scientific"]]
@@ -186,13 +176,14 @@ def best_of(names: Sequence[str], among: Container[str] | None = None) -> tuple[
 
 
 def _named(words: list[str]) -> Match | None:
+    """What words mean as a whole or as a common name."""
     return _exactly(words) or _common(words)
 
 
 def _exactly(words: list[str]) -> Match | None:
     """What words mean as a whole."""
     known, key = _known(), "".join(words)
-    return known.whole.get(key) or (known.words[key].match if key in known.words else None)
+    return known.whole.get(key) or known.first.get(key) or known.last.get(key)
 
 
 def _scientific(words: list[str]) -> Match | None:
@@ -212,14 +203,16 @@ def _common(words: list[str]) -> Match | None:
     """What a common name names: its first or last words."""
     known = _known()
     keys = ["".join(words[i:]) for i in range(len(words))]
-    last = next((word.match for key in keys if (word := known.words.get(key)) and word.last), None)
+    last = next((known.last[key] for key in keys if key in known.last), None)
     if last is None and len(words) > 1 and words[-1] in _AFTER:
         return _named(words[:-1])
-    begin = words
+    begin, false = words, next((i for i, word in enumerate(words) if i and word in _FALSE), 0)
+    if false and (match := _named(words[:false])):  # "robinier faux acacia"
+        return match
     while begin and begin[0] in (_LINKS if len(begin) < len(words) else _BEFORE):
         begin = begin[1:]
     keys = ["".join(way[:i]) for way in (words, begin) for i in range(len(way), 0, -1)]
-    first = next((word.match for key in keys if (word := known.words.get(key)) and word.first), None)
+    first = next((known.first[key] for key in keys if key in known.first), None)
     found = first or last if _LINKS.intersection(words) else last or first
     if found is not None:
         return found
@@ -229,18 +222,13 @@ def _common(words: list[str]) -> Match | None:
             if match is not None:
                 return match
     inner = ("".join(words[i:j]) for j in range(len(words) - 1, 0, -1) for i in range(j))
-    return next((word.match for key in inner if (word := known.words.get(key)) and word.last and len(key) > 2), None)
+    return next((known.last[key] for key in inner if key in known.last and len(key) > 2), None)
 
 
 @cache
-def _unknown() -> set[str]:
-    """Words of names that name nothing."""
-    return set(table()["unknown"].split())
-
-
 def is_name(text: str) -> bool:
     """Whether a text names any plant at all."""
-    return not set(plain_words(text)) <= _unknown()
+    return not set(plain_words(text)).issubset(table("species_names")["unknown"].split())
 
 
 def told(names: dict[str, int], most: int = 8) -> str:

@@ -8,41 +8,21 @@ The words are in `titles.json`. A title is cut into them wherever it hides them:
 
 from __future__ import annotations
 
-import json
 import re
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
+from . import table
 from .species_names import plain_words
 
+_TABLE = table("titles")
 #: What a column may hold, with its name for artists.
-FIELDS = {
-    "": "Not Used",
-    "name": "Species",
-    "common": "Common Name",
-    "genus": "Genus",
-    "family": "Family",
-    "leaf": "Conifer or Broadleaf",
-    "height": "Height",
-    "diameter": "Trunk Diameter",
-    "girth": "Trunk Girth",
-    "crown_width": "Crown Width",
-    "crown_radius": "Crown Radius",
-    "crown_base": "Crown Base",
-    "age": "Age",
-    "planted": "Year of Planting",
-    "status": "Status",
-    "dead": "Dead",
-    "x": "X, East",
-    "y": "Y, North",
-    "longitude": "Longitude",
-    "latitude": "Latitude",
-    "place": "Both Coordinates",
-}
+FIELDS: dict[str, str] = _TABLE["fields"]
 #: Fields that may be told by several columns.
 NAMES = ("genus", "name", "common", "leaf", "family")
 _SIZES = {"h": "height", "d": "diameter", "z": "z", "e": "x", "n": "y"}  # of a single letter
+#: Meanings of what may stand beside them, as in "H tot" and "E UTM"; True for numbers, as in "LV95 E".
+_BESIDE = {"h": {"filler", "dead"}, "d": {"filler"}, "z": {"filler"}, "e": {"grid", True}, "n": {"grid", True}}
 _MOST_UNKNOWN = 4  # letters that may stand beside words that are known
 _SHORTEST = 4  # letters of the beginning of a word, where a name ends after ten
 _STRONG = {"breast", "girth"}
@@ -71,23 +51,17 @@ class Title(NamedTuple):
 
 
 @cache
-def table() -> dict:
-    """What `titles.json` holds."""
-    return json.loads(Path(__file__).with_name("titles.json").read_text(encoding="utf-8"))
-
-
-@cache
 def _words() -> tuple[dict[str, str], dict[str, float], dict[str, str]]:
     """Meanings of words, metres of units, and the words that begin with some letters."""
     words, begun = {}, {}
-    for meaning, texts in table()["words"].items():
+    for meaning, texts in _TABLE["words"].items():
         for text in texts.split():
             word = "".join(plain_words(text))
             if word not in words:
                 words[word] = meaning
             for end in range(3, len(word)):
                 begun.setdefault(word[:end], word)
-    units = {"".join(plain_words(u)): float(m) for m, us in table()["units"].items() for u in us.split()}
+    units = {"".join(plain_words(u)): float(m) for m, us in _TABLE["units"].items() for u in us.split()}
     return words, units, begun
 
 
@@ -119,7 +93,8 @@ def _cut(text: str) -> list[str]:
 def read_title(title: str) -> Title:
     """What a title says."""
     words, units, _ = _words()
-    title = re.sub(r"(?i)\bd[ _]?1[.,]?30?\b", "dbh", title[:200])  # the diameter at 1.3 m
+    title = re.sub(r"(?i)\bd[ _]?(?:1[.,]?30?|bh)(?![a-z0-9])", "dbh", title[:200])  # the diameter at 1.3 m
+    title = re.sub(r"(?i)(stamm|kronen?)[ _]?dm(?![a-z])", r"\1durchmesser", title)
     once = re.sub(r"[^\W\d_]+", lambda run: re.sub(r"(?<=[a-z])(?=[A-Z])", " ", run[0]), title)
     ways = [[part for word in plain_words(text) for part in _parts(word)] for text in dict.fromkeys((title, once))]
     parts = min(ways, key=lambda way: (sum(part.startswith("?") for part in way), len(way)))
@@ -132,12 +107,13 @@ def read_title(title: str) -> Title:
         elif not part.isdigit() and part not in units:
             unknown += len(part.lstrip("?"))
     plain = [part.lstrip("?") for part in parts if part not in units or part == parts[0]]
-    if len(plain) == 1 and plain[0] in _SIZES:
-        return Title(_SIZES[plain[0]], unit, 0)
+    letter = next((part for part in plain if part in _SIZES), None)
+    if letter and all(part == letter or words.get(part, part.isdigit()) in _BESIDE[letter] for part in plain):
+        return Title(_SIZES[letter], unit, 0)
     field, doubt = _field(set(meant) - {"filler"})
     if unknown > _MOST_UNKNOWN and not _STRONG.intersection(meant):
         field = ""
-    if unknown and field == "crown_width" and "crown" not in meant:
+    if (unknown > 1 and field == "place") or (unknown and field == "crown_width" and "crown" not in meant):
         field = ""
     return Title(field, unit if field else 0.0, doubt + (unknown > 0), "class" in meant)
 
@@ -149,65 +125,21 @@ def _parts(word: str) -> list[str]:
 
 
 def _field(meant: set[str]) -> tuple[str, int]:
-    """The field that meanings of words make up, and the doubt."""
-    if {"plant", "year"} <= meant:
-        return "planted", 0
-    if "cultivar" in meant and not meant & {"species", "genus"}:
-        return "", NEVER
-    meant = meant - {"plant", "cultivar"}
-    if "veto" in meant or ("id" in meant and not meant & {"breast", "girth", "crown", "height", "diameter"}):
-        return "", NEVER
-    if meant & {"species", "genus", "name", "latin", "common"} and "lat" in meant:
-        meant = (meant - {"lat"}) | {"latin"}
-    place = meant & {"x", "y", "longitude", "latitude", "lat", "place"}
-    if place and not meant - place - {"grid", "width"}:
-        core = place - {"place"}
-        for name, also in (("longitude", {"x"}), ("latitude", {"lat", "y"})):
-            if core & {name, "lat"} and core <= {name, *also}:
-                return name, 0
-        return (core.pop(), 0) if len(core) == 1 else ("place", 1)
-    if meant == {"grid"}:
-        return "place", 2
-    sizes = meant - {"trunk", "class", "name", "type", "id"}
-    if "crown" in sizes:
-        if sizes & {"status", "species", "age"}:
-            return "", 0
-        by = next((name for name in ("radius", "base") if name in sizes), "width")
-        return ("height", 2) if by == "width" and "height" in sizes and "diameter" not in sizes else (f"crown_{by}", 0)
-    if meant & {"planted"} and not meant & {"species", "genus", "name", "height"}:
-        return "planted", 0
-    for name, field in (("girth", "girth"), ("breast", "diameter"), ("diameter", "diameter")):
-        if name in sizes:
-            return field, 0
-    if sizes & {"base"} or {"trunk", "height"} <= meant:  # the height of a trunk is that below the crown
-        return ("crown_base", 0) if "height" in sizes else ("", 0)
-    for name, field in (("height", "height"), ("width", "crown_width"), ("age", "age")):
-        if name in sizes:
-            return field, 0
-    if meant & {"dead", "status"}:
-        return ("dead" if "dead" in meant else "status"), 0
-    if "family" in meant:
-        return "family", 0
-    if "genus" in meant:
-        return ("common", 0) if "common" in meant else ("name", 0) if "species" in meant else ("genus", 0)
-    if "common" in meant:
-        return "common", int(not meant & {"species", "name", "type"})
-    if meant & {"latin", "species"}:
-        return "name", 0
-    if "leaf" in meant:
-        return "leaf", 0
-    return ("common", 2) if meant & {"name", "type"} else ("", 0)
+    """The field that meanings of words make up, and the doubt, by the first rule that fits.
 
-
-def meaning(title: str) -> tuple[str, float]:
-    """What a column holds, empty if unknown, and the metres of its unit, 0 if it names none."""
-    found = read_title(title)
-    return found.field, found.unit
+    Of a rule ``a|b !c =d|e`` there is one of a and b, no c, and nothing but d and e.
+    """
+    for rule, name, doubt in _TABLE["rules"]:
+        parts = [(part[0], meant.intersection(part.lstrip("!=").split("|"))) for part in rule.split()]
+        if all(some == meant if way == "=" else bool(some) != (way == "!") for way, some in parts):
+            return name, doubt
+    return "", 0
 
 
 @cache
 def _values() -> dict[tuple[str, ...], str]:
-    values = {what: texts for what, texts in table()["values"].items() if what != "rest"}
+    """What words of cells say, by these words."""
+    values = {what: texts for what, texts in _TABLE["values"].items() if what != "rest"}
     return {tuple(plain_words(text)): what for what, texts in values.items() for text in texts.split(";")}
 
 
@@ -217,7 +149,7 @@ def said_of(text: str) -> str:
 
     "Dead" and "dead tree" say it, "dead branches" does not; after "vacant" anything may stand.
     """
-    words, rest = tuple(plain_words(text)), set(table()["values"]["rest"].split())
+    words, rest = tuple(plain_words(text)), set(_TABLE["values"]["rest"].split())
     for end in range(min(len(words), 4), 0, -1):
         what = _values().get(words[:end], "")
         if what and (what in ("vacant", "stump", "planned") or rest.issuperset(words[end:])):

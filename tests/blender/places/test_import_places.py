@@ -22,8 +22,8 @@ from tests.blender.scenes import depsgraph, select
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.places import columns, outlines, trees
 from tetflora_addon.blender.places.completion import curves_of
-from tetflora_addon.blender.places.origin import KEY, origin_of
-from tetflora_addon.blender.places.rasters import read_raster
+from tetflora_addon.blender.places.origin import KEY, Import, importing, origin_of
+from tetflora_addon.blender.places.terrain import read_raster
 from tetflora_addon.blender.placing.terrain import lines_of, read_ground
 from tetflora_addon.blender.runtime import GoneError
 from tetflora_addon.blender.species.edits import species_for
@@ -39,6 +39,10 @@ def _call(operator, path, **options):
     return bpy.context.view_layer.objects.active
 
 
+def _raster(path, **settings):
+    return importing(read_raster)(Import(bpy.context.scene, depsgraph(), path, **settings))
+
+
 def _vertices(obj):
     return read(obj.data, "position").astype(np.float64) + np.array(obj.location)
 
@@ -52,7 +56,7 @@ def test_pixels_of_tiff_are_what_was_written(tmp_path, dtype, order):
         values[3, 3] = -250
     path = tmp_path / "a.tif"
     path.write_bytes(files.geotiff(values, order=order))
-    raster = at_once(read_raster(path, 0, 1.0, 0.0))
+    raster = at_once(_raster(path))
     expected = values.astype(np.float64)
     expected[expected == -9999] = np.nan
     np.testing.assert_allclose(raster.values, expected, atol=1e-2 if dtype != np.uint32 else 200.0)
@@ -65,7 +69,7 @@ def test_cells_of_a_tiff_that_are_no_number_are_holes(tmp_path, dtype):
     values[0, 1], values[2, 3], values[4, 4] = np.nan, np.inf, -np.inf
     path = tmp_path / "a.tif"
     path.write_bytes(files.geotiff(values, nothing=None))
-    found = at_once(read_raster(path, 0, 1.0, 0.0)).values
+    found = at_once(_raster(path)).values
     np.testing.assert_allclose(found, np.where(np.isfinite(values), values, np.nan), rtol=1e-6)
 
 
@@ -78,17 +82,17 @@ def test_whole_numbers_of_a_tiff_stay_whole(tmp_path, dtype):
     path = tmp_path / "a.tif"
     for nothing in (low, 0, int(values[17, 5]), high):
         path.write_bytes(files.geotiff(values, nothing=f"{nothing}\0".encode()))
-        found = at_once(read_raster(path, 0, 1.0, 0.0)).values
+        found = at_once(_raster(path)).values
         np.testing.assert_array_equal(found, np.where(values == nothing, np.nan, values.astype(np.float64)))
     values[3, 3] = limits.min
     path.write_bytes(files.geotiff(values, nothing=f"{limits.min}\0".encode()))
-    assert np.isnan(at_once(read_raster(path, 0, 1.0, 0.0)).values[3, 3])
+    assert np.isnan(at_once(_raster(path)).values[3, 3])
 
 
 @pytest.mark.parametrize("ending", [".asc", ".tif", ".png"])
 def test_a_missing_raster_is_told(tmp_path, ending):
     with pytest.raises(SceneError, match="No such file or directory"):
-        at_once(read_raster(tmp_path / f"a{ending}", 0, 1.0, 0.0))
+        at_once(_raster(tmp_path / f"a{ending}"))
 
 
 def test_pixels_of_png_and_ascii_grids(tmp_path):
@@ -97,15 +101,15 @@ def test_pixels_of_png_and_ascii_grids(tmp_path):
     path = tmp_path / "a.png"
     path.write_bytes(files.png(values))
     path.with_suffix(".pgw").write_bytes(files.WORLD)
-    image = at_once(read_raster(path, 25832, 0.01, -5.0))
+    image = at_once(_raster(path, code=25832, factor=0.01, shift=-5.0))
     grid = tmp_path / "a.asc"
     grid.write_text(files.ascii_grid(values / 100.0 - 5.0, 5.0, 499_997.5, 5_315_972.5))
-    text = at_once(read_raster(grid, 25832, 1.0, 0.0))
+    text = at_once(_raster(grid, code=25832))
     np.testing.assert_allclose(image.values, text.values, atol=1e-3)
     np.testing.assert_allclose(image.outline, text.outline)
     path.with_suffix(".pgw").unlink()
-    with pytest.raises(SceneError, match="no world file"):
-        at_once(read_raster(path, 0, 1.0, 0.0))
+    with pytest.raises(SceneError, match="nothing tells where it lies, neither tags nor a world file"):
+        at_once(_raster(path))
 
 
 def test_terrain_trees_and_outlines_align(tmp_path):
@@ -139,7 +143,7 @@ def test_terrain_trees_and_outlines_align(tmp_path):
     found = _vertices(field)
     np.testing.assert_allclose(found[:, :2], spots - [place.east, place.north], atol=2e-3)
     column, row = (spots[:, 0] - files.EAST) / 5.0 - 0.5, (files.NORTH - spots[:, 1]) / 5.0 - 0.5
-    raster = at_once(read_raster(path, 0, 1.0, 0.0))
+    raster = at_once(_raster(path))
     np.testing.assert_allclose(found[:, 2], raster.at(column, row), atol=0.1)
     # Outlines too; a road is a path of its width, a wood with a hole one closed curve.
     ring = [[0.0, 0.0], [50.0, 0.0], [50.0, 50.0], [0.0, 50.0]]
@@ -225,6 +229,19 @@ def test_thin_trunks_are_trees_above_breast_height():
     assert heights.max() < 6.0
 
 
+def test_trees_beside_the_ground_are_told(tmp_path, capfd):
+    ground = tmp_path / "a.asc"
+    ground.write_text(files.ascii_grid(files.hills(20), 5.0))
+    _call("import_terrain", ground)
+    path = tmp_path / "a.csv"
+    path.write_text(
+        f"species,x,y\noak,{files.EAST + 50},{files.NORTH + 50}\noak,{files.EAST + 50},{files.NORTH + 500}\n"
+    )
+    field = _call("import_inventory", path)
+    assert "1 stand beside the ground" in capfd.readouterr().out
+    assert (_vertices(field)[:, 2] > 300.0).all()
+
+
 def test_far_rows_are_named_before_any_import():
     path = inventories.FOLDER / "inv06_two_far_rows.csv"
     with pytest.raises(RuntimeError, match=r"line 12.*line 13") as caught:
@@ -237,7 +254,7 @@ def test_large_areas_are_cropped(tmp_path, capfd):
     path = tmp_path / "a.csv"
     rows = [(9.0 + 0.5 * n, 48.0) for n in range(15)] + [(12.5001, 48.0001)]
     path.write_text("species,lon,lat\n" + "".join(f"oak,{x},{y}\n" for x, y in rows))
-    with pytest.raises(RuntimeError, match=r"an area of 522 by 6 km; choose a Crop"):
+    with pytest.raises(RuntimeError, match=r"it is 52\d by \d km large; choose a Crop"):
         _call("import_inventory", path)
     with pytest.raises(RuntimeError, match="nothing was imported yet"):
         _call("import_inventory", path, crop='EXISTING')
@@ -245,6 +262,29 @@ def test_large_areas_are_cropped(tmp_path, capfd):
     assert "14 beyond the Crop" in capfd.readouterr().out
     # What the scene has is now a box of some metres about two trees.
     assert len(_call("import_inventory", path, crop='EXISTING').data.vertices) == 2
+
+
+def test_rasters_and_outlines_are_cropped(tmp_path, capfd):
+    path = tmp_path / "a.tif"
+    values = files.hills(40)
+    path.write_bytes(files.geotiff(values, 5.0))
+    ground = _call("import_terrain", path, crop='MIDDLE', crop_size=50.0)
+    assert len(ground.data.vertices) == 12 * 12  # cells that the box touches
+    np.testing.assert_allclose(np.unique(_vertices(ground)[:, 2]), np.unique(values[14:26, 14:26]), atol=1e-4)
+    whole = _call("import_terrain", path, crop='EXISTING')
+    assert len(whole.data.vertices) in range(12 * 12, 14 * 14 + 1)
+    squares = tmp_path / "a.geojson"
+    corner = np.array([origin_of(bpy.context.scene).east, origin_of(bpy.context.scene).north])
+    rings = [np.array([[0, 0], [9, 0], [9, 9], [0, 0]], float) + off for off in (corner, corner + 900.0)]
+    features = [files.feature("Polygon", [to_degrees(System(25832), ring).tolist()], building="yes") for ring in rings]
+    squares.write_text(files.collection(*features))
+    _call("import_outlines", squares, crop='EXISTING')
+    assert len(bpy.data.collections["Buildings"].objects) == 1
+    assert "1 beyond the Crop" in capfd.readouterr().out
+    path.write_bytes(files.geotiff(values, 5.0, west=files.EAST + 5000.0))
+    for operator, file in (("import_terrain", path), ("import_canopy", path)):
+        with pytest.raises(RuntimeError, match="nothing of it lies within the Crop"):
+            _call(operator, file, crop='EXISTING')
 
 
 def test_a_mapping_from_scripts_and_from_the_dialog(tmp_path):
@@ -315,9 +355,9 @@ def test_closing_the_steps_leaves_everything_as_it_was(tmp_path, kind):
     before = everything()
     for number in (1, 2, 4, 6):
         steps = {
-            "grid": lambda: terrain.terrain_steps(scene, path, 1000, 0, 1.0, 0.0, False),
-            "csv": lambda: trees.inventory_steps(scene, depsgraph(), path, [], "GENERIC", 0, "METRIC", False, False),
-            "outlines": lambda: outlines.outline_steps(scene, depsgraph(), path, [], 0, False),
+            "grid": lambda: terrain.terrain_steps(Import(scene, depsgraph(), path), 1000),
+            "csv": lambda: trees.inventory_steps(Import(scene, depsgraph(), path), "GENERIC", "METRIC", False),
+            "outlines": lambda: outlines.outline_steps(Import(scene, depsgraph(), path)),
         }[kind]()
         for _ in range(number):
             if next(steps, None) is None:
@@ -334,9 +374,9 @@ def test_imports_stop_when_their_view_layer_goes(tmp_path, kind):
     graph = depsgraph()
     scene.view_layers.new("Other")
     steps = {
-        "csv": lambda: trees.inventory_steps(scene, graph, path, [], "GENERIC", 0, "METRIC", False, False),
-        "big_tiff": lambda: trees.canopy_steps(scene, graph, path, [], {"beech": 1.0}, 3.0, 0, 1.0, 0.0, False),
-        "outlines": lambda: outlines.outline_steps(scene, graph, path, [], 0, False),
+        "csv": lambda: trees.inventory_steps(Import(scene, graph, path), "GENERIC", "METRIC", False),
+        "big_tiff": lambda: trees.canopy_steps(Import(scene, graph, path), {"beech": 1.0}, 3.0),
+        "outlines": lambda: outlines.outline_steps(Import(scene, graph, path)),
     }[kind]()
     next(steps)
     scene.view_layers.remove(scene.view_layers["ViewLayer"])

@@ -11,20 +11,17 @@ import pytest
 from benchmarks import places_files as files
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
-from tetflora_addon.places.geotiff import read_head
+from tetflora_addon.places.grids import read_grid
 from tetflora_addon.places.inventories import read_inventory
 from tetflora_addon.places.outlines import read_outlines
-from tetflora_addon.places.rasters import read_ascii
 
-_READERS = {
-    "grid": lambda path: at_once(read_ascii(path)),
-    "tiff": read_head,
-    "tiff_16": read_head,
-    "big_tiff": read_head,
-    "csv": read_inventory,
-    "points": read_inventory,
-    "outlines": read_outlines,
+_OPERATORS = {
+    "import_terrain": lambda path: at_once(read_grid(path)),
+    "import_canopy": lambda path: at_once(read_grid(path)),
+    "import_inventory": read_inventory,
+    "import_outlines": read_outlines,
 }
+_READERS = {kind: _OPERATORS[operator] for kind, (operator, *_) in files.FILES.items() if kind != "png"}
 
 
 @pytest.mark.filterwarnings("error")

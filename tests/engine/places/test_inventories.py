@@ -13,10 +13,10 @@ import pytest
 from benchmarks import places_files as files
 from benchmarks import places_inventories as inventories
 from tetflora_addon.errors import SceneError
-from tetflora_addon.places import cells
+from tetflora_addon.places import table, tables
 from tetflora_addon.places.inventories import IMPERIAL, preview, read_inventory
-from tetflora_addon.places.species_names import GENUS, KIN, KIND, SPECIES, best_of, names_in, species_named, table, told
-from tetflora_addon.places.titles import FIELDS, meaning, said_of
+from tetflora_addon.places.species_names import GENUS, KIN, KIND, SPECIES, best_of, names_in, species_named, told
+from tetflora_addon.places.titles import FIELDS, read_title, said_of
 
 _CATALOGUE = Path(__file__).parents[3] / "tetflora_addon" / "catalogue"
 
@@ -82,13 +82,14 @@ def test_points_of_geojson(tmp_path):
     ],
 )
 def test_what_columns_mean(title, name, unit):
-    assert meaning(title) == (name, unit)
+    assert read_title(title)[:2] == (name, unit)
 
 
 _TITLES = {
-    "height": "TREE_HEIGH, TREEHEIGHTinMETRES, hauteurenm, height_range_id, 樹高",
-    "diameter": "DBH_1_99_, D130, DIAM_BREAS",
-    "crown_width": "Schirmdurchmesser, canopyspre, diametre_houppier, diameter_crown",
+    "height": "TREE_HEIGH, TREEHEIGHTinMETRES, hauteurenm, height_range_id, H_TOT_M, 樹高",
+    "diameter": "DBH_1_99_, D130, DIAM_BREAS, D_BH cm, StammDM",
+    "girth": "StU, PAP",
+    "crown_width": "CRN_DIA_M, kr_durchm, KronenDM, Schirmdurchmesser, canopyspre, diametre_houppier, diameter_crown",
     "crown_base": "crownBaseHeightM, Kronenansatzhöhe",
     "planted": "Pflanzjahr, annee de plantation, plant_date, Year Planted",
     "status": "Tree Status, condition",
@@ -96,8 +97,8 @@ _TITLES = {
     "name": "Name_lat, tradart_vet, SP_CODE, GATTUNG_ART",
     "common": "Gattung Deutsch, dansk_navn",
     "family": "familia",
-    "x": "POINT_X, X_L93",
-    "y": "yRel, Y_LAMBERT93",
+    "x": "POINT_X, X_L93, Standort_X, RW, E_UTM, lv95_e",
+    "y": "yRel, Y_LAMBERT93, HW, N_UTM",
     "place": "geo_point_2d, the_geom, WKT",
     "latitude": "LAT_WGS84",
     "longitude": "経度",
@@ -108,7 +109,7 @@ _TITLES = {
 @pytest.mark.parametrize("name", _TITLES)
 def test_words_within_titles(name):
     titles = _TITLES[name].split(", ")
-    assert {title: meaning(title)[0] for title in titles} == dict.fromkeys(titles, name)
+    assert {title: read_title(title).field for title in titles} == dict.fromkeys(titles, name)
 
 
 def test_titles_of_cities():
@@ -117,6 +118,49 @@ def test_titles_of_cities():
 
 def test_names_of_streets_and_parks():
     assert len(inventories.names_unknown()) <= 12, inventories.names_unknown()
+
+
+def test_false_names_are_of_the_genus_before_them():
+    names = "Robinier faux-acacia", "Érable faux platane", "Chêne faux-liège", "Falsa acacia"
+    assert [species_named(name).species for name in names] == ["ash", "maple", "oak", "ash"]
+
+
+def test_degrees_minutes_and_seconds(tmp_path):
+    found = _read(tmp_path, "species\tlat\tlon\noak\t48°06'00\"N\t9°05′60\"W\n")
+    assert found.points[0] == pytest.approx([-9.1, 48.1])
+
+
+def test_degrees_in_german_and_below_addresses(tmp_path):
+    found = _read(tmp_path, "Art;Länge;Breite\nEiche;9,1;48,1\n")
+    assert found.points.tolist() == [[9.1, 48.1]] and not found.sizes["crown_width"].any()
+    found = _read(tmp_path, 'species,Location\noak,"12 Main St\n(42.36, -71.05)"\n')
+    assert found.points.tolist() == [[-71.05, 42.36]]
+
+
+def test_rounded_degrees_called_x_and_y(tmp_path):
+    text = "species,x,y\npine,12.49,41.89\npine,12.48,41.88\n"
+    assert _read(tmp_path, text).system.code == 4326
+    assert _read(tmp_path, text.replace("48,", "98,")).system.code == 0  # a plot
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "01010000003333333333332240CDCCCCCCCC0C4840",
+        "0101000020E61000003333333333332240CDCCCCCCCC0C4840",
+        "POLYGON (("
+        + ", ".join(f"{9.1 + 1e-5 * a} {48.1 + 1e-5 * b}" for a, b in [(0, 0), (1, 0), (1, 1), (0, 1)] * 4)
+        + "))",
+    ],
+)
+def test_places_of_databases(tmp_path, place):
+    found = _read(tmp_path, f'species,geom\noak,"{place}"\n')
+    assert found.points[0] == pytest.approx([9.1, 48.1], abs=1e-4)
+
+
+def test_who_planted_a_tree_is_no_year(tmp_path):
+    found = _read(tmp_path, "species,planted by,x,y\noak,Jones,0,0\n")
+    assert "columns not used: planted by" in found.notes
 
 
 @pytest.mark.parametrize("name", inventories.cases())
@@ -233,7 +277,7 @@ def test_a_scientific_name_counts_before_a_common_one():
 
 
 def test_the_table_of_names_fits_the_catalogue():
-    known, data = {path.stem for path in _CATALOGUE.glob("*.json")}, table()
+    known, data = {path.stem for path in _CATALOGUE.glob("*.json")}, table("species_names")
     kin = {kin for groups in data["families"].values() for kin, _ in names_in(groups)}
     assert {*data["species"], *data["kin"], *data["kinds"], *kin} <= known
     # Each entry stands below a source that is explained.
@@ -268,7 +312,7 @@ def test_the_table_of_names_fits_the_catalogue():
     ],
 )
 def test_numbers_as_people_write_them(text, value, unit):
-    values, units, _ = cells.cells(np.array([text]))
+    values, units, _ = tables.cells(np.array([text]))
     assert (values[0], units[0]) == pytest.approx((value, unit), nan_ok=True)
 
 

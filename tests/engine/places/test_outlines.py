@@ -49,6 +49,10 @@ def test_kinds_widths_and_heights(tmp_path):
         ("Polygon", _AREA, {"building": "yes", "building:levels": "3"}, (BUILDING, 0.0, 9.0)),
         ("Polygon", _AREA, {"building": "no", "landuse": "meadow"}, (MEADOW, 0.0, 0.0)),
         ("Polygon", _AREA, {"building": "yes", "height": "about 20"}, (BUILDING, 0.0, 7.0)),
+        ("Polygon", _AREA, {"building": "yes", "roof:height": "3", "height": "~12m"}, (BUILDING, 0.0, 12.0)),
+        ("Polygon", _AREA, {"tags": '{"building": "yes", "height": "9"}'}, (BUILDING, 0.0, 9.0)),
+        ("Polygon", _AREA, {"other_tags": '"name"=>"a \\"b\\"","building"=>"yes"'}, (BUILDING, 0.0, 7.0)),
+        ("Polygon", _AREA, {"Funktion": "Wohnhaus", "HOEHE": "12,4"}, (BUILDING, 0.0, 12.4)),
     ],
 )
 def test_what_features_are(tmp_path, kind, coordinates, properties, expected):
@@ -64,8 +68,8 @@ def test_what_features_are(tmp_path, kind, coordinates, properties, expected):
         ({"type": "FeatureCollection", "features": 3}, "must be a list"),
         ({"type": "FeatureCollection", "features": []}, "no areas and no lines"),
         (files.feature("Polygon", 3), "feature 1: its coordinates are 3"),
-        (files.feature("Polygon", [[[0, 0], [1, 1]]]), "less than three points"),
-        (files.feature("LineString", [[0, 0]]), "less than two points"),
+        (files.feature("Polygon", [[[0, 0], [1, 1]]]), "no areas and no lines but 1 of too few"),
+        (files.feature("LineString", [[0, 0]]), "no areas and no lines but 1 of too few"),
         (files.feature("LineString", [[0, 0], [0, "1"]]), "no positions"),
         (files.feature("LineString", [[0, 0], [0, 95.0]]), "no longitude and latitude"),
         (files.feature("Curve", _LINE), "'Curve' is no geometry"),

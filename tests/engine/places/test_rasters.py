@@ -11,11 +11,15 @@ from benchmarks import places_files as files
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
 from tetflora_addon.places import rasters
-from tetflora_addon.places.geotiff import read_head
-from tetflora_addon.places.projection import System
+from tetflora_addon.places.geotiff import read_tiff
+from tetflora_addon.places.projection import System, place_about
 from tetflora_addon.places.rasters import Raster, read_ascii, world_file
 
 _HILLS = files.hills(9)
+
+
+def _tiff(path):
+    return at_once(read_tiff(path))
 
 
 def _grid(tmp_path, text):
@@ -75,11 +79,11 @@ def test_blank_text_holds_no_numbers(tmp_path, monkeypatch):
 
 def test_a_file_that_is_missing_or_none(tmp_path):
     with pytest.raises(FileNotFoundError):
-        read_head(tmp_path / "a.tif")
+        _tiff(tmp_path / "a.tif")
     with pytest.raises(SceneError, match="not a regular file"):
-        read_head(tmp_path)
+        _tiff(tmp_path)
     with pytest.raises(SceneError, match="not a regular file"):
-        read_head(tmp_path / "a\0.tif")
+        _tiff(tmp_path / "a\0.tif")
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
@@ -87,30 +91,34 @@ def test_a_file_that_is_missing_or_none(tmp_path):
 def test_tags_of_a_geotiff(tmp_path, order, big):
     path = tmp_path / "a.tif"
     path.write_bytes(files.geotiff(_HILLS, 2.0, order=order, big=big))
-    head = read_head(path)
-    assert (head.width, head.height, head.factor, head.nothing, head.system.code) == (9, 9, 1.0, -9999.0, files.CODE)
-    assert head.corner.tolist() == [files.EAST + 1.0, files.NORTH - 1.0]
-    assert (head.along.tolist(), head.down.tolist()) == ([2.0, 0.0], [0.0, -2.0])
-    for dtype, factor in ((np.uint16, 65535.0), (np.int16, 32767.0), (np.uint8, 255.0), (np.float64, 1.0)):
-        path.write_bytes(files.tiff(np.zeros((3, 4), dtype), order=order, big=big))
-        head = read_head(path)
-        assert (head.width, head.height, head.factor, head.corner) == (4, 3, factor, None)
+    raster = _tiff(path)
+    np.testing.assert_array_equal(raster.values, _HILLS)
+    assert raster.system.code == files.CODE
+    assert raster.corner.tolist() == [files.EAST + 1.0, files.NORTH - 1.0]
+    assert (raster.along.tolist(), raster.down.tolist()) == ([2.0, 0.0], [0.0, -2.0])
 
 
 def test_points_matrices_and_feet(tmp_path):
     path = tmp_path / "a.tif"
-    # Values belong to points, and the plane has no code and counts in feet.
-    keys = [1, 1, 0, 3, 1025, 0, 1, 2, 3072, 0, 1, 32767, 3076, 0, 1, 9002]
+    # Values belong to points, and the plane has no code and counts in feet, heights too.
+    keys = [1, 1, 0, 4, 1025, 0, 1, 2, 3072, 0, 1, 32767, 3076, 0, 1, 9002, 4099, 0, 1, 9002]
     path.write_bytes(files.geotiff(_HILLS, 10.0, extra={34735: (3, keys)}))
-    head = read_head(path)
-    assert head.system.code == 0
-    assert head.corner == pytest.approx([0.3048 * files.EAST, 0.3048 * files.NORTH])
-    assert head.along == pytest.approx([3.048, 0.0])
+    raster = _tiff(path)
+    assert raster.system == System(unit=0.3048)
+    assert raster.system.name == "plain units of 0.3048 m"
+    place = place_about(raster.system, *np.sort(raster.outline[::2], axis=0))
+    local = place.local(raster.places(np.array([0, 1]), np.zeros(2)), raster.system, "")
+    assert local[1] - local[0] == pytest.approx([3.048, 0.0])
+    assert local[0] == pytest.approx(
+        [-3.048 * 0.5 * (_HILLS.shape[1] - 1), 3.048 * 0.5 * (_HILLS.shape[0] - 1)], abs=0.6
+    )
+    np.testing.assert_allclose(raster.values, 0.3048 * _HILLS, rtol=1e-6)
+    assert raster.notes == ("heights in feet read as such",)
     # A turned raster.
     matrix = [0.0, 2.0, 0.0, 100.0, 2.0, 0.0, 0.0, 200.0, *(8 * [0.0])]
     path.write_bytes(files.geotiff(_HILLS, extra={34264: (12, matrix)}))
-    head = read_head(path)
-    assert (head.along.tolist(), head.down.tolist(), head.corner.tolist()) == ([0, 2], [2, 0], [101, 201])
+    raster = _tiff(path)
+    assert (raster.along.tolist(), raster.down.tolist(), raster.corner.tolist()) == ([0, 2], [2, 0], [101, 201])
 
 
 @pytest.mark.parametrize(
@@ -118,6 +126,11 @@ def test_points_matrices_and_feet(tmp_path):
     [
         ({256: None}, r"ImageWidth \(256\) is missing"),
         ({256: (4, [4_000_000_000])}, "in all can be read"),
+        ({259: (3, [34887])}, r"Compression \(259\): it is compressed with LERC.*COMPRESS=DEFLATE"),
+        ({259: (3, [7])}, "compressed with JPEG"),
+        ({259: (3, [8])}, "strip 1 of 1 is damaged"),
+        ({259: (3, [5])}, "strip 1 of 1 ends too early; get it again"),
+        ({278: (4, [0])}, r"RowsPerStrip \(278\) gives pieces of 9 by 0"),
         ({258: (3, [12])}, r"BitsPerSample \(258\) is 12"),
         ({273: None}, r"StripOffsets \(273\) is missing"),
         ({273: (4, [10_000])}, r"StripOffsets \(273\) leads beyond"),
@@ -133,14 +146,15 @@ def test_a_broken_geotiff_is_told_by_its_tag(tmp_path, extra, message):
     path = tmp_path / "a.tif"
     path.write_bytes(files.geotiff(_HILLS, extra=extra))
     with pytest.raises(SceneError, match=message):
-        read_head(path)
+        _tiff(path)
 
 
 def test_world_files(tmp_path):
     path = tmp_path / "a.png"
-    assert world_file(path) is None
+    with pytest.raises(SceneError, match=r"a.png: nothing tells where it lies.*\.pgw"):
+        world_file(path)
     path.with_suffix(".pgw").write_bytes(files.WORLD)
-    corner, along, down, _ = world_file(path)
+    corner, along, down = world_file(path)
     assert (corner.tolist(), along.tolist(), down.tolist()) == ([500000, 5316000], [5, 0], [0, -5])
     path.with_suffix(".pgw").write_text("5\n0\n0\nx\n1\n2\n")
     with pytest.raises(SceneError, match=r"a.pgw: line 4"):

@@ -38,13 +38,7 @@ class TetFloraInventoryColumn(bpy.types.PropertyGroup):
 
 
 def show_columns(table: bpy.types.bpy_prop_collection, path: Path) -> None:
-    """Fill a table with the columns of a file.
-
-    Raises
-    ------
-    OSError, SceneError
-        As `preview`.
-    """
+    """Fill a table with the columns of a file."""
     for column in preview(path):
         row = table.add()
         row.name, row.field, row.values = column.title, column.field.upper() or 'NONE', ", ".join(column.values)
@@ -57,13 +51,7 @@ def chosen_columns(table: Iterable[TetFloraInventoryColumn]) -> str:
 
 
 def columns_in(text: str) -> dict[str, str]:
-    """What columns hold by their titles, from JSON.
-
-    Raises
-    ------
-    SceneError
-        It is none.
-    """
+    """What columns hold by their titles, from JSON."""
     try:
         columns = json.loads(text or "{}")
     except (ValueError, RecursionError) as error:

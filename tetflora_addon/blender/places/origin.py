@@ -1,8 +1,17 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where on a map the origin of a scene is: found by the first import, and shared by all later ones."""
+"""What all imports share: their settings, the job that they are, and where on a map the scene's origin is.
+
+The first import of a scene finds that place, and all later ones lie where they are in relation to it.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from functools import wraps
+from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -10,27 +19,26 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...places.projection import MOST_AWAY, MapOrigin, System, between, place_about, system_of
+from ...jobs import Progress
+from ...places.projection import MapOrigin, System, between, place_about, system_of
+from ..runtime import JobData, guarded
 
 #: Custom property of the scene.
 KEY = "tetflora_place"
+_STORED = ("code", "longitude", "latitude", "east", "north")
+#: On objects that are imported ground.
+TERRAIN = "tetflora_terrain"
 #: What an import may be cropped to: nothing, a box around its middle, or what the scene has there already.
 WHOLE, MIDDLE, EXISTING = 'WHOLE', 'MIDDLE', 'EXISTING'
 
 
 def origin_of(scene: bpy.types.Scene) -> MapOrigin | None:
-    """The place of a scene; None before its first import.
-
-    Raises
-    ------
-    SceneError
-        What is stored cannot be a place.
-    """
+    """The place of a scene; None before its first import."""
     stored = scene.get(KEY)
     if stored is None:
         return None
     try:
-        code, *numbers = (float(stored[name]) for name in ("code", "longitude", "latitude", "east", "north"))
+        code, *numbers = (float(stored[name]) for name in _STORED)
         if not np.isfinite(numbers).all() or np.abs(numbers).max() > 1e9:
             raise ValueError
         system = System(int(code), *numbers[:2])
@@ -43,85 +51,146 @@ def origin_of(scene: bpy.types.Scene) -> MapOrigin | None:
     return MapOrigin(system, *numbers[2:])
 
 
-def origin_for(scene: bpy.types.Scene, system: System, points: NDArray[np.float64], new: bool, what: str) -> MapOrigin:
-    """The scene's place, or one in the middle of some points (n, 2), if the scene has none or another is asked for.
+@dataclass(frozen=True)
+class Box:
+    """What a file is cropped to: corners in metres from a place, and the system that counts for the file."""
 
-    Raises
-    ------
-    SceneError
-        It has one that cannot be read, or the points lie nowhere; ``what`` begins the message.
-    """
-    place = None if new else origin_of(scene)
-    if place is None:
-        return place_about(system, points.min(axis=0), points.max(axis=0), what)
-    # Plain metres are taken for those of the scene, if it has a map of metres; whether they are near is asked later.
-    return place
+    place: MapOrigin
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    system: System
+
+    def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which points (n, 2) of the file lie within it."""
+        local = self.place.offsets(points, self.system, "")
+        return ((local >= self.low) & (local <= self.high)).all(axis=1)
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Its four corners in the file's coordinates, (4, 2)."""
+        (west, south), (east, north) = self.low, self.high
+        local = np.array([[west, south], [east, south], [east, north], [west, north]])
+        return between(local + [self.place.east, self.place.north], self.place.system, self.system)
 
 
-def cropped(
-    scene: bpy.types.Scene,
-    grounds: list[bpy.types.Object],
-    points: NDArray[np.float64],
-    system: System,
-    crop: tuple[str, float],
-    what: str,
-) -> NDArray[np.bool_]:
-    """Which points (n, 2) of a file lie within what it is cropped to.
+@dataclass(frozen=True)
+class Import:
+    """What is imported, and where it goes.
 
-    Parameters
+    Attributes
     ----------
-    grounds : list of objects
-        What is there already; all of the scene if empty.
-    crop : tuple
-        `WHOLE`, `MIDDLE` or `EXISTING`, and the side of the box around the middle in metres.
-
-    Raises
-    ------
-    SceneError
-        They lie over too large an area, or nothing lies there; ``what`` begins the message.
+    scene : bpy.types.Scene
+    depsgraph : bpy.types.Depsgraph
+    path : Path
+    code : int
+        EPSG code of the coordinates, `PLAIN`, or 0 where the file tells.
+    new : bool
+        Let its middle be the scene's origin, whatever was imported before.
+    selected : tuple of objects
+        Meshes to lie or stand on; imported ground if empty.
+    crop : str
+        `WHOLE`, `MIDDLE` or `EXISTING`.
+    side : float
+        Of the box around the middle, metres.
+    factor, shift : float
+        Of rasters: metres of a value, and what is added.
+    tiles : tuple of Path
+        Of rasters: other files of the same grid.
     """
-    how, side = crop
-    place = origin_of(scene) if how == EXISTING else None
-    middle = np.median(points, axis=0)
-    own = place or place_about(system, middle, middle, what)
-    known = system if system.code or own.system.code == -1 else own.system
-    local = between(points, known, own.system) - [own.east, own.north]
-    low, high = np.full(2, -side / 2.0), np.full(2, side / 2.0)
-    if how == EXISTING:
-        corners = [obj.matrix_world @ Vector(c) for obj in grounds or scene.objects for c in obj.bound_box]
-        if place is None or not corners:
-            raise SceneError(f"{what}nothing was imported yet; choose a box around its middle as Crop")
-        low, high = np.min(corners, axis=0)[:2] - 1.0, np.max(corners, axis=0)[:2] + 1.0
-    elif how == WHOLE:
-        width, depth = np.ptp(local, axis=0) / 1000.0
-        if not max(width, depth) < 2.0 * MOST_AWAY / 1000.0:
-            raise SceneError(f"{what}it lies over an area of {width:,.0f} by {depth:,.0f} km; choose a Crop")
-        return np.ones(len(points), bool)
-    inside = ((local >= low) & (local <= high)).all(axis=1)
-    if not inside.any():
-        raise SceneError(f"{what}nothing of it lies within the Crop; choose another one")
-    return inside
+
+    scene: bpy.types.Scene
+    depsgraph: bpy.types.Depsgraph
+    path: Path
+    code: int = 0
+    new: bool = False
+    selected: tuple[bpy.types.Object, ...] = ()
+    crop: str = WHOLE
+    side: float = 0.0
+    factor: float = 1.0
+    shift: float = 0.0
+    tiles: tuple[Path, ...] = ()
+
+    @property
+    def what(self) -> str:
+        """Begins messages."""
+        return f"{self.path.name}: "
+
+    @property
+    def grounds(self) -> list[bpy.types.Object]:
+        """Meshes to put things on: those that are selected, else what was imported as ground."""
+        return list(self.selected) or [obj for obj in self.scene.objects if obj.type == 'MESH' and obj.get(TERRAIN)]
+
+    def box(self, points: NDArray[np.float64], system: System) -> Box | None:
+        """What the file with some points (n, 2) is cropped to; None for all of it."""
+        if self.crop == WHOLE:
+            place_about(system, points.min(axis=0), points.max(axis=0), self.what)
+            return None
+        middle = np.median(points, axis=0)
+        low, high = np.full(2, -self.side / 2.0), np.full(2, self.side / 2.0)
+        place = origin_of(self.scene) if self.crop == EXISTING else place_about(system, middle, middle, self.what)
+        if self.crop == EXISTING:
+            objects = self.grounds or self.scene.objects
+            corners = [obj.matrix_world @ Vector(corner) for obj in objects for corner in obj.bound_box]
+            if place is None or not corners:
+                raise SceneError(f"{self.what}nothing was imported yet; choose a box around its middle as Crop")
+            low, high = np.min(corners, axis=0)[:2] - 1.0, np.max(corners, axis=0)[:2] + 1.0
+        known = self.known(place, system)
+        place.offsets(points, known, self.what)  # or nobody can tell where they lie
+        return Box(place, low, high, known)
+
+    def nothing_left(self) -> SceneError:
+        """The error of a crop that leaves nothing."""
+        return SceneError(f"{self.what}nothing of it lies within the Crop; choose another one")
+
+    def origin(self, points: NDArray[np.float64], system: System) -> MapOrigin:
+        """The scene's place, or one in the middle of points (n, 2), if it has none or another is asked for.
+
+        Plain metres are taken for those of the scene, if it has a map of metres; whether they are near is asked later.
+        """
+        place = None if self.new else origin_of(self.scene)
+        return place or place_about(system, points.min(axis=0), points.max(axis=0), self.what)
+
+    def local(self, place: MapOrigin, points: NDArray[np.float64], system: System) -> NDArray[np.float64]:
+        """Metres from the scene's origin, (n, 2), of points of the file."""
+        return place.local(points, self.known(place, system), self.what)
+
+    @staticmethod
+    def known(place: MapOrigin, system: System) -> System:
+        """The system of the file, of which plain coordinates are taken for those of the scene's map."""
+        return replace(place.system, unit=system.unit) if system.code == 0 and place.system.code > 0 else system
+
+    def remember(self, place: MapOrigin) -> None:
+        """Store the place of the scene."""
+        self.scene[KEY] = {name: getattr(place, name, getattr(place.system, name, 0)) for name in _STORED}
 
 
-def in_scene(place: MapOrigin, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
-    """Metres from the scene's origin, (n, 2), of points of a file.
+@dataclass
+class Imported:
+    """What an import made: the object if it is one, parts of the report, and whether that is a warning."""
 
-    Raises
-    ------
-    SceneError
-        As `MapOrigin.local`; ``what`` begins the message.
-    """
-    if system.code == 0 and place.system.code > 0:
-        system = place.system
-    return place.local(points, system, what)
+    object: bpy.types.Object | None
+    told: list[str]
+    warning: bool = False
 
 
-def remember(scene: bpy.types.Scene, place: MapOrigin) -> None:
-    """Store the place of a scene."""
-    scene[KEY] = {
-        "code": place.system.code,
-        "longitude": place.system.longitude,
-        "latitude": place.system.latitude,
-        "east": place.east,
-        "north": place.north,
-    }
+#: Of an import.
+Steps = Generator[Progress, Any, Imported]
+
+
+def importing(steps: Callable[..., Steps]) -> Callable[..., Steps]:
+    """Make a guarded job of the steps of an `Import`: what they work on may be deleted between two of them."""
+
+    def read(order: Import, *others: Any, **named: Any) -> Steps:
+        try:
+            return (yield from steps(order, *others, **named))
+        except OSError as error:
+            name = Path(error.filename).name if isinstance(error.filename, str) else order.path.name
+            raise SceneError(f"{name}: cannot read the file: {error.strerror or error}") from None
+
+    @wraps(steps)
+    def job(order: Import, *others: Any, **named: Any) -> Steps:
+        data = JobData("Importing", order.scene, order.depsgraph.view_layer)
+        data.add_objects(list(order.selected))
+        return guarded(data, read(order, *others, **named))
+
+    return job

@@ -8,27 +8,21 @@ corners, roads are ribbons: a curve that is tilted on its side and extruded.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Generator
-from dataclasses import dataclass
 from math import pi
-from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SceneError
 from ...jobs import Progress
 from ...places.outlines import BUILDING, KINDS, WATER, MapFeature, denser, one_ring, read_outlines
 from ...planting.height_grid import HeightGrid
-from ..compat import shader_tree
+from ..attributes import members
+from ..materials.nodes import Graph, surface_material
 from ..placing.terrain import HALF_WIDTH
 from ..worker import call_in_thread
-from .jobs import importing
-from .origin import in_scene, origin_for, remember
-from .terrain import grounds_in, heights_steps
+from .origin import Import, Imported, Steps, importing
+from .terrain import heights_steps
 
 _STEP, _ABOVE = 4.0, 0.08  # metres between points of roads on the ground, and how far they lie above it
 _SINK = 0.3  # metres that a building reaches into the ground below its lowest corner
@@ -39,96 +33,77 @@ _LOOKS = {
     BUILDING: ("Map building", (0.55, 0.5, 0.44), 0.8),
     "": ("Map road", (0.14, 0.13, 0.12), 0.9),
 }
-#: On materials of maps.
-_MARK = "tetflora_map"
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """What importing made.
-
-    Attributes
-    ----------
-    collections : list of bpy.types.Collection
-    number : Counter
-        Outlines of each kind.
-    """
-
-    collections: list[bpy.types.Collection]
-    number: Counter
+#: On objects that are imported buildings.
+BUILDING_MARK = "tetflora_building"
 
 
 @importing
-def outline_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    grounds: list[bpy.types.Object],
-    code: int,
-    new: bool,
-) -> Generator[Progress, Any, Drawn]:
-    """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
+def outline_steps(order: Import, kind: str = "") -> Steps:
+    """Make curves of the outlines in a file.
 
     Parameters
     ----------
-    grounds : list of objects
-        To lie on; imported ground if empty.
-    code : int
-        EPSG code of the coordinates; 0 where the file tells.
-    new : bool
-        Let its middle be the scene's origin, whatever was imported before.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
+    kind : str
+        What all are taken for; empty to tell them by their keys.
     """
-    progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
+    progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress
-    try:
-        outlines, system = yield from call_in_thread(progress, read_outlines, path, code)
-    except OSError as error:
-        raise SceneError(f"{what}cannot read the file: {error.strerror or error}") from None
-    sizes = [len(ring) for outline in outlines for ring in outline.rings]
+    outlines, system, notes = yield from call_in_thread(progress, read_outlines, order.path, order.code, kind)
     points = np.concatenate([ring for outline in outlines for ring in outline.rings])
-    place = origin_for(scene, system, points, new, what)
-    flat = iter(np.split(in_scene(place, points, system, what), np.cumsum(sizes)[:-1]))
+    box = order.box(points, system)
+    if box is not None:
+        number = len(outlines)
+        outlines = [outline for outline in outlines if any(box.holds(ring).any() for ring in outline.rings)]
+        if not outlines:
+            raise order.nothing_left()
+        points = np.concatenate([ring for outline in outlines for ring in outline.rings])
+        notes.append(f"{number - len(outlines):,} beyond the Crop")
+    sizes = [len(ring) for outline in outlines for ring in outline.rings]
+    place = order.origin(points, system)
+    flat = iter(np.split(order.local(place, points, system), np.cumsum(sizes)[:-1]))
     rings = [[next(flat) for _ in outline.rings] for outline in outlines]
-    heights = yield from heights_steps(grounds_in(scene, grounds), depsgraph, Progress(0.4, "Reading the ground"))
-    top = bpy.data.collections.new(path.stem)
+    heights = yield from heights_steps(order, Progress(0.4, "Reading the ground"))
+    top = bpy.data.collections.new(order.path.stem)
     made = [bpy.data.collections.new(kind) for kind in KINDS]
-    looks = {}
     try:
         for number, (outline, own) in enumerate(zip(outlines, rings, strict=True)):
             if number % _AT_ONCE == 0:
                 yield Progress(0.5 + 0.5 * number / len(outlines), "Drawing outlines", amid=True)
-            curve = _curve(outline, own, heights, looks)
+            curve = _curve(outline, own, heights)
             made[KINDS.index(outline.kind)].objects.link(curve)
     except BaseException:  # an error, or Esc
-        _remove([top, *made], list(looks.values()))
+        _remove([top, *made])
         raise
-    found = [collection for collection in made if collection.objects]
-    for collection in found:
+    found = {kind: collection for kind, collection in zip(KINDS, made, strict=True) if collection.objects}
+    for collection in found.values():
         top.children.link(collection)
     bpy.data.batch_remove([collection for collection in made if not collection.objects])
-    scene.collection.children.link(top)
-    remember(scene, place)
-    return Drawn(found, Counter(outline.kind for outline in outlines))
+    order.scene.collection.children.link(top)
+    order.remember(place)
+    told = ", ".join(f"{kind} {len(collection.objects):,}" for kind, collection in found.items())
+    return Imported(None, [f"Outlines imported: {told}", *notes, f"coordinates: {system.name}"])
 
 
-def _remove(collections: list[bpy.types.Collection], materials: list[bpy.types.Material]) -> None:
+def building_areas(scene: bpy.types.Scene) -> list[NDArray[np.float64]]:
+    """Borders (k, 2) of the buildings that were imported into a scene, in world space."""
+    return [
+        (members(spline.points, "co", 4).astype(np.float64) @ np.array(obj.matrix_world).T)[:, :2]
+        for obj in scene.objects
+        if obj.type == 'CURVE' and obj.get(BUILDING_MARK)
+        for spline in obj.data.splines[:1]
+    ]
+
+
+def _remove(collections: list[bpy.types.Collection]) -> None:
+    """Take back what was drawn."""
     objects = [obj for collection in collections for obj in collection.objects]
     curves = [obj.data for obj in objects]
+    materials = {material for curve in curves for material in curve.materials}
     bpy.data.batch_remove([*objects, *collections])
     bpy.data.batch_remove([*curves, *(material for material in materials if not material.users)])
 
 
-def _curve(
-    outline: MapFeature,
-    rings: list[NDArray[np.float64]],
-    heights: HeightGrid | None,
-    looks: dict[str, bpy.types.Material],
-) -> bpy.types.Object:
+def _curve(outline: MapFeature, rings: list[NDArray[np.float64]], heights: HeightGrid | None) -> bpy.types.Object:
     """One outline as an object; its points count from its first one, so that far ones are exact."""
     data = bpy.data.curves.new(outline.name, 'CURVE')
     filled = outline.closed and outline.kind in (WATER, BUILDING)
@@ -156,11 +131,13 @@ def _curve(
         if ribbon:
             spline.points.foreach_set("tilt", np.full(len(local), pi / 2.0, np.float32))
     if filled or ribbon:
-        data.materials.append(_look(outline.kind if outline.kind in (WATER, BUILDING) else "", looks))
+        data.materials.append(_look(outline.kind if outline.kind in (WATER, BUILDING) else ""))
     obj = bpy.data.objects.new(outline.name, data)
     obj.location = foot
     if ribbon:
         obj[HALF_WIDTH] = outline.width / 2.0
+    if filled and outline.kind == BUILDING:
+        obj[BUILDING_MARK] = True
     return obj
 
 
@@ -169,22 +146,13 @@ def _on(heights: HeightGrid | None, points: NDArray[np.float64]) -> NDArray[np.f
     return np.zeros(len(points)) if heights is None else np.nan_to_num(heights.at(heights.height, points), nan=0.0)
 
 
-def _look(kind: str, looks: dict[str, bpy.types.Material]) -> bpy.types.Material:
+def _look(kind: str) -> bpy.types.Material:
     """The material of water, buildings or roads; that of an earlier import if there is one."""
     name, colour, rough = _LOOKS[kind]
-    if kind not in looks:
-        found = next((m for m in bpy.data.materials if m.get(_MARK) == name and m.library is None), None)
-        if found is None:
-            found = bpy.data.materials.new(name)
-            found[_MARK] = name
-            surface = next(node for node in shader_tree(found).nodes if node.type == 'BSDF_PRINCIPLED')
-            surface.inputs["Base Color"].default_value = (*colour, 1.0)
-            surface.inputs["Roughness"].default_value = rough
-            found.diffuse_color = (*colour, 1.0)
-        looks[kind] = found
-    return looks[kind]
 
+    def build(graph: Graph, material: bpy.types.Material) -> None:
+        material.diffuse_color = (*colour, 1.0)
+        surface = graph.node("ShaderNodeBsdfPrincipled", {"Base Color": (*colour, 1.0), "Roughness": rough})
+        graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
 
-def told(number: Counter) -> str:
-    """How many outlines of which kinds there are, for a report."""
-    return ", ".join(f"{kind} {number[kind]:,}" for kind in KINDS if number[kind])
+    return surface_material(name, 1, build)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Generator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import tau
 from pathlib import Path
 from typing import Any
@@ -19,113 +19,50 @@ from ...errors import SceneError, SpeciesError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...growth.seeds import Seeds
 from ...jobs import Progress
-from ...places.canopy import find_trees
+from ...places.canopy import checked_canopy, find_trees, heights_above, without_areas
 from ...places.inventories import Inventory, read_inventory
 from ...places.projection import MapOrigin
-from ...places.species_names import GENUS, KIN, KIND, best_of, words_of
+from ...places.species_names import GENUS, KIN, KIND, best_of, told, words_of
 from ...planting.places import Placement
 from ...planting.rules import species_by_weight
 from ...species.species import Species
 from ..attributes import write
 from ..placing.plant_objects import add_field
+from ..scene.field_sizes import FIT, HEIGHT, NUMBERS, OFFSET, SIZE_ATTRIBUTES
 from ..scene.own_ages import Sizes
 from ..scene.sizes import fits_of
 from ..species.edits import catalogue, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .completion import complete
-from .jobs import importing
-from .origin import WHOLE, cropped, in_scene, origin_for, remember
-from .rasters import read_raster
-from .terrain import grounds_in, heights_steps
+from .origin import Import, Imported, Steps, importing
+from .outlines import building_areas
+from .terrain import heights_steps, read_raster
 
-#: Attributes of fields by the names that sizes have in inventories.
-ATTRIBUTES = {
-    "height": "tf_height",
-    "diameter": "tf_diameter",
-    "crown_width": "tf_crown_width",
-    "crown_base": "tf_crown_base",
-    "dead": "tf_dead",
-}
 #: What to do with species that nobody knows.
 GENERIC, LEFT_OUT = 'GENERIC', 'LEAVE_OUT'
 _GENERIC = "broadleaf_tree"
 
 
-@dataclass
-class Planted:
-    """What importing made.
-
-    Attributes
-    ----------
-    object : bpy.types.Object
-        The field.
-    number : int
-    kin, unknown : Counter
-        Names that stand for others, with how many trees have them: of other species, and of no known one.
-    left_out : int
-        Trees of unknown species that were not planted.
-    completed : int
-        Heights that followed from other sizes.
-    beside : int
-        Trees where there is no ground.
-    notes : list of str
-    inventory : Inventory, optional
-    """
-
-    object: bpy.types.Object | None = None
-    number: int = 0
-    kin: Counter = field(default_factory=Counter)
-    unknown: Counter = field(default_factory=Counter)
-    left_out: int = 0
-    completed: int = 0
-    beside: int = 0
-    notes: list[str] = field(default_factory=list)
-    inventory: Inventory | None = None
-
-
 @importing
 def inventory_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    grounds: list[bpy.types.Object],
-    unknown: str,
-    code: int,
-    units: str,
-    skip: bool,
-    new: bool,
-    seed: int = 0,
-    columns: Mapping[str, str] | None = None,
-    crop: tuple[str, float] = (WHOLE, 0.0),
-) -> Generator[Progress, Any, Planted]:
-    """Make a field of the trees of a file; yields progress. Closing the steps leaves all as it was.
+    order: Import, unknown: str, units: str, skip: bool, columns: Mapping[str, str] | None = None
+) -> Steps:
+    """Make a field of the trees of a file.
 
     Parameters
     ----------
-    grounds : list of objects
-        To stand on; imported ground if empty.
     unknown : str
         `GENERIC`, `LEFT_OUT`, or the identifier of a species for trees of species that nobody knows.
-    code, units, skip, columns
+    units, skip, columns
         As of `read_inventory`.
-    new : bool
-        Let its middle be the scene's origin, whatever was imported before.
-    crop : tuple
-        As of `cropped`.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
     """
-    progress, what = Progress(0.0, f"Reading {path.name}"), f"{path.name}: "
+    progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress
-    try:
-        inventory = yield from call_in_thread(progress, read_inventory, path, code, units, skip, columns)
-    except OSError as error:
-        raise SceneError(f"{what}cannot read the file: {error.strerror or error}") from None
-    inside = cropped(scene, grounds_in(scene, grounds), inventory.points, inventory.system, crop, what)
-    if not inside.all():
+    inventory = yield from call_in_thread(progress, read_inventory, order.path, order.code, units, skip, columns)
+    if (box := order.box(inventory.points, inventory.system)) is not None:
+        inside = box.holds(inventory.points)
+        if not inside.any():
+            raise order.nothing_left()
         inventory = replace(
             inventory,
             name=inventory.name[inside],
@@ -133,22 +70,35 @@ def inventory_steps(
             sizes={name: values[inside] for name, values in inventory.sizes.items()},
             notes=[*inventory.notes, f"{(~inside).sum():,} beyond the Crop"],
         )
-    place = origin_for(scene, inventory.system, inventory.points, new, what)
-    flat = in_scene(place, inventory.points, inventory.system, what)
-    made = Planted(notes=list(inventory.notes), inventory=inventory)
-    identifiers, kinds = _species(inventory, unknown, made)
+    place = order.origin(inventory.points, inventory.system)
+    flat = order.local(place, inventory.points, inventory.system)
+    identifiers, kinds, kin, others = _species(inventory, unknown)
     kept = np.flatnonzero(kinds >= 0)
     if not len(kept):
-        raise SceneError(f"{what}none of its trees is of a known species; choose what stands for unknown ones")
+        raise SceneError(f"{order.what}none of its trees is of a known species; choose what stands for unknown ones")
     kinds, sizes = kinds[kept], {name: values[kept] for name, values in inventory.sizes.items()}
     yield Progress(0.5, "Completing sizes")
-    sizes["height"], made.completed = complete(sizes, kinds, identifiers, lambda name: species_for(scene, name))
-    yield from _plant(scene, depsgraph, path.stem, grounds, place, flat[kept], kinds, identifiers, sizes, seed, made)
+    sizes["height"], completed = complete(sizes, kinds, identifiers, lambda name: species_for(order.scene, name))
+    made = yield from _plant(order, place, flat[kept], kinds, identifiers, sizes)
+    left = " and left out" * (len(kept) < len(flat))
+    made.told[1:1] = [
+        *[f"{others.total():,} of unknown species{left}: {told(others, 25)}"] * bool(others),
+        *[f"rows without a tree left out: {told(inventory.left_out)}"] * bool(inventory.left_out),
+        *[f"heights of {completed:,} follow from trunk or crown"] * bool(completed),
+        *[f"{kin.total():,} stand as their nearest kin: {told(kin)}"] * bool(kin),
+    ]
+    made.told += [*inventory.notes, f"coordinates: {inventory.system.name}"]
+    if number := inventory.skipped:
+        made.told.append(f"{number:,} broken row{'s' * (number > 1)} skipped, the first: {inventory.first}")
+    made.warning = bool(others or number)
     return made
 
 
-def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[str], NDArray[np.int32]]:
-    """Species of the catalogue, and the index (n,) of each tree's; -1 for those to leave out."""
+def _species(inventory: Inventory, unknown: str) -> tuple[list[str], NDArray[np.int32], Counter, Counter]:
+    """Species of the catalogue, and the index (n,) of each tree's, -1 for those to leave out; and names that stand for
+    others, with how many trees have them: of other species, and of no known one.
+    """
+    kin, others = Counter(), Counter()
     known, counts = catalogue(), np.bincount(inventory.name, minlength=len(inventory.names))
     chosen: list[str] = []
     for names, count in zip(inventory.names, counts.tolist(), strict=True):
@@ -157,37 +107,23 @@ def _species(inventory: Inventory, unknown: str, made: Planted) -> tuple[list[st
             continue
         match, name = best_of(names, known)
         if match is None or match.certainty == KIND:
-            made.unknown[names[0] if names else ""] += count
+            others[names[0] if names else ""] += count
             kind = match.species if match is not None else _GENERIC
             kind = {GENERIC: kind, LEFT_OUT: ""}.get(unknown, unknown)
-            made.left_out += 0 if kind else count
         else:
             kind = match.species
             # A bare genus says no more than what it gets.
             if match.certainty == KIN or (match.certainty == GENUS and len(words_of(name)) > 1):
-                made.kin[name] += count
+                kin[name] += count
         chosen.append(kind)
     identifiers = sorted({kind for kind in chosen if kind})
     index = {kind: number for number, kind in enumerate(identifiers)}
-    return identifiers, np.array([index.get(kind, -1) for kind in chosen], np.int32)[inventory.name]
+    return identifiers, np.array([index.get(kind, -1) for kind in chosen], np.int32)[inventory.name], kin, others
 
 
 @importing
-def canopy_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    grounds: list[bpy.types.Object],
-    mix: Mapping[str, float],
-    least: float,
-    code: int,
-    factor: float,
-    shift: float,
-    new: bool,
-    seed: int = 0,
-) -> Generator[Progress, Any, Planted]:
-    """Make a field of the trees that a raster of canopy height shows; yields progress. Closing the steps leaves all
-    as it was.
+def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: Path | None = None) -> Steps:
+    """Make a field of the trees that a raster of canopy height shows.
 
     Parameters
     ----------
@@ -195,33 +131,40 @@ def canopy_steps(
         Weights of species by identifier.
     least : float
         Height of the smallest tree, metres.
-    code, factor, shift
-        As of `read_raster`.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, has no trees, or cannot lie in this scene.
+    below : Path, optional
+        Elevations of the ground, which are subtracted.
     """
-    raster = yield from read_raster(path, code, factor, shift)
-    what = f"{path.name}: "
-    place = origin_for(scene, raster.system, raster.outline, new, what)
+    raster, what = (yield from read_raster(order)), order.what
+    if below is not None:
+        ground = yield from read_raster(order, below)
+        progress = Progress(0.05, "Subtracting the ground")
+        raster = yield from call_in_thread(progress, heights_above, raster, ground, what)
+    values, notes = checked_canopy(raster.values, what)
+    raster = replace(raster, values=values)
+    notes = [*raster.notes, f"coordinates: {raster.system.name}", *notes]
+    place = order.origin(raster.outline, raster.system)
     h, w = raster.values.shape
     # Steps from a cell in the middle to the next ones, in metres of the scene.
-    middle, along, down = in_scene(
-        place, raster.places(np.array([0, 1, 0]) + w // 2, np.array([0, 0, 1]) + h // 2), raster.system, what
-    )
+    near = raster.places(np.array([0, 1, 0]) + w // 2, np.array([0, 0, 1]) + h // 2)
+    middle, along, down = order.local(place, near, raster.system)
     along, down = along - middle, down - middle
     cell = float(np.sqrt(abs(along[0] * down[1] - along[1] * down[0])))
+    if roofs := building_areas(order.scene):
+        flat_cells = replace(raster, corner=middle - along * (w // 2) - down * (h // 2), along=along, down=down)
+        flat_cells, number = yield from call_in_thread(
+            Progress(0.1, "Leaving out roofs"), without_areas, flat_cells, roofs
+        )
+        raster = replace(raster, values=flat_cells.values)
+        notes += [f"{number:,} cells on buildings left out"] * (number > 0)
     if cell > _COARSEST:
         raise SceneError(f"{what}its cells are {cell:.1f} m wide; trees can be told apart up to {_COARSEST:g} m")
     found = yield from steps_in_thread(find_trees(raster.values, cell, least), Progress(0.1, "Looking for treetops"))
     number = len(found.height)
     if not number:
         raise SceneError(f"{what}nothing in it is {least:g} m high; check its unit, or lower Smallest Tree")
-    flat = in_scene(place, raster.places(found.column, found.row), raster.system, what)
+    flat = order.local(place, raster.places(found.column, found.row), raster.system)
     identifiers = list(mix)
-    keys = child_key(child_key(key_of_seed(seed), _SPECIES), np.arange(number))
+    keys = child_key(child_key(key_of_seed(0), _SPECIES), np.arange(number))
     kinds = species_by_weight(tuple(mix.values()), uniform(keys, 0))
     unit = np.stack([along / np.linalg.norm(along), down / np.linalg.norm(down)])
     sizes = {
@@ -229,8 +172,8 @@ def canopy_steps(
         "crown_width": found.width.astype(np.float32),
         "offset": np.column_stack([found.offset @ unit, np.zeros(number)]).astype(np.float32),
     }
-    made = Planted()
-    yield from _plant(scene, depsgraph, path.stem, grounds, place, flat, kinds, identifiers, sizes, seed, made)
+    made = yield from _plant(order, place, flat, kinds, identifiers, sizes)
+    made.told += notes
     return made
 
 
@@ -239,62 +182,56 @@ _SPECIES, _AZIMUTH, _SEED = 1, 2, 3
 
 
 def _plant(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    name: str,
-    grounds: list[bpy.types.Object],
+    order: Import,
     place: MapOrigin,
     flat: NDArray[np.float64],
     kinds: NDArray[np.int32],
     identifiers: list[str],
     sizes: dict[str, NDArray[np.float32]],
-    seed: int,
-    made: Planted,
-) -> Generator[Progress, Any, None]:
+) -> Steps:
     """Make the field; its plants stand on the ground, those beside it as high as the ground is on average."""
     progress = Progress(0.8, "Standing trees on the ground")
     yield progress
-    heights = yield from heights_steps(grounds_in(scene, grounds), depsgraph, progress)
-    z = np.zeros(len(flat))
+    heights = yield from heights_steps(order, progress)
+    parts, z = [f"{len(flat):,} tree{'s' * (len(flat) > 1)} imported"], np.zeros(len(flat))
     if heights is not None:
         z = heights.at(heights.height, flat)
-        beside = ~np.isfinite(z)
-        made.beside = int(beside.sum())
+        beside, corner = ~np.isfinite(z), np.array([heights.west, heights.south])
+        # Beyond its box the ground goes on as at its border.
+        beyond = ((flat < corner) | (flat > corner + heights.cell * np.array(heights.height.shape[::-1]))).any(axis=1)
+        number = (beside | beyond).sum()
+        parts += [f"{number:,} stand beside the ground"] * bool(number)
         z[beside] = z[~beside].mean() if not beside.all() else 0.0
-    keys = child_key(key_of_seed(seed), np.arange(len(flat)))
+    keys = child_key(key_of_seed(0), np.arange(len(flat)))
     seeds = (uniform(keys, _SEED) * 2**31).astype(np.int32)
     turns = tau * uniform(keys, _AZIMUTH)
     placement = Placement(np.column_stack([flat, z]), turns, np.ones(len(flat)), kinds, seeds, len(flat))
     age = sizes.get("age")
     ages = None if age is None else np.where(sizes["height"] > 0.0, 0.0, age)
-    fit = yield from _fit_steps(scene, placement, identifiers, sizes)
+    columns = {name: sizes[key] for name in NUMBERS if (key := name.removeprefix("tf_")) in sizes and sizes[key].any()}
+    columns |= {OFFSET: sizes["offset"]} if "offset" in sizes else {}
+    if HEIGHT in columns:
+        columns[FIT] = yield from _fit_steps(order.scene, placement, identifiers, columns)
     yield Progress(0.95, "Making the field")
-    made.object = add_field(scene, placement, identifiers, ages=ages)
-    made.object.name = made.object.data.name = name
-    for key, attribute in ATTRIBUTES.items():
-        if key in sizes and sizes[key].any():
-            write(made.object.data, attribute, sizes[key], data_type='FLOAT')
-    for values, attribute in ((sizes.get("offset"), "tf_crown_offset"), (fit, "tf_fit")):
-        if values is not None:
-            write(made.object.data, attribute, values, data_type='FLOAT_VECTOR')
-    made.number = len(flat)
-    remember(scene, place)
+    made = add_field(order.scene, placement, identifiers, ages=ages)
+    made.name = made.data.name = order.path.stem
+    for name, values in columns.items():
+        write(made.data, name, values, data_type=SIZE_ATTRIBUTES[name])
+    order.remember(place)
+    return Imported(made, parts)
 
 
 def _fit_steps(
-    scene: bpy.types.Scene, placement: Placement, identifiers: list[str], sizes: dict[str, NDArray[np.float32]]
-) -> Generator[Progress, Any, NDArray[np.float32] | None]:
-    """Factors on height and crown width, (n, 3), that make up for what is random in each plant; None for none."""
-    none, number = np.zeros(len(placement)), len(placement)
-    columns = [sizes.get(key, none).astype(np.float64) for key in ATTRIBUTES]
-    if not columns[0].any():
-        return None
-    offset = sizes["offset"][:, :2] if "offset" in sizes else np.zeros((number, 2))
-    own = Sizes(*columns, offset, np.ones((number, 2)))
+    scene: bpy.types.Scene, placement: Placement, identifiers: list[str], columns: dict[str, NDArray[np.float32]]
+) -> Generator[Progress, Any, NDArray[np.float32]]:
+    """Factors on height and crown width, (n, 3), that make up for what is random in each plant."""
+    none, number = np.zeros((len(placement), 3)), len(placement)
+    numbers = (columns.get(name, none[:, 0]).astype(np.float64) for name in NUMBERS)
+    own = Sizes(*numbers, columns.get(OFFSET, none)[:, :2], none[:, :2] + 1.0)
     turn, frame = placement.azimuth, np.zeros((number, 3, 3))
     frame[:, 0, 0] = frame[:, 1, 1] = np.cos(turn)
     frame[:, 1, 0], frame[:, 0, 1], frame[:, 2, 2] = np.sin(turn), -np.sin(turn), 1.0
-    given = placement.species, placement.seed.astype(np.int64), np.zeros((number, 3)), frame, np.ones(number)
+    given = placement.species, placement.seed.astype(np.int64), none, frame, np.ones(number)
     species = {name: species_for(scene, name) for name in set(identifiers) & grown().keys()}
 
     def find(name: str) -> Species:
