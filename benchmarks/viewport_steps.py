@@ -129,12 +129,10 @@ def panels(ui, draws):
     """Milliseconds of each panel's draw in a real redraw; panels that are closed are opened by copies of them."""
     shown = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
     spent = {}
-    for cls in sorted(shown, key=lambda cls: not hasattr(cls, "bl_parent_id")):
+    for cls in shown:
         bpy.utils.unregister_class(cls)
-    for cls in sorted(shown, key=lambda cls: hasattr(cls, "bl_parent_id")):
+    for cls in shown:
         members = {"bl_options": set(), "bl_idname": f"{cls.__name__}_open", "draw": timed(cls, spent)}
-        if hasattr(cls, "bl_parent_id"):
-            members["bl_parent_id"] = f"{cls.bl_parent_id}_open"
         bpy.utils.register_class(type(f"{cls.__name__}_open", (cls,), members))
     plant = next(obj for obj in bpy.context.scene.objects if obj.tetflora.is_plant)
     plant.select_set(True)

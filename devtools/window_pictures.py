@@ -23,28 +23,22 @@ TABS = 24  # pixels at the sidebar's right edge with the names of its tabs
 
 WINDOWS = ("first-forest", "populated", "add-menu", "progress", "refined", "previewed")  # pictures of all of it
 
-# Panels by picture: those that are shown, opened; a sub-panel without its parent stands alone.
+# The panel of each picture, and its sections that are open.
 PANELS = {
-    "plants": ("TETFLORA_PT_plants", "TETFLORA_PT_selected_plants"),
-    "populate": ("TETFLORA_PT_populate", "TETFLORA_PT_populate_species"),
-    "populate-where": ("TETFLORA_PT_populate_where", "TETFLORA_PT_populate_arrangement", "TETFLORA_PT_populate_size"),
+    "plants": ("TETFLORA_PT_plants",),
+    "populate": ("TETFLORA_PT_populate", "Species"),
+    "populate-where": ("TETFLORA_PT_populate", "Placement", "Spacing", "Size and Age"),
     "brush": ("TETFLORA_PT_brush",),
-    "refinement": (
-        "TETFLORA_PT_refine",
-        "TETFLORA_PT_proxies",
-        "TETFLORA_PT_assets",
-        "TETFLORA_PT_visibility",
-        "TETFLORA_PT_limits",
-    ),
+    "refinement": ("TETFLORA_PT_refine", "Proxies", "Assets", "Visibility", "Limits"),
     "year": ("TETFLORA_PT_year",),
     "wind": ("TETFLORA_PT_wind",),
-    "animation": ("TETFLORA_PT_refine", "TETFLORA_PT_animation", "TETFLORA_PT_leaf_objects"),
-    "output": ("TETFLORA_PT_output", "TETFLORA_PT_ray_visibility", "TETFLORA_PT_passes"),
+    "animation": ("TETFLORA_PT_refine", "Animation", "Leaf Objects"),
+    "output": ("TETFLORA_PT_output", "Ray Visibility", "Passes and Materials"),
     "preview": ("TETFLORA_PT_preview",),
     "statistics": ("TETFLORA_PT_statistics",),
-    "species": ("TETFLORA_PT_species", "TETFLORA_PT_species_whole"),
-    "stand": ("TETFLORA_PT_stand", "TETFLORA_PT_stand_site"),
-    "biomes": ("TETFLORA_PT_biomes", "TETFLORA_PT_biome_limits"),
+    "species": ("TETFLORA_PT_species", "Name, Leaf and Bark"),
+    "stand": ("TETFLORA_PT_stand", "Site"),
+    "biomes": ("TETFLORA_PT_biomes", "Where"),
 }
 
 
@@ -99,20 +93,19 @@ def steps(ui: Any) -> Iterator[float | None]:
     own = scene.tetflora.output.species.add()
     own.species = "conifer"
     registered = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
-    for cls in sorted(registered, key=lambda cls: not hasattr(cls, "bl_parent_id")):
+    for cls in registered:
         bpy.utils.unregister_class(cls)
-    for name, shown in PANELS.items():
+    for name, (shown, *sections) in PANELS.items():
         if name == "stand":
             yield from _stand(ui, scene)
         elif name == "biomes":
             with ui.override():
                 bpy.ops.tetflora.add_biome('INVOKE_DEFAULT', biome="dead_forest")
             yield from ui.until(lambda: not ui.window.modal_operators, 60, "biome")
-        opened = _register_open([cls for wanted in shown for cls in registered if cls.__name__ == wanted])
+        opened = _register_open(next(cls for cls in registered if cls.__name__ == shown), name, sections)
         yield from ui.show_sidebar("TetFlora")
         yield from ui.picture(f"panel-{name}")
-        for cls in reversed(opened):
-            bpy.utils.unregister_class(cls)
+        bpy.utils.unregister_class(opened)
     region = next(r for r in ui.area().regions if r.type == 'UI')
     ui.values["sidebar"] = [region.x, region.y, region.width, region.height]
 
@@ -189,18 +182,17 @@ def _hill(scene: Any) -> None:
         entry.species, entry.weight = species, weight
 
 
-def _register_open(panels: list[Any]) -> list[Any]:
-    """Register copies of panels that are open; under other names, because Blender remembers which were closed."""
+def _register_open(cls: Any, picture: str, sections: list[str]) -> Any:
+    """Register a copy of a panel that is open; under another name, because Blender remembers what was closed."""
     import bpy
 
-    made = []
-    for cls in panels:
-        members = {"bl_options": set(), "bl_idname": f"{cls.__name__}_open"}
-        if hasattr(cls, "bl_parent_id"):
-            shown = any(cls.bl_parent_id == other.__name__ for other in panels)
-            members["bl_parent_id"] = f"{cls.bl_parent_id}_open" if shown else ""
-        made.append(type(f"{cls.__name__}_open", (cls,), members))
-        bpy.utils.register_class(made[-1])
+    section = sys.modules[f"{cls.__module__.rpartition('.')[0]}.base"].section
+    sys.modules[cls.__module__].section = lambda layout, title, closed=True, switch=None: section(
+        layout, title, title not in sections, switch
+    )
+    name = f"{cls.__name__}_{picture.replace('-', '_')}"
+    made = type(name, (cls,), {"bl_options": set(), "bl_idname": name})
+    bpy.utils.register_class(made)
     return made
 
 

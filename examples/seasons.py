@@ -201,7 +201,7 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
         some.vertex_group, some.min_distance = mask, apart
         some.by_density, some.density = True, density
         some.scale_min, some.scale_max, some.seed = *sizes, 3
-        populations.make_plants(scene, bpy.context.evaluated_depsgraph_get(), some)
+        at_once(populations.make_plants_steps(scene, bpy.context.evaluated_depsgraph_get(), some))
         bpy.context.view_layer.update()
     steps = cover.cover_steps(scene, bpy.context.evaluated_depsgraph_get(), some, masks={"vertex_group": ""})
     at_once(steps)

@@ -140,7 +140,7 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     wood.vertex_group, wood.min_distance = _MASK, _APART
     wood.by_density, wood.density = True, _DENSITY
     wood.scale_min, wood.scale_max, wood.seed = 0.6, 1.15, 3
-    populations.make_plants(scene, depsgraph, wood)
+    at_once(populations.make_plants_steps(scene, depsgraph, wood))
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     at_once(cover.cover_steps(scene, depsgraph, wood, masks={"vertex_group": ""}))

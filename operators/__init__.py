@@ -1,17 +1,17 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the artist can do. Each file owns its operators and lists them in its ``CLASSES``."""
+"""What the artist can do: all operators of these files."""
 
 # ruff: noqa: F401 (the imports are the registry: a new file of operators is registered by its line here)
 
 import bpy
 
+from ..tetflora_addon.blender.runtime import classes_in
 from . import (
     add,
     assets,
     biomes,
     brush,
-    ground_cover,
     ground_tools,
     marks,
     places,
@@ -25,6 +25,6 @@ from . import (
     year,
 )
 
-CLASSES = tuple(cls for module in tuple(vars().values()) for cls in getattr(module, "CLASSES", ()))
+CLASSES = classes_in(tuple(vars().values()), bpy.types.Operator)
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

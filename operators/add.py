@@ -12,7 +12,7 @@ from ..tetflora_addon.blender.placing.distances import distance_of, follows_spec
 from ..tetflora_addon.blender.placing.first_forest import build
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.placing.populations import Made, add_population, forget_population, make_plants_steps
-from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES, STORAGE_ITEMS
+from ..tetflora_addon.blender.placing.properties import CREATE_AS, MOST_EMPTIES
 from ..tetflora_addon.blender.placing.rules import copy_entry
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES, read_skeleton, upright_turn
 from ..tetflora_addon.blender.settings import properties_of
@@ -22,8 +22,8 @@ from ..tetflora_addon.blender.species.edits import catalogue, unknown_text
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.planting.rules import Rules
-from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, selected_plants
-from .populations import ground_selected, report_made, selected_grounds
+from .base import Reporting, counted, in_object_mode, need, select_only, selected_plants
+from .populations import Placing, ground_selected, selected_grounds
 
 
 class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
@@ -32,7 +32,6 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
     It is stored as an empty with a species and seed; Refine or rendering creates its branches and leaves.
     """
 
-    bl_idname = "tetflora.add_plant"
     bl_label = "Add Plant"
     needs = (in_object_mode,)
 
@@ -80,7 +79,6 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
     The form is no longer rendered.
     """
 
-    bl_idname = "tetflora.use_as_form"
     bl_label = "Make Plant from Form"
     needs = (
         in_object_mode,
@@ -121,7 +119,6 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
     Existing objects remain: if the scene is not empty, a new scene is added.
     """
 
-    bl_idname = "tetflora.first_forest"
     bl_label = "First Forest"
     needs = (in_object_mode,)
 
@@ -157,25 +154,18 @@ _RULES = properties_of(Rules, options={'SKIP_SAVE'})
 _SHARED = ("by_density", "count", "as_field", "seed", "slope_max", "min_distance", "scale_min", "scale_max")
 
 
-class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
+class TETFLORA_OT_populate(Placing, bpy.types.Operator):
     """Scatter plants over the selected meshes as a new population, which can be changed later.
 
     Each plant is an empty, or a vertex of one mesh if there are many.
     """
 
-    bl_idname = "tetflora.populate"
     bl_label = "Populate"
     needs = (in_object_mode, ground_selected)
 
     by_density: _RULES.by_density
     count: _RULES.count
-    as_field: EnumProperty(
-        name="Create As",
-        description="What the plants are created as",
-        items=STORAGE_ITEMS,
-        default='AUTOMATIC',
-        options={'SKIP_SAVE'},
-    )
+    as_field: EnumProperty(**CREATE_AS, options={'SKIP_SAVE'})
     seed: _RULES.seed
     slope_max: _RULES.slope_max
     min_distance: _RULES.min_distance
@@ -217,7 +207,7 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
         select_only(context, [*result.objects, *grounds])
         # The terrain stays selected and active, so that Populate can follow Populate.
         context.view_layer.objects.active = grounds[0]
-        return report_made(self, result)
+        return super().finish(context, result)
 
     def _population(
         self, scene: bpy.types.Scene, grounds: list[bpy.types.Object], weights: dict[str, float]
@@ -274,11 +264,3 @@ def parse_weights(text: str) -> dict[str, float]:
         except ValueError:
             raise SceneError(f'"{part}" is not a species with a weight; write for example {identifier}:2') from None
     return weights
-
-
-CLASSES = (
-    TETFLORA_OT_add_plant,
-    TETFLORA_OT_use_as_form,
-    TETFLORA_OT_first_forest,
-    TETFLORA_OT_populate,
-)

@@ -16,7 +16,7 @@ from ..tetflora_addon.blender.placing.plant_objects import prepare_scene
 from ..tetflora_addon.blender.scene.objects import is_scatter, mark_scatter, may_scatter
 from ..tetflora_addon.blender.species.asset_species import Datablock, asset_of
 from ..tetflora_addon.errors import SceneError
-from .base import Reporting, counted, in_object_mode
+from .base import Reporting, counted, in_object_mode, need
 from .marks import action_property
 
 _NAMED = 3  # species that a report names
@@ -43,16 +43,11 @@ class _OnAssets(Reporting):
         raise NotImplementedError
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode != 'OBJECT':
-            cls.poll_message_set(in_object_mode(context))
-            return False
+    def missing(cls, context: bpy.types.Context) -> str:
         # A script may name a collection, whatever is selected.
         by_script = context.area is None or context.area.type != 'VIEW_3D'
-        if (by_script and bpy.data.collections) or any(cls.fits(one) for one in chosen(context)):
-            return True
-        cls.poll_message_set(cls.nothing)
-        return False
+        found = (by_script and bpy.data.collections) or any(cls.fits(one) for one in chosen(context))
+        return in_object_mode(context) or ("" if found else cls.nothing)
 
 
 class TETFLORA_OT_use_as_species(_OnAssets, bpy.types.Operator):
@@ -61,7 +56,6 @@ class TETFLORA_OT_use_as_species(_OnAssets, bpy.types.Operator):
     They are offered wherever species are, in this file. Use again after a change of their shape.
     """
 
-    bl_idname = "tetflora.use_as_species"
     bl_label = "Use as Species"
     nothing = "Select objects with faces, or a collection in the Outliner, first"
 
@@ -87,9 +81,7 @@ class TETFLORA_OT_use_as_species(_OnAssets, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         found = chosen(context, self.collection)
         if not found:
-            return self.refused(
-                f'There is no collection "{self.collection}"' if self.collection else self.nothing,
-            )
+            return self.refused(f'There is no collection "{self.collection}"' if self.collection else self.nothing)
         depsgraph = context.evaluated_depsgraph_get()
         names, wrong = [], []
         for datablock in found:
@@ -110,7 +102,6 @@ class TETFLORA_OT_use_as_species(_OnAssets, bpy.types.Operator):
 class TETFLORA_OT_stop_using_as_species(_OnAssets, bpy.types.Operator):
     """Use the selected objects or collections as species no more. Plants of them stay, and need another species."""
 
-    bl_idname = "tetflora.stop_using_as_species"
     bl_label = "Stop Using as Species"
     nothing = "Select an object that is used as a species first"
 
@@ -140,37 +131,33 @@ def _asset_of(datablock: Datablock) -> bpy.types.PropertyGroup | None:
     return found
 
 
+def _scatterers(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Selected objects that scatter, or else the active one: results hide it, and nobody can select it then."""
+    for objects in (context.selected_objects, [context.view_layer.objects.active]):
+        if found := [o for o in objects if o is not None and (may_scatter(o) or is_scatter(o))]:
+            return found
+    return []
+
+
 class TETFLORA_OT_refine_scatter(Reporting, bpy.types.Operator):
     """Refine what the modifiers or particles of the selected objects scatter, where it stands.
 
     The objects go on scattering by their own rules. Use again to keep the scatter plain.
     """
 
-    bl_idname = "tetflora.refine_scatter"
     bl_label = "Refine Scatter"
+    needs = (
+        need(
+            _scatterers,
+            "Select an object that scatters others first, by geometry nodes, particles, instancing or as a collection "
+            "instance",
+        ),
+    )
 
     action: action_property("Refine what the objects scatter", "Keep the scatter plain, as it is without TetFlora")
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if cls._found(context):
-            return True
-        cls.poll_message_set(
-            "Select an object that scatters others first, by geometry nodes, particles, instancing or as a collection "
-            "instance"
-        )
-        return False
-
-    @staticmethod
-    def _found(context: bpy.types.Context) -> list[bpy.types.Object]:
-        """Selected objects that scatter, or else the active one: results hide it, and nobody can select it then."""
-        for objects in (context.selected_objects, [context.view_layer.objects.active]):
-            if found := [o for o in objects if o is not None and (may_scatter(o) or is_scatter(o))]:
-                return found
-        return []
-
     def run(self, context: bpy.types.Context) -> set[str]:
-        found = self._found(context)
+        found = _scatterers(context)
         marked = all(is_scatter(o) for o in found)
         if self.action == 'UNMARK' or (self.action == 'TOGGLE' and marked):
             for obj in found:
@@ -195,6 +182,3 @@ class TETFLORA_OT_refine_scatter(Reporting, bpy.types.Operator):
         text = f"{counted(instances, 'instance')} of {counted(len(assets), 'asset')} will be refined"
         text += f"; {counted(left, 'instance')} without faces will not show in results" if left else ""
         return self.done(f"{text}; {wrong[0]}" if wrong else text)
-
-
-CLASSES = (TETFLORA_OT_use_as_species, TETFLORA_OT_stop_using_as_species, TETFLORA_OT_refine_scatter)

@@ -3,10 +3,13 @@
 """What operators share: tooltips, conditions, reports, the selection, and work in steps between redraws."""
 
 from collections.abc import Callable, Generator
+from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy.props import StringProperty
 
+from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.plant_objects import plants_of
 from ..tetflora_addon.blender.runtime import remember
 from ..tetflora_addon.blender.worker import at_once
@@ -25,18 +28,27 @@ Need = Callable[[bpy.types.Context], str]
 
 
 class Tool:
-    """Mix-in for operators: the docstring is the tooltip, and `needs` decides whether the operator is available."""
+    """Mix-in for operators: the identifier follows from the class's name, the docstring is the tooltip, and `needs`
+    decides whether the operator is available.
+    """
 
     needs: tuple[Need, ...] = ()
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        if cls.__name__.startswith("TETFLORA_OT_"):
+            cls.bl_idname = cls.__name__.replace("TETFLORA_OT_", "tetflora.", 1)
         if "bl_description" not in vars(cls):
             cls.bl_description = " ".join((cls.__doc__ or "").split()).removesuffix(".")
 
     @classmethod
+    def missing(cls, context: bpy.types.Context) -> str:
+        """Why the operator is not available; an empty text where it is."""
+        return next(filter(None, (need(context) for need in cls.needs)), "")
+
+    @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        reason = next(filter(None, (need(context) for need in cls.needs)), "")
+        reason = cls.missing(context)
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -75,6 +87,18 @@ class Reporting(Tool):
     def run(self, context: bpy.types.Context) -> set[str]:
         """Do it; the result of ``execute``."""
         raise NotImplementedError
+
+
+class FileTool(Reporting):
+    """Mix-in for operators that read or write a JSON file which the artist chooses."""
+
+    filename_ext = ENDING
+    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
+
+    @property
+    def path(self) -> Path:
+        """The chosen file."""
+        return Path(bpy.path.abspath(self.filepath))
 
 
 def need(test: Callable[[bpy.types.Context], object], message: str) -> Need:

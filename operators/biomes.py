@@ -3,7 +3,6 @@
 """Add, plant again, remove and save biomes; import files of biomes and delete them."""
 
 from collections.abc import Generator
-from pathlib import Path
 
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
@@ -15,18 +14,15 @@ from ..tetflora_addon.blender.biomes.adding import (
     plant_biome_steps,
     remove_biome,
 )
-from ..tetflora_addon.blender.biomes.biome import active_biome
-from ..tetflora_addon.blender.biomes.files import read_biome
+from ..tetflora_addon.blender.biomes.files import active_biome, import_biome, read_biome, save_biome, saved_populations
 from ..tetflora_addon.blender.biomes.ground import make_land
 from ..tetflora_addon.blender.biomes.library import NO_BIOME, OWN_FILES, biome_property, biomes
-from ..tetflora_addon.blender.biomes.saving import import_biome, save_biome, saved_populations
-from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
+from .base import FileTool, ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
 from .populations import selected_grounds
 
 _biome_exists = need(lambda context: active_biome(context.scene), "Add a biome first")
@@ -60,7 +56,6 @@ class TETFLORA_OT_add_biome(_Planting, bpy.types.Operator):
     Without a selected mesh, a hectare of land is made at the 3D cursor.
     """
 
-    bl_idname = "tetflora.add_biome"
     bl_label = "Add Biome"
     needs = (in_object_mode,)
 
@@ -112,7 +107,6 @@ class TETFLORA_OT_update_biome(_Planting, bpy.types.Operator):
     Frozen layers, and stands of which a year is kept, stay as they are.
     """
 
-    bl_idname = "tetflora.update_biome"
     bl_label = "Update Biome"
     needs = (in_object_mode, _biome_exists)
     cancelled = "Stopped; layers that were done already keep their new plants"
@@ -140,7 +134,6 @@ class TETFLORA_OT_remove_biome(Reporting, bpy.types.Operator):
     Plants of frozen layers, and stands of which a year is kept, remain, and so does the ground.
     """
 
-    bl_idname = "tetflora.remove_biome"
     bl_label = "Remove Biome"
     needs = (in_object_mode, _biome_exists)
 
@@ -157,7 +150,6 @@ class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
     biome, the populations on the ground of the active population.
     """
 
-    bl_idname = "tetflora.save_biome"
     bl_label = "Save as Biome"
     needs = (need(lambda context: saved_populations(context.scene), "Add a biome or populate a ground first"),)
     bl_options = {'REGISTER'}
@@ -180,21 +172,18 @@ class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
         )
 
 
-class TETFLORA_OT_import_biome(Reporting, bpy.types.Operator, ImportHelper):
+class TETFLORA_OT_import_biome(FileTool, bpy.types.Operator, ImportHelper):
     """Copy a biome's file to your folder of biomes, with the picture of the same name beside it."""
 
-    bl_idname = "tetflora.import_biome"
     bl_label = "Import Biome"
     bl_options = {'REGISTER'}
 
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
     replace: BoolProperty(
         name="Replace", description="Replace your own biome of the same file name", options={'SKIP_SAVE'}
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        identifier = import_biome(Path(bpy.path.abspath(self.filepath)), self.replace)
+        identifier = import_biome(self.path, self.replace)
         context.scene.tetflora.new_biome = identifier
         return self.done(f'Biome "{biomes()[identifier].name}" imported; click Add Biome to use it')
 
@@ -202,7 +191,6 @@ class TETFLORA_OT_import_biome(Reporting, bpy.types.Operator, ImportHelper):
 class TETFLORA_OT_delete_biome(Reporting, bpy.types.Operator):
     """Delete the file of the chosen biome from your folder of biomes. Built-in biomes remain. This cannot be undone."""
 
-    bl_idname = "tetflora.delete_biome"
     bl_label = "Delete from My Biomes"
     bl_options = {'REGISTER'}
     needs = (
@@ -217,13 +205,3 @@ class TETFLORA_OT_delete_biome(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         return self.done(f"{OWN_FILES.delete(context.scene.tetflora.new_biome).name} deleted")
-
-
-CLASSES = (
-    TETFLORA_OT_add_biome,
-    TETFLORA_OT_update_biome,
-    TETFLORA_OT_remove_biome,
-    TETFLORA_OT_save_biome,
-    TETFLORA_OT_import_biome,
-    TETFLORA_OT_delete_biome,
-)

@@ -39,7 +39,6 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
     Each stroke is one undo step; Esc or a right click finishes and keeps what was painted.
     """
 
-    bl_idname = "tetflora.paint_plants"
     bl_label = "Paint Plants"
 
     mode: EnumProperty(
@@ -236,6 +235,3 @@ def _places(text: str) -> list[tuple[float, float, float]]:
 def _result_of(stroke: Stroke) -> str:
     number = stroke.added if stroke.mode == 'PAINT' else stroke.removed
     return f"{counted(number, 'plant')} {_DONE[stroke.mode]}"
-
-
-CLASSES = (TETFLORA_OT_paint_plants,)

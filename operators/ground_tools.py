@@ -50,7 +50,7 @@ class GroundTool(Tool):
 
     def begin(self, context: bpy.types.Context) -> bool:
         """Start listening and drawing; False, with a report, where that is impossible."""
-        if bpy.app.background or context.window is None or _view_of(context.screen) is None:
+        if bpy.app.background or context.window is None or not _views(context.screen):
             self.failed(NO_VIEWPORT)
             return False
         self._look_around(context)
@@ -135,15 +135,13 @@ class GroundTool(Tool):
         self._data.add_objects(self._ground.objects)
 
 
-def _view_of(screen: bpy.types.Screen | None) -> bpy.types.Area | None:
-    return next((area for area in screen.areas if area.type == 'VIEW_3D'), None) if screen else None
+def _views(screen: bpy.types.Screen | None) -> list[bpy.types.Area]:
+    return [area for area in screen.areas if area.type == 'VIEW_3D'] if screen else []
 
 
 def _region_at(screen: bpy.types.Screen, x: int, y: int) -> tuple[bpy.types.Region, bpy.types.RegionView3D] | None:
     """The main region of a 3D view at a place of the window, unless a sidebar, header or gizmo covers it there."""
-    for area in screen.areas:
-        if area.type != 'VIEW_3D' or not _in(area, x, y):
-            continue
+    for area in (area for area in _views(screen) if _in(area, x, y)):
         if any(r.type not in {'WINDOW', 'HUD', 'XR'} and r.height > 1 and _in(r, x, y) for r in area.regions):
             return None
         for region in area.regions:
@@ -171,7 +169,6 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
     The wheel rotates, Ctrl and the wheel scale; each plant is one undo step; Esc finishes.
     """
 
-    bl_idname = "tetflora.place_plant"
     bl_label = "Place Plants by Clicking"
 
     species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
@@ -246,6 +243,3 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
         turn = np.degrees(self._turn)
         context.workspace.status_text_set(_KEYS.format(name=name, turn=turn, scale=self._scale))
         redraw()
-
-
-CLASSES = (TETFLORA_OT_place_plant,)

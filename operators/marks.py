@@ -5,7 +5,7 @@
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, StringProperty
 
 from ..tetflora_addon.blender.placing.plant_objects import (
     field_from_plants,
@@ -15,12 +15,10 @@ from ..tetflora_addon.blender.placing.plant_objects import (
 )
 from ..tetflora_addon.blender.placing.populations import adopt, collection_of, owner_of
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES
-from ..tetflora_addon.blender.placing.rules import shown_population
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
 from ..tetflora_addon.blender.scene.objects import SURFACE_TYPES, may_instance
 from ..tetflora_addon.blender.species.catalogue import default_species
 from ..tetflora_addon.blender.species.edits import catalogue
-from ..tetflora_addon.blender.stands.growing import shown_stand
 from .base import Reporting, counted, in_object_mode, need, plants_selected, select_only, selected_plants
 
 
@@ -67,10 +65,8 @@ class Marking(Reporting):
         return [o for o in context.selected_objects if cls.fits(o) or getattr(o.tetflora, cls.mark)]
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not cls._chosen(context):
-            cls.poll_message_set(cls.nothing)
-        return bool(cls._chosen(context))
+    def missing(cls, context: bpy.types.Context) -> str:
+        return "" if cls._chosen(context) else cls.nothing
 
     def run(self, context: bpy.types.Context) -> set[str]:
         chosen = self._chosen(context)
@@ -95,7 +91,6 @@ class TETFLORA_OT_mark_explicit(Marking, bpy.types.Operator):
     Use again to unmark.
     """
 
-    bl_idname = "tetflora.mark_explicit"
     bl_label = "Refine These Meshes"
     mark, nothing, marked = "is_explicit", "Select meshes, or objects that instance them, first", "{} will be refined"
 
@@ -111,7 +106,6 @@ class TETFLORA_OT_mark_occluder(Marking, bpy.types.Operator):
     Use again to unmark.
     """
 
-    bl_idname = "tetflora.mark_occluder"
     bl_label = "Mark as Occluder"
     mark, nothing, marked = "is_occluder", "Select meshes first", "{} marked as occluder"
 
@@ -133,7 +127,6 @@ class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
     The attributes species, seed, rotation and scale define the plants. Use again to turn it off.
     """
 
-    bl_idname = "tetflora.mark_field"
     bl_label = "Use as Field of Plants"
     needs = (
         need(
@@ -161,7 +154,6 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
     This keeps Blender fast with many plants; parents, constraints and animation of single plants are lost.
     """
 
-    bl_idname = "tetflora.make_field"
     bl_label = "Convert Plants to Field"
     needs = (in_object_mode, plants_selected)
 
@@ -169,9 +161,7 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
         selected = plants_of(context.selected_objects)
         plants = [o for o in selected_plants(context) if o.tetflora.enabled and not o.hide_render]
         if not plants:
-            return self.refused(
-                "The selected plants are disabled, hidden in renders, or linked; enable them first",
-            )
+            return self.refused("The selected plants are disabled, hidden in renders, or linked; enable them first")
         left = len(selected) - len(plants)
         owner = owner_of(context.scene, plants)
         home = collection_of(context.scene, owner) if owner else None
@@ -186,7 +176,6 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
 class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
     """Make an empty of each plant of the selected fields."""
 
-    bl_idname = "tetflora.split_field"
     bl_label = "Convert Field to Objects"
     needs = (
         in_object_mode,
@@ -213,21 +202,13 @@ class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
 class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
     """Add an entry to a list of species, or remove the active one."""
 
-    bl_idname = "tetflora.edit_list"
     bl_label = "Edit List"
     bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
 
-    which: EnumProperty(
-        name="List",
-        description="List to edit",
-        items=(
-            ('MIX', "Species", "Species to populate with"),
-            ('LEAVES', "Leaf Objects", "Meshes that replace leaves"),
-            ('OUTPUT', "Output", "Species with their own pass index, light group or materials"),
-            ('FIELD', "Field Species", "Species of the active field of plants"),
-            ('STAND', "Stand", "Species of the stand"),
-        ),
+    owner: StringProperty(
+        name="Owner", description="Where in the context the owner of the list is, such as scene.tetflora.populate"
     )
+    entries: StringProperty(name="List", description="Name of the list")
     action: EnumProperty(
         name="Action",
         description="Change to make",
@@ -242,10 +223,11 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         return properties.bl_rna.properties["action"].enum_items[properties.action].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        owner, name = self._list(context)
-        if owner is None:
-            return self.failed("The active object must be a field of plants; select one")
-        entries, index = getattr(owner, name), f"{name}_index"
+        try:
+            owner, index = context.path_resolve(self.owner), f"{self.entries}_index"
+            entries = getattr(owner, self.entries)
+        except (AttributeError, ValueError):
+            return self.failed(f'There is no list "{self.entries}" of "{self.owner}"; click the buttons beside a list')
         if self.action == 'ADD':
             present = {entry.species for entry in entries}
             species = next((s for s in catalogue() if s not in present), None) or default_species()
@@ -258,26 +240,3 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         entries.remove(active)
         setattr(owner, index, max(min(active, len(entries) - 1), 0))
         return {'FINISHED'}
-
-    def _list(self, context: bpy.types.Context) -> tuple[bpy.types.PropertyGroup | None, str]:
-        """The list's owner, and its name there."""
-        if self.which == 'FIELD':
-            active = context.active_object
-            return (active.tetflora if active is not None and active.tetflora.is_field else None), "field_species"
-        if self.which == 'OUTPUT':
-            return context.scene.tetflora.output, "species"
-        if self.which == 'MIX':
-            return shown_population(context.scene), "mix"
-        if self.which == 'STAND':
-            return shown_stand(context), "species"
-        return context.scene.tetflora, "leaf_objects"
-
-
-CLASSES = (
-    TETFLORA_OT_mark_explicit,
-    TETFLORA_OT_mark_occluder,
-    TETFLORA_OT_mark_field,
-    TETFLORA_OT_make_field,
-    TETFLORA_OT_split_field,
-    TETFLORA_OT_edit_list,
-)

@@ -180,7 +180,6 @@ class _Raster(_Importing):
 class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
     """Make ground from a raster of elevations, or from several tiles of one."""
 
-    bl_idname = "tetflora.import_terrain"
     bl_label = "Import Terrain"
 
     most: _Int(
@@ -209,7 +208,6 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
     They stand on the selected meshes, or on imported terrain.
     """
 
-    bl_idname = "tetflora.import_inventory"
     bl_label = "Import Tree Inventory"
 
     filter_glob: StringProperty(default=f"*.csv;*.tsv;*.txt;{_LAYERS}", options={'HIDDEN'})
@@ -288,7 +286,6 @@ class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
     They stand on the selected meshes, or on imported terrain.
     """
 
-    bl_idname = "tetflora.import_canopy"
     bl_label = "Import Canopy Height"
 
     species: _String(
@@ -324,7 +321,6 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
     They lie on the selected meshes, or on imported terrain. Populations can be limited to them.
     """
 
-    bl_idname = "tetflora.import_outlines"
     bl_label = "Import Outlines"
 
     filter_glob: StringProperty(default=_LAYERS, options={'HIDDEN'})
@@ -340,11 +336,3 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps:
         return outline_steps(self.order(context), "" if self.kind == 'KEYS' else self.kind.title())
-
-
-CLASSES = (
-    TETFLORA_OT_import_terrain,
-    TETFLORA_OT_import_canopy,
-    TETFLORA_OT_import_inventory,
-    TETFLORA_OT_import_outlines,
-)

@@ -29,7 +29,6 @@ class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
     Seeds, scales and positions do not change.
     """
 
-    bl_idname = "tetflora.assign_species"
     bl_label = "Change Species"
     needs = (plants_or_fields_selected,)
 
@@ -51,7 +50,6 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
     Copies with the same seed become different.
     """
 
-    bl_idname = "tetflora.reseed"
     bl_label = "Re-roll Seeds"
     needs = (plants_or_fields_selected,)
 
@@ -71,7 +69,6 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
 class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
     """Select all plants of the same species as the active plant."""
 
-    bl_idname = "tetflora.select_species"
     bl_label = "Select Species"
     needs = (in_object_mode,)
 
@@ -100,7 +97,6 @@ class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
 class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
     """Delete plants from the scene."""
 
-    bl_idname = "tetflora.remove_plants"
     bl_label = "Remove Plants"
     needs = (in_object_mode,)
 
@@ -145,7 +141,6 @@ class TETFLORA_OT_drop_to_ground(ModalJob, bpy.types.Operator):
     Plants, results and refined meshes do not count as ground.
     """
 
-    bl_idname = "tetflora.drop_to_ground"
     bl_label = "Drop Plants to Ground"
     needs = (in_object_mode, plants_or_fields_selected)
 
@@ -161,12 +156,3 @@ class TETFLORA_OT_drop_to_ground(ModalJob, bpy.types.Operator):
         moves = f"{counted(result.moved, 'plant')} moved to the ground"
         self.report({'WARNING' if notes else 'INFO'}, "; ".join([moves, *notes]))
         return {'FINISHED'} if result.moved else {'CANCELLED'}
-
-
-CLASSES = (
-    TETFLORA_OT_assign_species,
-    TETFLORA_OT_reseed,
-    TETFLORA_OT_select_species,
-    TETFLORA_OT_remove_plants,
-    TETFLORA_OT_drop_to_ground,
-)

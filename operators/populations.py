@@ -1,15 +1,21 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Add, change and remove populations of plants; write them to files and read them."""
+"""Add, change and remove populations of plants, and cover their ground; write them to files and read them."""
 
 from collections.abc import Generator
-from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import BoolProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..tetflora_addon.blender.placing.population_files import ENDING, read_populations, write_populations
+from ..tetflora_addon.blender.placing.cover import (
+    Covered,
+    cover_steps,
+    cover_with_snow,
+    covered_population,
+    strew_steps,
+)
+from ..tetflora_addon.blender.placing.population_files import read_populations, write_populations
 from ..tetflora_addon.blender.placing.populations import (
     Made,
     add_population,
@@ -22,7 +28,7 @@ from ..tetflora_addon.blender.placing.rules import active_population, copy_setti
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import readable
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, Reporting, Tool, counted, in_object_mode, need, select_only
+from .base import FileTool, ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
 
 
 def selected_grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -40,17 +46,20 @@ _ACTIVE = (in_object_mode, _population_exists)
 _REPLACING = (*_ACTIVE, _not_frozen)
 
 
-def report_made(operator: Tool, made: Made) -> set[str]:
-    """Report how many plants there are, as what, and why not more; the operator's result."""
-    where = ""
-    if made.objects and made.objects[0].tetflora.is_field:
-        where = f' in the field "{made.objects[0].name}"'
-    if made.reason:
-        operator.report({'WARNING'}, f"{counted(made.number, 'plant')} of {made.wanted:,} placed{where}: {made.reason}")
-        return {'FINISHED'}
-    returned = f"; {counted(made.returned, 'deleted plant')} restored" if made.returned else ""
-    erased = f"; {made.erased:,} omitted where you erased" if made.erased else ""
-    return operator.done(f"{counted(made.number, 'plant')} placed{where}{returned}{erased}")
+class Placing(ModalJob):
+    """Mix-in for operators that place the plants of a population."""
+
+    def finish(self, _context: bpy.types.Context, result: Made) -> set[str]:
+        where = ""
+        if result.objects and result.objects[0].tetflora.is_field:
+            where = f' in the field "{result.objects[0].name}"'
+        placed = f"{counted(result.number, 'plant')} of {result.wanted:,} placed{where}: {result.reason}"
+        if result.reason:
+            self.report({'WARNING'}, placed)
+            return {'FINISHED'}
+        returned = f"; {counted(result.returned, 'deleted plant')} restored" if result.returned else ""
+        erased = f"; {result.erased:,} omitted where you erased" if result.erased else ""
+        return self.done(f"{counted(result.number, 'plant')} placed{where}{returned}{erased}")
 
 
 class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
@@ -59,7 +68,6 @@ class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
     Adjust the settings, then click Update.
     """
 
-    bl_idname = "tetflora.add_population"
     bl_label = "Add Population"
     needs = (in_object_mode, ground_selected)
 
@@ -74,21 +82,13 @@ class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class _Placing(ModalJob):
-    """Mix-in for operators that place the plants of the active population."""
-
-    def finish(self, _context: bpy.types.Context, result: Made) -> set[str]:
-        return report_made(self, result)
-
-
-class TETFLORA_OT_update_population(_Placing, bpy.types.Operator):
+class TETFLORA_OT_update_population(Placing, bpy.types.Operator):
     """Place the plants of the active population again according to its settings.
 
     Plants that you moved, changed or deleted are replaced too, except where you erased with the brush; other plants
     keep their space.
     """
 
-    bl_idname = "tetflora.update_population"
     bl_label = "Update Population"
     needs = _REPLACING
 
@@ -97,10 +97,9 @@ class TETFLORA_OT_update_population(_Placing, bpy.types.Operator):
         return make_plants_steps(context.scene, depsgraph, active_population(context.scene))
 
 
-class TETFLORA_OT_reroll_population(_Placing, bpy.types.Operator):
+class TETFLORA_OT_reroll_population(Placing, bpy.types.Operator):
     """Place the plants of the active population with a new seed, for a different arrangement."""
 
-    bl_idname = "tetflora.reroll_population"
     bl_label = "Re-roll Population"
     needs = _REPLACING
 
@@ -115,7 +114,6 @@ class TETFLORA_OT_freeze_population(Reporting, bpy.types.Operator):
     Use again to unfreeze: the next update then replaces the plants, with all your changes.
     """
 
-    bl_idname = "tetflora.freeze_population"
     bl_label = "Freeze Population"
     needs = _ACTIVE
 
@@ -129,7 +127,6 @@ class TETFLORA_OT_freeze_population(Reporting, bpy.types.Operator):
 class TETFLORA_OT_remove_population(Reporting, bpy.types.Operator):
     """Remove the active population and its plants. Plants of a frozen population remain."""
 
-    bl_idname = "tetflora.remove_population"
     bl_label = "Remove Population"
     needs = _ACTIVE
 
@@ -150,7 +147,6 @@ class TETFLORA_OT_remove_population(Reporting, bpy.types.Operator):
 class TETFLORA_OT_select_population(Reporting, bpy.types.Operator):
     """Select the plants of the active population, or its field."""
 
-    bl_idname = "tetflora.select_population"
     bl_label = "Select Population"
     needs = _ACTIVE
 
@@ -165,7 +161,6 @@ class TETFLORA_OT_select_population(Reporting, bpy.types.Operator):
 class TETFLORA_OT_set_population_ground(Reporting, bpy.types.Operator):
     """Use the selected meshes as ground of the active population. Click Update to place its plants."""
 
-    bl_idname = "tetflora.set_population_ground"
     bl_label = "Use Selected Meshes"
     needs = (*_ACTIVE, ground_selected)
 
@@ -181,7 +176,6 @@ class TETFLORA_OT_forget_erased(Reporting, bpy.types.Operator):
     Click Update to place them.
     """
 
-    bl_idname = "tetflora.forget_erased"
     bl_label = "Clear Erased Places"
     needs = (
         *_ACTIVE,
@@ -203,7 +197,6 @@ class TETFLORA_OT_preview_population(Reporting, bpy.types.Operator):
     Creates no objects.
     """
 
-    bl_idname = "tetflora.preview_population"
     bl_label = "Preview Points"
     bl_options = {'REGISTER'}
 
@@ -212,19 +205,16 @@ class TETFLORA_OT_preview_population(Reporting, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper):
+class TETFLORA_OT_export_populations(FileTool, bpy.types.Operator, ExportHelper):
     """Export the settings of the populations in this scene to a file, for use in other scenes.
 
     Plants are not exported.
     """
 
-    bl_idname = "tetflora.export_populations"
     bl_label = "Export Populations"
     needs = (need(lambda context: context.scene.tetflora.populations, "Add a population first"),)
     bl_options = {'REGISTER'}
 
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
     only_active: BoolProperty(name="Only Active", description="Export the active population only")
 
     def run(self, context: bpy.types.Context) -> set[str]:
@@ -232,25 +222,20 @@ class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper
         chosen = list(settings.populations)
         if self.only_active:
             chosen = chosen[settings.populations_index :][:1]
-        path = write_populations(chosen, Path(bpy.path.abspath(self.filepath)))
+        path = write_populations(chosen, self.path)
         return self.done(f"{counted(len(chosen), 'population')} written to {path}")
 
 
-class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper):
+class TETFLORA_OT_import_populations(FileTool, bpy.types.Operator, ImportHelper):
     """Import populations from a file, without plants; click Update for each.
 
     They grow on meshes with the names in the file, or else on the selected meshes.
     """
 
-    bl_idname = "tetflora.import_populations"
     bl_label = "Import Populations"
 
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
-
     def run(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath))
-        number, missing = read_populations(context.scene, path, selected_grounds(context))
+        number, missing = read_populations(context.scene, self.path, selected_grounds(context))
         points.schedule()
         added = f"{counted(number, 'population')} added"
         if not missing:
@@ -259,16 +244,62 @@ class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper
         return {'FINISHED'}
 
 
-CLASSES = (
-    TETFLORA_OT_add_population,
-    TETFLORA_OT_update_population,
-    TETFLORA_OT_reroll_population,
-    TETFLORA_OT_freeze_population,
-    TETFLORA_OT_remove_population,
-    TETFLORA_OT_select_population,
-    TETFLORA_OT_set_population_ground,
-    TETFLORA_OT_forget_erased,
-    TETFLORA_OT_preview_population,
-    TETFLORA_OT_export_populations,
-    TETFLORA_OT_import_populations,
-)
+class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
+    """Cover the ground under the active population with grass, moss and herbs by the light there, and with leaves,
+    branches and logs of its species where they fall.
+
+    The cover is a population of its own; use again to renew it after changes above.
+    """
+
+    bl_label = "Ground Cover"
+    needs = (
+        in_object_mode,
+        need(lambda context: active_population(context.scene), "Add a population first; its ground is then covered"),
+    )
+
+    soil: BoolProperty(
+        name="Soil",
+        description="Give the ground a material in the colors of what lies there, unless it has one of yours",
+        default=True,
+    )
+
+    fallen: BoolProperty(
+        name="Fallen Leaves",
+        description="With Seasons on, strew in a population of their own the leaves that the plants above shed in "
+        "autumn, as many as are no longer on them",
+        default=True,
+    )
+
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Covered]:
+        scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
+        made = yield from cover_steps(scene, depsgraph, covered_population(scene), self.soil)
+        if self.fallen and scene.tetflora.year.enabled:
+            yield from strew_steps(scene, depsgraph, covered_population(scene))
+        return made
+
+    def finish(self, context: bpy.types.Context, result: Covered) -> set[str]:
+        points.schedule()
+        show_shapes(context.scene)
+        kept = f'; "{result.bare[0]}" keeps its own material' if result.bare else ""
+        if not result.made.number:
+            return self.refused(f"Nothing grows here: {result.made.reason}")
+        return self.done(f"{counted(result.made.number, 'plant')} cover the ground{kept}")
+
+
+class TETFLORA_OT_ground_snow(Reporting, bpy.types.Operator):
+    """Add the snow of the scene to the materials of the active population's ground, as a node before their output.
+
+    Soil of Ground Cover needs none of it.
+    """
+
+    bl_label = "Snow on Ground"
+    needs = (
+        in_object_mode,
+        need(lambda context: active_population(context.scene), "Add a population first; its ground can then have snow"),
+    )
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        found = cover_with_snow(context.scene, covered_population(context.scene))
+        if not found:
+            return self.refused("The materials of the ground have snow already")
+        return self.done(f"{counted(len(found), 'material')} can have snow; set Snow under Year and Age")

@@ -19,13 +19,7 @@ _VIEWPORT = 72.0
 
 
 def _frozen(scene: bpy.types.Scene) -> Camera | None:
-    preview = state.find(scene)
-    return None if preview is None else preview.frozen
-
-
-def _levels_of(scene: bpy.types.Scene) -> Levels | None:
-    preview = state.find(scene)
-    return None if preview is None else preview.levels
+    return getattr(state.find(scene), "frozen", None)
 
 
 _camera_found = need(lambda context: context.scene.camera is not None or _frozen(context.scene) is not None, NO_CAMERA)
@@ -38,7 +32,6 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
     Takes as long as the first part of Refine; Esc cancels and keeps the previous levels.
     """
 
-    bl_idname = "tetflora.preview_levels"
     bl_label = "Compute Levels"
     needs = (_camera_found,)
     bl_options = {'REGISTER'}  # nothing in the file changes but the level that is shown
@@ -59,11 +52,13 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
 class TETFLORA_OT_forget_levels(Reporting, bpy.types.Operator):
     """Remove the levels from viewports and memory. The file does not change."""
 
-    bl_idname = "tetflora.forget_levels"
     bl_label = "Clear Levels"
     bl_options = set()
     needs = (
-        need(lambda context: _levels_of(context.scene) is not None, "No levels to clear; click Compute Levels first"),
+        need(
+            lambda context: getattr(state.find(context.scene), "levels", None) is not None,
+            "No levels to clear; click Compute Levels first",
+        ),
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
@@ -76,7 +71,6 @@ class TETFLORA_OT_look_through(Reporting, bpy.types.Operator):
     camera.
     """
 
-    bl_idname = "tetflora.look_through"
     bl_label = "Look Through Camera"
     bl_options = set()
     needs = (
@@ -106,6 +100,3 @@ def look_from(space: bpy.types.SpaceView3D, camera: Camera) -> None:
     if camera.kind == "PERSP":
         space.lens = min(max(_VIEWPORT / max(right - left, top - bottom), 1.0), 250.0)
     region.view_matrix = matrix.inverted()
-
-
-CLASSES = (TETFLORA_OT_preview_levels, TETFLORA_OT_forget_levels, TETFLORA_OT_look_through)

@@ -45,7 +45,6 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
     Esc cancels without changes; Return stops refining and creates what has been decided so far.
     """
 
-    bl_idname = "tetflora.refine"
     bl_label = "Refine"
     needs = (in_object_mode, need(lambda context: context.scene.camera is not None, NO_CAMERA))
 
@@ -165,7 +164,6 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
     Plants remain, and hidden meshes are shown again.
     """
 
-    bl_idname = "tetflora.clear"
     bl_label = "Clear"
     needs = (in_object_mode, need(lambda context: _clearable(context.scene), "No results to clear"))
 
@@ -184,7 +182,6 @@ class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
     Refine and Clear no longer change them. Turns off Refine at Render, to avoid rendering the plants twice.
     """
 
-    bl_idname = "tetflora.keep_results"
     bl_label = "Keep Results as Meshes"
     needs = (
         in_object_mode,
@@ -209,7 +206,6 @@ class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
     The plant remains, but disabled; Clear does not remove the mesh. Esc cancels without changes.
     """
 
-    bl_idname = "tetflora.make_plant_mesh"
     bl_label = "Convert Plants to Meshes"
     needs = (in_object_mode, plants_selected)
 
@@ -226,19 +222,9 @@ class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
 class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
     """Delete all cached species analysis, and nothing else in the folder. It is computed again when needed."""
 
-    bl_idname = "tetflora.clear_cache"
     bl_label = "Clear Cache"
     needs = (need(lambda _: storage.used() is not None, "The cache folder does not exist"),)
     bl_options = {'REGISTER'}
 
     def run(self, _context: bpy.types.Context) -> set[str]:
         return self.done(f"{counted(storage.clear() + kept.clear(), 'file')} deleted from {storage.used()}")
-
-
-CLASSES = (
-    TETFLORA_OT_refine,
-    TETFLORA_OT_clear,
-    TETFLORA_OT_keep_results,
-    TETFLORA_OT_make_plant_mesh,
-    TETFLORA_OT_clear_cache,
-)

@@ -20,7 +20,6 @@ class TETFLORA_OT_write_report(Reporting, bpy.types.Operator, ExportHelper):
     Nothing of the scene is in it, and no names or folders.
     """
 
-    bl_idname = "tetflora.write_report"
     bl_label = "Write Report"
     bl_options = {'REGISTER'}
 
@@ -38,6 +37,3 @@ class TETFLORA_OT_write_report(Reporting, bpy.types.Operator, ExportHelper):
         except OSError as error:
             raise TetFloraError(f"Cannot write {path}: {error.strerror}. Choose another folder") from None
         return self.done(f"Written to {path}; look through it before you send it")
-
-
-CLASSES = (TETFLORA_OT_write_report,)

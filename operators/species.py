@@ -9,7 +9,6 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
 from ..tetflora_addon.blender.placing.plant_objects import assign_species
 from ..tetflora_addon.blender.species.catalogue import (
@@ -32,7 +31,7 @@ from ..tetflora_addon.blender.species.edits import (
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.schema import DEFAULT_SPUR
 from ..tetflora_addon.species.skeletons import MAX_ORDERS
-from .base import Reporting, counted, need, selected_plants
+from .base import FileTool, Reporting, counted, need, selected_plants
 
 
 def shown(context: bpy.types.Context) -> str:
@@ -46,7 +45,6 @@ species_shown = need(lambda context: shown(context) in catalogue(), "Choose a sp
 class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
     """Duplicate the shown species. The copy belongs to this file until you save it to your species."""
 
-    bl_idname = "tetflora.duplicate_species"
     bl_label = "Duplicate as New Species"
     needs = (species_shown,)
 
@@ -93,7 +91,6 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
     Deletes a species that exists only in this file.
     """
 
-    bl_idname = "tetflora.revert_species"
     bl_label = "Revert"
     needs = (need(lambda context: find_edit(context.scene, shown(context)), "The species has no changes to revert"),)
 
@@ -110,7 +107,6 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
 class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
     """Add or remove an order of branches or the short shoots of the species."""
 
-    bl_idname = "tetflora.edit_orders"
     bl_label = "Edit Orders"
     needs = (species_shown,)
 
@@ -177,7 +173,6 @@ class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
     It replaces a built-in species of the same identifier, and an earlier version of your own.
     """
 
-    bl_idname = "tetflora.save_species"
     bl_label = "Save to My Species"
     needs = (species_shown,)
     bl_options = {'REGISTER'}
@@ -187,34 +182,27 @@ class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
         return self.done(f"Saved as {path}")
 
 
-class TETFLORA_OT_load_species(Reporting, bpy.types.Operator, ImportHelper):
+class TETFLORA_OT_load_species(FileTool, bpy.types.Operator, ImportHelper):
     """Copy a species file to your species folder, to use it in all files."""
 
-    bl_idname = "tetflora.load_species"
     bl_label = "Load Species"
 
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
     replace: BoolProperty(
         name="Replace", description="Replace your own species of the same file name", options={'SKIP_SAVE'}
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        identifier = load_species_file(Path(bpy.path.abspath(self.filepath)), self.replace)
+        identifier = load_species_file(self.path, self.replace)
         context.scene.tetflora.species_editor.species = identifier
         return self.done(f'Species "{catalogue()[identifier].name}" loaded')
 
 
-class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
+class TETFLORA_OT_export_species(FileTool, bpy.types.Operator, ExportHelper):
     """Export the species to a file, to share it. The file name is the identifier of the species."""
 
-    bl_idname = "tetflora.export_species"
     bl_label = "Export Species"
     needs = (species_shown,)
     bl_options = {'REGISTER'}
-
-    filename_ext = ENDING
-    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.filepath:
@@ -223,14 +211,12 @@ class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         identifier = shown(context)
-        path = Path(bpy.path.abspath(self.filepath))
-        return self.done(f"Written to {write_species(context.scene, identifier, path)}")
+        return self.done(f"Written to {write_species(context.scene, identifier, self.path)}")
 
 
 class TETFLORA_OT_delete_species(Reporting, bpy.types.Operator):
     """Delete the file of the species from your species folder. Built-in species remain. This cannot be undone."""
 
-    bl_idname = "tetflora.delete_species"
     bl_label = "Delete from My Species"
     needs = (need(lambda context: own_file(shown(context)), "The species has no file in your species folder"),)
     bl_options = {'REGISTER'}
@@ -249,7 +235,6 @@ class TETFLORA_OT_preview_species(Reporting, bpy.types.Operator):
     It is never rendered or saved. Use again to hide it.
     """
 
-    bl_idname = "tetflora.preview_species"
     bl_label = "Preview Species"
     needs = (lambda context: "" if species.shown_in(context.scene) else species_shown(context),)
     # No undo: the preview is no part of the file.
@@ -266,7 +251,6 @@ class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
     Assets refer to species by name: using them requires TetFlora and the same species.
     """
 
-    bl_idname = "tetflora.create_asset_library"
     bl_label = "Create Asset Library"
     bl_options = {'REGISTER'}
 
@@ -290,16 +274,3 @@ class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
         shown = self.add_library and add_to_preferences(path.parent)
         more = "; folder added to the asset libraries" if shown else ""
         return self.done(f"{counted(number, 'plant')} written to {path}{more}")
-
-
-CLASSES = (
-    TETFLORA_OT_duplicate_species,
-    TETFLORA_OT_revert_species,
-    TETFLORA_OT_edit_orders,
-    TETFLORA_OT_save_species,
-    TETFLORA_OT_load_species,
-    TETFLORA_OT_export_species,
-    TETFLORA_OT_delete_species,
-    TETFLORA_OT_preview_species,
-    TETFLORA_OT_create_asset_library,
-)

@@ -46,7 +46,6 @@ class TETFLORA_OT_grow_stand(_Growing, bpy.types.Operator):
     use Grow Again.
     """
 
-    bl_idname = "tetflora.grow_stand"
     bl_label = "Grow Stand"
     needs = (in_object_mode, ground_selected)
 
@@ -57,7 +56,6 @@ class TETFLORA_OT_grow_stand(_Growing, bpy.types.Operator):
 class TETFLORA_OT_grow_again(_Growing, bpy.types.Operator):
     """Grow the active stand again by its present settings, in place of all its plants."""
 
-    bl_idname = "tetflora.grow_again"
     bl_label = "Grow Again"
     needs = _ACTIVE
 
@@ -68,7 +66,6 @@ class TETFLORA_OT_grow_again(_Growing, bpy.types.Operator):
 class TETFLORA_OT_animate_growth(Reporting, bpy.types.Operator):
     """Key the year of the active stand from its first year to its last, and turn on Smooth Growth."""
 
-    bl_idname = "tetflora.animate_growth"
     bl_label = "Animate Growth"
     needs = _ACTIVE
 
@@ -99,7 +96,6 @@ class TETFLORA_OT_keep_year(Reporting, bpy.types.Operator):
     The brush and other tools can then change it. Grow Again brings the years back.
     """
 
-    bl_idname = "tetflora.keep_year"
     bl_label = "Keep Year"
     needs = _ACTIVE
 
@@ -111,6 +107,3 @@ class TETFLORA_OT_keep_year(Reporting, bpy.types.Operator):
         number = keep_year(context.active_object)
         context.scene.update_tag()
         return self.done(f"{counted(number, 'plant')} kept")
-
-
-CLASSES = (TETFLORA_OT_grow_stand, TETFLORA_OT_grow_again, TETFLORA_OT_animate_growth, TETFLORA_OT_keep_year)

@@ -16,7 +16,6 @@ _HALF = 182.0
 class TETFLORA_OT_set_season(Reporting, bpy.types.Operator):
     """Set Day of Year to the middle of a season at the latitude of the scene, and turn on Seasons."""
 
-    bl_idname = "tetflora.set_season"
     bl_label = "Set Season"
 
     season: EnumProperty(
@@ -37,6 +36,3 @@ class TETFLORA_OT_set_season(Reporting, bpy.types.Operator):
         year.enabled, year.day = True, (day - 1.0) % 365.0 + 1.0
         context.scene.update_tag()  # as a slider does: previews and Refine Automatically listen
         return self.done(date_text(year.day))
-
-
-CLASSES = (TETFLORA_OT_set_season,)

@@ -5,11 +5,12 @@
 import bpy
 
 from ..tetflora_addon.blender.job import render
+from ..tetflora_addon.blender.runtime import classes_in
 from . import base, biomes, menus, places, plants, populate, preferences, refine, results, species, stands
 
 # In the order of registration, which is that of the panels in the tab: as an artist works, a panel after its parent.
 _MODULES = (base, refine, plants, populate, biomes, stands, places, species, results, menus)
-CLASSES = tuple(cls for module in _MODULES for cls in module.CLASSES)
+CLASSES = classes_in(_MODULES, bpy.types.Panel, bpy.types.Menu, bpy.types.UIList)
 
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 

@@ -4,44 +4,6 @@
 
 import bpy
 
-from ..operators.add import (
-    TETFLORA_OT_add_plant,
-    TETFLORA_OT_first_forest,
-    TETFLORA_OT_populate,
-    TETFLORA_OT_use_as_form,
-)
-from ..operators.assets import (
-    TETFLORA_OT_refine_scatter,
-    TETFLORA_OT_stop_using_as_species,
-    TETFLORA_OT_use_as_species,
-)
-from ..operators.biomes import TETFLORA_OT_add_biome
-from ..operators.brush import TETFLORA_OT_paint_plants
-from ..operators.ground_cover import TETFLORA_OT_ground_cover
-from ..operators.ground_tools import TETFLORA_OT_place_plant
-from ..operators.marks import (
-    TETFLORA_OT_make_field,
-    TETFLORA_OT_mark_explicit,
-    TETFLORA_OT_mark_field,
-    TETFLORA_OT_mark_occluder,
-    TETFLORA_OT_split_field,
-)
-from ..operators.plants import (
-    TETFLORA_OT_assign_species,
-    TETFLORA_OT_drop_to_ground,
-    TETFLORA_OT_remove_plants,
-    TETFLORA_OT_reseed,
-    TETFLORA_OT_select_species,
-)
-from ..operators.populations import TETFLORA_OT_export_populations, TETFLORA_OT_import_populations
-from ..operators.preview import TETFLORA_OT_preview_levels
-from ..operators.refine import (
-    TETFLORA_OT_clear,
-    TETFLORA_OT_keep_results,
-    TETFLORA_OT_make_plant_mesh,
-    TETFLORA_OT_refine,
-)
-from ..operators.stands import TETFLORA_OT_grow_stand
 from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.species.catalogue import FIRST
@@ -54,7 +16,7 @@ from .preferences import PIE
 class _SpeciesMenu:
     """Mix-in for menus with an entry for each species of the catalog, which calls ``operator`` with it."""
 
-    operator: type[bpy.types.Operator]
+    operator: str
 
     def draw(self, _context: bpy.types.Context) -> None:
         # Menus execute operators by default; tools need the mouse, and the others have nothing to ask.
@@ -62,7 +24,7 @@ class _SpeciesMenu:
         known = catalogue()
         for info in known.values():
             icon = thumbnail(info.identifier)
-            self.layout.operator(self.operator.bl_idname, text=info.name, **icon).species = info.identifier
+            self.layout.operator(f"tetflora.{self.operator}", text=info.name, **icon).species = info.identifier
             if info.identifier == FIRST:  # the others follow by name
                 self.layout.separator()
         if not known:
@@ -73,36 +35,27 @@ class TETFLORA_MT_species(_SpeciesMenu, bpy.types.Menu):
     """Species to assign to the selected plants."""
 
     bl_label = "Change Species"
-    operator = TETFLORA_OT_assign_species
+    operator = "assign_species"
 
 
 class TETFLORA_MT_add_plant(_SpeciesMenu, bpy.types.Menu):
     """Species to add a plant of."""
 
     bl_label = "TetFlora Plant"
-    operator = TETFLORA_OT_add_plant
+    operator = "add_plant"
 
 
 class TETFLORA_MT_place_plant(_SpeciesMenu, bpy.types.Menu):
     """Species to place by clicking on the ground."""
 
     bl_label = "Place Plants by Clicking"
-    operator = TETFLORA_OT_place_plant
+    operator = "place_plant"
 
 
-#: Buttons that panels have as well.
-PLANT_TOOLS = (
-    Button(TETFLORA_OT_reseed, 'FILE_REFRESH'),
-    Button(TETFLORA_OT_select_species, 'RESTRICT_SELECT_OFF', "Select All of This Species"),
-)
-CONVERSIONS = (
-    Button(TETFLORA_OT_make_field, 'POINTCLOUD_DATA'),
-    Button(TETFLORA_OT_split_field, 'OUTLINER_OB_EMPTY'),
-)
-_POPULATE = Button(TETFLORA_OT_populate, 'OUTLINER_OB_POINTCLOUD', "Populate with Plants")
-_PAINT = Button(TETFLORA_OT_paint_plants, 'BRUSH_DATA')
-_DROP = Button(TETFLORA_OT_drop_to_ground, 'TRIA_DOWN_BAR')
-_FIRST_FOREST = Button(TETFLORA_OT_first_forest, 'WORLD')
+_POPULATE = Button("populate", 'OUTLINER_OB_POINTCLOUD', "Populate with Plants")
+_PAINT = Button("paint_plants", 'BRUSH_DATA')
+_DROP = Button("drop_to_ground", 'TRIA_DOWN_BAR')
+_FIRST_FOREST = Button("first_forest", 'WORLD')
 
 
 def draw_place_menu(layout: bpy.types.UILayout) -> None:
@@ -134,15 +87,16 @@ class TETFLORA_MT_object(bpy.types.Menu):
         draw_buttons(
             layout,
             _POPULATE,
-            Button(TETFLORA_OT_grow_stand, 'TIME'),
-            Button(TETFLORA_OT_mark_occluder, 'MOD_MASK', "Mark or Unmark as Occluder"),
-            Button(TETFLORA_OT_mark_explicit, 'MESH_ICOSPHERE', "Refine or Ignore These Meshes"),
-            Button(TETFLORA_OT_use_as_species, 'ASSET_MANAGER'),
-            Button(TETFLORA_OT_stop_using_as_species, 'X'),
-            Button(TETFLORA_OT_refine_scatter, 'OUTLINER_OB_POINTCLOUD', "Refine Scatter or Keep It Plain"),
-            Button(TETFLORA_OT_use_as_form, 'CURVE_DATA'),
-            Button(TETFLORA_OT_mark_field, 'POINTCLOUD_DATA', "Use or Stop Using as Field of Plants"),
-            *CONVERSIONS,
+            Button("grow_stand", 'TIME'),
+            Button("mark_occluder", 'MOD_MASK', "Mark or Unmark as Occluder"),
+            Button("mark_explicit", 'MESH_ICOSPHERE', "Refine or Ignore These Meshes"),
+            Button("use_as_species", 'ASSET_MANAGER'),
+            Button("stop_using_as_species", 'X'),
+            Button("refine_scatter", 'OUTLINER_OB_POINTCLOUD', "Refine Scatter or Keep It Plain"),
+            Button("use_as_form", 'CURVE_DATA'),
+            Button("mark_field", 'POINTCLOUD_DATA', "Use or Stop Using as Field of Plants"),
+            Button("make_field", 'POINTCLOUD_DATA'),
+            Button("split_field", 'OUTLINER_OB_EMPTY'),
             None,
             _PAINT,
         )
@@ -150,10 +104,10 @@ class TETFLORA_MT_object(bpy.types.Menu):
         draw_buttons(
             layout,
             _DROP,
-            Button(TETFLORA_OT_ground_cover, 'OUTLINER_OB_CURVES'),
-            Button(TETFLORA_OT_add_biome, FALLBACK_ICON),
-            Button(TETFLORA_OT_import_populations, 'IMPORT', "Import Populations..."),
-            Button(TETFLORA_OT_export_populations, 'EXPORT', "Export Populations..."),
+            Button("ground_cover", 'OUTLINER_OB_CURVES'),
+            Button("add_biome", FALLBACK_ICON),
+            Button("import_populations", 'IMPORT', "Import Populations..."),
+            Button("export_populations", 'EXPORT', "Export Populations..."),
             None,
             *IMPORTS,
             None,
@@ -161,15 +115,16 @@ class TETFLORA_MT_object(bpy.types.Menu):
         draw_species_menu(layout)
         draw_buttons(
             layout,
-            *PLANT_TOOLS,
-            Button(TETFLORA_OT_make_plant_mesh, 'OUTLINER_OB_MESH'),
-            Button(TETFLORA_OT_remove_plants, 'X', "Remove Selected Plants", {"which": 'SELECTED'}),
-            Button(TETFLORA_OT_remove_plants, 'TRASH', "Remove All Plants", {"which": 'ALL'}),
+            Button("reseed", 'FILE_REFRESH'),
+            Button("select_species", 'RESTRICT_SELECT_OFF', "Select All of This Species"),
+            Button("make_plant_mesh", 'OUTLINER_OB_MESH'),
+            Button("remove_plants", 'X', "Remove Selected Plants", {"which": 'SELECTED'}),
+            Button("remove_plants", 'TRASH', "Remove All Plants", {"which": 'ALL'}),
             None,
-            Button(TETFLORA_OT_preview_levels, 'MOD_REMESH'),
-            Button(TETFLORA_OT_refine, 'MOD_DECIM', "Refine Plants"),
-            Button(TETFLORA_OT_keep_results, 'MESH_DATA'),
-            Button(TETFLORA_OT_clear, 'TRASH', "Clear Results"),
+            Button("preview_levels", 'MOD_REMESH'),
+            Button("refine", 'MOD_DECIM', "Refine Plants"),
+            Button("keep_results", 'MESH_DATA'),
+            Button("clear", 'TRASH', "Clear Results"),
         )
 
 
@@ -184,8 +139,8 @@ def draw_in_outliner(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.separator()
     draw_buttons(
         menu.layout,
-        Button(TETFLORA_OT_use_as_species, 'ASSET_MANAGER', "Use as TetFlora Species"),
-        Button(TETFLORA_OT_stop_using_as_species, 'X', "Stop Using as TetFlora Species"),
+        Button("use_as_species", 'ASSET_MANAGER', "Use as TetFlora Species"),
+        Button("stop_using_as_species", 'X', "Stop Using as TetFlora Species"),
     )
 
 
@@ -198,9 +153,9 @@ class TETFLORA_MT_pie(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         pie = self.layout.menu_pie()
         # West, east, south, north, north-west, north-east, south-west, south-east: Blender's own order.
-        draw_buttons(pie, _PAINT, Button(TETFLORA_OT_refine, 'MOD_DECIM'), _POPULATE)
+        draw_buttons(pie, _PAINT, Button("refine", 'MOD_DECIM'), _POPULATE)
         draw_place_menu(pie)
-        draw_buttons(pie, _DROP, Button(TETFLORA_OT_clear, 'TRASH'), _FIRST_FOREST)
+        draw_buttons(pie, _DROP, Button("clear", 'TRASH'), _FIRST_FOREST)
         draw_species_menu(pie)
 
 
@@ -212,20 +167,10 @@ class TETFLORA_MT_nothing_refined(bpy.types.Menu):
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.label(text="Nothing is refined, and Refine at Render is off", icon='INFO')
-        self.layout.operator(TETFLORA_OT_refine.bl_idname, icon='MOD_DECIM')
+        self.layout.operator("tetflora.refine", icon='MOD_DECIM')
         self.layout.prop(context.scene.tetflora, "refine_at_render")
 
 
 def open_nothing_refined() -> None:
     """Open the menu, where there is a window."""
     open_menu(TETFLORA_MT_nothing_refined.bl_idname)
-
-
-CLASSES = (
-    TETFLORA_MT_species,
-    TETFLORA_MT_add_plant,
-    TETFLORA_MT_place_plant,
-    TETFLORA_MT_object,
-    TETFLORA_MT_pie,
-    TETFLORA_MT_nothing_refined,
-)

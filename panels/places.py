@@ -4,23 +4,17 @@
 
 import bpy
 
-from ..operators.places import (
-    TETFLORA_OT_import_canopy,
-    TETFLORA_OT_import_inventory,
-    TETFLORA_OT_import_outlines,
-    TETFLORA_OT_import_terrain,
-    column_row,
-)
+from ..operators.places import column_row
 from ..tetflora_addon.blender.places.origin import origin_of
 from ..tetflora_addon.errors import TetFloraError
 from .base import Button, SidebarPanel, draw_buttons, draw_message
 
 #: In the order in which a place is built.
 IMPORTS = (
-    Button(TETFLORA_OT_import_terrain, 'RNDCURVE'),
-    Button(TETFLORA_OT_import_canopy, 'OUTLINER_OB_POINTCLOUD'),
-    Button(TETFLORA_OT_import_inventory, 'SPREADSHEET'),
-    Button(TETFLORA_OT_import_outlines, 'OUTLINER_OB_CURVE'),
+    Button("import_terrain", 'RNDCURVE'),
+    Button("import_canopy", 'OUTLINER_OB_POINTCLOUD'),
+    Button("import_inventory", 'SPREADSHEET'),
+    Button("import_outlines", 'OUTLINER_OB_CURVE'),
 )
 
 
@@ -55,12 +49,9 @@ def draw_in_import_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> No
     """Entries in Blender's File > Import."""
     menu.layout.separator()
     for kind, ending, icon in (
-        (TETFLORA_OT_import_terrain, "Terrain (.tif, .asc, .hgt)", 'RNDCURVE'),
-        (TETFLORA_OT_import_canopy, "Canopy Height (.tif, .asc, .xyz)", 'OUTLINER_OB_POINTCLOUD'),
-        (TETFLORA_OT_import_inventory, "Tree Inventory (.csv, .geojson)", 'SPREADSHEET'),
-        (TETFLORA_OT_import_outlines, "Map Outlines (.geojson, .shp, .gpkg)", 'OUTLINER_OB_CURVE'),
+        ("import_terrain", "Terrain (.tif, .asc, .hgt)", 'RNDCURVE'),
+        ("import_canopy", "Canopy Height (.tif, .asc, .xyz)", 'OUTLINER_OB_POINTCLOUD'),
+        ("import_inventory", "Tree Inventory (.csv, .geojson)", 'SPREADSHEET'),
+        ("import_outlines", "Map Outlines (.geojson, .shp, .gpkg)", 'OUTLINER_OB_CURVE'),
     ):
         Button(kind, icon, ending).draw(menu.layout)
-
-
-CLASSES = (TETFLORA_UL_inventory_columns, TETFLORA_PT_places)

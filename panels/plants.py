@@ -1,32 +1,20 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plants: the active plant or field, and operators for the selected ones."""
+"""Plants: the active plant or field; operators for the selected ones are in the Object menu."""
 
 import bpy
 
-from ..operators.add import TETFLORA_OT_use_as_form
-from ..operators.assets import TETFLORA_OT_stop_using_as_species, TETFLORA_OT_use_as_species
-from ..operators.marks import TETFLORA_OT_mark_field
-from ..operators.plants import TETFLORA_OT_remove_plants
-from ..operators.refine import TETFLORA_OT_make_plant_mesh
 from ..tetflora_addon.blender.assets.marks import is_species
 from ..tetflora_addon.blender.scene.ages import stage_text
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.scene.objects import has_nodes
 from ..tetflora_addon.blender.scene.own_ages import has_ages
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES
+from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.species.asset_species import name_of
 from ..tetflora_addon.blender.species.edits import catalogue
-from .base import (
-    Button,
-    SidebarPanel,
-    TETFLORA_UL_field_species,
-    draw_below,
-    draw_buttons,
-    draw_properties,
-    split_layout,
-)
-from .menus import CONVERSIONS, PLANT_TOOLS, TETFLORA_MT_add_plant, draw_species_menu
+from .base import Button, SidebarPanel, TETFLORA_UL_field_species, draw_below, draw_properties, split_layout
+from .menus import TETFLORA_MT_add_plant
 
 
 class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
@@ -58,12 +46,12 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
         # A mesh with faces is ground or something else, as a rule; the Object menu offers these for it too.
         faces = active.type == 'MESH' and len(active.data.polygons) > 0
         if active.type in FORM_TYPES and not faces:
-            layout.operator(TETFLORA_OT_use_as_form.bl_idname, icon='CURVE_DATA')
+            layout.operator("tetflora.use_as_form", icon='CURVE_DATA')
         field = active.tetflora.is_field
         if field or (active.type in FIELD_TYPES and (not faces or has_nodes(active))):
             text = "Field of Plants" if field else "Use as Field of Plants"
             icon = 'CHECKMARK' if field else 'POINTCLOUD_DATA'
-            Button(TETFLORA_OT_mark_field, icon, text).draw(layout, depress=field)
+            Button("mark_field", icon, text).draw(layout, depress=field)
 
 
 def _draw_asset(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
@@ -71,8 +59,8 @@ def _draw_asset(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     if is_species(obj):
         row = layout.row(align=True)
         row.label(text="Used as a species", icon='CHECKMARK')
-        Button(TETFLORA_OT_use_as_species, 'FILE_REFRESH', "").draw(row)
-        Button(TETFLORA_OT_stop_using_as_species, 'X', "").draw(row)
+        Button("use_as_species", 'FILE_REFRESH', "").draw(row)
+        Button("stop_using_as_species", 'X', "").draw(row)
 
 
 def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
@@ -83,8 +71,8 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     TETFLORA_UL_field_species.draw_in(column, field)
     if not kinds:
         column.prop(field, "species_choice")
-    elif 0 <= field.field_species_index < len(kinds):
-        column.prop(kinds[field.field_species_index], "form")
+    elif entry := active_in(field, "field_species"):
+        column.prop(entry, "form")
     for species in {entry.species for entry in kinds} or {field.species}:
         if species not in catalogue():
             column.label(text=f'"{name_of(species)}" is not in the catalog', icon='ERROR')
@@ -93,25 +81,3 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         column.label(text="Age by attribute", icon='INFO')
     else:
         column.prop(field, "age")
-
-
-class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
-    """Operators for many plants at once; closed by default to keep the panels below in sight."""
-
-    bl_label = "Selected Plants"
-    bl_parent_id = "TETFLORA_PT_plants"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        column = self.layout.column(align=True)
-        draw_species_menu(column)
-        mesh = Button(TETFLORA_OT_make_plant_mesh, 'OUTLINER_OB_MESH', "Convert to Meshes")
-        draw_buttons(column, *PLANT_TOOLS, mesh, *CONVERSIONS)
-        draw_buttons(
-            self.layout.column(align=True),
-            Button(TETFLORA_OT_remove_plants, 'X', "Remove Selected", {"which": 'SELECTED'}),
-            Button(TETFLORA_OT_remove_plants, 'TRASH', "Remove All Plants", {"which": 'ALL'}),
-        )
-
-
-CLASSES = (TETFLORA_PT_plants, TETFLORA_PT_selected_plants)

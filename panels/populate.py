@@ -4,54 +4,37 @@
 
 import bpy
 
-from ..operators.add import TETFLORA_OT_populate
-from ..operators.brush import TETFLORA_OT_paint_plants
-from ..operators.ground_cover import TETFLORA_OT_ground_cover, TETFLORA_OT_ground_snow
-from ..operators.marks import TETFLORA_OT_mark_occluder
-from ..operators.populations import (
-    TETFLORA_OT_add_population,
-    TETFLORA_OT_export_populations,
-    TETFLORA_OT_forget_erased,
-    TETFLORA_OT_freeze_population,
-    TETFLORA_OT_import_populations,
-    TETFLORA_OT_preview_population,
-    TETFLORA_OT_remove_population,
-    TETFLORA_OT_reroll_population,
-    TETFLORA_OT_select_population,
-    TETFLORA_OT_set_population_ground,
-    TETFLORA_OT_update_population,
-)
 from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
 from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
+from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.viewport import points
 from .base import (
     Button,
+    LayerList,
     SidebarPanel,
     TETFLORA_UL_mix,
     draw_below,
     draw_buttons,
-    draw_limits,
-    draw_mask,
+    draw_list,
     draw_message,
-    draw_paths,
     draw_properties,
+    draw_where,
+    section,
     shown_length,
     split_layout,
 )
 
 
-class TETFLORA_UL_populations(bpy.types.UIList):
+class TETFLORA_UL_populations(LayerList, bpy.types.UIList):
     """A population's name, how many plants it has, and whether it is frozen or an update would change it."""
 
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
-        row = layout.row(align=True)
-        row.prop(item, "name", text="", emboss=False, icon='OUTLINER_OB_POINTCLOUD')
-        right = row.row()
-        right.alignment = 'RIGHT'
-        icon = 'FREEZE' if item.frozen else 'FILE_REFRESH' if is_outdated(item) else 'NONE'
-        right.label(text=f"{item.made:,}", icon=icon)
+    icon = 'OUTLINER_OB_POINTCLOUD'
+
+    @staticmethod
+    def state(item: bpy.types.PropertyGroup) -> tuple[int, str]:
+        return item.made, 'FREEZE' if item.frozen else 'FILE_REFRESH' if is_outdated(item) else 'NONE'
 
 
 class TETFLORA_MT_populations(bpy.types.Menu):
@@ -62,13 +45,13 @@ class TETFLORA_MT_populations(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         draw_buttons(
             self.layout,
-            Button(TETFLORA_OT_select_population, 'RESTRICT_SELECT_OFF'),
-            Button(TETFLORA_OT_remove_population, 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
-            Button(TETFLORA_OT_forget_erased, 'LOOP_BACK'),
-            Button(TETFLORA_OT_ground_snow, 'FREEZE'),
+            Button("select_population", 'RESTRICT_SELECT_OFF'),
+            Button("remove_population", 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
+            Button("forget_erased", 'LOOP_BACK'),
+            Button("ground_snow", 'FREEZE'),
             None,
-            Button(TETFLORA_OT_import_populations, 'IMPORT', "Import..."),
-            Button(TETFLORA_OT_export_populations, 'EXPORT', "Export..."),
+            Button("import_populations", 'IMPORT', "Import..."),
+            Button("export_populations", 'EXPORT', "Export..."),
         )
 
 
@@ -80,15 +63,18 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
         group, settings = context.scene.tetflora, shown_population(context.scene)
-        _draw_populations(layout, group)
+        buttons = [Button("add_population", 'ADD', ""), Button("remove_population", 'REMOVE', "")]
+        buttons, rows = (buttons, 3) if group.populations else (buttons[:1], 1)
+        beside = draw_list(layout, TETFLORA_UL_populations, group, "populations", *buttons, rows=rows)
+        beside.menu(TETFLORA_MT_populations.__name__, text="", icon='DOWNARROW_HLT')
         if settings.uid:
             row = layout.row(align=True)
-            Button(TETFLORA_OT_update_population, 'FILE_REFRESH', "Update").draw(row)
-            Button(TETFLORA_OT_reroll_population, 'MOD_NOISE', "Re-roll").draw(row)
-            Button(TETFLORA_OT_freeze_population, 'FREEZE', "Freeze").draw(row, depress=settings.frozen)
-            Button(TETFLORA_OT_ground_cover, 'OUTLINER_OB_CURVES').draw(layout)
+            Button("update_population", 'FILE_REFRESH', "Update").draw(row)
+            Button("reroll_population", 'MOD_NOISE', "Re-roll").draw(row)
+            Button("freeze_population", 'FREEZE', "Freeze").draw(row, depress=settings.frozen)
+            Button("ground_cover", 'OUTLINER_OB_CURVES').draw(layout)
         else:
-            Button(TETFLORA_OT_populate, 'OUTLINER_OB_POINTCLOUD', "Populate Selected Meshes").draw(layout)
+            Button("populate", 'OUTLINER_OB_POINTCLOUD', "Populate Selected Meshes").draw(layout)
         _draw_status(context, layout, settings)
         column = layout.column()
         column.active = not settings.frozen
@@ -105,88 +91,59 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
         active = context.active_object
         marked = active is not None and active.tetflora.is_occluder
         text, icon = ("Occluder", 'CHECKMARK') if marked else ("Mark as Occluder", 'MOD_MASK')
-        Button(TETFLORA_OT_mark_occluder, icon, text).draw(layout, depress=marked)
+        Button("mark_occluder", icon, text).draw(layout, depress=marked)
+        for title, draw in _SECTIONS.items():
+            # What to plant is the first question.
+            if body := section(layout, title, closed=title != "Species"):
+                body.active = not settings.frozen
+                draw(body, settings)
 
 
-class _PartOfPopulate(SidebarPanel):
-    """Mix-in for panels within Populate, closed at first."""
-
-    bl_parent_id = "TETFLORA_PT_populate"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        settings = shown_population(context.scene)
-        layout.active = not settings.frozen
-        self.draw_settings(layout, settings)
-
-
-class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
-    """Which species, and which of them are companions."""
-
-    bl_label = "Species"
-    bl_options = set()  # open: what to plant is the first question
-
-    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        TETFLORA_UL_mix.draw_in(layout, settings)
-        if not settings.mix:
-            known = catalogue()
-            text = f"Default: {next(iter(known.values())).name}" if known else "The catalog has no species"
-            layout.label(text=text, icon='INFO')
-        elif 0 <= settings.mix_index < len(settings.mix):
-            entry = settings.mix[settings.mix_index]
-            layout.prop(entry, "companion_choice")
-            if entry.companion:
-                draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")
-            layout.prop(entry, "habitat")
+def _draw_species(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    TETFLORA_UL_mix.draw_in(layout, settings)
+    if not settings.mix:
+        known = catalogue()
+        text = f"Default: {next(iter(known.values())).name}" if known else "The catalog has no species"
+        layout.label(text=text, icon='INFO')
+    elif entry := active_in(settings, "mix"):
+        layout.prop(entry, "companion_choice")
+        if entry.companion:
+            draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")
+        layout.prop(entry, "habitat")
 
 
-class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
-    """On which ground."""
-
-    bl_label = "Placement"
-
-    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        draw_limits(layout, settings, "slope")
-        column = layout.column(align=True)
-        column.prop(settings, "aspect")
-        column.prop(settings, "aspect_spread", text="Spread")
-        layout.prop(settings, "use_altitude")
-        if settings.use_altitude:
-            draw_limits(layout, settings, "altitude", "falloff")
-        row = draw_limits(layout, settings, "wetness").row()
-        row.active = settings.wetness_min > 0.0 or settings.wetness_max < 1.0
-        row.prop(settings, "wetness_softness", text="Softness")
-        layout.prop(settings, "edge_falloff")
-        draw_mask(layout, settings)
-        draw_paths(layout, settings)
+def _draw_placement(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    draw_where(layout, settings)
+    column = layout.column(align=True)
+    column.prop(settings, "aspect")
+    column.prop(settings, "aspect_spread", text="Spread")
+    layout.prop(settings, "edge_falloff")
 
 
-class TETFLORA_PT_populate_arrangement(_PartOfPopulate, bpy.types.Panel):
-    """How far from each other."""
-
-    bl_label = "Spacing"
-
-    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        _draw_distance(layout, settings)
-        layout.prop(settings, "clumping")
-        if settings.clumping:
-            layout.prop(settings, "clump_size")
+def _draw_spacing(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    _draw_distance(layout, settings)
+    layout.prop(settings, "clumping")
+    if settings.clumping:
+        layout.prop(settings, "clump_size")
 
 
-class TETFLORA_PT_populate_size(_PartOfPopulate, bpy.types.Panel):
-    """How large, how upright, and how old."""
+def _draw_size(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
+    draw_properties(layout, settings, "scale_at_top", "tilt")
+    column = layout.column(align=True)
+    column.prop(settings, "age")
+    row = column.row()
+    row.active = settings.age > 0.0
+    row.prop(settings, "age_spread", slider=True)
 
-    bl_label = "Size and Age"
 
-    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
-        draw_properties(layout, settings, "scale_at_top", "tilt")
-        column = layout.column(align=True)
-        column.prop(settings, "age")
-        row = column.row()
-        row.active = settings.age > 0.0
-        row.prop(settings, "age_spread", slider=True)
+#: Sections of Populate by title.
+_SECTIONS = {
+    "Species": _draw_species,
+    "Placement": _draw_placement,
+    "Spacing": _draw_spacing,
+    "Size and Age": _draw_size,
+}
 
 
 def _distance(settings: bpy.types.PropertyGroup) -> str:
@@ -206,18 +163,6 @@ def _draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
         layout.prop(settings, "min_distance", text=" ")
 
 
-def _draw_populations(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    row = layout.row()
-    rows = 3 if group.populations else 1
-    name = TETFLORA_UL_populations.__name__
-    row.template_list(name, "", group, "populations", group, "populations_index", rows=rows)
-    column = row.column(align=True)
-    column.operator(TETFLORA_OT_add_population.bl_idname, text="", icon='ADD')
-    if group.populations:
-        column.operator(TETFLORA_OT_remove_population.bl_idname, text="", icon='REMOVE')
-    column.menu(TETFLORA_MT_populations.__name__, text="", icon='DOWNARROW_HLT')
-
-
 def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """How many plants as what, and why not more; the switch of the preview."""
     shown = points.shown_in(context.scene)
@@ -226,7 +171,7 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, setting
     # In the place of the other text: a line that comes and goes would move the slider away from under the mouse.
     text = points.status(settings)
     row.label(text=f"Update: {text}" if waiting else text, icon='FILE_REFRESH' if waiting else 'INFO')
-    Button(TETFLORA_OT_preview_population, 'HIDE_OFF' if shown else 'HIDE_ON', "").draw(row, depress=shown)
+    Button("preview_population", 'HIDE_OFF' if shown else 'HIDE_ON', "").draw(row, depress=shown)
     for text in points.complaints(settings):
         draw_message(context, layout, text)
 
@@ -239,7 +184,7 @@ def _draw_grounds(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     left.alignment = 'RIGHT'
     left.label(text="Ground")
     row.label(text=", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None")
-    layout.operator(TETFLORA_OT_set_population_ground.bl_idname, icon='MESH_GRID')
+    layout.operator("tetflora.set_population_ground", icon='MESH_GRID')
     layout.prop(settings, "ground_collection", text="Collection")
 
 
@@ -255,7 +200,7 @@ class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.scale_y = 1.4
         for mode, name, _, icon, _ in MODES:
-            Button(TETFLORA_OT_paint_plants, icon, name, {"mode": mode}).draw(row, depress=settings.mode == mode)
+            Button("paint_plants", icon, name, {"mode": mode}).draw(row, depress=settings.mode == mode)
         column = layout.column(align=True)
         draw_properties(column, settings, "radius", "density")
         column.prop(settings, "strength", slider=True)
@@ -266,15 +211,3 @@ class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
             column.prop(settings, "species_choice", text=" ")
         draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
         draw_properties(layout.column(), settings, "store", "seed")
-
-
-CLASSES = (
-    TETFLORA_UL_populations,
-    TETFLORA_MT_populations,
-    TETFLORA_PT_populate,
-    TETFLORA_PT_populate_species,
-    TETFLORA_PT_populate_where,
-    TETFLORA_PT_populate_arrangement,
-    TETFLORA_PT_populate_size,
-    TETFLORA_PT_brush,
-)

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..operators.refine import TETFLORA_OT_clear_cache, TETFLORA_OT_refine
-from ..operators.report import TETFLORA_OT_write_report
 from ..tetflora_addon import storage
 from ..tetflora_addon.blender.preferences import CACHE_VARIABLE, TetFloraPreferences, species_folders
 from ..tetflora_addon.blender.species.edits import skipped_files
@@ -34,7 +32,7 @@ class Shortcut:
 
 KEYS = (
     Shortcut("wm.call_menu_pie", 'F', alt=True, shift=True, menu=PIE),
-    Shortcut(TETFLORA_OT_refine.bl_idname, 'F', ctrl=True, alt=True, shift=True),
+    Shortcut("tetflora.refine", 'F', ctrl=True, alt=True, shift=True),
 )
 
 _made: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
@@ -86,7 +84,7 @@ def _draw(self: TetFloraPreferences, context: bpy.types.Context) -> None:
     layout.prop(self, "new_quality")
     layout.prop(self, "new_memory")
     _draw_cache(layout.column(), self)
-    layout.operator(TETFLORA_OT_write_report.bl_idname, icon='TEXT')
+    layout.operator("tetflora.write_report", icon='TEXT')
     _draw_keys(layout.column(), context)
 
 
@@ -97,7 +95,7 @@ def _draw_cache(column: bpy.types.UILayout, own: TetFloraPreferences) -> None:
     row = column.row()
     row.active = own.use_cache
     row.prop(own, "cache_folder")
-    column.operator(TETFLORA_OT_clear_cache.bl_idname)
+    column.operator("tetflora.clear_cache")
     if storage.trouble():
         column.label(text=storage.trouble(), icon='ERROR')
 

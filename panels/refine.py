@@ -1,15 +1,12 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine: buttons, state and settings of refinement; and First Forest, while the scene has no plants."""
+"""Refine: First Forest while the scene has no plants, then buttons, state and settings of refinement."""
 
 from math import isclose
 
 import bpy
 
-from ..operators.add import TETFLORA_OT_first_forest
-from ..operators.assets import TETFLORA_OT_refine_scatter
 from ..operators.marks import can_be_explicit
-from ..operators.refine import TETFLORA_OT_clear, TETFLORA_OT_refine
 from ..tetflora_addon.blender.job.forecast import forecast_text, memory_text
 from ..tetflora_addon.blender.job.render import render_errors
 from ..tetflora_addon.blender.placing.first_forest import is_first_forest
@@ -24,30 +21,13 @@ from .base import (
     draw_below,
     draw_message,
     draw_properties,
+    section,
     shown_length,
     split_layout,
 )
 from .results import made_of
 
 _FEW = 200  # objects to look through at every movement of the mouse; a larger scene is not a new one
-
-
-class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
-    """First forest: at the top of the tab while the scene has no plants."""
-
-    bl_label = "Get Started"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        scene = context.scene
-        return len(scene.objects) <= _FEW and not has_contents(scene)
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        column = self.layout.column()
-        row = column.row()
-        row.scale_y = 1.6
-        row.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
-        column.label(text="Then click Refine and press F12")
 
 
 class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
@@ -57,10 +37,15 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.tetflora
+        if len(context.scene.objects) <= _FEW and not has_contents(context.scene):
+            column = layout.box().column()
+            column.scale_y = 1.6
+            Button("first_forest", 'WORLD').draw(column)
+            layout.label(text="Then click Refine and press F12")
         row = layout.row(align=True)
         row.scale_y = 1.4
-        row.operator(TETFLORA_OT_refine.bl_idname, icon='MOD_DECIM')
-        row.operator(TETFLORA_OT_clear.bl_idname, icon='TRASH')
+        row.operator("tetflora.refine", icon='MOD_DECIM')
+        row.operator("tetflora.clear", icon='TRASH')
         if settings.auto_refine:  # a line of its own also while nothing is done: what comes and goes moves all below
             draw_message(context, layout, auto.message() or "Refine Automatically is on", 'SORTTIME')
         for error in render_errors()[-1:]:
@@ -98,6 +83,14 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         row = layout.row()
         row.active = settings.auto_refine
         row.prop(settings, "follow_viewport")
+        for title, draw in _SECTIONS.items():
+            if body := section(layout, title):
+                body.active = title == "Limits" or not settings.expand_everything
+                draw(body, context.scene)
+        if body := section(layout, "Animation", switch=(settings, "share_frames")):
+            _draw_animation(body, context.scene)
+        if body := section(layout, "Leaf Objects"):
+            TETFLORA_UL_leaf_objects.draw_in(body, settings)
 
 
 def _draw_scatter(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
@@ -109,7 +102,7 @@ def _draw_scatter(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     else:
         marked = is_scatter(obj)
         text, icon = ("Refine Scatter", 'CHECKBOX_HLT' if marked else 'CHECKBOX_DEHLT')
-        Button(TETFLORA_OT_refine_scatter, icon, text).draw(layout, depress=marked)
+        Button("refine_scatter", icon, text).draw(layout, depress=marked)
 
 
 def _draw_memory(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -136,118 +129,48 @@ def hint(scene: bpy.types.Scene) -> str:
     return "" if kept or not has_plants(scene) else "Nothing is refined, so renders show no plants"
 
 
-class _PartOfRefine(SidebarPanel):
-    """Mix-in for sub-panels of Refine, closed at first."""
-
-    bl_parent_id = "TETFLORA_PT_refine"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def column(self, context: bpy.types.Context, *names: str) -> bpy.types.UILayout:
-        """A column with settings of the scene, inactive where everything is expanded."""
-        settings = context.scene.tetflora
-        column = split_layout(self).column()
-        column.active = not settings.expand_everything
-        draw_properties(column, settings, *names)
-        return column
+def _draw_proxies(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    settings, form, cycles = scene.tetflora, form_of(scene), getattr(scene, "cycles", None)
+    draw_properties(layout, settings, "leaf_limit", "facet")
+    if form.bounces and cycles is not None:
+        layout.prop(cycles, "transparent_max_bounces", text="Transparent")
+        if few_bounces(scene):
+            layout.label(text="Too few: Cycles renders proxies black", icon='ERROR')
+    if form.sockets and (body := section(layout, "Proxy Shading")):
+        body.active = settings.baked_light == 'OFF'
+        draw_properties(body, settings, *form.sockets.values())
 
 
-class TETFLORA_PT_proxies(_PartOfRefine, bpy.types.Panel):
-    """Proxies."""
-
-    bl_label = "Proxies"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        column = self.column(context, "leaf_limit", "facet")
-        cycles = getattr(context.scene, "cycles", None)
-        if form_of(context.scene).bounces and cycles is not None:
-            column.prop(cycles, "transparent_max_bounces", text="Transparent")
-            if few_bounces(context.scene):
-                column.label(text="Too few: Cycles renders proxies black", icon='ERROR')
+def _draw_assets(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Always there, because to look for any among all objects takes too long for a panel."""
+    layout.prop(scene.tetflora, "asset_detail", text="Detail")  # the section's name is the rest of its name
 
 
-class TETFLORA_PT_proxy_shading(_PartOfRefine, bpy.types.Panel):
-    """Proxy shading."""
-
-    bl_label = "Proxy Shading"
-    bl_parent_id = "TETFLORA_PT_proxies"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(form_of(context.scene).sockets)
-
-    def draw(self, context: bpy.types.Context) -> None:
-        settings = context.scene.tetflora
-        column = split_layout(self).column()
-        column.active = not settings.expand_everything and settings.baked_light == 'OFF'
-        draw_properties(column, settings, *form_of(context.scene).sockets.values())
+def _draw_visibility(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    settings = scene.tetflora
+    layout.prop(settings, "visibility_resolution", text="Resolution")  # the whole name is wider than labels are
+    draw_properties(layout, settings, "hidden", "block", "few_polygons")
 
 
-class TETFLORA_PT_assets(_PartOfRefine, bpy.types.Panel):
-    """Assets: always there, because to look for any among all objects takes too long for a panel."""
-
-    bl_label = "Assets"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        column, settings = self.column(context), context.scene.tetflora
-        column.prop(settings, "asset_detail", text="Detail")  # the panel's name is the rest of theirs
+def _draw_limits(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    column = layout.column()
+    column.active = not scene.tetflora.expand_everything
+    draw_properties(column, scene.tetflora, "max_tetrahedra", "max_levels", "max_passes")
+    layout.prop(scene.tetflora, "expand_everything")
 
 
-class TETFLORA_PT_visibility(_PartOfRefine, bpy.types.Panel):
-    """Visibility."""
-
-    bl_label = "Visibility"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        column, settings = self.column(context), context.scene.tetflora
-        column.prop(settings, "visibility_resolution", text="Resolution")  # the whole name is wider than labels are
-        draw_properties(column, settings, "hidden", "block", "few_polygons")
+#: Sections of Refine by title, most of them inactive where everything is expanded.
+_SECTIONS = {
+    "Proxies": _draw_proxies,
+    "Assets": _draw_assets,
+    "Visibility": _draw_visibility,
+    "Limits": _draw_limits,
+}
 
 
-class TETFLORA_PT_limits(_PartOfRefine, bpy.types.Panel):
-    """Limits."""
-
-    bl_label = "Limits"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        self.column(context, "max_tetrahedra", "max_levels", "max_passes")
-        self.layout.prop(context.scene.tetflora, "expand_everything")
-
-
-class TETFLORA_PT_animation(_PartOfRefine, bpy.types.Panel):
-    """Animation."""
-
-    bl_label = "Animation"
-
-    def draw_header(self, context: bpy.types.Context) -> None:
-        self.layout.prop(context.scene.tetflora, "share_frames", text="")
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        settings = context.scene.tetflora
-        column = layout.column()
-        column.active = settings.share_frames and settings.refine_at_render
-        draw_properties(column, settings, "cell_length", "cell_turn", "kept_memory")
-        column.prop(context.scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
-        layout.prop(settings, "anchored")
-
-
-class TETFLORA_PT_leaf_objects(_PartOfRefine, bpy.types.Panel):
-    """Leaf objects."""
-
-    bl_label = "Leaf Objects"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        TETFLORA_UL_leaf_objects.draw_in(self.layout, context.scene.tetflora)
-
-
-CLASSES = (
-    TETFLORA_PT_first,
-    TETFLORA_PT_refine,
-    TETFLORA_PT_proxies,
-    TETFLORA_PT_proxy_shading,
-    TETFLORA_PT_assets,
-    TETFLORA_PT_visibility,
-    TETFLORA_PT_limits,
-    TETFLORA_PT_animation,
-    TETFLORA_PT_leaf_objects,
-)
+def _draw_animation(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    settings, column = scene.tetflora, layout.column()
+    column.active = settings.share_frames and settings.refine_at_render
+    draw_properties(column, settings, "cell_length", "cell_turn", "kept_memory")
+    column.prop(scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
+    layout.prop(settings, "anchored")

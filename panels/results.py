@@ -7,14 +7,19 @@ from functools import lru_cache
 
 import bpy
 
-from ..operators.preview import TETFLORA_OT_forget_levels, TETFLORA_OT_look_through, TETFLORA_OT_preview_levels
-from ..operators.refine import TETFLORA_OT_keep_results
-from ..operators.year import TETFLORA_OT_set_season
 from ..tetflora_addon.blender.job.forecast import polygons_text, seconds_text
 from ..tetflora_addon.blender.placing.plant_objects import plant_collections
-from ..tetflora_addon.blender.settings import date_text
+from ..tetflora_addon.blender.settings import active_in, date_text
 from ..tetflora_addon.blender.viewport import state
-from .base import SidebarPanel, TETFLORA_UL_output_species, draw_below, draw_message, draw_properties, split_layout
+from .base import (
+    SidebarPanel,
+    TETFLORA_UL_output_species,
+    draw_below,
+    draw_message,
+    draw_properties,
+    section,
+    split_layout,
+)
 
 
 class TETFLORA_PT_wind(SidebarPanel, bpy.types.Panel):
@@ -40,7 +45,7 @@ class TETFLORA_MT_seasons(bpy.types.Menu):
     bl_label = "Season"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        self.layout.operator_enum(TETFLORA_OT_set_season.bl_idname, "season")
+        self.layout.operator_enum("tetflora.set_season", "season")
 
 
 class TETFLORA_PT_year(SidebarPanel, bpy.types.Panel):
@@ -82,41 +87,24 @@ class TETFLORA_PT_output(SidebarPanel, bpy.types.Panel):
             column = layout.column(heading=collection.name)
             column.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)
             column.prop(collection, "hide_render", text="Renders", toggle=False, invert_checkbox=True)
-        layout.operator(TETFLORA_OT_keep_results.bl_idname, icon='MESH_DATA')
+        layout.operator("tetflora.keep_results", icon='MESH_DATA')
+        if body := section(layout, "Ray Visibility"):
+            draw_properties(body, output, "camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+        if body := section(layout, "Passes and Materials"):
+            _draw_passes(body, context)
 
 
-class TETFLORA_PT_ray_visibility(SidebarPanel, bpy.types.Panel):
-    """Ray visibility."""
-
-    bl_label = "Ray Visibility"
-    bl_parent_id = "TETFLORA_PT_output"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        column = split_layout(self).column()
-        names = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
-        draw_properties(column, context.scene.tetflora.output, *names)
-
-
-class TETFLORA_PT_passes(SidebarPanel, bpy.types.Panel):
+def _draw_passes(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Pass index, light groups and materials, of all and by species."""
-
-    bl_label = "Passes and Materials"
-    bl_parent_id = "TETFLORA_PT_output"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        output, layer = context.scene.tetflora.output, context.view_layer
-        layout.prop(output, "pass_index")
-        layout.prop_search(output, "light_group", layer, "lightgroups")
-        TETFLORA_UL_output_species.draw_in(layout, output)
-        if 0 <= output.species_index < len(output.species):
-            entry = output.species[output.species_index]
-            layout.prop(entry, "pass_index")
-            layout.prop_search(entry, "light_group", layer, "lightgroups")
-            for name in ("leaf", "blossom", "bark"):
-                layout.prop(entry, name, text=name.capitalize())  # the field itself says Material
+    output, layer = context.scene.tetflora.output, context.view_layer
+    layout.prop(output, "pass_index")
+    layout.prop_search(output, "light_group", layer, "lightgroups")
+    TETFLORA_UL_output_species.draw_in(layout, output)
+    if entry := active_in(output, "species"):
+        layout.prop(entry, "pass_index")
+        layout.prop_search(entry, "light_group", layer, "lightgroups")
+        for name in ("leaf", "blossom", "bark"):
+            layout.prop(entry, name, text=name.capitalize())  # the field itself says Material
 
 
 class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
@@ -137,10 +125,10 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
             if preview is not None and preview.message:
                 draw_message(context, column, preview.message)
         row = layout.row(align=True)
-        row.operator(TETFLORA_OT_preview_levels.bl_idname, icon='MOD_REMESH')
-        row.operator(TETFLORA_OT_forget_levels.bl_idname, text="", icon='X')
+        row.operator("tetflora.preview_levels", icon='MOD_REMESH')
+        row.operator("tetflora.forget_levels", text="", icon='X')
         layout.prop(settings, "freeze")
-        layout.operator(TETFLORA_OT_look_through.bl_idname, icon='VIEW_CAMERA')
+        layout.operator("tetflora.look_through", icon='VIEW_CAMERA')
         if preview is None or preview.levels is None:
             return
         column = layout.column()
@@ -203,6 +191,18 @@ def made_of(text: str) -> str:
     return f"{made}, facets of {figures['facet_pixels']:.2g} pixels" if figures.get("coarser") else made
 
 
+@lru_cache(maxsize=8)
+def steps_of(text: str) -> tuple[tuple[str, ...], ...]:
+    """Rows of the table of passes: number, tetrahedra, those to split, polygons, seconds; none if there are none."""
+    try:
+        return tuple(
+            (f"{n}", *(f"{s[key]:,}" for key in ("tetrahedra_made", "split", "polygons")), f"{s['seconds']:.1f}")
+            for n, s in enumerate(json.loads(text)["steps"], start=1)
+        )
+    except (ValueError, KeyError, TypeError):
+        return ()
+
+
 class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
     """Statistics."""
 
@@ -221,46 +221,8 @@ class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
         for name, value in rows:
             names.label(text=name)
             values.label(text=value)
-
-
-@lru_cache(maxsize=8)
-def steps_of(text: str) -> tuple[tuple[str, ...], ...]:
-    """Rows of the table of passes: number, tetrahedra, those to split, polygons, seconds; none if there are none."""
-    try:
-        return tuple(
-            (f"{n}", *(f"{s[key]:,}" for key in ("tetrahedra_made", "split", "polygons")), f"{s['seconds']:.1f}")
-            for n, s in enumerate(json.loads(text)["steps"], start=1)
-        )
-    except (ValueError, KeyError, TypeError):
-        return ()
-
-
-class TETFLORA_PT_steps(SidebarPanel, bpy.types.Panel):
-    """Passes."""
-
-    bl_label = "Passes"
-    bl_parent_id = "TETFLORA_PT_statistics"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(steps_of(context.scene.tetflora.statistics))
-
-    def draw(self, context: bpy.types.Context) -> None:
-        grid = self.layout.grid_flow(row_major=True, columns=5, even_columns=False, align=True)
-        for row in (("Pass", "Tetrahedra", "To Split", "Polygons", "s"), *steps_of(context.scene.tetflora.statistics)):
-            for text in row:
+        steps = steps_of(context.scene.tetflora.statistics)
+        if steps and (body := section(layout, "Passes")):
+            grid = body.grid_flow(row_major=True, columns=5, even_columns=False, align=True)
+            for text in (text for row in (("Pass", "Tetrahedra", "To Split", "Polygons", "s"), *steps) for text in row):
                 grid.label(text=text)
-
-
-CLASSES = (
-    TETFLORA_MT_seasons,
-    TETFLORA_PT_year,
-    TETFLORA_PT_wind,
-    TETFLORA_PT_output,
-    TETFLORA_PT_ray_visibility,
-    TETFLORA_PT_passes,
-    TETFLORA_PT_preview,
-    TETFLORA_PT_statistics,
-    TETFLORA_PT_steps,
-)

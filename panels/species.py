@@ -4,17 +4,6 @@
 
 import bpy
 
-from ..operators.species import (
-    TETFLORA_OT_create_asset_library,
-    TETFLORA_OT_delete_species,
-    TETFLORA_OT_duplicate_species,
-    TETFLORA_OT_edit_orders,
-    TETFLORA_OT_export_species,
-    TETFLORA_OT_load_species,
-    TETFLORA_OT_preview_species,
-    TETFLORA_OT_revert_species,
-    TETFLORA_OT_save_species,
-)
 from ..tetflora_addon.blender.species.catalogue import own_file
 from ..tetflora_addon.blender.species.editor import (
     NO_LEAF,
@@ -28,7 +17,7 @@ from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skippe
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.schema import ORDER_KEYS
 from ..tetflora_addon.species.species import LEAF_KINDS
-from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_properties, split_layout
+from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_properties, section, split_layout
 
 _MOST_TOLD = 3  # files of the folder that are not used
 # Prefixes of an order's keys about leaves; the others are about branches.
@@ -45,13 +34,13 @@ class TETFLORA_MT_species_files(bpy.types.Menu):
         layout.operator_context = 'INVOKE_DEFAULT'
         draw_buttons(
             layout,
-            Button(TETFLORA_OT_save_species, 'FILE_TICK'),
-            Button(TETFLORA_OT_load_species, 'IMPORT'),
-            Button(TETFLORA_OT_export_species, 'EXPORT'),
+            Button("save_species", 'FILE_TICK'),
+            Button("load_species", 'IMPORT'),
+            Button("export_species", 'EXPORT'),
             None,
-            Button(TETFLORA_OT_delete_species, 'TRASH'),
+            Button("delete_species", 'TRASH'),
             None,
-            Button(TETFLORA_OT_create_asset_library, 'ASSET_MANAGER'),
+            Button("create_asset_library", 'ASSET_MANAGER'),
         )
 
 
@@ -70,8 +59,8 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.use_property_split = False
         row.prop(editor, "species_choice", text="")
-        row.operator(TETFLORA_OT_duplicate_species.bl_idname, text="", icon='DUPLICATE')
-        row.operator(TETFLORA_OT_revert_species.bl_idname, text="", icon='LOOP_BACK')
+        row.operator("tetflora.duplicate_species", text="", icon='DUPLICATE')
+        row.operator("tetflora.revert_species", text="", icon='LOOP_BACK')
         row.menu(TETFLORA_MT_species_files.__name__, text="", icon='DOWNARROW_HLT')
         if find_edit(scene, identifier) is not None:
             layout.label(text="Edited in this file", icon='GREASEPENCIL')
@@ -85,67 +74,43 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         shown = species.shown_in(scene)
         row = layout.row(align=True)
         row.use_property_split = False
-        Button(TETFLORA_OT_preview_species, 'HIDE_OFF' if shown else 'HIDE_ON', "Preview").draw(row, depress=shown)
+        Button("preview_species", 'HIDE_OFF' if shown else 'HIDE_ON', "Preview").draw(row, depress=shown)
         row.prop(editor, "preview_seed")
         text, failed = species.message()
         if shown and text and text != problem:
             draw_message(context, layout, text, 'ERROR' if failed else 'BLANK1')
+        if not orders_of(editor):
+            return
+        if body := section(layout, "Name, Leaf and Bark"):
+            _draw_whole(body, editor)
+        if body := section(layout, "Branches by Order", closed=False):
+            _draw_orders(body, editor)
+        if body := section(layout, "Leaves of This Order"):
+            _draw_keys(body, editor, leaves=True)
 
 
-class _SpeciesPart(SidebarPanel):
-    """Mix-in for the editor's sub-panels."""
-
-    bl_parent_id = "TETFLORA_PT_species"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(orders_of(context.scene.tetflora.species_editor))
-
-
-class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
+def _draw_whole(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup) -> None:
     """Name, leaf and what else holds for the whole species."""
-
-    bl_label = "Name, Leaf and Bark"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        editor = context.scene.tetflora.species_editor
-        column = layout.column()
-        draw_properties(column, editor, "species_name", "species_description")
-        for kind in LEAF_KINDS:
-            form = getattr(editor, f"{kind}_form")
-            column.prop(editor, f"{kind}_form")
-            if form == OBJECT_LEAF:
-                column.prop_search(editor, f"{kind}_object", bpy.data, "objects")
-            if form != NO_LEAF:
-                column.prop(editor, f"{kind}_transmission", text="Translucency")
-        draw_properties(column, editor, "bark", "quality", "habit", "exact")
+    draw_properties(layout, editor, "species_name", "species_description")
+    for kind in LEAF_KINDS:
+        form = getattr(editor, f"{kind}_form")
+        layout.prop(editor, f"{kind}_form")
+        if form == OBJECT_LEAF:
+            layout.prop_search(editor, f"{kind}_object", bpy.data, "objects")
+        if form != NO_LEAF:
+            layout.prop(editor, f"{kind}_transmission", text="Translucency")
+    draw_properties(layout, editor, "bark", "quality", "habit", "exact")
 
 
-class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):
+def _draw_orders(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup) -> None:
     """The orders as a list, and the branches of the active one."""
-
-    bl_label = "Branches by Order"
-    bl_options = set()
-
-    def draw(self, context: bpy.types.Context) -> None:
-        editor = context.scene.tetflora.species_editor
-        row = self.layout.row()
-        row.column(align=True).prop(editor, "order", expand=True)
-        buttons = row.column(align=True)
-        for action, icon in (('ADD', 'ADD'), ('REMOVE', 'REMOVE'), ('SPUR', 'OUTLINER_OB_FORCE_FIELD')):
-            Button(TETFLORA_OT_edit_orders, icon, "", {"action": action}).draw(buttons)
-        _draw_keys(split_layout(self), editor, leaves=False)
-
-
-class TETFLORA_PT_species_leaves(_SpeciesPart, bpy.types.Panel):
-    """Leaves of the active order."""
-
-    bl_label = "Leaves of This Order"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        _draw_keys(split_layout(self), context.scene.tetflora.species_editor, leaves=True)
+    row = layout.row()
+    row.use_property_split = False
+    row.column(align=True).prop(editor, "order", expand=True)
+    buttons = row.column(align=True)
+    for action, icon in (('ADD', 'ADD'), ('REMOVE', 'REMOVE'), ('SPUR', 'OUTLINER_OB_FORCE_FIELD')):
+        Button("edit_orders", icon, "", {"action": action}).draw(buttons)
+    _draw_keys(layout, editor, leaves=False)
 
 
 def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leaves: bool) -> None:
@@ -168,12 +133,3 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
             row.prop(editor, name + VARIATION, text="")
         if key.kind == "colour":
             column.separator()
-
-
-CLASSES = (
-    TETFLORA_MT_species_files,
-    TETFLORA_PT_species,
-    TETFLORA_PT_species_whole,
-    TETFLORA_PT_species_orders,
-    TETFLORA_PT_species_leaves,
-)

@@ -4,21 +4,16 @@
 
 import bpy
 
-from ..operators.stands import (
-    TETFLORA_OT_animate_growth,
-    TETFLORA_OT_grow_again,
-    TETFLORA_OT_grow_stand,
-    TETFLORA_OT_keep_year,
-)
 from ..tetflora_addon.blender.scene.field_sizes import has_history
+from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.stands.growing import is_stand, shown_stand
 from .base import (
     Button,
     SidebarPanel,
     TETFLORA_UL_stand_species,
-    draw_paths,
     draw_properties,
-    draw_vertex_group,
+    draw_where,
+    section,
     split_layout,
 )
 
@@ -41,50 +36,20 @@ class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
                 column.prop(active.tetflora, "stand_year", text=text, slider=True)
                 layout.prop(active.tetflora, "stand_smooth")
                 row = layout.row(align=True)
-                Button(TETFLORA_OT_animate_growth, 'KEYFRAME').draw(row)
-                Button(TETFLORA_OT_keep_year, 'PINNED').draw(row)
-            Button(TETFLORA_OT_grow_again, 'FILE_REFRESH').draw(layout)
+                Button("animate_growth", 'KEYFRAME').draw(row)
+                Button("keep_year", 'PINNED').draw(row)
+            Button("grow_again", 'FILE_REFRESH').draw(layout)
         else:
-            Button(TETFLORA_OT_grow_stand, 'TIME', "Grow Stand on Selected Meshes").draw(layout)
+            Button("grow_stand", 'TIME', "Grow Stand on Selected Meshes").draw(layout)
         draw_properties(layout.column(), stand, "years", "density", "recruits", "outside", "seed")
         TETFLORA_UL_stand_species.draw_in(layout, stand)
         if not stand.species:
             layout.label(text="Default: a mixed wood of central Europe", icon='INFO')
-        elif 0 <= stand.species_index < len(stand.species):
-            draw_properties(layout.column(align=True), stand.species[stand.species_index], "planted", "rain")
-
-
-class _PartOfStand(SidebarPanel):
-    """Mix-in for panels within Grow a Stand, closed at first."""
-
-    bl_parent_id = "TETFLORA_PT_stand"
-    bl_options = {'DEFAULT_CLOSED'}
-
-
-class TETFLORA_PT_stand_site(_PartOfStand, bpy.types.Panel):
-    """Climate, soil, and where plants can stand."""
-
-    bl_label = "Site"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        stand = shown_stand(context)
-        draw_properties(layout.column(align=True), stand, "warmth", "winter")
-        draw_properties(layout.column(align=True), stand, "moisture", "relief", "fertility")
-        layout.prop(stand, "slope_max")
-        draw_vertex_group(layout, stand)
-        draw_paths(layout, stand)
-
-
-class TETFLORA_PT_stand_detail(_PartOfStand, bpy.types.Panel):
-    """How finely the stand is computed and recorded."""
-
-    bl_label = "Detail"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        draw_properties(
-            split_layout(self).column(), shown_stand(context), "interval", "least_height", "cell", "open_edges"
-        )
-
-
-CLASSES = (TETFLORA_PT_stand, TETFLORA_PT_stand_site, TETFLORA_PT_stand_detail)
+        elif entry := active_in(stand, "species"):
+            draw_properties(layout.column(align=True), entry, "planted", "rain")
+        if body := section(layout, "Site"):
+            draw_properties(body.column(align=True), stand, "warmth", "winter")
+            draw_properties(body.column(align=True), stand, "moisture", "relief", "fertility")
+            draw_where(body, stand)
+        if body := section(layout, "Detail"):
+            draw_properties(body, stand, "interval", "least_height", "cell", "open_edges")

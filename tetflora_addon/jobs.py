@@ -59,6 +59,18 @@ def mapped(steps: Generator[_Item, Any, _Result], change: Callable[[_Item], _Ste
         sent = yield change(step)
 
 
+def part_of(
+    steps: Generator[Progress, None, _Result], begin: float, end: float, title: str = ""
+) -> Generator[Progress, object, _Result]:
+    """The steps of a job as a part of another, from a fraction of it to a later one."""
+    title = f"{title}: " if title else ""
+
+    def change(step: Progress) -> Progress:
+        return replace(step, fraction=begin + (end - begin) * step.fraction, message=title + step.message)
+
+    return mapped(steps, change)
+
+
 class Pace:
     """How long a job works between two redraws: a window that takes long to draw is drawn less often.
 

@@ -46,6 +46,8 @@ class Layout:
         return call
 
     def _result(self, name: str, arguments: tuple) -> Any:
+        if name == "panel":
+            return Layout(self.drawn), Layout(self.drawn)
         if name != "operator":
             return Layout(self.drawn)
         group, operator = arguments[0].split(".")

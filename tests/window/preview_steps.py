@@ -175,7 +175,7 @@ def only_panel():
     """Show the panel Preview alone, open: a copy under another name, because Blender remembers which were closed."""
     shown = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
     ours = next(cls for cls in shown if cls.__name__ == "TETFLORA_PT_preview")
-    for cls in sorted(shown, key=lambda cls: not hasattr(cls, "bl_parent_id")):
+    for cls in shown:
         bpy.utils.unregister_class(cls)
     members = {"bl_options": set(), "bl_idname": "TETFLORA_PT_preview_open"}
     bpy.utils.register_class(type("TETFLORA_PT_preview_open", (ours,), members))

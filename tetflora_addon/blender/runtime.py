@@ -12,7 +12,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
 from textwrap import wrap
 from traceback import FrameSummary, extract_tb
@@ -67,6 +67,16 @@ class Listeners(list):
         """Call all of them."""
         for listener in tuple(self):
             listener(*arguments)
+
+
+def classes_in(modules: Iterable[object], *kinds: type) -> tuple[type, ...]:
+    """Classes that modules define and that are of some of Blender's kinds, in their order."""
+    return tuple(
+        cls
+        for module in modules
+        for cls in getattr(module, "__dict__", {}).values()
+        if isinstance(cls, type) and issubclass(cls, kinds) and cls.__module__ == module.__name__
+    )
 
 
 def call_soon(function: Callable[[], float | None], seconds: float) -> None:
@@ -197,6 +207,24 @@ def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any
     finally:
         _running.remove(own)
         steps.close()
+
+
+def job(title: str) -> Callable[[Callable[..., Generator]], Callable[..., Generator]]:
+    """Make a job of a generator function: callers give the scene, the dependency graph and what else there is.
+
+    It gets what it needs from its first step to its last before these, as `JobData`, and is `guarded`. Closing the
+    steps, or an error, has to leave everything as it was.
+    """
+
+    def decorated(steps: Callable[..., Generator]) -> Callable[..., Generator]:
+        @wraps(steps)
+        def begin(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, *given: Any, **named: Any) -> Generator:
+            data = JobData(title, scene, depsgraph.view_layer)
+            return guarded(data, steps(data, scene, depsgraph, *given, **named))
+
+        return begin
+
+    return decorated
 
 
 def stop_jobs(reason: str) -> None:

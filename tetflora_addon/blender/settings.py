@@ -7,6 +7,7 @@ Properties are generated from the engine's dataclasses, which hold their names, 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields
 from datetime import date, timedelta
 from math import degrees
@@ -57,6 +58,22 @@ def properties_of(settings: type, **common: Any) -> SimpleNamespace:
         if f.metadata:
             setattr(made, f.name, _MAKERS[type(f.default)](**{"default": f.default, **f.metadata, **common}))
     return made
+
+
+def settings_in(settings: type, **common: Any) -> type:
+    """A mix-in for property groups with all settings of a dataclass, as `properties_of`."""
+    return type(settings.__name__, (), {"__annotations__": vars(properties_of(settings, **common))})
+
+
+def with_identity(groups: Iterable[bpy.types.PropertyGroup], uid: str) -> bpy.types.PropertyGroup | None:
+    """The population or biome of an identity; None where there is none."""
+    return next((group for group in groups if group.uid == uid), None)
+
+
+def active_in(owner: bpy.types.PropertyGroup, entries: str) -> bpy.types.PropertyGroup | None:
+    """The active entry of a list of an owner; None without one."""
+    found, index = getattr(owner, entries), getattr(owner, f"{entries}_index")
+    return found[index] if 0 <= index < len(found) else None
 
 
 _ENDLESS = 1e30  # what Blender has for no bound is larger
@@ -134,13 +151,7 @@ def set_quality(group: bpy.types.PropertyGroup, number: int) -> None:
         setattr(group, name, value)
 
 
-class EngineSettings:
-    """The engine's settings, field by field."""
-
-    __annotations__ = vars(properties_of(RefinementSettings))
-
-
-class RefinementProperties(EngineSettings):
+class RefinementProperties(settings_in(RefinementSettings)):
     """Refinement settings of a scene: the engine's, quality, and the look of shells."""
 
     quality: EnumProperty(

@@ -16,8 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
-from tetflora_addon.blender.biomes import adding, files, ground, library, saving, stands
-from tetflora_addon.blender.biomes import biome as parts
+from tetflora_addon.blender.biomes import adding, files, ground, library
 from tetflora_addon.blender.file_library import as_text
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.preferences import preferences
@@ -81,18 +80,18 @@ def scene():
     return bpy.context.scene
 
 
-def small(**changes) -> parts.Biome:
+def small(**changes) -> files.Biome:
     return files.checked(copy.deepcopy({**SMALL, **changes}), "small")
 
 
-def add(biome: parts.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.Added:
+def add(biome: files.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.Added:
     return at_once(adding.add_biome_steps(scene(), depsgraph(), biome, list(grounds), seed))
 
 
 def places(uid: str) -> np.ndarray:
     """Where the plants of a biome stand, (n, 3)."""
     found = [np.zeros((0, 3))]
-    for layer in parts.layers_of(scene(), uid):
+    for layer in files.layers_of(scene(), uid):
         for obj in populations.own_objects(scene(), layer):
             own = np.zeros((len(obj.data.vertices), 3)) if obj.tetflora.is_field else np.array([obj.location])
             if obj.tetflora.is_field:
@@ -106,7 +105,7 @@ def places(uid: str) -> np.ndarray:
 def test_shipped_biomes_are_sound(path):
     """They pass the checks, need only species that there are, and have a small picture."""
     biome, known = files.read_biome(path), catalogue()
-    pages = parts.pages_of(scene(), biome)
+    pages = files.pages_of(scene(), biome)
     for layer in biome.layers:
         for part in layer["species"]:
             name, shed_by = part["species"], part.get("shed_by", "")
@@ -140,7 +139,7 @@ def test_a_biome_makes_what_its_file_says():
     assert [name for name, _ in added.layers] == ["Bushes", "Floor"]
     assert 10 <= added.layers[0][1] <= 60 and 100 <= added.layers[1][1] <= 900
     (biome,) = scene().tetflora.biomes
-    bushes, floor = parts.layers_of(scene(), biome.uid)
+    bushes, floor = files.layers_of(scene(), biome.uid)
     assert [entry.object for entry in bushes.grounds] == [land] and not bushes.covers and floor.covers
     assert {"blue_bush", "blue_bush_litter"} <= {edit.identifier for edit in scene().tetflora.species_edits}
     assert bushes.min_distance == pytest.approx(0.8) and bushes.slope_max == pytest.approx(np.radians(30.0))
@@ -161,14 +160,14 @@ def test_what_is_saved_comes_back():
     given = small(limits={"slope_max": 42.0, "wetness_min": 0.25, "altitude_max": 30.0})
     add(given, land)
     scene().tetflora.biomes[0].wetness_min = 0.0
-    path = saving.save_biome(scene(), "Small", "For tests", picture=False, replace=False)
+    path = files.save_biome(scene(), "Small", "For tests", picture=False, replace=False)
     read = files.read_biome(library.biomes()["small"].path)
     assert path == library.biomes()["small"].path and library.biomes()["small"].is_own
     assert [{k: v for k, v in layer.items() if k != "seed"} for layer in read.layers] == given.layers
     assert read.limits == {"slope_max": 42.0, "altitude_max": 30.0} and read.ground == given.ground
-    assert parts.pages_of(scene(), read) == parts.pages_of(scene(), given)
+    assert files.pages_of(scene(), read) == files.pages_of(scene(), given)
     with pytest.raises(SceneError, match="already has"):
-        saving.save_biome(scene(), "Small", "", picture=False, replace=False)
+        files.save_biome(scene(), "Small", "", picture=False, replace=False)
     library.OWN_FILES.delete("small")
     assert "small" not in library.biomes()
     with pytest.raises(SceneError, match="built-in"):
@@ -178,7 +177,7 @@ def test_what_is_saved_comes_back():
 def test_a_biome_whose_picture_another_program_has_open_stays(monkeypatch):
     """As Windows has it, where what is open cannot be deleted: it is there as a whole, or gone."""
     add(small(), add_mesh("ground", size=6.0))
-    path = saving.save_biome(scene(), "Small", "", picture=False, replace=False)
+    path = files.save_biome(scene(), "Small", "", picture=False, replace=False)
     picture, unlink = path.with_suffix(".png"), Path.unlink
     picture.write_bytes(b"")
 
@@ -204,8 +203,8 @@ def test_a_stand_is_a_layer():
     added = add(small(layers=[STAND, *SMALL["layers"]]), land)
     assert [name for name, _ in added.layers] == ["Birches", "Bushes", "Floor"] and added.layers[0][1] > 5
     (biome,) = scene().tetflora.biomes
-    (field,) = stands.stands_of(scene(), biome.uid)
-    path = saving.save_biome(scene(), "With a stand", "", picture=False, replace=False)
+    (field,) = files.stands_of(scene(), biome.uid)
+    path = files.save_biome(scene(), "With a stand", "", picture=False, replace=False)
     assert files.read_biome(path).layers[0] == STAND
     biome.vertex_group = "west"
     number = len(field.data.vertices)
@@ -220,7 +219,7 @@ def test_stands_that_are_not_the_biomes_to_change_stay():
     land = add_mesh("ground", size=10.0)
     add(small(layers=[STAND, SMALL["layers"][0]]), land)
     (biome,) = scene().tetflora.biomes
-    (field,) = stands.stands_of(scene(), biome.uid)
+    (field,) = files.stands_of(scene(), biome.uid)
     keep_year(field)
     mesh, foreign = field.data, field.copy()
     foreign.tetflora.stand.biome = "of another file"
@@ -243,11 +242,11 @@ def test_a_stand_that_cannot_grow_keeps_no_other_layer_from_its_plants():
     (said,) = added.bare
     assert "Birches" in said and "Nothing is planted" in said
     biome = scene().tetflora.biomes[0]
-    assert stands.stands_of(scene(), biome.uid) == []
+    assert files.stands_of(scene(), biome.uid) == []
     adding.remove_biome(scene(), biome)
     add(small(layers=[STAND, bushes]), land)
     (biome,) = scene().tetflora.biomes
-    (field,) = stands.stands_of(scene(), biome.uid)
+    (field,) = files.stands_of(scene(), biome.uid)
     mesh = field.data
     field.tetflora.stand.grounds.clear()
     updated = at_once(adding.plant_biome_steps(scene(), depsgraph(), biome))
@@ -272,21 +271,21 @@ def test_neighbours_blend():
     add(floor, land)
     meadow = scene().tetflora.biomes[0].uid
     before = places(meadow)
-    at_once(adding.plant_biome_steps(scene(), depsgraph(), parts.find_biome(scene(), meadow)))
+    at_once(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), meadow)))
     assert np.array_equal(places(meadow), before), "planting again changes nothing"
     add(replace(floor, name="Other"), land)
     other = scene().tetflora.biomes[1]
     other.vertex_group = "west"
     from tetflora_addon.blender.placing.rules import awaits_update
 
-    assert awaits_update(parts.layers_of(scene(), meadow)[0]), "the mask of one is the other's limit"
+    assert awaits_update(files.layers_of(scene(), meadow)[0]), "the mask of one is the other's limit"
     for uid in (meadow, other.uid):
-        at_once(adding.plant_biome_steps(scene(), depsgraph(), parts.find_biome(scene(), uid)))
-    east, west = places(meadow), places(parts.find_biome(scene(), scene().tetflora.biomes[1].uid).uid)
+        at_once(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), uid)))
+    east, west = places(meadow), places(files.find_biome(scene(), scene().tetflora.biomes[1].uid).uid)
     assert abs(len(east) + len(west) - len(before)) < 5.0 * np.sqrt(len(before))
     assert east[:, 0].mean() > 2.0 and west[:, 0].mean() < -2.0
-    parts.find_biome(scene(), meadow).gives_way = False
-    at_once(adding.plant_biome_steps(scene(), depsgraph(), parts.find_biome(scene(), meadow)))
+    files.find_biome(scene(), meadow).gives_way = False
+    at_once(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), meadow)))
     assert np.array_equal(places(meadow), before)
 
 
@@ -337,7 +336,7 @@ def test_broken_files_are_refused(tmp_path, data, said):
     path = tmp_path / "broken.json"
     path.write_text(json.dumps(data), encoding="utf-8")
     with pytest.raises(SceneError, match=r"broken\.json") as error:
-        saving.import_biome(path, replace=False)
+        files.import_biome(path, replace=False)
     assert said in str(error.value) and "broken" not in library.biomes()
 
 
@@ -365,7 +364,7 @@ def test_mutated_files_are_read_or_refused(tmp_path, data):
     path = tmp_path / "mutated.json"
     path.write_text(json.dumps(mutated), encoding="utf-8")
     try:
-        parts.pages_of(scene(), files.read_biome(path))
+        files.pages_of(scene(), files.read_biome(path))
     except TetFloraError as error:
         assert str(error)
 

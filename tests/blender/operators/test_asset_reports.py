@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-from types import SimpleNamespace
 
 import bpy
 import pytest
@@ -102,6 +101,5 @@ def test_only_plants_are_missed_in_renders_of_what_is_not_refined(scatter, monke
 
 def test_the_panel_shows_the_settings_of_assets():
     layout = Layout()
-    panel = SimpleNamespace(layout=layout, column=lambda _context: layout)
-    refine.TETFLORA_PT_assets.draw(panel, bpy.context)
+    refine._SECTIONS["Assets"](layout, bpy.context.scene)
     assert layout.names("prop", 1) == ["asset_detail"]

@@ -195,7 +195,8 @@ def _texts():
         found |= {rna.name, *(prop.name for prop in rna.properties)}
         found |= {item.name for prop in rna.properties if prop.type == 'ENUM' for item in prop.enum_items}
     found |= {FULL_GROWN, *MONTHS, *(stage.capitalize() for stage in STAGES)}
-    for path in (build.ROOT / "panels").glob("*.py"):
+    # Importing an inventory draws a table of its own.
+    for path in (*(build.ROOT / "panels").glob("*.py"), build.ROOT / "operators" / "places.py"):
         found |= {n.value for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Constant)}
     return found
 

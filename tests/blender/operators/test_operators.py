@@ -5,16 +5,20 @@
 from __future__ import annotations
 
 import json
+import re
 
 import bpy
 import pytest
 
 import operators
+from devtools import build
 from operators import ground_tools
 from panels import results
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tetflora_addon.blender.job import refine, render
 from tetflora_addon.blender.results.collection import has_results
+
+_NAMED = re.compile(r'(?:\bButton\(\s*"|"tetflora\.|\boperator = ")(\w+)"')  # operators of buttons in a source text
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -40,6 +44,14 @@ def test_every_class_of_operators_is_registered_under_its_own_name(blender):
     registered = {name for name in dir(bpy.types) if name.startswith("TETFLORA_OT_")}
     assert {cls.__name__ for cls in classes} == registered
     assert all(cls.bl_idname == cls.__name__.replace("TETFLORA_OT_", "tetflora.") for cls in classes)
+
+
+def test_every_button_has_an_operator(blender):
+    texts = [path.read_text(encoding="utf-8") for path in (build.ROOT / "panels").glob("*.py")]
+    named = {name for text in texts for name in _NAMED.findall(text)}
+    known = {cls.bl_idname.removeprefix("tetflora.") for cls in operators.CLASSES}
+    assert len(named & known) > 50
+    assert sorted(named - known) == []
 
 
 def test_add_plant_stands_at_the_cursor_with_another_seed_each_time():
@@ -114,16 +126,16 @@ def test_mark_occluder_toggles_meshes_only():
 
 def test_lists_grow_and_shrink():
     settings = bpy.context.scene.tetflora
-    assert _ops().edit_list(which='MIX', action='REMOVE') == {'CANCELLED'}
+    assert _ops().edit_list(owner="scene.tetflora.populate", entries="mix", action='REMOVE') == {'CANCELLED'}
     for _ in range(3):
-        _ops().edit_list(which='MIX', action='ADD')
+        _ops().edit_list(owner="scene.tetflora.populate", entries="mix", action='ADD')
     species = [entry.species for entry in settings.populate.mix]
     assert len(set(species)) == 3
     assert settings.populate.mix_index == 2
     settings.populate.mix_index = 0
-    _ops().edit_list(which='MIX', action='REMOVE')
+    _ops().edit_list(owner="scene.tetflora.populate", entries="mix", action='REMOVE')
     assert [entry.species for entry in settings.populate.mix] == species[1:]
-    _ops().edit_list(which='LEAVES', action='ADD')
+    _ops().edit_list(owner="scene.tetflora", entries="leaf_objects", action='ADD')
     assert len(settings.leaf_objects) == 1
 
 

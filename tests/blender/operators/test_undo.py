@@ -131,7 +131,7 @@ def species_edited() -> None:
 
 def listed() -> None:
     forest()
-    assert ops().edit_list(which='MIX', action='ADD') == {'FINISHED'}
+    assert ops().edit_list(owner="scene.tetflora.populate", entries="mix", action='ADD') == {'FINISHED'}
 
 
 def species_of_mesh() -> None:
@@ -152,6 +152,7 @@ def drop() -> None:
 
 Case = tuple[str, Callable[[], None], str, dict]
 
+LIST = {"owner": "scene.tetflora.populate", "entries": "mix"}
 CASES: list[Case] = [
     ("add_plant", forest, "add_plant", {"species": "bush"}),
     ("populate", ground_active, "populate", {"count": 12, "species": MIX}),
@@ -173,8 +174,8 @@ CASES: list[Case] = [
     ("use_as_species of a collection", drop, "use_as_species", {}),
     ("stop_using_as_species", species_of_mesh, "stop_using_as_species", {}),
     ("refine_scatter", drop, "refine_scatter", {}),
-    ("edit_list add", forest, "edit_list", {"which": 'MIX', "action": 'ADD'}),
-    ("edit_list remove", listed, "edit_list", {"which": 'MIX', "action": 'REMOVE'}),
+    ("edit_list add", forest, "edit_list", LIST | {"action": 'ADD'}),
+    ("edit_list remove", listed, "edit_list", LIST | {"action": 'REMOVE'}),
     ("refine", forest, "refine", {}),
     ("refine again", refined, "refine", {}),
     ("refine a mesh", lambda: (ground_active(), mark_ground()), "refine", {}),

@@ -151,5 +151,5 @@ def test_the_first_species_is_offered_first_everywhere():
     population = _populate(count=3)
     assert [entry.species for entry in population.mix] == [catalogue.FIRST]
     assert brush.brush_of(scene)[1] == (catalogue.FIRST,)
-    bpy.ops.tetflora.edit_list(which='LEAVES', action='ADD')
+    bpy.ops.tetflora.edit_list(owner="scene.tetflora", entries="leaf_objects", action='ADD')
     assert scene.tetflora.leaf_objects[0].species == catalogue.FIRST

@@ -12,7 +12,7 @@ from tests.blender.placing.test_ground_cover import _cover, _covers, _field, _gr
 from tests.blender.scenes import depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.materials import snow
-from tetflora_addon.blender.placing import fallen
+from tetflora_addon.blender.placing import cover
 from tetflora_addon.blender.placing.canopy import canopy_of
 from tetflora_addon.blender.placing.terrain import MASKS, read_ground
 from tetflora_addon.blender.scene import fields, plants
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _strewn():
-    return [p for p in _covers() if p.name == fallen.NAME]
+    return [p for p in _covers() if p.name == cover.FALLEN_LEAVES]
 
 
 def _all_places(populations_of):
@@ -59,7 +59,7 @@ def test_what_covers_the_ground_keeps_its_places_when_leaves_are_strewn():
     _group().year.enabled = True
     for _ in range(2):
         _cover()
-        assert [p.name for p in _covers()] == ["Ground cover", fallen.NAME]
+        assert [p.name for p in _covers()] == ["Ground cover", cover.FALLEN_LEAVES]
         after = _all_places(_covers())
         for name, places in before.items():
             np.testing.assert_array_equal(after[name], places)

@@ -34,7 +34,7 @@ def _add(**values):
 def _values(population):
     """All settings as Blender stores them."""
     simple = {p.identifier: getattr(population, p.identifier) for p in population_data.simple_settings(population)}
-    mix = [tuple(getattr(e, name) for name in population_data.MIX) for e in population.mix]
+    mix = [tuple(getattr(e, name) for name in population_data.ENTRY) for e in population.mix]
     return simple, mix, [e.object for e in population.grounds]
 
 

@@ -190,7 +190,7 @@ def populated(scene, **settings):
     population.min_distance = 0.5
     for name, value in settings.items():
         setattr(population, name, value)
-    return population, populations.make_plants(scene, depsgraph(), population)
+    return population, at_once(populations.make_plants_steps(scene, depsgraph(), population))
 
 
 def test_young_plants_are_placed_closer(scene):
@@ -215,7 +215,7 @@ def test_a_population_has_the_ages_of_its_rule(scene, store):
     assert not rules.is_outdated(population)
     population.age_spread = 0.0
     assert rules.is_outdated(population)
-    populations.make_plants(scene, depsgraph(), population)
+    at_once(populations.make_plants_steps(scene, depsgraph(), population))
     assert {skeletons.age_of(kind) for kind in seeds(scene).identifiers} == {40.0}
 
 

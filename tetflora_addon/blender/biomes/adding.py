@@ -11,32 +11,31 @@ import json
 import uuid
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import bpy
 
 from ...errors import SceneError, TetFloraError
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress, mapped
+from ...jobs import Progress, part_of
 from ...species.litter import FALLEN
 from ...species.litter import KIND as FALLEN_LEAVES
 from ..placing.cover import fallen_from
 from ..placing.plant_objects import remove_fields
-from ..placing.population_data import fill_population
+from ..placing.population_data import fill_population, set_setting
 from ..placing.populations import add_population, free_name, make_plants_steps, remove_population
 from ..placing.rules import set_grounds
-from ..runtime import GoneError, JobData, guarded, is_there
+from ..runtime import GoneError, JobData, is_there, job
+from ..scene.field_sizes import has_history
+from ..settings import with_identity
 from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
-from ..stands.growing import GrownStand, again_steps, is_stand
-from .biome import Biome, find_biome, layers_of, pages_of, set_limits
+from ..stands.growing import GrownStand, again_steps, is_stand, new_stand_steps
+from .files import Biome, find_biome, layers_of, pages_of, stand_settings, stands_of
 from .ground import lay_biome_soil, make_line
-from .stands import grow_layer_steps, growing_of
 
 _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
-
-
-_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,9 @@ class Added:
     kept: list[str]
 
 
+@job("Adding the biome")
 def add_biome_steps(
+    data: JobData,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     biome: Biome,
@@ -75,18 +76,7 @@ def add_biome_steps(
         It needs a species that the catalog does not have, or no layer finds any place; or something was deleted
         meanwhile.
     """
-    data = JobData("Adding the biome", scene)
     data.add_objects(grounds)
-    return guarded(data, _add_steps(scene, depsgraph, biome, grounds, seed))
-
-
-def _add_steps(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    biome: Biome,
-    grounds: Sequence[bpy.types.Object],
-    seed: int,
-) -> Generator[Progress, object, Added]:
     yield Progress(0.0, "Reading the biome")
     with _restored(scene):
         renamed = _own_species(scene, biome)
@@ -97,11 +87,19 @@ def _add_steps(
         made.data = json.dumps({"ground": biome.ground, "season": biome.season}, ensure_ascii=False)
         for obj in grounds:
             made.grounds.add().object = obj
-        set_limits(made, biome.limits)
+        for key, value in biome.limits.items():
+            set_setting(made, key, value)
+        made.use_altitude = bool({"altitude_min", "altitude_max"} & biome.limits.keys())
         if "path_max" in biome.limits:
             made.paths = make_line(scene, f"{made.name} line", grounds)
         group.biomes_index = len(group.biomes) - 1
-        grown = yield from _grow(scene, depsgraph, uid, biome, renamed, grounds, seed)
+        stands = [layer for layer in biome.layers if layer["kind"] == "stand"]
+        grown = yield from _grown(
+            [layer["name"] for layer in stands],
+            lambda n: new_stand_steps(
+                scene, depsgraph, grounds, stands[n]["name"], partial(_fill_stand, stands[n], uid, renamed, seed)
+            ),
+        )
         for number, layer in enumerate(biome.layers):
             if layer["kind"] == "stand":
                 continue
@@ -120,8 +118,9 @@ def _add_steps(
         return (yield from _plant(scene, depsgraph, uid, *grown))
 
 
+@job("Planting the biome")
 def plant_biome_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, biome: bpy.types.PropertyGroup
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, biome: bpy.types.PropertyGroup
 ) -> Generator[Progress, object, Added]:
     """Plant all layers of a biome again by their settings, but frozen ones and stands of which a year is kept.
 
@@ -130,28 +129,11 @@ def plant_biome_steps(
     SceneError
         No layer finds any place.
     """
-    data, uid = JobData("Planting the biome", scene), biome.uid
+    uid = biome.uid
     data.add_objects(entry.object for entry in biome.grounds if is_there(entry.object))
-    return guarded(data, _plant_again(scene, depsgraph, uid))
-
-
-def _grow(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    uid: str,
-    biome: Biome,
-    renamed: Mapping[str, str],
-    grounds: Sequence[bpy.types.Object],
-    seed: int,
-) -> Generator[Progress, object, tuple[list[tuple[str, int]], list[str]]]:
-    """Stands of a new biome; as `_grown`."""
-    layers = [layer for layer in biome.layers if layer["kind"] == "stand"]
-    return (
-        yield from _grown(
-            [layer["name"] for layer in layers],
-            lambda number: grow_layer_steps(scene, depsgraph, uid, layers[number], renamed, grounds, seed),
-        )
-    )
+    fields = growing_of(scene, uid)
+    grown = yield from _grown([field.name for field in fields], lambda n: again_steps(scene, depsgraph, fields[n]))
+    return (yield from _plant(scene, depsgraph, uid, *grown))
 
 
 def _grown(
@@ -163,7 +145,7 @@ def _grown(
         begin, end = (_STANDS * n / len(names) for n in (number, number + 1))
         try:
             with closing(grow(number)) as steps:
-                grown = yield from _within(steps, begin, end, name)
+                grown = yield from part_of(steps, begin, end, name)
         except GoneError:
             raise
         except TetFloraError as error:
@@ -172,14 +154,6 @@ def _grown(
             continue
         made.append((name, grown.plants))
     return made, bare
-
-
-def _plant_again(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str
-) -> Generator[Progress, object, Added]:
-    fields = growing_of(scene, uid)
-    grown = yield from _grown([field.name for field in fields], lambda n: again_steps(scene, depsgraph, fields[n]))
-    return (yield from _plant(scene, depsgraph, uid, *grown))
 
 
 def _plant(
@@ -196,7 +170,7 @@ def _plant(
     layers, bare = list(stands), list(without)
     for number, name in enumerate(names):
         depsgraph.update()  # plants of the layers before shade the ground, and keep others away
-        population = _layer(scene, name)
+        population = with_identity(scene.tetflora.populations, name)
         if population is None:
             continue
         for entry in population.mix:
@@ -205,7 +179,7 @@ def _plant(
         begin, end = (first + n / len(names) * (1.0 - _SOIL - first) for n in (number, number + 1))
         try:
             with closing(make_plants_steps(scene, depsgraph, population)) as steps:
-                made = yield from _within(steps, begin, end, title)
+                made = yield from part_of(steps, begin, end, title)
         except GoneError:
             raise
         except SceneError as error:
@@ -223,18 +197,6 @@ def _plant(
     grounds = [entry.object for entry in biome.grounds if entry.object is not None] if biome is not None else []
     kept = lay_biome_soil(scene, depsgraph, grounds) if grounds else []
     return Added(biome.name if biome is not None else "", layers, bare, kept)
-
-
-def _layer(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
-    return next((population for population in scene.tetflora.populations if population.uid == uid), None)
-
-
-def _within(
-    steps: Generator[Progress, object, _Result], begin: float, end: float, title: str
-) -> Generator[Progress, object, _Result]:
-    """Steps that are a part of others."""
-    part = end - begin
-    return mapped(steps, lambda s: replace(s, fraction=begin + part * s.fraction, message=f"{title}: {s.message}"))
 
 
 def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
@@ -294,6 +256,25 @@ def _restored(scene: bpy.types.Scene) -> Iterator[None]:
             for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
                 revert_species(identifier)
         raise
+
+
+def growing_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
+    """Those of them that have their years, and may be grown again: *Keep Year* makes a stand the artist's own."""
+    return [obj for obj in stands_of(scene, uid) if has_history(obj) and not (obj.library or obj.data.library)]
+
+
+def _fill_stand(
+    layer: Mapping[str, Any], uid: str, renamed: Mapping[str, str], seed: int, stand: bpy.types.PropertyGroup
+) -> None:
+    """Give a stand the settings of a checked layer."""
+    for name in stand_settings():
+        if name in layer:
+            set_setting(stand, name, layer[name])
+    stand.biome, stand.seed = uid, (stand.seed + seed) % 2**31
+    for part in layer["species"]:
+        entry = stand.species.add()
+        for key, value in part.items():
+            setattr(entry, key, renamed.get(value, value) if key == "species" else value)
 
 
 def remove_biome(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> int:

@@ -3,13 +3,14 @@
 """Biomes as JSON files: a name, a ground, limits, and layers of plants from the tallest to what lies on the ground.
 
 A layer is a population, with the keys of population files, or a stand that grows. Everything unknown is refused, with
-the name of the file and of the key.
+the name of the file and of the key. What grows on a ground is saved as one, with a picture, into the user's folder.
 """
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +20,28 @@ from ...errors import SceneError, SpeciesError, shown
 from ...files import IDENTIFIER_RULE, is_identifier, json_of, read_whole
 from ...planting.zones import Limits
 from ...species.schema import species_from_dict
-from ..file_library import MAX_FILE_BYTES
-from ..placing.file_checks import check_format, check_keys, check_text, check_value, list_of, refuse_constant, value_for
-from ..placing.population_data import check_population, population_data
-from ..placing.properties import TetFloraPopulation
+from ..file_library import MAX_FILE_BYTES, as_text
+from ..placing.population_data import (
+    check_format,
+    check_keys,
+    check_population,
+    check_settings,
+    check_species,
+    check_text,
+    list_of,
+    population_data,
+    refuse_constant,
+    settings_data,
+    value_for,
+)
+from ..placing.rules import active_population, grounds_of
 from ..placing.zones import limits_of_zone
-from ..species.edits import find_edit, species_data
-from .biome import GROUND, Biome, data_of
-from .properties import TetFloraBiome
-from .stands import check_stand, stand_data, stands_of
+from ..settings import active_in, with_identity
+from ..species.edits import find_edit, new_identifier, species_data
+from ..stands.growing import is_stand
+from ..stands.properties import TetFloraStand, TetFloraStandEntry
+from . import library
+from .properties import GROUND, TetFloraBiome, data_of
 
 FORMAT = "TetFlora biome"
 VERSION = 1
@@ -40,6 +54,38 @@ _KEYS = {"format", "version", "name", "layers"}
 _MORE = {"description", "species", "limits", "gives_way", "ground", "season"}
 #: Settings of populations that mean something in one file only.
 _LOCAL = ("grounds", "ground_collection", "vertex_group", "image", "uv_layer", "areas", "paths")
+#: Settings of a species of a stand.
+STAND_ENTRY = ("species", "planted", "rain")
+
+
+@dataclass(frozen=True)
+class Biome:
+    """A biome as its file has it, checked.
+
+    Attributes
+    ----------
+    layers : list of dict
+        Each with ``kind`` and the keys of that.
+    species : dict
+        Species of its own by identifier: whole pages, or what differs from one ``of`` the catalog, and what differs
+        in ``every_order`` of that.
+    """
+
+    identifier: str
+    name: str
+    layers: list[dict[str, Any]]
+    description: str = ""
+    species: dict[str, dict[str, Any]] = field(default_factory=dict)
+    limits: dict[str, float] = field(default_factory=dict)
+    gives_way: bool = True
+    ground: dict[str, Any] = field(default_factory=dict)
+    season: dict[str, float] = field(default_factory=dict)
+
+
+def stand_settings() -> list[str]:
+    """Names of settings of stands that mean something in any file."""
+    numbers = [p.identifier for p in TetFloraStand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN'}]
+    return [name for name in numbers if name not in ("is_grown", "last_year", "species_index", "path_distance")]
 
 
 def read_biome(path: Path) -> Biome:
@@ -102,7 +148,7 @@ def biome_data(
     stored = data_of(biome) if biome is not None else {}
     data |= {key: value for key, value in stored.items() if key in ("ground", "season") and value}
     layers = [_layer_data(population) for population in populations]
-    stands = [] if biome is None else [stand_data(field) for field in stands_of(scene, biome.uid)]
+    stands = [] if biome is None else [_stand_data(field) for field in stands_of(scene, biome.uid)]
     species = _species_data(scene, [part for layer in (*stands, *layers) for part in layer["species"]])
     if species:
         data["species"] = species
@@ -121,19 +167,37 @@ def biome_data(
 
 def _layer_data(population: bpy.types.PropertyGroup) -> dict[str, Any]:
     """What differs from a new population."""
-    whole = population_data(population)
-    layer: dict[str, Any] = {"kind": "cover" if population.covers else "population", "name": whole.pop("name")}
-    for key, value in whole.items():
-        prop = TetFloraPopulation.bl_rna.properties[key] if key != "species" and key != "grounds" else None
-        if key in _LOCAL or key == "species" or value == value_for(prop, prop.default):
-            continue
-        layer[key] = value
-    properties = type(population.mix[0]).bl_rna.properties if population.mix else {}
-    layer["species"] = [
-        {k: v for k, v in part.items() if k == "species" or v != value_for(properties[k], properties[k].default)}
-        for part in whole["species"]
-    ]
-    return layer
+    data = population_data(population, changed=True)
+    species = data.pop("species")
+    layer = {"kind": "cover" if population.covers else "population", "name": population.name}
+    return layer | {key: value for key, value in data.items() if key not in _LOCAL} | {"species": species}
+
+
+def _stand_data(stand: bpy.types.Object) -> dict[str, Any]:
+    """What differs from a new stand."""
+    group = stand.tetflora.stand
+    layer = {"kind": "stand", "name": stand.name, **settings_data(group, stand_settings(), changed=True)}
+    return layer | {"species": [settings_data(entry, STAND_ENTRY) for entry in group.species]}
+
+
+def find_biome(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
+    """A biome of a scene by its identity."""
+    return with_identity(scene.tetflora.biomes, uid)
+
+
+def active_biome(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
+    """The biome that buttons act on; None where there is none."""
+    return active_in(scene.tetflora, "biomes")
+
+
+def layers_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.PropertyGroup]:
+    """Populations of a biome, in their order."""
+    return [population for population in scene.tetflora.populations if population.biome == uid]
+
+
+def stands_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
+    """Fields of a biome that are stands."""
+    return [obj for obj in scene.objects if is_stand(obj) and obj.tetflora.stand.biome == uid]
 
 
 def _species_data(scene: bpy.types.Scene, parts: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -146,8 +210,7 @@ def _species_data(scene: bpy.types.Scene, parts: Iterable[Mapping[str, Any]]) ->
 def _check_limits(limits: Any) -> None:
     known = {one.name for one in fields(Limits)}
     check_keys('"limits"', limits, set(), known)
-    for key, value in limits.items():
-        check_value(f'"limits": "{key}"', TetFloraBiome.bl_rna.properties[key], value)
+    check_settings('"limits"', limits, TetFloraBiome, known)
 
 
 def _check_ground(ground: Any) -> None:
@@ -191,8 +254,124 @@ def _check_layer(where: str, layer: Any) -> None:
     if kind not in KINDS:
         raise ValueError(f'{where}: "kind" is {shown(kind)}; it must be one of {", ".join(KINDS)}')
     if kind == "stand":
-        check_stand(where, layer)
+        check_keys(where, layer, {"kind", "name", "species"}, {"kind", "name", "species", *stand_settings()})
+        check_text(f'{where}: "name"', layer["name"])
+        check_settings(where, layer, TetFloraStand, stand_settings())
+        check_species(where, layer["species"], TetFloraStandEntry, STAND_ENTRY)
     else:
         check_population(where, layer, ("kind",))
         if not layer.get("species"):
             raise ValueError(f'{where} has no "species"')
+
+
+def pages_of(scene: bpy.types.Scene, biome: Biome) -> dict[str, dict[str, Any]]:
+    """Pages of the species of a biome's own, complete.
+
+    Raises
+    ------
+    SceneError, SpeciesError
+        One is made from a species that the catalog does not have, or is broken.
+    """
+    pages: dict[str, dict[str, Any]] = {}
+    for identifier, given in biome.species.items():
+        page = dict(given)
+        if "of" in page:
+            of = page.pop("of")
+            each = page.pop("every_order", {})
+            page = {**(pages[of] if of in pages else species_data(scene, of)), **page}
+            if each and isinstance(page.get("orders"), list):
+                # Where an order has the key already: what bears no leaves has no color of leaves.
+                page["orders"] = [
+                    {**order, **{k: each[k] for k in each.keys() & order.keys()}} if isinstance(order, dict) else order
+                    for order in page["orders"]
+                ]
+            species_from_dict(page, identifier, f'{biome.name}: species "{identifier}"')
+        pages[identifier] = page
+    return pages
+
+
+#: Pixels of a picture, and its quality as a JPEG.
+_SIDES, _QUALITY = (320, 200), 82
+
+
+def saved_populations(scene: bpy.types.Scene) -> list[bpy.types.PropertyGroup]:
+    """What would be saved: the layers of the active biome or, without one, the populations on the ground of the active
+    population.
+    """
+    biome = active_biome(scene)
+    if biome is not None:
+        return layers_of(scene, biome.uid)
+    active = active_population(scene)
+    if active is None:
+        return []
+    own = set(grounds_of(scene, active))
+    return [p for p in scene.tetflora.populations if p.uid == active.uid or own & set(grounds_of(scene, p))]
+
+
+def save_biome(scene: bpy.types.Scene, name: str, description: str, picture: bool, replace: bool) -> Path:
+    """Save what grows on a ground as a file of the user's folder.
+
+    Parameters
+    ----------
+    picture : bool
+        Whether the last render becomes the biome's picture.
+    replace : bool
+        Whether an own file of the same name gives way.
+
+    Raises
+    ------
+    SceneError
+        There is nothing to save, no render, or no place for the file.
+    """
+    populations = saved_populations(scene)
+    if not populations:
+        raise SceneError("No population grows here; add a biome or populate the ground first")
+    if not name.strip():
+        raise SceneError("A biome needs a name")
+    identifier = new_identifier(name, lambda one: False)
+    data = biome_data(scene, populations, active_biome(scene), name.strip(), description.strip())
+    try:
+        checked(data, identifier)  # what is saved can be read
+    except ValueError as error:
+        raise SceneError(f'"{name}" cannot be saved: {error}') from None
+    with tempfile.TemporaryDirectory() as folder:
+        image = _last_render(scene, Path(folder)) if picture else None
+        return library.OWN_FILES.store(identifier, as_text(data), replace, image)
+
+
+def import_biome(path: Path, replace: bool) -> str:
+    """Take a file into the user's folder, with the picture beside it; returns the identifier.
+
+    Raises
+    ------
+    SceneError
+        The file breaks a rule of the format, or another one of its name is there.
+    """
+    read_biome(path)
+    try:
+        content = read_whole(path, MAX_FILE_BYTES)
+    except OSError as error:
+        raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
+    library.OWN_FILES.store(path.stem, content, replace, library.picture_file(path))
+    return path.stem
+
+
+def _last_render(scene: bpy.types.Scene, folder: Path) -> Path:
+    """The last render as a small JPEG."""
+    result = next((image for image in bpy.data.images if image.type == 'RENDER_RESULT'), None)
+    path = folder / "render.png"
+    try:
+        if result is None:
+            raise RuntimeError
+        result.save_render(str(path), scene=scene)
+        image = bpy.data.images.load(str(path))
+    except RuntimeError:
+        raise SceneError("There is no render to take as picture; press F12 first, or turn off Last Render") from None
+    try:
+        image.scale(*_SIDES)
+        image.file_format = 'JPEG'
+        made = folder / "picture.jpg"
+        image.save(filepath=str(made), quality=_QUALITY)
+    finally:
+        bpy.data.images.remove(image)
+    return made

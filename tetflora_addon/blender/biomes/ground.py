@@ -22,7 +22,7 @@ from ..placing.populations import own_objects
 from ..placing.terrain import grid_mesh, read_ground
 from ..scene.crowns import crown_for
 from ..scene.fields import fields_of, read_field
-from .biome import GROUND, data_of
+from .properties import GROUND, data_of
 
 NAME = "Land"
 #: Side of land that is made, and of its squares, meters.

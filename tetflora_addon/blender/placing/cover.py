@@ -3,14 +3,16 @@
 """Ground Cover: a population on the ground of another, of what grows in its light and shade and falls from its crowns.
 
 What falls from a species is a species of its own, kept in the file as one that the artist edited. The population of
-the cover is an ordinary one: it can be changed, updated, frozen and removed.
+the cover is an ordinary one: it can be changed, updated, frozen and removed. Leaves that fall in autumn are another,
+so that what grows there, and the litter of years before, keep their places.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import bpy
@@ -20,13 +22,15 @@ from numpy.typing import NDArray
 from ...errors import SceneError, TetFloraError
 from ...files import is_identifier
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress, mapped
+from ...jobs import Progress, mapped, part_of
 from ...planting.canopy import Canopy
-from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
-from ...species.litter import FALLEN, KIND, leaves_page
+from ...planting.cover import FULL, Floor, Habitat, Stratum, covered, tinted
+from ...species.litter import FALLEN, KIND, leaves_page, shed_share
+from ..materials.snow import add_snow
 from ..materials.soil import SHADED, lay_soil
-from ..runtime import JobData, guarded, is_there
+from ..runtime import JobData, is_there, job
 from ..scene.crowns import crown_for, crown_steps
+from ..settings import with_identity
 from ..species.edits import catalogue, revert_species, species_data, species_for, store_species
 from ..worker import steps_in_thread
 from .canopy import canopy_of, floor_steps, is_cover, shedder_of, standing
@@ -35,7 +39,8 @@ from .populations import Made, add_population, forget_population, make_plants_st
 from .rules import active_population, copy_settings, grounds_of
 from .terrain import MASKS, read_ground
 
-NAME = "Ground cover"
+NAME, FALLEN_LEAVES = "Ground cover", "Fallen leaves"
+_SQUARE = 0.976  # mean square of the scales of a cover's plants
 #: What grows: species, habitat, plants on a square meter of ground that suits.
 GROWN = (
     ("wood_grass", 'LIGHT', 9.0),
@@ -54,7 +59,7 @@ _SHEDS = 1.2
 #: What is covered where the plants above are of no population.
 ANYBODY = "plants"
 #: Fraction of the work after which plants are placed, and what is done before.
-_PLANTING, UNDER = 0.7, "Light and litter under the plants"
+_PLANTING, _UNDER = 0.7, "Light and litter under the plants"
 _PAGES = {**FALLEN, KIND: leaves_page}
 #: Soil without anything on it, linear RGB.
 HUMUS = np.array([0.036, 0.025, 0.016])
@@ -90,16 +95,18 @@ def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None
     active = active_population(scene)
     if active is None or not active.covers:
         return active
-    return next((p for p in scene.tetflora.populations if p.uid == active.covers), active)
+    return with_identity(scene.tetflora.populations, active.covers) or active
 
 
+@job("Covering the ground")
 def cover_steps(
+    data: JobData,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     population: bpy.types.PropertyGroup,
     soil: bool = True,
     grounds: Iterable[bpy.types.Object] | None = None,
-    masks: Mapping[str, Any] | None = None,
+    masks: Mapping[str, Any] = MappingProxyType({}),
 ) -> Generator[Progress, object, Covered]:
     """Cover the ground of a population.
 
@@ -122,22 +129,38 @@ def cover_steps(
     SceneError
         It has no ground or no plants above it, or the cover is frozen; or something was deleted meanwhile.
     """
-    data = JobData("Covering the ground", scene)
-    return guarded(data, _cover_steps(data, scene, depsgraph, population, soil, grounds, masks or {}))
+    uid = population.uid or ANYBODY
+    grounds = yield from _begun(data, scene, population, grounds)
+    population = _again(data, scene, population, uid)
+    own = {name: getattr(population, name) for name in MASKS} | dict(masks)
+    ground = read_ground(grounds, depsgraph, **own)
+    canopy, above = canopy_of(scene, depsgraph)
+    if not len(canopy):
+        raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
+    yield (progress := Progress(0.05, _UNDER))
+    floor = yield from steps_in_thread(_told(floor_steps(canopy, ground.triangles, len(above))), progress)
+    yield Progress(_PLANTING, "Planting")
+    population = _again(data, scene, population, uid)
+    with _restored(scene, uid):
+        parts = _parts(scene, canopy, above)
+        found = cover_of(scene, uid) or _add_cover(scene, population, grounds, masks)
+        _mix(found, parts, ground.map_area)
+        with closing(make_plants_steps(scene, depsgraph, found)) as steps:
+            made = yield from part_of(steps, _PLANTING, 1.0)
+        bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
+    return Covered(made, bare)
 
 
-def _cover_steps(
+def _begun(
     data: JobData,
     scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
     population: bpy.types.PropertyGroup,
-    soil: bool,
-    grounds: Iterable[bpy.types.Object] | None,
-    masks: Mapping[str, Any],
-) -> Generator[Progress, object, Covered]:
-    yield (progress := Progress(0.0, UNDER))
-    uid = population.uid or ANYBODY
-    found = cover_of(scene, uid)
+    grounds: Iterable[bpy.types.Object] | None = None,
+    fallen: bool = False,
+) -> Generator[Progress, object, list[bpy.types.Object]]:
+    """See whether a population can have a cover, and measure what stands above; returns its ground, or that given."""
+    yield (progress := Progress(0.0, _UNDER))
+    found = cover_of(scene, population.uid or ANYBODY, fallen)
     if found is not None:
         refuse_frozen(found)
     grounds = grounds_of(scene, population) if grounds is None else list(grounds)
@@ -147,27 +170,10 @@ def _cover_steps(
         )
     data.add_objects(grounds)
     yield from crown_steps(progress, scene, standing(scene))
-    population = again(data, scene, population, uid)
-    own = {name: getattr(population, name) for name in MASKS} | dict(masks)
-    ground = read_ground(grounds, depsgraph, **own)
-    canopy, above = canopy_of(scene, depsgraph)
-    if not len(canopy):
-        raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
-    yield (progress := Progress(0.05, UNDER))
-    floor = yield from steps_in_thread(_told(floor_steps(canopy, ground.triangles, len(above))), progress)
-    yield Progress(_PLANTING, "Planting")
-    population = again(data, scene, population, uid)
-    with restored(scene, uid):
-        parts = _parts(scene, canopy, above)
-        found = cover_of(scene, uid) or add_cover(scene, population, grounds, masks)
-        mix(found, parts, ground.map_area)
-        with closing(make_plants_steps(scene, depsgraph, found)) as steps:
-            made = yield from _scaled(steps, _PLANTING)
-        bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
-    return Covered(made, bare)
+    return grounds
 
 
-def again(
+def _again(
     data: JobData, scene: bpy.types.Scene, population: bpy.types.PropertyGroup, uid: str
 ) -> bpy.types.PropertyGroup:
     """A population, fetched again after others may have been added; settings for new ones stay where they are."""
@@ -176,16 +182,11 @@ def again(
 
 def _told(steps: Generator[float, object, Floor]) -> Generator[Progress, object, Floor]:
     """The maps, with their progress as a part of the whole."""
-    return mapped(steps, lambda done: Progress(0.05 + (_PLANTING - 0.05) * done, UNDER))
-
-
-def _scaled(steps: Generator[Progress, object, Made], begin: float) -> Generator[Progress, object, Made]:
-    """Steps that are the last part of others."""
-    return mapped(steps, lambda step: replace(step, fraction=begin + (1.0 - begin) * step.fraction))
+    return mapped(steps, lambda done: Progress(0.05 + (_PLANTING - 0.05) * done, _UNDER))
 
 
 @contextmanager
-def restored(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> Iterator[None]:
+def _restored(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> Iterator[None]:
     """Where what is done ends early, forget a cover that is new, or what was added to one, and species of litter."""
     group, found = scene.tetflora, cover_of(scene, uid, fallen)
     active, species = group.populations_index, {edit.identifier for edit in group.species_edits}
@@ -222,7 +223,7 @@ def _is_fallen(population: bpy.types.PropertyGroup) -> bool:
     return bool(population.mix) and all(entry.habitat == 'FALLEN' for entry in population.mix)
 
 
-def add_cover(
+def _add_cover(
     scene: bpy.types.Scene,
     population: bpy.types.PropertyGroup,
     grounds: list[bpy.types.Object],
@@ -232,9 +233,8 @@ def add_cover(
     """A population for the cover, on the same ground and within the same limits; the covered one stays active."""
     index, uid = scene.tetflora.populations_index, population.uid
     cover = add_population(scene, grounds, name=name)
-    populations = scene.tetflora.populations
     # Fetched again: adding to a list moves what is in it.
-    source = next((p for p in populations if p.uid == uid), None)
+    source = with_identity(scene.tetflora.populations, uid)
     if source is not None:
         copy_settings(source, cover)
         scene.tetflora.populations_index = index
@@ -253,14 +253,14 @@ def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> li
     """Species of a cover; those of what falls are made where the file does not have them."""
     known = catalogue()
     parts = [Ingredient(*one) for one in GROWN if one[0] in known]
-    order = shedders(canopy, above)
+    order = _shedders(canopy, above)
     for kind, habitat, number, most in DROPPED:
         made = [(name, fallen) for name in order if (fallen := fallen_from(scene, name, kind))][:most]
         parts += [Ingredient(fallen, habitat, number, name) for name, fallen in made]
     return parts
 
 
-def shedders(canopy: Canopy, above: tuple[str, ...]) -> list[str]:
+def _shedders(canopy: Canopy, above: tuple[str, ...]) -> list[str]:
     """Species from which anything falls that is seen; those that shed most come first."""
     leaves = np.bincount(canopy.species, canopy.area + 1e-6 * canopy.top, minlength=len(above))
     tall = np.zeros(len(above))
@@ -286,7 +286,7 @@ def fallen_from(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
     return name
 
 
-def mix(cover: bpy.types.PropertyGroup, parts: list[Ingredient], area: float) -> None:
+def _mix(cover: bpy.types.PropertyGroup, parts: list[Ingredient], area: float) -> None:
     """Add what the mixture of a cover lacks; what it has stays as the artist left it."""
     there = {entry.species for entry in cover.mix}
     before = sum(entry.weight for entry in cover.mix)
@@ -344,3 +344,60 @@ def _strata(
         one = Stratum(patch * suits, thin * entry.weight, crown.seen, np.array(crown.colour))
         (lying if habitat.falls else growing).append(one)
     return lying, growing
+
+
+@job("Strewing leaves")
+def strew_steps(
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup
+) -> Generator[Progress, object, Made | None]:
+    """Strew the leaves that fall in autumn under a population; None where nothing above sheds its leaves.
+
+    What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
+    steps leaves everything as it was.
+
+    Raises
+    ------
+    SceneError
+        It has no ground, or the leaves are frozen; or something was deleted meanwhile.
+    """
+    uid = population.uid or ANYBODY
+    grounds = yield from _begun(data, scene, population, fallen=True)
+    population = _again(data, scene, population, uid)
+    with _restored(scene, uid, fallen=True):
+        canopy, above = canopy_of(scene, depsgraph)
+        parts = _fallen_leaves(scene, canopy, above)
+        if not parts:
+            return None
+        found = cover_of(scene, uid, fallen=True) or _add_cover(scene, population, grounds, {}, FALLEN_LEAVES)
+        # Ground that is wholly suited, of all that falls on it.
+        _mix(found, parts, canopy.area.sum() / FULL / len(parts))
+        with closing(make_plants_steps(scene, depsgraph, found)) as steps:
+            return (yield from steps)
+
+
+def _fallen_leaves(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Ingredient]:
+    """Fallen leaves of each species: as many patches as have the area of what falls."""
+    parts = []
+    for name in _shedders(canopy, above):
+        patch = fallen_from(scene, name, KIND)
+        share = shed_share(species_for(scene, name)) if patch else 0.0
+        area = crown_for(scene, patch).leaves if share > 0.0 else 0.0
+        if area > 0.0:
+            parts.append(Ingredient(patch, 'FALLEN', FULL * share / (area * _SQUARE), name))
+    return parts
+
+
+def cover_with_snow(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[str]:
+    """Put the snow of the scene on all materials of a population's ground; names of those that had none before.
+
+    Raises
+    ------
+    SceneError
+        The population has no ground, or the ground has no material of this file.
+    """
+    slots = [slot for obj in grounds_of(scene, population) for slot in obj.material_slots]
+    materials = dict.fromkeys(slot.material for slot in slots if slot.material is not None)
+    own = [one for one in materials if one.library is None and one.override_library is None and one.node_tree]
+    if not own:
+        raise SceneError(f'The ground of "{population.name}" has no material in this file; give it one first')
+    return [material.name for material in own if add_snow(material)]

@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -29,15 +28,6 @@ SOURCES = (
     ('SPECIES', "Species", "From the crowns of the species", 0),
     ('OWN', "Own", "Set by the artist", 1),
 )
-
-
-@dataclass(frozen=True)
-class Mixture:
-    """Species with their relative frequencies, the mean scale of plants, and plants per square metre if asked for."""
-
-    weights: dict[str, float]
-    scale: float
-    density: float | None = None
 
 
 def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
@@ -85,42 +75,29 @@ def distance_of(settings: bpy.types.PropertyGroup) -> float:
 
 def distance_to_draw(settings: bpy.types.PropertyGroup) -> float | None:
     """The same for panels: None for a moment, until the crowns of the species are known."""
-    return _suggestion(settings, crown_to_draw) if follows_species(settings) else settings.min_distance
+    return suggestion(settings, crown_to_draw) if follows_species(settings) else settings.min_distance
 
 
-def suggestion(settings: bpy.types.PropertyGroup) -> float:
+def suggestion(
+    settings: bpy.types.PropertyGroup, find: Callable[[bpy.types.Scene, str], Crown | None] = crown_for
+) -> float | None:
     """Distance in metres that suits the species of a population or brush.
 
-    Species are compiled at the first time, up to a tenth of a second each.
+    Species are compiled at the first time, up to a tenth of a second each. None where a crown is not found.
     """
-    return _suggestion(settings, crown_for)
-
-
-def _suggestion(
-    settings: bpy.types.PropertyGroup, find: Callable[[bpy.types.Scene, str], Crown | None]
-) -> float | None:
+    scene, of_brush = settings.id_data, "strokes" in settings.bl_rna.properties
     try:
-        mixture = _mixture_of(settings)
+        weights = painted_weights(scene) if of_brush else weights_of(settings)
     except SpeciesError:  # an empty catalogue, of which Populate and the brush complain
         return settings.min_distance
-    age = 0.0 if _is_brush(settings) else settings.age
-    crowns = [find(settings.id_data, aged_kind(identifier, age)) for identifier in mixture.weights]
+    crowns = [find(scene, aged_kind(identifier, 0.0 if of_brush else settings.age)) for identifier in weights]
     if None in crowns:
         return None
-    radii = [crown.radius for crown in crowns]
-    suited = suggested_distance(radii, list(mixture.weights.values()), mixture.scale, mixture.density)
-    return float(np.float32(suited))  # as Blender stores it, so that it is the same when the artist takes it over
-
-
-def _is_brush(settings: bpy.types.PropertyGroup) -> bool:
-    return "strokes" in settings.bl_rna.properties
-
-
-def _mixture_of(settings: bpy.types.PropertyGroup) -> Mixture:
+    # Plants per square metre, if they are asked for.
+    density = settings.density / (SQUARE if of_brush else HECTARE) if of_brush or settings.by_density else None
     scale = (settings.scale_min + settings.scale_max) / 2.0
-    if _is_brush(settings):
-        return Mixture(painted_weights(settings.id_data), scale, settings.density / SQUARE)
-    return Mixture(weights_of(settings), scale, settings.density / HECTARE if settings.by_density else None)
+    suited = suggested_distance([crown.radius for crown in crowns], list(weights.values()), scale, density)
+    return float(np.float32(suited))  # as Blender stores it, so that it is the same when the artist takes it over
 
 
 def choose(settings: bpy.types.PropertyGroup, by_species: bool) -> None:

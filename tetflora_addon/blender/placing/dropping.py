@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...jobs import Progress, mapped
 from ..attributes import read, write
-from ..runtime import JobData, guarded
+from ..runtime import JobData, job
 from .field_edits import own_mesh, positions
 from .ground import Ground
 
@@ -30,7 +30,9 @@ class Dropped:
     missed: int
 
 
+@job("Dropping plants")
 def drop_steps(
+    data: JobData,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     plants: Sequence[bpy.types.Object],
@@ -53,17 +55,7 @@ def drop_steps(
     SceneError
         Nothing is visible to stand on, or something was deleted meanwhile.
     """
-    data = JobData("Dropping plants", scene, depsgraph.view_layer)
     data.add_objects([*plants, *fields])
-    return guarded(data, _drop_steps(data, depsgraph, plants, fields))
-
-
-def _drop_steps(
-    data: JobData,
-    depsgraph: bpy.types.Depsgraph,
-    plants: Sequence[bpy.types.Object],
-    fields: Sequence[bpy.types.Object],
-) -> Generator[Progress, object, Dropped]:
     yield Progress(0.0, _LOOKING)
     view_layer = depsgraph.view_layer
     view_layer.update()

@@ -8,6 +8,7 @@ scene.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
 
@@ -21,14 +22,13 @@ from ...planting.places import Placement
 from ...planting.strokes import admitted
 from ..attributes import write
 from ..compat import shader_tree
+from ..materials.nodes import Graph, find_socket
 from ..species.catalogue import default_species
 from ..species.edits import catalogue
 from ..worker import at_once
 from .cover import cover_steps
 from .plant_objects import add_plants
 from .terrain import grid_mesh
-
-Stops = tuple[tuple[float, tuple[float, float, float]], ...]
 
 NAME = "First forest"
 EYE_HEIGHT = 1.7  # metres
@@ -45,28 +45,17 @@ _PATH = 2.2  # metres from the middle of the path to its edge
 
 def tread(material: bpy.types.Material) -> None:
     """Trodden earth on a soil where the attribute ``aside`` (meters from the middle of the path) is small."""
-    tree = shader_tree(material)
-    new, link = tree.nodes.new, tree.links.new
-    surface = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
-    floor = surface.inputs["Base Color"].links[0].from_socket
-    place = new("ShaderNodeTexCoord")
-    earth = _ramp(tree, place, 9.0, 6.0, ((0.35, (0.085, 0.06, 0.038)), (0.65, (0.19, 0.14, 0.09))))
-    aside = new("ShaderNodeAttribute")
-    aside.attribute_name = "aside"
-    edge = new("ShaderNodeTexNoise")
-    edge.inputs["Scale"].default_value, edge.inputs["Detail"].default_value = 1.2, 5.0
-    link(place.outputs["Object"], edge.inputs["Vector"])
-    ragged = new("ShaderNodeMath")
-    ragged.operation = 'MULTIPLY_ADD'
-    ragged.inputs[1].default_value = 1.8
-    link(edge.outputs[0], ragged.inputs[0])
-    link(aside.outputs["Fac"], ragged.inputs[2])
-    weight = new("ShaderNodeMapRange")
-    weight.interpolation_type = 'SMOOTHSTEP'
-    for socket, value in (("From Min", 1.3), ("From Max", 2.6), ("To Min", 0.0), ("To Max", 1.0)):
-        weight.inputs[socket].default_value = value
-    link(ragged.outputs[0], weight.inputs["Value"])
-    link(_mixed(tree, 'MIX', weight.outputs[0], earth, floor), surface.inputs["Base Color"])
+    graph = Graph(shader_tree(material), clear=False)
+    color = next(node for node in graph.tree.nodes if node.type == 'BSDF_PRINCIPLED').inputs["Base Color"]
+    floor = color.links[0].from_socket
+    place = find_socket(graph.node("ShaderNodeTexCoord").outputs, "Object")
+    coarse, fine = (
+        graph.node("ShaderNodeTexNoise", {"Vector": place, "Scale": scale, "Detail": detail})
+        for scale, detail in ((1.2, 5.0), (9.0, 6.0))
+    )
+    earth = _ramp(graph, fine, ((0.35, (0.085, 0.06, 0.038)), (0.65, (0.19, 0.14, 0.09))))
+    ragged = graph.math('MULTIPLY_ADD', coarse, 1.8, graph.attribute("aside", "Fac"))
+    graph.feed(color, graph.mixed(graph.step(ragged, 1.3, 2.6), earth, floor))
 
 
 def sky(name: str) -> bpy.types.World:
@@ -76,56 +65,21 @@ def sky(name: str) -> bpy.types.World:
     strength: shade is cool, not blue-black.
     """
     world = bpy.data.worlds.new(name)
-    tree = shader_tree(world)
-    tree.nodes.clear()
-    new, link = tree.nodes.new, tree.links.new
-    place, split, ramp = (new(f"ShaderNode{kind}") for kind in ("TexCoord", "SeparateXYZ", "ValToRGB"))
-    _set_stops(ramp, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.2, 0.3, 0.51))))
-    link(place.outputs["Generated"], split.inputs[0])
-    link(split.outputs["Z"], ramp.inputs[0])
-    background, output = new("ShaderNodeBackground"), new("ShaderNodeOutputWorld")
-    background.inputs["Strength"].default_value = 0.7
-    link(ramp.outputs["Color"], background.inputs["Color"])
-    link(background.outputs[0], output.inputs["Surface"])
+    graph = Graph(shader_tree(world))
+    place = find_socket(graph.node("ShaderNodeTexCoord").outputs, "Generated")
+    height = graph.node("ShaderNodeSeparateXYZ", {"Vector": place}).outputs["Z"]
+    color = _ramp(graph, height, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.2, 0.3, 0.51))))
+    background = graph.node("ShaderNodeBackground", {"Color": color, "Strength": 0.7})
+    graph.node("ShaderNodeOutputWorld", {"Surface": background})
     return world
 
 
-def _set_stops(ramp: bpy.types.ShaderNode, stops: Stops) -> None:
-    for element, (position, colour) in zip(ramp.color_ramp.elements, stops, strict=True):
-        element.position, element.color = position, (*colour, 1.0)
-
-
-def _ramp(
-    tree: bpy.types.NodeTree, place: bpy.types.ShaderNode, scale: float, detail: float, stops: Stops
-) -> bpy.types.NodeSocket:
-    """Colours by noise over the object's coordinates."""
-    noise, ramp = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeValToRGB")
-    noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = scale, detail
-    tree.links.new(place.outputs["Object"], noise.inputs["Vector"])
-    tree.links.new(noise.outputs[0], ramp.inputs[0])
-    _set_stops(ramp, stops)
+def _ramp(graph: Graph, factor: object, stops: Sequence[tuple[float, tuple[float, ...]]]) -> bpy.types.NodeSocket:
+    """Colors between two stops."""
+    ramp = graph.node("ShaderNodeValToRGB", {"Fac": factor})
+    for element, (position, color) in zip(ramp.color_ramp.elements, stops, strict=True):
+        element.position, element.color = position, (*color, 1.0)
     return ramp.outputs["Color"]
-
-
-def _mixed(
-    tree: bpy.types.NodeTree,
-    blend: str,
-    factor: float | bpy.types.NodeSocket,
-    a: bpy.types.NodeSocket,
-    b: bpy.types.NodeSocket,
-) -> bpy.types.NodeSocket:
-    mix = tree.nodes.new("ShaderNodeMix")
-    mix.data_type, mix.blend_type = 'RGBA', blend
-    # A mix node has sockets of each name for each type of data; those of colours are found by their type.
-    colours = [s for s in mix.inputs if s.type == 'RGBA']
-    weight = next(s for s in mix.inputs if s.type == 'VALUE' and s.name == "Factor")
-    if isinstance(factor, float):
-        weight.default_value = factor
-    else:
-        tree.links.new(factor, weight)
-    tree.links.new(a, colours[0])
-    tree.links.new(b, colours[1])
-    return next(s for s in mix.outputs if s.type == 'RGBA')
 
 
 @dataclass(frozen=True)

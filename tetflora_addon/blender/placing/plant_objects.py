@@ -4,7 +4,6 @@
 
 from collections.abc import Generator, Iterable, Sequence
 from functools import lru_cache
-from typing import Any
 
 import bpy
 import numpy as np
@@ -46,9 +45,8 @@ def plant_collections(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
 
 def plant_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     """The scene's collection for plants; made if there is none."""
-    for collection in scene.collection.children_recursive:
-        if collection.get(_MARK) and collection.library is None:
-            return collection
+    if found := plant_collections(scene):
+        return found[0]
     collection = bpy.data.collections.new(COLLECTION)
     collection[_MARK] = True
     settings.begin(scene)
@@ -113,11 +111,6 @@ def add_plants_steps(
     """As `add_plants`; yields those that are made so far, which the caller removes if it goes no further."""
     rows = (placement.position, _eulers(placement), placement.scale, placement.species, placement.seed)
     return _empties_steps(scene, rows, species, [None] * len(species), collection, ages)
-
-
-def _empties(*given: Any) -> list[bpy.types.Object]:
-    """As `_empties_steps`, at once."""
-    return at_once(_empties_steps(*given))
 
 
 def _empties_steps(
@@ -284,7 +277,7 @@ def plants_from_field(
     angles = np.array([Matrix(frame).to_euler() for frame in read.frame])
     species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
     rows = (read.position, angles, read.scale, read.species, read.seed)
-    made = _empties(scene, rows, species, forms, collection, ages)
+    made = at_once(_empties_steps(scene, rows, species, forms, collection, ages))
     remove_fields([field])
     return made
 

@@ -1,41 +1,38 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One population as files have it: its settings by their names in Python, checked before they are used."""
+"""Settings as files that artists exchange have them, of populations and of other groups: written, checked, and read.
+
+What cannot be is refused by a `ValueError` that names the key.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from math import radians
+from collections.abc import Collection, Iterable, Mapping
+from math import degrees, inf, radians
 from typing import Any
 
 import bpy
+import numpy as np
 
-from ...errors import shown
+from ...errors import NAME, readable, shown
 from ...files import IDENTIFIER_RULE, is_identifier
-from .file_checks import check_keys, check_text, check_value, is_pointer, list_of, value_for
+from ..settings import limits_of
 from .properties import TetFloraMixEntry, TetFloraPopulation
-from .rules import set_grounds, settings_of
+from .rules import ENTRY, set_grounds, settings_of
 
-#: Keys of a species.
-MIX = ("species", "weight", "companion", "companion_strength", "companion_distance", "habitat", "shed_by")
+MAX_TEXT = 1000
+#: Most entries of a list: populations of a file, species and grounds of a population.
+MAX_ENTRIES = 1000
 #: Settings that hold identifiers of species.
-_IDENTIFIERS = ("species", "companion", "shed_by")
+_IDENTIFIERS = {"species", "companion", "shed_by"}
 
 
-def population_data(population: TetFloraPopulation) -> dict[str, Any]:
-    """A population as a file has it."""
+def population_data(population: TetFloraPopulation, changed: bool = False) -> dict[str, Any]:
+    """A population as a file has it, all of it or what differs from a new one."""
     data: dict[str, Any] = {"name": population.name}
     data["grounds"] = [entry.object.name for entry in population.grounds if entry.object is not None]
-    data["species"] = [
-        {name: value_for(entry.bl_rna.properties[name], getattr(entry, name)) for name in MIX}
-        for entry in population.mix
-    ]
-    for prop in simple_settings(population):
-        value = getattr(population, prop.identifier)
-        data[prop.identifier] = (
-            (value.name if value is not None else None) if is_pointer(prop) else value_for(prop, value)
-        )
-    return data
+    data["species"] = [settings_data(entry, ENTRY, changed, "species") for entry in population.mix]
+    return data | settings_data(population, [p.identifier for p in simple_settings(population)], changed)
 
 
 def simple_settings(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
@@ -43,8 +40,30 @@ def simple_settings(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGro
     return [p for p in settings_of(group) if p.type != 'COLLECTION']
 
 
+def settings_data(
+    group: bpy.types.PropertyGroup, names: Iterable[str], changed: bool = False, always: str = ""
+) -> dict[str, Any]:
+    """Settings of a group as files have them, all or those that differ from their defaults, and one of them always."""
+    data = {}
+    for name in names:
+        prop, value = group.bl_rna.properties[name], getattr(group, name)
+        if prop.type == 'POINTER':
+            value, default = value.name if value is not None else None, None
+        else:
+            value, default = value_for(prop, value), value_for(prop, prop.default)
+        if name == always or not changed or value != default:
+            data[name] = value
+    return data
+
+
+def set_setting(group: bpy.types.PropertyGroup, name: str, value: Any) -> None:
+    """Give a group a setting that is no datablock as a checked file has it."""
+    prop = group.bl_rna.properties[name]
+    setattr(group, name, radians(value) if prop.type == 'FLOAT' and prop.subtype == 'ANGLE' else value)
+
+
 def check_population(where: str, entry: Any, more: Iterable[str] = ()) -> None:
-    """Refuse what cannot be a population.
+    """Refuse what cannot be a population with a `ValueError`.
 
     Parameters
     ----------
@@ -54,26 +73,34 @@ def check_population(where: str, entry: Any, more: Iterable[str] = ()) -> None:
         Decoded.
     more : iterable of str
         Keys that somebody else checks.
-
-    Raises
-    ------
-    ValueError
-        Something is not as it must be; names the key.
     """
-    simple = {p.identifier: p for p in simple_settings(TetFloraPopulation)}
-    mix = {name: TetFloraMixEntry.bl_rna.properties[name] for name in MIX}
+    simple = {p.identifier for p in simple_settings(TetFloraPopulation)}
     check_keys(where, entry, {"name"}, {"name", "grounds", "species", *simple, *more})
     check_text(f'{where}: "name"', entry["name"])
     for name in list_of(f'{where}: "grounds"', entry.get("grounds", [])):
         check_text(f'{where}: "grounds"', name)
-    for index, part in enumerate(list_of(f'{where}: "species"', entry.get("species", [])), 1):
-        check_keys(f"{where}: species {index}", part, {"species"}, set(mix))
-        for key, value in part.items():
-            check_value(f'{where}: species {index}: "{key}"', mix[key], value)
-            if key in _IDENTIFIERS and value and not is_identifier(value):
-                raise ValueError(f'{where}: species {index}: "{key}" is {shown(value)}; use only {IDENTIFIER_RULE}')
-    for key in simple.keys() & entry.keys():
-        check_value(f'{where}: "{key}"', simple[key], entry[key])
+    check_species(where, entry.get("species", []), TetFloraMixEntry, ENTRY)
+    check_settings(where, entry, TetFloraPopulation, simple)
+
+
+def check_species(where: str, parts: Any, kind: type[bpy.types.PropertyGroup], names: Collection[str]) -> None:
+    """Refuse what cannot be the list of species of a layer with a `ValueError`."""
+    for index, part in enumerate(list_of(f'{where}: "species"', parts), 1):
+        here = f"{where}: species {index}"
+        check_keys(here, part, {"species"}, set(names))
+        check_settings(here, part, kind, names)
+        for key in _IDENTIFIERS & part.keys():
+            if part[key] and not is_identifier(part[key]):
+                raise ValueError(f'{here}: "{key}" is {shown(part[key])}; use only {IDENTIFIER_RULE}')
+
+
+def check_settings(
+    where: str, entry: Mapping[str, Any], kind: type[bpy.types.PropertyGroup], names: Iterable[str]
+) -> None:
+    """Refuse values of settings that a group could not have with a `ValueError`."""
+    for key in names:
+        if key in entry:
+            check_value(f'{where}: "{key}"', kind.bl_rna.properties[key], entry[key])
 
 
 def fill_population(
@@ -83,11 +110,10 @@ def fill_population(
     for prop in simple_settings(population):
         name = prop.identifier
         population.property_unset(name)
-        if is_pointer(prop):
+        if prop.type == 'POINTER':
             setattr(population, name, _named(prop.fixed_type.identifier, entry.get(name), missing))
         elif name in entry:
-            angle = prop.subtype == 'ANGLE' and prop.type == 'FLOAT'
-            setattr(population, name, radians(entry[name]) if angle else entry[name])
+            set_setting(population, name, entry[name])
     population.mix.clear()
     for part in entry.get("species", []):
         new = population.mix.add()
@@ -105,3 +131,92 @@ def _named(kind: str, name: str | None, missing: list[str]) -> bpy.types.ID | No
     if found is None:
         missing.append(f'the {kind.lower()} "{name}"')
     return found
+
+
+def check_format(data: dict[str, Any], expected: str, version: int, files: str) -> None:
+    """Refuse a file of another format or version with a `ValueError`."""
+    if data["format"] != expected:
+        raise ValueError(f'"format" is {shown(data["format"])}; {files} have "{expected}"')
+    if data["version"] != version or isinstance(data["version"], bool):
+        raise ValueError(
+            f'"version" is {shown(data["version"])}; this version of TetFlora reads {version}; update the extension'
+        )
+
+
+def check_value(where: str, prop: bpy.types.Property, value: Any) -> None:
+    """Refuse a value that a property could not have with a `ValueError`."""
+    if prop.type == 'POINTER':
+        if value is not None:
+            check_text(where, value)
+    elif prop.type == 'BOOLEAN':
+        if not isinstance(value, bool):
+            raise ValueError(f"{where} is {shown(value)}; it must be true or false")
+    elif prop.type == 'ENUM':
+        known = [item.identifier for item in prop.enum_items]
+        if value not in known:
+            raise ValueError(f"{where} is {shown(value)}; it must be one of {', '.join(known)}")
+    elif prop.type == 'STRING':
+        check_text(where, value)
+    else:
+        _check_number(where, prop, value)
+
+
+def _check_number(where: str, prop: bpy.types.Property, value: Any) -> None:
+    whole = prop.type == 'INT'
+    if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
+        raise ValueError(f"{where} is {shown(value)}; it must be a {'whole ' if whole else ''}number")
+    if not whole and not -inf < value < inf:
+        raise ValueError(f"{where} is {shown(value)}; it must be a finite number")
+    angle = prop.subtype == 'ANGLE'
+    # Bounds are single-precision numbers: 0.1 as a file has it is less than 0.1 as Blender stores it.
+    with np.errstate(over="ignore"):
+        stored = value if whole else float(np.float32(radians(value) if angle else value))
+    if not prop.hard_min <= stored <= prop.hard_max:
+        raise ValueError(f"{where} is {shown(value)}; it must be {limits_of(prop)}")
+
+
+def check_keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:
+    """Refuse what is no object, lacks a key or has an unknown one with a `ValueError`."""
+    if not isinstance(data, dict):
+        raise ValueError(f"{where} is {type(data).__name__}; it must be an object with keys")
+    if needed - data.keys():
+        raise ValueError(f'{where} has no "{min(needed - data.keys())}"')
+    if data.keys() - known:
+        raise ValueError(f'{where} has an unknown key "{readable(min(data.keys() - known), NAME)}"')
+
+
+def list_of(where: str, value: Any) -> list:
+    """A list that is not too long; anything else is a `ValueError`."""
+    if not isinstance(value, list):
+        raise ValueError(f"{where} is {type(value).__name__}; it must be a list")
+    if len(value) > MAX_ENTRIES:
+        raise ValueError(f"{where} has {len(value):,} entries; {MAX_ENTRIES:,} is the limit")
+    return value
+
+
+def check_text(where: str, value: Any) -> None:
+    """Refuse what is not one line of text with a `ValueError`."""
+    if not isinstance(value, str):
+        raise ValueError(f"{where} is {shown(value)}; it must be a string")
+    if readable(value, MAX_TEXT) != value:
+        raise ValueError(
+            f"{where} is {shown(value)}; it must be one line of at most {MAX_TEXT} characters, and none that control "
+            "terminals"
+        )
+
+
+def value_for(prop: bpy.types.Property, value: Any) -> Any:
+    """A stored value as files have it; numbers in as few digits as give the same single-precision number back."""
+    if prop.type != 'FLOAT':
+        return value
+    forth, back = (degrees, radians) if prop.subtype == 'ANGLE' else (float, float)
+    for digits in range(6, 18):
+        short = float(f"{forth(value):.{digits}g}")
+        if np.float32(back(short)) == np.float32(value):
+            return short
+    return forth(value)
+
+
+def refuse_constant(name: str) -> float:
+    """Refuse a number that JSON does not have with a `ValueError`."""
+    raise ValueError(f"{name} is not a number")

@@ -17,13 +17,19 @@ import bpy
 
 from ...errors import SceneError
 from ...files import json_of, read_whole, write_whole
-from .file_checks import check_format, check_keys, list_of, refuse_constant
-from .population_data import check_population, fill_population, population_data
+from .population_data import (
+    check_format,
+    check_keys,
+    check_population,
+    fill_population,
+    list_of,
+    population_data,
+    refuse_constant,
+)
 from .populations import add_population
 from .properties import TetFloraPopulation
 from .rules import set_grounds
 
-ENDING = ".json"
 FORMAT = "TetFlora populations"
 VERSION = 1
 

@@ -22,12 +22,13 @@ from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...planting.places import Placement, plant_ages
 from ..assets.marks import measure_all
-from ..runtime import JobData, guarded, is_there
+from ..runtime import JobData, is_there, job
 from ..scene.crowns import crown_steps
 from ..scene.fields import fields_of, stored_size
 from ..scene.own_ages import MOST_YEARS
 from ..scene.skeletons import aged_kind
-from ..worker import at_once, call_in_thread
+from ..settings import with_identity
+from ..worker import call_in_thread
 from .canopy import is_cover, standing
 from .plant_objects import (
     POPULATION_MARK,
@@ -115,13 +116,9 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
     return sum(stored_size(o) if o.tetflora.is_field else 1 for o in objects)
 
 
-def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation) -> Made:
-    """Place a population's plants at once; as `make_plants_steps`."""
-    return at_once(make_plants_steps(scene, depsgraph, population))
-
-
+@job("Placing plants")
 def make_plants_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
 ) -> Generator[Progress, object, Made]:
     """Place a population's plants by its settings, in place of those that it has.
 
@@ -132,12 +129,6 @@ def make_plants_steps(
     SceneError
         It is frozen, or no plants can be placed by its settings, as the message says; or it was deleted meanwhile.
     """
-    return guarded(data := JobData("Placing plants", scene), _make_plants_steps(data, scene, depsgraph, population))
-
-
-def _make_plants_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
-) -> Generator[Progress, object, Made]:
     progress, uid = Progress(0.0, "Reading the ground"), population.uid
     yield progress
     refuse_frozen(population)
@@ -187,7 +178,7 @@ def _make_plants_steps(
 
 def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraPopulation:
     """A population, fetched again: adding to the list moves what is in it."""
-    found = next((p for p in scene.tetflora.populations if p.uid == uid), None)
+    found = with_identity(scene.tetflora.populations, uid)
     if found is None:
         data.stop("its population was deleted")
         data.check()
@@ -240,9 +231,9 @@ def reroll_steps(
     try:
         return (yield from make_plants_steps(scene, depsgraph, population))
     except BaseException:  # an error, or Esc
-        for found in scene.tetflora.populations if is_there(scene) else ():
-            if found.uid == uid:
-                found.seed = old
+        found = with_identity(scene.tetflora.populations, uid) if is_there(scene) else None
+        if found is not None:
+            found.seed = old
         raise
 
 

@@ -18,7 +18,7 @@ from ...planting.strokes import Brush
 from ...setting import LENGTH
 from ..runtime import Listeners
 from ..scene.own_ages import AGE_PROPERTY
-from ..settings import properties_of
+from ..settings import properties_of, settings_in
 from ..species.catalogue import SpeciesChoice, items_for, number_of
 from .distances import SOURCES, choose, follows_species
 from .plant_objects import EMPTIES_UNASKED
@@ -30,6 +30,12 @@ STORAGE_ITEMS = (
     ('EMPTIES', "Empties", "One object per plant. Each can be moved on its own; many slow Blender down", 1),
     ('FIELD', "Field", "One object whose vertices are the plants. Room for millions", 2),
 )
+CREATE_AS = {
+    "name": "Create As",
+    "description": "What the plants are created as",
+    "items": STORAGE_ITEMS,
+    "default": 'AUTOMATIC',
+}
 #: Painted plants become empties as long as the scene has no more plants than this that are objects.
 MOST_PAINTED_EMPTIES = 2_000
 HABITATS = (
@@ -62,9 +68,10 @@ def _choose_distance(settings: bpy.types.PropertyGroup, by_species: bool) -> Non
     listeners.notify()
 
 
-_LIVE = {"options": set(), "update": _notify}
-_HIDDEN = {"options": {'HIDDEN'}}
-_COMPANION = properties_of(Companion, **_LIVE)
+#: Options of settings that the preview follows, and of state.
+LIVE = {"options": set(), "update": _notify}
+HIDDEN = {"options": {'HIDDEN'}}
+_COMPANION = properties_of(Companion, **LIVE)
 _DISTANCE = {"options": set(), "update": _on_distance}
 _BY_SPECIES = {
     "name": "By Species",
@@ -99,12 +106,12 @@ class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
         default=1.0,
         min=0.0,
         soft_max=10.0,
-        **_LIVE,
+        **LIVE,
     )
     companion: StringProperty(
         name="Companion",
         description="Identifier of the species that this one seeks or avoids; empty for none",
-        **_LIVE,
+        **LIVE,
     )
     companion_choice: EnumProperty(
         name="Companion",
@@ -121,7 +128,7 @@ class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
         description="Where under the other plants this species is found",
         items=HABITATS,
         default='ANYWHERE',
-        **_LIVE,
+        **LIVE,
     )
     shed_by: StringProperty(
         name="Shed By",
@@ -144,25 +151,29 @@ class TetFloraGround(bpy.types.PropertyGroup):
 
 
 class GroundMask:
-    """Mix-in: where on its grounds something grows, by a vertex group and an image."""
+    """Mix-in: where on its grounds something grows, by a vertex group and an image, and whether altitudes count."""
+
+    use_altitude: BoolProperty(
+        name="Altitude", description="Grow only between two heights above the scene's origin", **LIVE
+    )
 
     vertex_group: StringProperty(
         name="Vertex Group",
         description="Vertex group of the ground whose weights say where plants grow: 0 is bare, 1 is full",
-        **_LIVE,
+        **LIVE,
     )
-    invert_group: BoolProperty(name="Invert Vertex Group", description="Weight 1 is bare, 0 is full", **_LIVE)
+    invert_group: BoolProperty(name="Invert Vertex Group", description="Weight 1 is bare, 0 is full", **LIVE)
     image: PointerProperty(
         name="Image",
         description="Image whose brightness says where plants grow: black is bare, white is full",
         type=bpy.types.Image,
-        **_LIVE,
+        **LIVE,
     )
-    invert_image: BoolProperty(name="Invert Image", description="White is bare, black is full", **_LIVE)
+    invert_image: BoolProperty(name="Invert Image", description="White is bare, black is full", **LIVE)
     uv_layer: StringProperty(
         name="UV Map",
         description="UV map of the ground for the image; the active one if empty",
-        **_LIVE,
+        **LIVE,
     )
 
 
@@ -173,13 +184,13 @@ class AroundPaths:
         name="Areas",
         description="Collection of closed curves; plants grow only inside them, as seen from above",
         type=bpy.types.Collection,
-        **_LIVE,
+        **LIVE,
     )
     paths: PointerProperty(
         name="Paths",
         description="Collection of curves along which the ground stays bare, as seen from above",
         type=bpy.types.Collection,
-        **_LIVE,
+        **LIVE,
     )
     path_distance: FloatProperty(
         name="Path Distance",
@@ -190,36 +201,30 @@ class AroundPaths:
         min=0.0,
         soft_max=50.0,
         **LENGTH,
-        **_LIVE,
+        **LIVE,
     )
 
 
-class PlacingRules:
-    """Mix-in: the settings of `planting.rules.Rules`."""
-
-    __annotations__ = vars(properties_of(Rules, **_LIVE))
-
-
-class TetFloraPopulation(bpy.types.PropertyGroup, PlacingRules, GroundMask, AroundPaths):
+class TetFloraPopulation(bpy.types.PropertyGroup, settings_in(Rules, **LIVE), GroundMask, AroundPaths):
     """How plants are placed together."""
 
     # Identity and state. Plants refer to ``uid``, never to the name or the place in the list.
     name: StringProperty(name="Name", description="Name of the population, and of the collection of its plants")
-    uid: StringProperty(name="Identity", **_HIDDEN)
-    frozen: BoolProperty(name="Frozen", **_HIDDEN)
-    collection: PointerProperty(name="Collection", type=bpy.types.Collection, **_HIDDEN)
-    made: IntProperty(name="Plants Made", **_HIDDEN)
-    message: StringProperty(name="Message", **_HIDDEN)
-    placed_by: StringProperty(name="Placed By", **_HIDDEN)  # `rules.fingerprint` of when it was placed
-    erased: StringProperty(name="Erased Places", **_HIDDEN)  # as `rules.note_erased` writes it
-    covers: StringProperty(name="Covers", **_HIDDEN)  # ``uid`` of the population whose ground it covers
+    uid: StringProperty(name="Identity", **HIDDEN)
+    frozen: BoolProperty(name="Frozen", **HIDDEN)
+    collection: PointerProperty(name="Collection", type=bpy.types.Collection, **HIDDEN)
+    made: IntProperty(name="Plants Made", **HIDDEN)
+    message: StringProperty(name="Message", **HIDDEN)
+    placed_by: StringProperty(name="Placed By", **HIDDEN)  # `rules.fingerprint` of when it was placed
+    erased: StringProperty(name="Erased Places", **HIDDEN)  # as `rules.note_erased` writes it
+    covers: StringProperty(name="Covers", **HIDDEN)  # ``uid`` of the population whose ground it covers
 
     grounds: CollectionProperty(name="Grounds", description="Meshes that the plants grow on", type=TetFloraGround)
     ground_collection: PointerProperty(
         name="Ground Collection",
         description="All meshes in this collection are ground too, including those added later",
         type=bpy.types.Collection,
-        **_LIVE,
+        **LIVE,
     )
     density: FloatProperty(
         name="Plants per Hectare",
@@ -231,15 +236,9 @@ class TetFloraPopulation(bpy.types.PropertyGroup, PlacingRules, GroundMask, Arou
         min=0.0,
         soft_max=100_000.0,
         precision=1,
-        **_LIVE,
+        **LIVE,
     )
-    as_field: EnumProperty(
-        name="Create As",
-        description="What the plants are created as",
-        items=STORAGE_ITEMS,
-        default='AUTOMATIC',
-        **_LIVE,
-    )
+    as_field: EnumProperty(**CREATE_AS, **LIVE)
 
     mix: CollectionProperty(
         name="Species",
@@ -250,16 +249,10 @@ class TetFloraPopulation(bpy.types.PropertyGroup, PlacingRules, GroundMask, Arou
 
     min_distance: properties_of(Rules, **_DISTANCE).min_distance
 
-    use_altitude: BoolProperty(
-        name="Altitude",
-        description="Plant only between two heights above the scene's origin",
-        **_LIVE,
-    )
-
     distance_from: EnumProperty(**_SOURCE)
     distance_by_species: BoolProperty(**_BY_SPECIES)
 
-    age: FloatProperty(**{**AGE_PROPERTY, "description": _AGE}, **_LIVE)
+    age: FloatProperty(**{**AGE_PROPERTY, "description": _AGE}, **LIVE)
     age_spread: FloatProperty(
         name="Age Spread",
         description=(
@@ -270,10 +263,10 @@ class TetFloraPopulation(bpy.types.PropertyGroup, PlacingRules, GroundMask, Arou
         min=0.0,
         max=1.0,
         subtype='FACTOR',
-        **_LIVE,
+        **LIVE,
     )
 
-    biome: StringProperty(name="Biome", **_HIDDEN)  # ``uid`` of the biome of which it is a layer
+    biome: StringProperty(name="Biome", **HIDDEN)  # ``uid`` of the biome of which it is a layer
 
 
 MODES = (

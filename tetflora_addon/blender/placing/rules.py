@@ -31,7 +31,7 @@ from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
-from ..settings import check_limits
+from ..settings import active_in, check_limits
 from ..species.catalogue import default_species
 from ..species.edits import catalogue, unknown_text
 from .canopy import not_of_covers, read_suits
@@ -46,8 +46,8 @@ IDENTITY = {
     *("mix_index", "distance_from", "covers", "biome"),
 }
 _DIGITS = 4  # of erased places: tenths of a millimetre
-_ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance")
-_HABITAT = ("habitat", "shed_by")
+#: Settings of a species of a mixture.
+ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance", "habitat", "shed_by")
 
 
 def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
@@ -62,9 +62,7 @@ def fingerprint(population: bpy.types.PropertyGroup) -> str:
     """
     values: list[Any] = [[e.object.name_full for e in population.grounds if e.object is not None]]
     for entry in population.mix:
-        values.append([getattr(entry, name) for name in _ENTRY])
-        if entry.habitat != 'ANYWHERE':
-            values.append([entry.habitat, entry.shed_by])
+        values.append([getattr(entry, name) for name in ENTRY])
     for name, default in _defaults(type(population)):
         value = distance_of(population) if name == "min_distance" else getattr(population, name)
         if isinstance(value, bpy.types.ID):
@@ -109,15 +107,13 @@ def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGro
 
 def copy_entry(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
     """Let an entry of a mixture be as another."""
-    for name in (*_ENTRY, *_HABITAT):
+    for name in ENTRY:
         setattr(target, name, getattr(source, name))
 
 
 def active_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
     """The population that buttons act on; None where there is none."""
-    settings = scene.tetflora
-    number = settings.populations_index
-    return settings.populations[number] if 0 <= number < len(settings.populations) else None
+    return active_in(scene.tetflora, "populations")
 
 
 def shown_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup:
@@ -210,25 +206,6 @@ def set_grounds(population: bpy.types.PropertyGroup, grounds: Iterable[bpy.types
     population.grounds.clear()
     for obj in grounds:
         population.grounds.add().object = obj
-
-
-def place_population(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    population: bpy.types.PropertyGroup,
-    own: Collection[bpy.types.Object],
-    grounds: Sequence[bpy.types.Object] | None = None,
-    most: int | None = None,
-) -> tuple[Placement, tuple[str, ...]]:
-    """Find places for the plants of a population, which count through species; parameters as of `read_search`.
-
-    Raises
-    ------
-    SceneError
-        As `read_search`, or settings that leave no place.
-    """
-    search = read_search(scene, depsgraph, population, own, grounds, most)
-    return search.placement(), search.species
 
 
 @dataclass(frozen=True)

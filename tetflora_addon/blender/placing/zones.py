@@ -19,6 +19,7 @@ import numpy as np
 from ...planting.terrain import Terrain
 from ...planting.wetness import wet_ground
 from ...planting.zones import Limits, Spots, Zone, distance_lines
+from ..settings import with_identity
 from .terrain import lines_within, read_ground
 
 #: Settings of a biome's mask, by the names that `read_ground` has for them.
@@ -27,8 +28,7 @@ MASK = ("vertex_group", "invert_group", "image", "invert_image", "uv_layer")
 
 def biome_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup | None:
     """The biome of which a population is a layer; None of others."""
-    uid = population.biome
-    return next((biome for biome in scene.tetflora.biomes if biome.uid == uid), None) if uid else None
+    return with_identity(scene.tetflora.biomes, population.biome) if population.biome else None
 
 
 def limits_of_zone(biome: bpy.types.PropertyGroup) -> Limits:

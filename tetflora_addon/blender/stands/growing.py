@@ -7,14 +7,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError, SpeciesError, TetFloraError
-from ...jobs import Progress, mapped
+from ...jobs import Progress, part_of
 from ...species.species import Species
 from ...stands.grow import StandSettings, grow
 from ...stands.guilds import Guild
@@ -24,7 +24,7 @@ from ..attributes import write
 from ..placing.plant_objects import link_field
 from ..placing.terrain import read_ground
 from ..placing.zones import zoned
-from ..runtime import JobData, guarded, is_there
+from ..runtime import JobData, is_there, job
 from ..scene.field_points import read_points
 from ..scene.field_sizes import (
     FIT,
@@ -100,7 +100,9 @@ def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup)
         entry.species, entry.planted, entry.rain = name, planted, rain
 
 
+@job("Growing the stand")
 def new_stand_steps(
+    data: JobData,
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     grounds: Iterable[bpy.types.Object],
@@ -116,30 +118,7 @@ def new_stand_steps(
     TetFloraError
         No ground, a species that the catalogue does not have, or settings with which nothing grows.
     """
-    grounds = list(grounds)
-    data = JobData("Growing the stand", scene, depsgraph.view_layer)
-    data.add_objects(grounds)
-    return guarded(data, _new_stand_steps(data, scene, depsgraph, grounds, name, fill))
-
-
-def again_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, field: bpy.types.Object
-) -> Generator[Progress, object, GrownStand]:
-    """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
-    grounds = [e.object for e in field.tetflora.stand.grounds if e.object is not None and scene in e.object.users_scene]
-    data = JobData("Growing the stand", scene, depsgraph.view_layer)
-    data.add_objects([*grounds, field])
-    return guarded(data, _again_steps(data, scene, depsgraph, field, grounds))
-
-
-def _new_stand_steps(
-    data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    grounds: list[bpy.types.Object],
-    name: str,
-    fill: Callable[[bpy.types.PropertyGroup], None] | None,
-) -> Generator[Progress, object, GrownStand]:
+    data.add_objects(grounds := list(grounds))
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
     field = write_field(name, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ())
     mesh, made = field.data, False
@@ -164,6 +143,16 @@ def _new_stand_steps(
                 bpy.data.objects.remove(field)
             if is_there(mesh) and not mesh.users:
                 bpy.data.meshes.remove(mesh)
+
+
+@job("Growing the stand")
+def again_steps(
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, field: bpy.types.Object
+) -> Generator[Progress, object, GrownStand]:
+    """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
+    grounds = [e.object for e in field.tetflora.stand.grounds if e.object is not None and scene in e.object.users_scene]
+    data.add_objects([*grounds, field])
+    return (yield from _again_steps(data, scene, depsgraph, field, grounds))
 
 
 def _again_steps(
@@ -217,9 +206,9 @@ def _again_steps(
 
 
 def _growing(site: StandSite, guilds: list[Guild], settings: StandSettings) -> Generator[Progress, object, Records]:
-    steps, (begin, part) = steps_in_thread(grow(site, guilds, settings), Progress(0.0, "Growing the stand")), _GROWING
-    with closing(steps):
-        return (yield from mapped(steps, lambda step: replace(step, fraction=begin + part * step.fraction)))
+    (begin, part) = _GROWING
+    with closing(steps_in_thread(grow(site, guilds, settings), Progress(0.0, "Growing the stand"))) as steps:
+        return (yield from part_of(steps, begin, begin + part))
 
 
 def _measuring(species: list[Species], records: Records) -> Generator[Progress, object, None]:
@@ -266,26 +255,28 @@ def _replace(
     """Give a field the records in place of its points."""
     given = position, rotation, np.ones(len(records)), records.species, records.seed
     other = write_field(NAME, *given, names)
-    values = {
-        "tf_height": records.height,
-        "tf_diameter": records.diameter,
-        "tf_crown_width": records.crown_width,
-        "tf_crown_base": records.crown_base,
-        "tf_dead": records.dead,
-        OFFSET: np.pad(records.offset, ((0, 0), (0, 1))),
-        YEAR: records.year,
-        PLANT: records.plant,
-    }
-    for name, column in values.items():
-        write(other.data, name, column, data_type=SIZE_ATTRIBUTES[name])
-    old, field.data = field.data, other.data
+    sizes = (records.height, records.diameter, records.crown_width, records.crown_base, records.dead, records.offset)
     field.matrix_world = other.matrix_world.copy()
+    _hand_over(other, field, {**_size_columns(*sizes), YEAR: records.year, PLANT: records.plant})
     group = field.tetflora
     forms = {entry.species: entry.form for entry in group.field_species}
     group.field_species.clear()
     for name in names:
         entry = group.field_species.add()
         entry.species, entry.form = name, forms.get(name)
+
+
+def _size_columns(*sizes: NDArray) -> dict[str, NDArray]:
+    """Attributes of height, diameter, width and base of the crown, share that is dead, and offset (n, 2) of plants."""
+    names = ("tf_height", "tf_diameter", "tf_crown_width", "tf_crown_base", "tf_dead", OFFSET)
+    return {**dict(zip(names, sizes, strict=True)), OFFSET: np.pad(sizes[-1], ((0, 0), (0, 1)))}
+
+
+def _hand_over(other: bpy.types.Object, field: bpy.types.Object, columns: dict[str, NDArray]) -> None:
+    """Give a field the points of another, which goes, and columns of sizes."""
+    for name, column in columns.items():
+        write(other.data, name, column, data_type=SIZE_ATTRIBUTES[name])
+    old, field.data = field.data, other.data
     bpy.data.objects.remove(other)
     if not old.users:
         bpy.data.meshes.remove(old)
@@ -303,29 +294,19 @@ def keep_year(field: bpy.types.Object) -> int:
     if not has_history(field):
         raise SceneError(f'"{field.name}" has no years; select a stand that was grown')
     group, parts = field.tetflora, [field.data]
-    points, sizes, records = (
-        read_points(field, field_kinds(field), parts),
-        read_sizes(field, parts),
-        read_records(field, parts),
-    )
-    points, sizes = in_year(points, sizes, records, group.stand_year, False)
+    points, sizes = read_points(field, field_kinds(field), parts), read_sizes(field, parts)
+    points, sizes = in_year(points, sizes, read_records(field, parts), group.stand_year, False)
     number = len(points.species)
     if not number:
         raise SceneError(f'"{field.name}" has no plants in this year; choose another')
     turn = quaternions(np.moveaxis(points.rotation, 2, 0))
     own = points.species.astype(np.int32), points.seed.astype(np.int32)
     other = write_field(field.data.name, points.position, turn, points.scale.mean(axis=0), *own, ())
-    for name, column in _stored(sizes).items():
-        write(other.data, name, column, data_type=SIZE_ATTRIBUTES[name])
     # `write_field` counts from a corner near the points; here they stay in the field's own space.
     write(other.data, "position", points.position)
-    old, field.data, group.seed = field.data, other.data, 0
-    bpy.data.objects.remove(other)
-    if not old.users:
-        bpy.data.meshes.remove(old)
-    field.display_type = 'TEXTURED'
+    _hand_over(other, field, _stored(sizes))
+    field.display_type, group.seed = 'TEXTURED', 0
     clear_years(field)
-    field.update_tag()
     return number
 
 
@@ -333,14 +314,7 @@ def _stored(sizes: Sizes | None) -> dict[str, NDArray]:
     """Attributes of sizes that say anything."""
     if sizes is None:
         return {}
-    found = {
-        "tf_height": sizes.height,
-        "tf_diameter": sizes.diameter,
-        "tf_crown_width": sizes.width,
-        "tf_crown_base": sizes.base,
-        "tf_dead": sizes.dead,
-        OFFSET: np.pad(sizes.offset, ((0, 0), (0, 1))),
-    }
+    found = _size_columns(sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead, sizes.offset)
     found = {name: column for name, column in found.items() if column.any()}
     if (sizes.fit != 1.0).any():
         found[FIT] = np.pad(sizes.fit, ((0, 0), (0, 1)))

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProper
 from ...planting.rules import Rules
 from ...stands.grow import StandSettings
 from ..placing.properties import AroundPaths, TetFloraGround
-from ..settings import properties_of
+from ..settings import properties_of, settings_in
 from ..species.catalogue import SpeciesChoice
 
 _RULES = properties_of(Rules, options=set())
@@ -40,13 +40,7 @@ class TetFloraStandEntry(bpy.types.PropertyGroup, SpeciesChoice):
     )
 
 
-class _Growth:
-    """Mix-in: the settings of `stands.grow.StandSettings`."""
-
-    __annotations__ = vars(properties_of(StandSettings, options=set()))
-
-
-class TetFloraStand(bpy.types.PropertyGroup, _Growth, AroundPaths):
+class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=set()), AroundPaths):
     """What a stand grows from."""
 
     is_grown: BoolProperty(name="Stand", description="This field was grown as a stand", options={'HIDDEN'})

@@ -23,7 +23,7 @@ from ...errors import TetFloraError
 from .. import compat
 from ..placing import properties
 from ..placing.populations import own_objects
-from ..placing.rules import awaits_update, makes_field, place_population, shown_population
+from ..placing.rules import awaits_update, makes_field, read_search, shown_population
 from ..runtime import Handlers, call_off, call_soon, redraw, with_uid
 from ..species import edits
 
@@ -119,7 +119,7 @@ def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: 
         chosen = [o for o in view_layer.objects if o.select_get(view_layer=view_layer)]
         grounds = [o for o in chosen if o.type == 'MESH' and not o.tetflora.is_field]
     own = set(own_objects(scene, population))
-    placement, _ = place_population(scene, depsgraph, population, own, grounds, MOST_PLACED)
+    placement = read_search(scene, depsgraph, population, own, grounds, MOST_PLACED).placement()
     number = len(placement)
     drawn = np.linspace(0, number - 1, min(number, MOST_DOTS)).astype(np.int64) if number else np.zeros(0, np.int64)
     origin = origin_near(placement.position)
