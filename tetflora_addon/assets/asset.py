@@ -246,6 +246,16 @@ class AssetTable:
         return cls.of(())
 
     @cached_property
+    def leaves(self) -> AssetKites:
+        """Leaves of all assets, one after the other."""
+        return AssetKites.concatenate([asset.leaves for asset in self.every])
+
+    @cached_property
+    def first_leaf(self) -> NDArray[np.int64]:
+        """The first (a,) of each asset."""
+        return np.cumsum([0, *(len(asset.leaves) for asset in self.every)])
+
+    @cached_property
     def leaf_faces(self) -> NDArray[np.float64]:
         """As of `Clusters`."""
         return self.clusters.leaf_faces

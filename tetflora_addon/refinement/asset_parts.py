@@ -103,6 +103,20 @@ class PlacedAssets:
         centre = self.to_world((low + high) / 2, instance)
         return AssetParts(instance.astype(np.int32), cluster.astype(np.int32), centre, totals, side)
 
+    def children(self, parts: AssetParts) -> tuple[AssetParts, NDArray[np.int64]]:
+        """Children of clusters (n,), and whose each is (m,)."""
+        clusters = self.assets.clusters
+        owner, index = spread(clusters.children[parts.cluster].astype(np.int64))
+        return self.parts(parts.instance[owner], clusters.child[parts.cluster][owner] + index), owner
+
+    def kites(self, parts: AssetParts) -> NDArray[np.float64]:
+        """Corners (k, 4, 3) of kites for all leaves of clusters (n,), metres."""
+        leaves, clusters, asset = self.assets.leaves, self.assets.clusters, self.instances.asset[parts.instance]
+        owner, index = spread(clusters.leaves[parts.cluster].astype(np.int64))
+        own = leaves.take((self.assets.first_leaf[asset] + clusters.first_leaf[parts.cluster])[owner] + index)
+        corners = (own.centre - own.along, own.centre - own.across, own.centre + own.along, own.centre + own.across)
+        return np.stack([self.to_world(corner, parts.instance[owner]) for corner in corners], axis=1)
+
     def to_world(self, points: NDArray[np.floating], instance: NDArray[np.integer]) -> NDArray[np.float64]:
         """Points (n, 3) of assets' spaces in the world, by instances (n,)."""
         linear, out = self.instances.linear, self.instances.position[instance]
@@ -182,10 +196,7 @@ class SharedAssets(SharedParts[AssetParts]):
 
     def opened(self, parts: AssetParts) -> Iterator[tuple[AssetParts, NDArray[np.int64], None]]:
         """Children of clusters, as `SharedParts.opened`."""
-        clusters = self.placed.assets.clusters
-        owner, index = spread(clusters.children[parts.cluster].astype(np.int64))
-        child = clusters.child[parts.cluster][owner] + index
-        yield self.placed.parts(parts.instance[owner], child), owner, None
+        yield *self.placed.children(parts), None
 
     def points_on(self, parts: AssetParts, known: None, most: int | None = None) -> SharePoints:
         """Points on clusters, all in the root: at their samples; at most so many on each."""

@@ -80,6 +80,8 @@ class Refinement:
         What is left out.
     lights : sequence of Light
         Those that throw shadows.
+    polygons : Polygons
+        All of them, whole.
     """
 
     tree: TetrahedralTree
@@ -95,6 +97,7 @@ class Refinement:
     seconds: dict[str, float]
     strays: Strays = field(default_factory=Strays)
     lights: Sequence[Light] = ()
+    polygons: Polygons = field(default_factory=Polygons.empty)
 
     @property
     def nodes(self) -> NDArray[np.intp]:
@@ -171,6 +174,7 @@ def refine(
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
     own = Held.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
+    whole = Polygons.empty() if polygons is None else polygons
     tree = root_for(camera, settings, _bounds(flora, plants, assets, polygons))
     holdings, most = Holdings(push_down(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
     divided = np.arange(len(tree)) == 0
@@ -212,7 +216,7 @@ def refine(
             splitting &= ~barred
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
-        found = cells, transmittance, decision, ranks, passes, not limited, seconds, strays, lights
+        found = cells, transmittance, decision, ranks, passes, not limited, seconds, strays, lights, whole
         state = Refinement(tree, plants, assets, holdings, *found)
         if not splitting.any():
             return state

@@ -18,13 +18,11 @@ import numpy as np
 from ... import memory
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
-from ...emission.asset_plan import plan_of
-from ...emission.asset_sight import AssetSight
+from ...emission.asset_plan import PlacedClusters
 from ...emission.budget import afford
 from ...emission.drawing import drawing
 from ...emission.forms import EmissionForm, Refined
 from ...emission.plants import Transition, expanded_blocks
-from ...emission.polygons import polygon_blocks
 from ...jobs import Progress, mapped
 from ...processes import pool
 from ...proxies.facet_weights import facet_weights, measuring, unmeasured
@@ -309,42 +307,39 @@ def _refined(
     """Refine, and find out what the proxies depend on."""
     refinement = yield from _run_loop(flora, given, bound, camera, settings, statistics)
     yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
-    assets = None if bound is None else (AssetSight(refinement, camera, form.facets), bound.keeping)
     if form.facets and unmeasured(flora):
         yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
         for name, done in measuring(flora, range(len(flora.species))):
             yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
         yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
-    detail = afford(refinement, camera, settings, form.faces, form.primitive_bytes, assets)
+    detail = afford(refinement, camera, settings, form.faces, form.primitive_bytes)
     clock.lap("refine")
     _count(statistics, detail.refinement)
     statistics.strays = given.named(refinement.strays)
-    planned = None
-    if assets is not None:
-        sight = assets[0] if detail.refinement is refinement else AssetSight(detail.refinement, camera, form.facets)
-        planned = sight, plan_of(sight, detail.asset_limit if form.facets else None, bound.keeping)
-    refinement = detail.refinement
+    refinement, keeping = detail.refinement, None if bound is None else bound.keeping
     if not form.facets:
-        return Refined(flora, refinement, camera, tolerance=detail.tolerance, assets=planned)
-    transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
+        return Refined(flora, refinement, camera, tolerance=detail.tolerance, keeping=keeping)
+    clusters = None
+    if bound is not None:
+        looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner]
+        clusters = PlacedClusters(refinement.assets.placed, camera, bound.keeping, detail.asset_limit, looks)
     # Light is baked for facets, whatever is made of them then.
     becomes = None if baked else form.form(camera, disc)
-    sizes, weights = detail.pixels, facet_weights(flora)
     with_all = drawing(
         flora,
         refinement,
         camera,
-        transition,
-        sizes.seen,
-        weights,
-        sizes.hidden,
+        Transition(flora, camera, detail.leaf_limit, detail.tolerance),
+        detail.facet,
+        facet_weights(flora),
+        detail.coarser,
         given.occluders,
         becomes,
         detail.most,
         settings.shadow_cutoff,
+        clusters,
     )
-    looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner] if bound else np.zeros(0, str)
-    return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc, looks)
+    return Refined(flora, refinement, camera, with_all, detail.tolerance, keeping, disc)
 
 
 def _write_refined(
@@ -373,11 +368,10 @@ def _write_refined(
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
     yield from write_blocks(results, flora, refined.mesh_blocks(), statistics, _LOOP_FRACTION, baking)
     if given.explicit is not None:
-        blocks = polygon_blocks(refined.refinement, camera, None if refined.pixels is None else refined.pixels.seen)
-        yield from write_polygons(results, given.explicit, blocks, statistics, baking)
+        yield from write_polygons(results, given.explicit, refined.polygon_blocks(), statistics, baking)
     hidden = []
-    if refined.assets is not None:
-        hidden = yield from write_assets(results, form, bound, refined.assets[1], depsgraph, statistics)
+    if bound is not None:
+        hidden = yield from write_assets(results, form, bound, refined.asset_plan(), depsgraph, statistics)
     if baking is not None:
         clock.lap("emit")
         yield from bake_light(baking, refined)
