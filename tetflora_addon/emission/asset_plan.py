@@ -36,8 +36,6 @@ ASSETS = -1
 FARTHER = 20.0
 #: Faces of a leaf up to which there is no kite for it.
 SIMPLE = 3.0
-#: What a face of a mesh in one more place counts for.
-SHARED = 0.003
 #: Pixels of facets that only tell what is covered.
 COVERING = 2.0
 #: Kites that are drawn at a time.
@@ -132,6 +130,8 @@ class PlacedClusters(FrontierKind):
         Width in pixels up to which leaves are facets.
     looks : (i,) str
         Of instances; what stands for different ones is kept apart.
+    larger : float
+        As of `FrontierKind`: where there are few facets, only those of plants gain by being finer than asked for.
     """
 
     placed: PlacedAssets
@@ -139,6 +139,7 @@ class PlacedClusters(FrontierKind):
     keeping: Keeping
     limit: float
     looks: NDArray[np.str_]
+    larger: float = 1.0
 
     def everything(self) -> ClusterRows:
         """All instances."""
@@ -150,8 +151,8 @@ class PlacedClusters(FrontierKind):
         return rows.centre, rows.reach
 
     def optical(self, rows: ClusterRows) -> NDArray[np.float64]:
-        """As of `FrontierKind`."""
-        return rows.totals.optical_area
+        """As of `FrontierKind`; of what is drawn as it is, for facets that only tell what is covered."""
+        return np.where(rows.shown, COVERING**-2.0, 1.0) * rows.totals.optical_area
 
     def one_leaf(self, rows: ClusterRows) -> NDArray[np.float64]:
         """As of `FrontierKind`."""

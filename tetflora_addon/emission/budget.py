@@ -23,8 +23,6 @@ from .leaf_detail import TOLERANCE
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
-#: The same for a microsphere in a point cloud.
-BYTES_PER_SPHERE = 210
 #: Polygons and facets for each pixel that plants cover, about, with facets of a pixel.
 A_PIXEL = 6.0
 #: Polygons and facets that are never too many: facets are finer than asked for as long as there are no more, up to so
@@ -79,7 +77,6 @@ def afford(
     camera: Camera,
     settings: RefinementSettings,
     faces: float | None = None,
-    primitive_bytes: float = BYTES_PER_POLYGON,
 ) -> Detail:
     """Detail that fits into the budget of the settings.
 
@@ -91,8 +88,6 @@ def afford(
     settings : RefinementSettings
     faces : float, optional
         Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
-    primitive_bytes : float
-        Memory of one facet or sphere.
     """
     memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON if settings.max_memory else np.inf
     most = (1.0 - RESERVE) * min(memory, settings.max_polygons or np.inf)

@@ -283,7 +283,7 @@ class _Tile:
                 if self.number > _FULL * most:
                     frontier.hidden[number].append(slab)
                 elif len(slab):
-                    side = given.facet * given.camera.extent_around(slab.centre)
+                    side = kind.larger * given.facet * given.camera.extent_around(slab.centre)
                     kind.draw(self, slab, side, frontier.shown)
             self._cover()
         self._draw_hidden(list(map(_together, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))

@@ -28,7 +28,6 @@ from ..proxies.drawn import (
 from ..proxies.microsurfaces import Facets
 from ..refinement.loop import Refinement
 from .asset_plan import AssetPlan, Keeping, explicit_plan
-from .budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE
 from .drawing import Drawing, Form, Parts, drawn_blocks
 from .faces import FaceRows
 from .frontier import Shown
@@ -129,8 +128,6 @@ class EmissionForm:
     baked_blocks : callable or None
         The same with baked light, given that light and the number of the first facet in its list of sheets. None:
         proxies of this form are always lit by the renderer.
-    primitive_bytes : float
-        Memory that one face or point takes in Blender and in a renderer together.
     faces : float or None
         Faces per proxy tetrahedron; None where the proxies are facets, whose number follows from Facet Size.
     hidden_block, proxy_block : float
@@ -140,7 +137,6 @@ class EmissionForm:
     blocks: Callable[[Refined], Iterator[Buffers]]
     form: Callable[[Camera, float], Form] | None = None
     baked_blocks: Callable[[Refined, BakedLight, int], Iterator[Buffers]] | None = None
-    primitive_bytes: float = BYTES_PER_POLYGON
     faces: float | None = None
     hidden_block: float = math.inf
     proxy_block: float = math.inf
@@ -229,7 +225,7 @@ def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Ite
 
 
 MICROSURFACES = EmissionForm(facet_blocks, _triangles_everywhere, _baked_facets)
-MICROSPHERES = EmissionForm(facet_blocks, _spheres_everywhere, _baked_spheres, primitive_bytes=BYTES_PER_SPHERE)
+MICROSPHERES = EmissionForm(facet_blocks, _spheres_everywhere, _baked_spheres)
 #: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
 AUTOMATIC = EmissionForm(facet_blocks, _spheres_where_hidden, _baked_facets)
 #: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because

@@ -78,7 +78,15 @@ class Canvas(Protocol):
 
 
 class FrontierKind:
-    """One kind of things. Parts are `Arrays`; each kind says what is different about its own."""
+    """One kind of things. Parts are `Arrays`; each kind says what is different about its own.
+
+    Attributes
+    ----------
+    larger : float
+        Sides of its facets over those of plants.
+    """
+
+    larger = 1.0
 
     def spheres(self, parts: Arrays) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Middles (n, 3) of spheres around parts, and radii (n,), metres."""
@@ -162,7 +170,7 @@ class Frontier:
         """Parts (n,) of a kind with spheres around them."""
         centre, radius = kind.spheres(parts)
         column, row, depth = self.coverage.project(centre)
-        side = self.facet * self.coverage.camera.extent_around(centre)
+        side = kind.larger * self.facet * self.coverage.camera.extent_around(centre)
         count = kind.optical(parts) / np.maximum(side**2, 1e-12)
         return Waiting(parts, centre, radius, depth - radius, self.coverage.cells(column, row), count)
 

@@ -198,8 +198,8 @@ class SharedAssets(SharedParts[AssetParts]):
         """Children of clusters, as `SharedParts.opened`."""
         yield *self.placed.children(parts), None
 
-    def points_on(self, parts: AssetParts, known: None, most: int | None = None) -> SharePoints:
-        """Points on clusters, all in the root: at their samples; at most so many on each."""
+    def points_on(self, parts: AssetParts, known: None) -> SharePoints:
+        """Points on clusters, all in the root: at their samples."""
         pixels = parts.extent / self.camera.extent_around(parts.centre)
         clusters, key = self.placed.assets.clusters, self.placed.keys(parts)
         bodies = self.placed.bodies(parts)
@@ -211,8 +211,6 @@ class SharedAssets(SharedParts[AssetParts]):
             part = (sheets + solids / 2) / np.maximum(parts.totals.optical_area, 1e-300)
             there = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
             count = np.minimum(np.ceil(number * part), there)
-            if most is not None:
-                count = np.minimum(count, most)
             count = np.where((sheets + solids > 0.0) & (there > 0), np.maximum(count, 1), 0).astype(np.int64)
             owner, index = spread(count)
             pick = self.placed.picked(parts, key, leafy, owner, index)

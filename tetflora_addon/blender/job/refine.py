@@ -312,7 +312,7 @@ def _refined(
         for name, done in measuring(flora, range(len(flora.species))):
             yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
         yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
-    detail = afford(refinement, camera, settings, form.faces, form.primitive_bytes)
+    detail = afford(refinement, camera, settings, form.faces)
     clock.lap("refine")
     _count(statistics, detail.refinement)
     statistics.strays = given.named(refinement.strays)
@@ -322,7 +322,8 @@ def _refined(
     clusters = None
     if bound is not None:
         looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner]
-        clusters = PlacedClusters(refinement.assets.placed, camera, bound.keeping, detail.asset_limit, looks)
+        larger = max(1.0 / detail.coarser, 1.0)
+        clusters = PlacedClusters(refinement.assets.placed, camera, bound.keeping, detail.asset_limit, looks, larger)
     # Light is baked for facets, whatever is made of them then.
     becomes = None if baked else form.form(camera, disc)
     with_all = drawing(
