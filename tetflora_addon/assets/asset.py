@@ -240,6 +240,12 @@ class AssetTable:
             tuple(assets), Clusters.concatenate(moved), SurfaceSamples.concatenate([a.samples for a in assets]), root
         )
 
+    def __getstate__(self) -> dict[str, object]:
+        """Without what meshes of clusters are made of, and without copies: other processes draw leaves and facets."""
+        none = np.zeros(0, np.int32)
+        every = tuple(replace(asset, part=none, face=none) for asset in self.every)
+        return {name: value for name, value in vars(self).items() if name != "leaves"} | {"every": every}
+
     @classmethod
     def none(cls) -> AssetTable:
         """No assets."""

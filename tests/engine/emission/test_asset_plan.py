@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -225,6 +226,16 @@ def test_nothing_at_all_makes_nothing() -> None:
     assert len(seen) and len(unseen)
     none = PlacedClusters(PlacedAssets.none(), camera, Keeping(np.zeros(0, bool)), 1.0, np.zeros(0, str))
     assert not len(none.everything()) and not list(none.unseen(ClusterRows.empty(), np.zeros(0), np.zeros(0), []))
+
+
+def test_other_processes_get_what_they_draw_and_no_more() -> None:
+    """Faces of all assets are gigabytes, and meshes of clusters are made here."""
+    placed = scene()[1].assets.placed
+    rows = placed.wholes()
+    sent = pickle.loads(pickle.dumps(placed))
+    assert np.array_equal(sent.kites(rows), placed.kites(rows))
+    assert np.array_equal(sent.keys(rows), placed.keys(rows))
+    assert sum(asset.part.nbytes + asset.face.nbytes for asset in sent.assets.every) == 0
 
 
 # Facets.
