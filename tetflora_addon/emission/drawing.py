@@ -166,11 +166,8 @@ def drawing(
     return Drawing(kinds, parts, camera, facet, hidden, shadows, shade, occluders, form, most, shadow)
 
 
-def drawn_blocks(given: Drawing, few: bool = False) -> Iterator[Block | Parts | Shown]:
-    """Everything that is drawn, tile by tile: meshes of plants, facets, and what of other things is drawn as it is.
-
-    few: so little that other processes are not worth it.
-    """
+def drawn_blocks(given: Drawing) -> Iterator[Block | Parts | Shown]:
+    """Everything that is drawn, tile by tile: meshes of plants, facets, and what of other things is drawn as it is."""
     tiles, outside, shown = _tiles(given)
     given = replace(given, parts=())
     yield from shown
@@ -181,7 +178,7 @@ def drawn_blocks(given: Drawing, few: bool = False) -> Iterator[Block | Parts | 
             some[kind] = own.take(slice(start, start + _OUTSIDE_BATCH))
             items.append((len(tiles), None, some, len(some[kind]) / sum(map(len, outside))))
     whole = max(len(items), 1)
-    for number, made in enumerate(in_processes(_drawn_tile, given, items, not few)):
+    for number, made in enumerate(in_processes(_drawn_tile, given, items)):
         while made:
             one = made.pop(0)
             yield replace(one, fraction=(number + 1) / whole) if isinstance(one, Block) else one

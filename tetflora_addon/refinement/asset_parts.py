@@ -14,7 +14,7 @@ from ..arrays import Arrays, column, nested, spread
 from ..assets.asset import AssetTable, Instances
 from ..camera.camera import Camera
 from ..growth.hashing import child_key, uniform
-from .contents import Held, Totals, sums
+from .contents import Totals
 from .shared_parts import SharedParts, SharePoints
 
 #: Pixels along a part for each of its points, and the fewest.
@@ -219,10 +219,3 @@ class SharedAssets(SharedParts[AssetParts]):
             cell = np.zeros(len(owner), np.int32)
             made.append(SharePoints(owner.astype(np.int32), cell, place.astype(np.float32), leaf, wood))
         return SharePoints.concatenate(made)
-
-    def held(self, nodes: int) -> Held[AssetParts]:
-        """Clusters, once for each node that holds some of them, with the totals of that."""
-        parts, points = self.parts, self.points
-        pair, row = np.unique(points.part.astype(np.int64) * nodes + points.cell, return_inverse=True)
-        totals, _ = self.totals(np.ones(nodes, bool))
-        return Held(parts.take(pair // nodes), (pair % nodes).astype(np.int32), sums(totals, row, len(pair)))

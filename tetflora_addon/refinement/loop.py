@@ -112,7 +112,7 @@ class Refinement:
     @property
     def contents(self) -> Contents:
         """All plants and polygons, in terminal nodes: a copy, with a sub-plant for each node that it is shared by."""
-        subplants, bodies = self.plants.held(len(self.tree))
+        subplants, bodies = self.plants.held_apart(len(self.tree))
         return Contents(subplants, bodies, self.holdings.polygons)
 
     @property
