@@ -322,8 +322,8 @@ def _refined(
     clusters = None
     if bound is not None:
         looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner]
-        larger = max(1.0 / detail.coarser, 1.0)
-        clusters = PlacedClusters(refinement.assets.placed, camera, bound.keeping, detail.asset_limit, looks, larger)
+        how = bound.keeping, detail.asset_limit, looks, detail.asset_larger
+        clusters = PlacedClusters(refinement.assets.placed, camera, *how)
     # Light is baked for facets, whatever is made of them then.
     becomes = None if baked else form.form(camera, disc)
     with_all = drawing(
