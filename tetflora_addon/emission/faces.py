@@ -28,8 +28,6 @@ from ..refinement.polygons import Meshes, Polygons
 from ..subplants.pieces import chunks
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose
 
-#: Faces of leaves that a facet which nobody sees stands for, over the leaves of plants.
-LEAFY = 0.5
 #: Least fraction of a surface that is opaque where it hides what is behind.
 OPAQUE = 0.99
 #: Triangles that are drawn at a time.
@@ -105,10 +103,6 @@ class Faces(FrontierKind):
         extent = self.camera.extent_around(rows.centre)
         return np.where(self._wide(rows), np.minimum(rows.optical, extent**2), rows.optical)
 
-    def one_leaf(self, rows: FaceRows) -> NDArray[np.float64]:
-        """As of `FrontierKind`."""
-        return np.where(self.meshes.leaf[rows.face], LEAFY * rows.optical, 0.0)
-
     def ordered(self, rows: FaceRows) -> FaceRows:
         """As of `FrontierKind`."""
         return rows.take(np.lexsort([rows.face, *rows.centre.T]))
@@ -120,7 +114,7 @@ class Faces(FrontierKind):
     def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], shown: list[Shown]) -> None:
         """As of `FrontierKind`."""
         rows = slab.parts
-        kept = (rows.optical >= side**2) | self._wide(rows)
+        kept = _stays(rows, side) | self._wide(rows)
         own = rows.take(np.flatnonzero(kept))
         shown.append(("face", own))
         canvas.add_shown(self.triangles(own), len(own))
@@ -132,7 +126,7 @@ class Faces(FrontierKind):
         self, rows: FaceRows, side: NDArray[np.float64], _kept: NDArray[np.float64], shown: list[Shown]
     ) -> Iterator[tuple[Whose, Facets]]:
         """As of `FrontierKind`; large faces stay."""
-        large = rows.optical >= side**2
+        large = _stays(rows, side)
         shown.append(("face", rows.take(np.flatnonzero(large))))
         rest = np.flatnonzero(~large)
         yield from self._facets(rows.take(rest), side[rest])
@@ -153,6 +147,11 @@ class Faces(FrontierKind):
         some = rows.take(np.flatnonzero(wide & (meshes.coverage[meshes.slot[rows.face]] >= OPAQUE)))
         owner, index = spread(meshes.face_size[some.face] - 2)
         return meshes.corners(meshes.face_triangle[some.face][owner] + index, some.instance[owner])
+
+
+def _stays(rows: FaceRows, side: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Faces (n,) that are no smaller than facets of sides (n,), or as long and without area."""
+    return (rows.optical >= side**2) | ((rows.optical <= 0.0) & (2.0 * rows.reach >= side))
 
 
 def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:

@@ -97,8 +97,8 @@ class FrontierKind:
         raise NotImplementedError
 
     def one_leaf(self, parts: Arrays) -> NDArray[np.float64]:
-        """Area (n,) of a leaf, m²."""
-        raise NotImplementedError
+        """Area (n,) of a leaf, m²; 0 where none is known."""
+        return np.zeros(len(parts))
 
     def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], shown: list[Shown]) -> None:
         """Draw parts that are seen, with facets of sides (n,), metres."""
