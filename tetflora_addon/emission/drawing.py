@@ -283,9 +283,9 @@ class _Tile:
                     side = kind.larger * given.facet * given.camera.extent_around(slab.centre)
                     kind.draw(self, slab, side, frontier.shown)
             self._cover()
-        self._draw_hidden(list(map(_together, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))
+        self._draw_hidden(list(map(Waiting.concatenate, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))
         # What is outside of a tile's own image was part of something inside: it lies near the border.
-        self._draw_outside(list(map(_together, frontier.outside)), self._few(OUTSIDE_A_PIXEL, share, most))
+        self._draw_outside(list(map(Waiting.concatenate, frontier.outside)), self._few(OUTSIDE_A_PIXEL, share, most))
         self._leave_out(self.number - most)
 
     def _leave_out(self, number: float) -> None:
@@ -509,10 +509,6 @@ class _Tile:
         if len(facets):
             form = self.given.form
             self._facets.setdefault((whose, seen), []).append(facets if form is None else form(facets, seen))
-
-
-def _together(some: list[Waiting]) -> Waiting:
-    return Waiting.concatenate(some)
 
 
 def _keys_of(centre: NDArray[np.float64]) -> NDArray[np.uint64]:
