@@ -77,7 +77,7 @@ def run(folder: Path, samples: int, names: tuple[str, ...] = tuple(SCENES), agai
     """Compare all scenes; again: and expanded plants with themselves, of another seed of the renderer."""
     build_wood(bpy.context.scene, case_of(WOOD))
     detail = detail_of(bpy.context.scene)
-    figures = {"light_facet_pixels": detail.pixels.seen, "light_hidden_factor": detail.pixels.hidden}
+    figures = {"light_facet_pixels": detail.facet, "light_hidden_factor": detail.coarser}
     for name in names:
         session.clean_file()
         found = _compared(SCENES[name], detail, folder, samples, again)

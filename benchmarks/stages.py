@@ -24,7 +24,6 @@ from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.emission.drawing import drawing
 from tetflora_addon.emission.forms import Refined, as_triangles, facet_blocks
 from tetflora_addon.emission.plants import Transition
-from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.refinement.settings import RefinementSettings
 
@@ -92,7 +91,7 @@ def run(quick: bool) -> dict[str, float]:
     settings = RefinementSettings()
     transition, weights = Transition(flora, camera, settings.leaf_limit), facet_weights(flora)
     given = drawing(flora, result, camera, transition, settings.facet, weights, form=as_triangles)
-    refined = Refined(flora, result, camera, FacetPixels(settings.facet), given)
+    refined = Refined(flora, result, camera, given)
     for block in refined.mesh_blocks():
         lap("polygons", block.buffers.nbytes)
         meshes.write_mesh("block", block.buffers)

@@ -21,7 +21,7 @@ from tests.engine import support
 from tetflora_addon import files, storage
 from tetflora_addon.assets.mesh_features import mesh_features
 from tetflora_addon.compiled.flora import compile_species
-from tetflora_addon.emission.polygons import polygon_blocks
+from tetflora_addon.emission.polygons import kept_polygons, polygon_blocks
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.parameters import Key
@@ -237,7 +237,10 @@ def polygons(rng: random.Random, _jail: Jail) -> None:
     whole = Polygons.everything(meshes)
     camera = support.camera((0, -3 * size, 0), (0, 0, 0), near=size / 10)
     result = _last(refine(support.small_flora(), support.plants([]), camera, _SETTINGS, None, whole))
-    for block in polygon_blocks(result, camera):
+    drawn = support.refined(support.small_flora(), result, camera, 1.2, 0.6)
+    assert not list(drawn.mesh_blocks())
+    assert all(np.isfinite(facets.centre).all() for parts in drawn.facet_parts() for facets, _ in parts)
+    for block in (*drawn.polygon_blocks(), *polygon_blocks(kept_polygons(result))):
         assert np.isfinite(block.buffers.positions).all()
 
 

@@ -25,7 +25,6 @@ from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts, trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.proxies.drawn import joined
-from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights, facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.refinement.loop import Refinement
@@ -279,7 +278,7 @@ def refined(
     there = np.unique(flora.species_of(result.plants.parts.branches.row)).tolist()
     weights = facet_weights(flora, there) if weighted else FacetWeights(ones, ones)
     given = drawing(flora, result, camera, Transition(flora, camera, limit, np.inf), facet, weights, **options)
-    return Refined(flora, result, camera, FacetPixels(facet / 3.0), given)
+    return Refined(flora, result, camera, given)
 
 
 def drawn(

@@ -240,10 +240,26 @@ class AssetTable:
             tuple(assets), Clusters.concatenate(moved), SurfaceSamples.concatenate([a.samples for a in assets]), root
         )
 
+    def __getstate__(self) -> dict[str, object]:
+        """Without what meshes of clusters are made of, and without copies: other processes draw leaves and facets."""
+        none = np.zeros(0, np.int32)
+        every = tuple(replace(asset, part=none, face=none) for asset in self.every)
+        return {name: value for name, value in vars(self).items() if name != "leaves"} | {"every": every}
+
     @classmethod
     def none(cls) -> AssetTable:
         """No assets."""
         return cls.of(())
+
+    @cached_property
+    def leaves(self) -> AssetKites:
+        """Leaves of all assets, one after the other."""
+        return AssetKites.concatenate([asset.leaves for asset in self.every])
+
+    @cached_property
+    def first_leaf(self) -> NDArray[np.int64]:
+        """The first (a,) of each asset."""
+        return np.cumsum([0, *(len(asset.leaves) for asset in self.every)])
 
     @cached_property
     def leaf_faces(self) -> NDArray[np.float64]:

@@ -60,7 +60,8 @@ def classified(
     face_of_corner = np.repeat(np.arange(faces), sizes)
     following = np.arange(len(corner_verts)) + 1
     following[face_offsets[1:] - 1] = face_offsets[:-1]
-    component = _components(face_of_corner, welded, following)
+    label = connected(int(welded.max()) + 1, welded, welded[following])
+    component = np.unique(label[welded[face_offsets[:-1]]], return_inverse=True)[1].reshape(-1)
     vector, centre = _measures(positions, corner_verts, face_offsets, following, sizes)
     area = np.linalg.norm(vector, axis=1)
     number = int(component.max()) + 1
@@ -105,26 +106,22 @@ def _welded(positions: NDArray[np.float64]) -> NDArray[np.int64]:
     return place
 
 
-def _components(face: NDArray, vertex: NDArray, following: NDArray) -> NDArray[np.int64]:
-    """Connected component (f,) of each face: labels of vertices sink to the minimum along edges, and are followed."""
-    label = np.arange(int(vertex.max()) + 1)
-    a, b = vertex, vertex[following]
+def connected(number: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int32]:
+    """The least of all that each of a number of vertices hangs together with, by pairs (n,), (n,)."""
+    label = np.arange(number, dtype=np.int32)
     while True:
-        least = np.minimum(label[a], label[b])
-        before = label.copy()
-        # Labels are vertices themselves: what they point to sinks, too, so that long chains take few rounds.
-        for target in (label[a], label[b], a, b):
-            np.minimum.at(label, target, least)
+        la, lb = label[a], label[b]
+        apart = la != lb
+        if not apart.any():
+            return label
+        a, b, la, lb = a[apart], b[apart], la[apart], lb[apart]
+        # The larger of two roots gets the smaller one as its parent; then all point to their roots.
+        np.minimum.at(label, np.maximum(la, lb), np.minimum(la, lb))
         while True:
             shorter = label[label]
             if (shorter == label).all():
                 break
             label = shorter
-        if (label == before).all():
-            break
-    of_face = np.zeros(int(face.max()) + 1, np.int64)
-    of_face[face] = label[vertex]
-    return np.unique(of_face, return_inverse=True)[1].reshape(-1)
 
 
 def _measures(

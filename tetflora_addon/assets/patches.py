@@ -17,7 +17,7 @@ from ..arrays import spread
 from ..growth.hashing import mix
 from ..parallel import blocks
 from .asset import AssetSurface
-from .mesh_features import classified
+from .mesh_features import classified, connected
 
 #: Faces of a patch at most; an island with more is cut into pieces of about so many that lie together.
 MOST_FACES = 48
@@ -112,25 +112,12 @@ def patches_of(surface: AssetSurface) -> Patches:
 def islands(surface: AssetSurface) -> NDArray[np.int32]:
     """Island (t,) of each triangle of a surface: many files split vertices at seams, so those of one place are one."""
     place = _places(surface.positions)
-    label = np.arange(int(place.max(initial=-1)) + 1, dtype=np.int32)
     corners = place[surface.triangles]
     # Triangles of a face hang together, whatever their corners.
     same = np.flatnonzero(np.diff(surface.face) == 0)
     a = np.concatenate([corners[:, 0], corners[:, 1], corners[same, 0]])
     b = np.concatenate([corners[:, 1], corners[:, 2], corners[same + 1, 0]])
-    while True:
-        la, lb = label[a], label[b]
-        apart = la != lb
-        if not apart.any():
-            break
-        a, b, la, lb = a[apart], b[apart], la[apart], lb[apart]
-        # The larger of two roots gets the smaller one as its parent; then all point to their roots.
-        np.minimum.at(label, np.maximum(la, lb), np.minimum(la, lb))
-        while True:
-            shorter = label[label]
-            if (shorter == label).all():
-                break
-            label = shorter
+    label = connected(int(place.max(initial=-1)) + 1, a, b)
     return label[corners[:, 0]]
 
 

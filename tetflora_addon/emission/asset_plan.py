@@ -1,40 +1,45 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What instances of assets are drawn as: instances of the originals, of clusters of them, or facets.
+"""PlacedClusters of instances of assets as the frontier draws them: originals, meshes of clusters, kites, or facets.
 
 Decisions are made for clusters of up to `asset.MESH_FACES` faces. One is real with the probability that its leaves are,
 by a hash of its own, so that nothing pops. An instance of which most is real is drawn as the original: that costs
-nothing more, and keeps all that the artist has made.
+nothing more, and keeps all that the artist has made. What is drawn as it is covers the image by its leaves, as far as
+these are more than a few pixels, or else by facets, as many as are needed for that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import column
+from ..camera.camera import Camera
 from ..growth.hashing import Draw, uniform
-from ..proxies.asset_facets import asset_facet_sizes, facets_of_assets
-from ..proxies.facet_sizes import FacetPixels, FacetSizes
-from ..proxies.microsurfaces import Facets, kept_out_of_view
-from ..refinement.asset_parts import AssetParts
+from ..proxies.asset_facets import facet_totals, facets_of_assets
+from ..proxies.drawn import triangle_corners
+from ..proxies.microsurfaces import Facets
+from ..refinement.asset_parts import AssetParts, PlacedAssets
 from ..refinement.decisions import real_fraction
+from ..refinement.loop import Refinement
 from ..subplants.pieces import chunks
-from .asset_sight import AssetPortions, AssetSight
-from .leaf_detail import FADING
-from .plants import KITES, MIXED
+from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
+from .plants import KITES, inside_explicit
 
+#: Stands for a species where facets are of assets.
+ASSETS = -1
 #: How many times as far plain instances are kept where the renderer shows a mesh in many places for the cost of one.
 FARTHER = 20.0
-#: Facets of a cluster from which on those of its children have places of their own, and where it is seen in part.
-MANY, FEW = 48.0, 6.0
 #: Faces of a leaf up to which there is no kite for it.
 SIMPLE = 3.0
-#: Approximate number of facets that are made at a time.
-AT_ONCE = 200_000
+#: Pixels of facets that only tell what is covered.
+COVERING = 2.0
+#: Kites that are drawn at a time.
+_KITES_BATCH = 200_000
 
 
 @dataclass(frozen=True)
@@ -62,127 +67,207 @@ class Keeping:
 
 @dataclass(frozen=True)
 class AssetPlan:
-    """What instances are drawn as.
+    """Instances of assets that are drawn as they are.
 
     Attributes
     ----------
     whole : (k,) int64
         Instances that are the originals.
     meshes, kites : AssetParts of m, of k
-        Clusters that are meshes of their own faces, and of kites for their leaves.
-    facets : AssetPortions of n
-        Clusters that are facets.
+        PlacedClusters that are meshes of their own faces, and of kites for their leaves.
     """
 
     whole: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     meshes: AssetParts = field(default_factory=AssetParts.empty)
     kites: AssetParts = field(default_factory=AssetParts.empty)
-    facets: AssetPortions = field(default_factory=AssetPortions.empty)
+
+    @classmethod
+    def of(cls, placed: PlacedAssets, keeping: Keeping, shown: list[Shown]) -> AssetPlan:
+        """What a drawing has shown."""
+        every = {
+            label: AssetParts.concatenate([AssetParts.empty(), *(rows for what, rows in shown if what == label)])
+            for label in ("original", "cluster", "kites")
+        }
+        whole = np.zeros(len(placed), bool)
+        whole[every["original"].instance] = True
+        whole |= keeping.always[placed.instances.asset]
+        return cls(np.flatnonzero(whole), every["cluster"], every["kites"])
 
 
-def real_fractions(
-    sight: AssetSight, portions: AssetPortions, limit: float | None, kites: bool = True
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fractions (n,) of clusters that are meshes, if only of kites, and (n,) that are their own faces.
+@dataclass(frozen=True)
+class ClusterRows(AssetParts):
+    """PlacedClusters of instances (n), as the frontier has them.
 
-    limit: width in pixels up to which leaves are facets; None: of each that reaches into an explicit tetrahedron, all.
+    Attributes
+    ----------
+    shown : (n,) bool
+        Drawn as they are: only what they cover is to be found.
     """
-    seen = portions.real & (portions.visibility > 0.0)
-    if limit is None:
-        own = (seen & (portions.visibility >= 0.5)).astype(np.float64)
-        return own, own
-    parts = portions.parts
-    pixels = parts.totals.width / np.maximum(sight.camera.extent_around(parts.centre), 1e-300)
-    pixels = pixels * portions.visibility**FADING
-    if not kites:
-        # An instance costs as much as three facets: all that is seen is real, but for specks.
-        seen, pixels = portions.visibility > 0.0, pixels * FARTHER
-    some = np.where(seen, real_fraction(pixels, limit), 0.0)
-    # A card or a leaf of two triangles is no more than a kite.
-    simple = sight.placed.assets.leaf_faces[parts.cluster] <= SIMPLE
-    return some, np.where(simple | (not kites), some, some * real_fraction(pixels, KITES))
+
+    shown: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+
+    @classmethod
+    def of(cls, parts: AssetParts, shown: NDArray[np.bool_]) -> ClusterRows:
+        """Parts (n,), of which some are shown already."""
+        return cls(*vars(parts).values(), shown)
+
+    @property
+    def parts(self) -> AssetParts:
+        """The clusters themselves."""
+        return AssetParts(self.instance, self.cluster, self.centre, self.totals, self.extent)
 
 
-def plan_of(sight: AssetSight, limit: float | None, keeping: Keeping) -> AssetPlan:
-    """Decide for all instances; ``limit`` as for `real_fractions`."""
-    placed, portions = sight.placed, sight.portions()
-    if not len(portions):
-        return AssetPlan()
-    assets, instances = placed.assets, placed.instances
-    mesh_of = assets.mesh_of
-    always = keeping.always[instances.asset]
-    portions = portions.take(~always[portions.parts.instance])
-    done = [AssetPortions.empty()]
-    if not keeping.kites and keeping.fraction <= 1.0:
-        # Whole instances that are real need not be opened to find out that most of each is.
-        root = portions.parts.cluster == assets.root[instances.asset[portions.parts.instance]]
-        real = root & (real_fractions(sight, portions, limit, keeping.kites)[1] >= 1.0)
-        always = always.copy()
-        always[portions.parts.instance[real]] = True
-        portions = portions.take(~real)
-    while len(portions):
-        # Down to the clusters that are meshes of their own, where some of them may be real.
-        above = mesh_of[portions.parts.cluster] < 0
-        some = real_fractions(sight, portions, limit, keeping.kites)[0] > 0.0
-        opening = above & (some | (portions.real & portions.mixed & (sight.pixels(portions) > MIXED)))
-        done.append(portions.take(~opening))
-        portions, _ = sight.opened(portions.take(opening))
-    every = AssetPortions.concatenate(done)
-    instance, mesh = every.parts.instance.astype(np.int64), mesh_of[every.parts.cluster]
+@dataclass(frozen=True)
+class PlacedClusters(FrontierKind):
+    """PlacedClusters of instances.
+
+    Attributes
+    ----------
+    placed : PlacedAssets
+    camera : Camera
+    keeping : Keeping
+    limit : float
+        Width in pixels up to which leaves are facets.
+    looks : (i,) str
+        Of instances; what stands for different ones is kept apart.
+    larger : float
+        As of `FrontierKind`: where there are few facets, only those of plants gain by being finer than asked for.
+    """
+
+    placed: PlacedAssets
+    camera: Camera
+    keeping: Keeping
+    limit: float
+    looks: NDArray[np.str_]
+    larger: float = 1.0
+
+    def everything(self) -> ClusterRows:
+        """All instances."""
+        whole = self.placed.wholes()
+        return ClusterRows.of(whole, self.keeping.always[self.placed.instances.asset])
+
+    def spheres(self, rows: ClusterRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As of `FrontierKind`."""
+        return rows.centre, rows.reach
+
+    def optical(self, rows: ClusterRows) -> NDArray[np.float64]:
+        """As of `FrontierKind`; of what is drawn as it is, for facets that only tell what is covered."""
+        return np.where(rows.shown, COVERING**-2.0, 1.0) * rows.totals.optical_area
+
+    def one_leaf(self, rows: ClusterRows) -> NDArray[np.float64]:
+        """As of `FrontierKind`."""
+        return self.placed.assets.clusters.one_leaf[rows.cluster] * self.placed.scale[rows.instance] ** 2
+
+    def enough(self, rows: ClusterRows) -> NDArray[np.float64]:
+        """As of `FrontierKind`; nothing of what is drawn as it is."""
+        clusters = self.placed.assets.clusters
+        side = (clusters.high - clusters.low)[rows.cluster]
+        silhouette = sum(side[:, i] * side[:, (i + 1) % 3] for i in range(3)) / 2.0
+        silhouette = silhouette * self.placed.scale[rows.instance] ** 2
+        return np.where(rows.shown, 0.0, opaque_fractions(silhouette, rows.totals.optical_area))
+
+    def can_open(self, rows: ClusterRows) -> NDArray[np.bool_]:
+        """As of `FrontierKind`; of what is drawn as it is, only what facets tell about."""
+        told = rows.shown & (self._mesh_of[rows.cluster] >= 0) & self._wide(rows)
+        return (self.placed.assets.clusters.children[rows.cluster] > 0) & ~told
+
+    def opened(self, rows: ClusterRows) -> tuple[ClusterRows, NDArray[np.int64]]:
+        """As of `FrontierKind`."""
+        parts, owner = self.placed.children(rows)
+        return ClusterRows.of(parts, rows.shown[owner]), owner
+
+    def to_be_opened(self, rows: ClusterRows) -> NDArray[np.bool_]:
+        """Those above clusters with meshes of their own, of which some may be real."""
+        return ~rows.shown & (self._mesh_of[rows.cluster] < 0) & (self.real(rows)[0] > 0.0)
+
+    def ordered(self, rows: ClusterRows) -> ClusterRows:
+        """As of `FrontierKind`."""
+        return rows.take(np.argsort(self.placed.keys(rows), kind="stable"))
+
+    @cached_property
+    def _mesh_of(self) -> NDArray[np.int64]:
+        return self.placed.assets.mesh_of
+
+    def _wide(self, rows: ClusterRows) -> NDArray[np.bool_]:
+        """PlacedClusters (n,) of which leaves are wide enough for kites of theirs to be told apart."""
+        return rows.totals.width > KITES * self.camera.extent_around(rows.centre)
+
+    def real(self, rows: AssetParts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Fractions (n,) of clusters that are meshes, if only of kites, and (n,) that are their own faces."""
+        pixels = rows.totals.width / np.maximum(self.camera.extent_around(rows.centre), 1e-300)
+        if not self.keeping.kites:
+            # An instance costs as much as three facets: all that is seen is real, but for specks.
+            pixels = pixels * FARTHER
+        some = real_fraction(pixels, self.limit)
+        # A card or a leaf of two triangles is no more than a kite.
+        plain = (self.placed.assets.leaf_faces[rows.cluster] <= SIMPLE) | (not self.keeping.kites)
+        return some, np.where(plain, some, some * real_fraction(pixels, KITES))
+
+    def met(self, rows: ClusterRows, shown: list[Shown]) -> ClusterRows:
+        """As of `FrontierKind`."""
+        assets, asset = self.placed.assets, self.placed.instances.asset[rows.instance]
+        some, full = self.real(rows)
+        number = uniform(self.placed.keys(rows), Draw.TRANSITION)
+        whole = ~rows.shown & (rows.cluster == assets.root[asset]) & (full >= self.keeping.fraction)
+        own = ~rows.shown & ~whole & (self._mesh_of[rows.cluster] == rows.cluster)
+        mesh = own & (number < full)
+        kites = own & ~mesh & (number < some) & (assets.clusters.leaves[rows.cluster] > 0)
+        for what, chosen in (("original", whole), ("cluster", mesh), ("kites", kites)):
+            if chosen.any():
+                shown.append((what, rows.parts.take(np.flatnonzero(chosen))))
+        return replace(rows, shown=rows.shown | whole | mesh | kites)
+
+    def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], _shown: list[Shown]) -> None:
+        """As of `FrontierKind`."""
+        rows = slab.parts
+        facets = np.flatnonzero(~rows.shown)
+        for whose, made in self._facets(rows.take(facets), side[facets]):
+            canvas.add_facets(whose, made)
+        some = rows.take(np.flatnonzero(rows.shown))
+        faces = 0.0 if self.keeping.shared else some.totals.polygons.sum()
+        wide = self._wide(some)
+        near = some.take(np.flatnonzero(wide))
+        for run in chunks(self.placed.assets.clusters.leaves[near.cluster], _KITES_BATCH):
+            canvas.add_shown(self.placed.kites(near.take(run)))
+        # Wood, and leaves of few pixels.
+        totals = facet_totals(self.placed, some)
+        totals = replace(totals, leaf_area=np.where(wide, 0.0, totals.leaf_area))
+        least = COVERING * self.camera.extent_around(some.centre)
+        made = facets_of_assets(self.placed, some, totals, np.maximum(least, np.sqrt(self.one_leaf(some))), least)
+        canvas.add_shown(triangle_corners(made), float(faces))
+
+    def unseen(
+        self, rows: ClusterRows, side: NDArray[np.float64], kept: NDArray[np.float64], _shown: list[Shown]
+    ) -> Iterator[tuple[Whose, Facets]]:
+        """As of `FrontierKind`."""
+        some = np.flatnonzero(~rows.shown)
+        yield from self._facets(rows.take(some), side[some], 1.0 - kept[some])
+
+    def _facets(
+        self, rows: ClusterRows, side: NDArray[np.float64], left_out: NDArray[np.float64] | None = None
+    ) -> Iterator[tuple[Whose, Facets]]:
+        looks = self.looks[rows.instance]
+        leaf = np.maximum(side, np.sqrt(self.one_leaf(rows)))
+        for look in np.unique(looks).tolist():
+            some = np.flatnonzero(looks == look)
+            own, out = rows.take(some), None if left_out is None else left_out[some]
+            totals = facet_totals(self.placed, own)
+            yield (ASSETS, look), facets_of_assets(self.placed, own, totals, leaf[some], side[some], out)
+
+
+def explicit_plan(result: Refinement, keeping: Keeping) -> AssetPlan:
+    """Where shells stand for all other instances: what lies in explicit tetrahedra for the most part."""
+    placed = result.assets.placed
+    assets, asset, number = placed.assets, placed.instances.asset, len(placed.assets.clusters)
+    found = list(inside_explicit(result.assets, result, lambda parts, _: assets.mesh_of[parts.cluster] < 0))
+    parts = AssetParts.concatenate([AssetParts.empty(), *(some for some, _ in found)])
+    inside = np.concatenate([np.zeros(0), *(part for _, part in found)])
+    mesh = assets.mesh_of[parts.cluster]
     inner = np.flatnonzero(mesh >= 0)
-    pair, of = np.unique(instance[inner] * len(assets.clusters) + mesh[inner], return_inverse=True)
-    area = every.parts.totals.optical_area[inner]
-    whole_area = np.maximum(np.bincount(of, area, len(pair)), 1e-300)
-    meshed, full = (
-        np.bincount(of, area * f[inner], len(pair)) / whole_area
-        for f in real_fractions(sight, every, limit, keeping.kites)
-    )
-    owner, cluster = pair // len(assets.clusters), pair % len(assets.clusters)
-    own = placed.parts(owner, cluster)
-    number = uniform(placed.keys(own), Draw.TRANSITION)
-    real = number < full
-    faces = np.bincount(owner[real], own.totals.polygons[real], len(placed))
-    all_faces = assets.clusters.faces[assets.root[instances.asset]]
-    whole = always | (faces >= keeping.fraction * all_faces)
-    apart = ~whole[owner]
-    kites = ~real & (number < meshed) & (assets.clusters.leaves[cluster] > 0)
-    left = ~whole[instance]
-    left[inner] &= ~(real | kites)[of]
-    return AssetPlan(np.flatnonzero(whole), own.take(real & apart), own.take(kites & apart), every.take(left))
-
-
-def planned_facets(
-    sight: AssetSight, plan: AssetPlan, pixels: FacetPixels, form: Callable[[Facets, bool], Any] | None = None
-) -> Iterator[tuple[Any, bool]]:
-    """Facets of a plan, or what a form makes of them, and whether they are seen, some at a time."""
-    expected = sizes_of(sight, plan.facets).counts(pixels) + 1.0
-    for run in chunks(expected, AT_ONCE):
-        for facets, seen in _facets_of(sight, plan.facets.take(run), pixels):
-            if len(facets):
-                yield facets if form is None else form(facets, seen), seen
-
-
-def sizes_of(sight: AssetSight, portions: AssetPortions) -> FacetSizes:
-    """Sizes of the facets of portions (n,), were they drawn as they are."""
-    seen = portions.visibility, portions.coarse, portions.beside
-    return asset_facet_sizes(sight.placed, portions.parts, sight.shadows, *seen)
-
-
-def _facets_of(sight: AssetSight, portions: AssetPortions, pixels: FacetPixels) -> Iterator[tuple[Facets, bool]]:
-    """Facets of portions, which are opened as far as their places show."""
-    while len(portions):
-        seen, sizes = portions.visibility > 0.0, sizes_of(sight, portions)
-        count, extent = sizes.counts(pixels), sight.pixels(portions)
-        # Where there are more facets than samples they would lie in heaps, and let light pass in between.
-        opening = (count > MANY) | (portions.mixed & (extent > MIXED) & (count > FEW))
-        opening &= sight.assets.can_open(portions.parts)
-        for group, beside in ((seen, False), (~seen & ~portions.beside, False), (~seen & portions.beside, True)):
-            some = np.flatnonzero(group & ~opening)
-            if len(some):
-                own = sizes.take(some)
-                left_out = np.where(seen[some], 0.0, 1.0 - own.enough(pixels))
-                made = facets_of_assets(sight.placed, portions.parts.take(some), own, pixels, left_out)
-                if not seen[some[0]]:
-                    made = kept_out_of_view(made, sight.camera.clearance, not beside)
-                yield made, bool(seen[some[0]] or not beside)
-        portions, _ = sight.opened(portions.take(opening))
+    pair, of = np.unique(parts.instance[inner].astype(np.int64) * number + mesh[inner], return_inverse=True)
+    area = parts.totals.optical_area[inner]
+    most = np.bincount(of, area * inside[inner], len(pair)) >= 0.5 * np.bincount(of, area, len(pair))
+    own = placed.parts(*np.divmod(pair[most], max(number, 1)))
+    faces = np.bincount(own.instance, own.totals.polygons, len(placed))
+    whole = keeping.always[asset] | (faces >= keeping.fraction * assets.clusters.faces[assets.root[asset]])
+    return AssetPlan(np.flatnonzero(whole), own.take(~whole[own.instance]))

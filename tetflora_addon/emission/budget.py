@@ -15,29 +15,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera.camera import Camera
-from ..proxies.facet_sizes import FacetPixels
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
-from .asset_expected import AssetExpected
-from .asset_plan import Keeping
-from .asset_sight import AssetSight
 from .drawing import HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL
 from .leaf_detail import TOLERANCE
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
-#: The same for a microsphere in a point cloud.
-BYTES_PER_SPHERE = 210
 #: Polygons and facets for each pixel that plants cover, about, with facets of a pixel.
 A_PIXEL = 6.0
 #: Polygons and facets that are never too many: facets are finer than asked for as long as there are no more, up to so
 #: many times.
 NEVER_TOO_MANY, FINEST = 1_200_000.0, 3.0
-#: What an expected number may be off by, and how often a detail is made coarser until it fits.
-RESERVE, _TRIES = 0.15, 24
-#: Facets of what is instanced are so many times finer than those of plants: its originals are at hand.
+#: What an expected number may be off by.
+RESERVE = 0.15
+#: Leaves of what is instanced are real from widths so many times smaller on than those of plants.
 ASSETS_FINER = 3.6
+#: Least side of facets of instances over that which is asked for. In a wood of 100 trees from the middle distance of
+#: ``benchmarks assets``, of which no original fits into memory, FLIP is .168 with .33, .168 with .67, .175 with 1.
+ASSETS_FINEST = 0.67
 
 
 @dataclass(frozen=True)
@@ -48,34 +45,34 @@ class Detail:
     ----------
     refinement : Refinement
         Decisions that fit into the budget.
-    pixels : FacetPixels
-        Sides of facets.
+    facet : float
+        Side of facets, pixels.
     leaf_limit : float
         Width in pixels up to which leaves are facets.
+    coarser : float
+        Sides over those that are asked for.
     tolerance : float
         Pixels by which the margins of near leaves may be off; infinite where only their models are drawn.
     most : float
-        Polygons and facets of plants that there may be.
-    asked : float
-        Side of facets that is asked for, pixels.
+        Polygons and facets that there may be.
     """
 
     refinement: Refinement
-    pixels: FacetPixels
+    facet: float
     leaf_limit: float
+    coarser: float = 1.0
     tolerance: float = TOLERANCE
     most: float = np.inf
-    asked: float = 1.0
-
-    @property
-    def of_assets(self) -> FacetPixels:
-        """Sides of facets of instances and of your own meshes, which are no finer where there are few plants."""
-        return FacetPixels(self.asked * max(self.pixels.hidden, 1.0) / ASSETS_FINER, max(self.pixels.hidden, 1.0))
 
     @property
     def asset_limit(self) -> float:
-        """`leaf_limit` of instances."""
-        return self.leaf_limit * max(1.0 / self.pixels.hidden, 1.0) / ASSETS_FINER
+        """`leaf_limit` of instances, whose originals are at hand, and of your own meshes."""
+        return self.leaf_limit * max(1.0 / self.coarser, 1.0) / ASSETS_FINER
+
+    @property
+    def asset_larger(self) -> float:
+        """Sides of facets of instances over those of plants, which alone gain by being much finer than asked for."""
+        return max(ASSETS_FINEST / self.coarser, 1.0)
 
 
 def enough(camera: Camera, facet: float = 1.0) -> float:
@@ -88,8 +85,6 @@ def afford(
     camera: Camera,
     settings: RefinementSettings,
     faces: float | None = None,
-    primitive_bytes: float = BYTES_PER_POLYGON,
-    assets: tuple[AssetSight, Keeping] | None = None,
 ) -> Detail:
     """Detail that fits into the budget of the settings.
 
@@ -101,45 +96,31 @@ def afford(
     settings : RefinementSettings
     faces : float, optional
         Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
-    primitive_bytes : float
-        Memory of one facet or sphere.
-    assets : AssetSight, Keeping, optional
-        What is seen of instances of assets, and which of them are always drawn as the originals.
     """
     memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON if settings.max_memory else np.inf
     most = (1.0 - RESERVE) * min(memory, settings.max_polygons or np.inf)
-    detail = Detail(result, FacetPixels(settings.facet), settings.leaf_limit, asked=settings.facet)
+    detail = Detail(result, settings.facet, settings.leaf_limit)
     if faces is not None:
         if not np.isfinite(most):
             return detail
         return replace(detail, refinement=_fitted_shells(result, most, faces), tolerance=np.inf)
     polygons = float(len(result.holdings.polygons))
-    placed = AssetExpected(*assets) if assets else None
     number = primitives(result, camera, settings.facet)
     coarser = float(np.clip(np.sqrt(number / NEVER_TOO_MANY), 1.0 / FINEST, 1.0))
     left = max(most - polygons, 0.01 * most) if np.isfinite(most) else most
-    for _ in range(_TRIES):
-        fewer = replace(
-            detail,
-            pixels=FacetPixels(coarser * settings.facet, coarser),
-            leaf_limit=coarser * settings.leaf_limit,
-            tolerance=TOLERANCE * max(coarser, 1.0) ** 2,
-            most=left,
-        )
-        every = number / coarser**2
-        if placed is not None:
-            pixels, limit = fewer.of_assets, fewer.asset_limit
-            every += placed.seen(pixels.seen, limit, 1.0, True) + placed.unseen(pixels)
-        if every <= left:
-            break
-        coarser *= max(min(np.sqrt(every / max(left, 1.0)), 2.0), 1.02)
-    return fewer
+    coarser = max(coarser, float(np.sqrt(number / left)))
+    return replace(
+        detail,
+        facet=coarser * settings.facet,
+        leaf_limit=coarser * settings.leaf_limit,
+        coarser=coarser,
+        tolerance=TOLERANCE * max(coarser, 1.0) ** 2,
+        most=left,
+    )
 
 
 def primitives(result: Refinement, camera: Camera, facet: float) -> float:
-    """Polygons and facets (expected) of plants with facets of so many pixels, by the pixels that their cells cover."""
-    if not len(result.plants.parts):
-        return 0.0
+    """Polygons and facets (expected) with facets of so many pixels, by the pixels that cells cover."""
     covered = float(contributions(result.cells, result.transmittance)[result.in_view[result.nodes]].sum())
     return A_PIXEL * covered / facet**2 + (HIDDEN_A_PIXEL + OUTSIDE_A_PIXEL) * camera.width * camera.height
 

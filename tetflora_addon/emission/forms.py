@@ -25,26 +25,19 @@ from ..proxies.drawn import (
     triangle_mesh,
     triangles_of,
 )
-from ..proxies.facet_sizes import FacetPixels
 from ..proxies.microsurfaces import Facets
 from ..refinement.loop import Refinement
-from .asset_plan import AssetPlan, planned_facets
-from .asset_sight import AssetSight
-from .budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE
+from .asset_plan import AssetPlan, Keeping, explicit_plan
 from .drawing import Drawing, Form, Parts, drawn_blocks
+from .faces import FaceRows
+from .frontier import Shown
 from .leaf_detail import TOLERANCE
 from .light import BakedLight, baked_attributes
 from .plants import Block, explicit_blocks
-from .polygons import hidden_polygon_facets
+from .polygons import PolygonBlock, kept_polygons, polygon_blocks
 from .shells import proxy_shells
 
 Buffers = MeshBuffers | PointBuffers
-
-
-#: Stands for a species where facets are of assets.
-ASSETS = -1
-#: Approximate number of facets of your own meshes that are made at a time.
-FACETS_AT_ONCE = 200_000
 
 
 @dataclass(frozen=True)
@@ -56,30 +49,25 @@ class Refined:
     flora : Flora
     refinement : Refinement
     camera : Camera
-    pixels : FacetPixels or None
-        Sides of facets and spheres of instances and meshes; None in forms that have none.
     drawing : Drawing or None
-        What plants are drawn with; None in forms without facets.
+        What all is drawn with; None in forms without facets.
     tolerance : float
         Pixels by which the margins of near leaves may be off, in forms without facets.
-    assets : AssetSight, AssetPlan or None
-        What instances of assets are drawn as; None where there are none.
+    keeping : Keeping or None
+        When instances of assets are the originals; None where there are no instances.
     disc : float
         Area that the renderer draws of a sphere of radius 1.
-    asset_looks : (i,) str
-        Of instances of assets; what stands for different ones is kept apart.
     """
 
     flora: Flora
     refinement: Refinement
     camera: Camera
-    pixels: FacetPixels | None = None
     drawing: Drawing | None = None
     tolerance: float = TOLERANCE
-    assets: tuple[AssetSight, AssetPlan] | None = None
+    keeping: Keeping | None = None
     disc: float = np.pi
-    asset_looks: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, str))
     _waiting: list[Parts] = field(default_factory=list, compare=False)
+    _shown: list[Shown] = field(default_factory=list, compare=False)
 
     @property
     def facet_pixels(self) -> float | None:
@@ -87,16 +75,33 @@ class Refined:
         return None if self.drawing is None else self.drawing.facet
 
     def mesh_blocks(self) -> Iterator[Block]:
-        """Meshes of plants. Facets are made with them, and wait until `facet_parts` is asked for them."""
+        """Meshes of plants. Facets are made with them, and wait until `facet_parts` is asked for them.
+
+        What of other things is drawn as it is can be asked for after that.
+        """
         if self.drawing is None:
             yield from explicit_blocks(self.flora, self.refinement, self.camera, self.tolerance)
             return
         self._waiting.clear()
-        for made in drawn_blocks(self.drawing, self.refinement.plants.parts):
+        self._shown.clear()
+        for made in drawn_blocks(self.drawing):
             if isinstance(made, Block):
                 yield made
             else:
-                self._waiting.append(made)
+                (self._waiting if isinstance(made, Parts) else self._shown).append(made)
+
+    def polygon_blocks(self) -> Iterator[PolygonBlock]:
+        """Polygons of your own meshes that stay, after `mesh_blocks`."""
+        if self.drawing is None:
+            return polygon_blocks(kept_polygons(self.refinement))
+        rows = FaceRows.concatenate([FaceRows.empty(), *(rows for what, rows in self._shown if what == "face")])
+        return polygon_blocks(rows.whole(self.refinement.polygons.meshes))
+
+    def asset_plan(self) -> AssetPlan:
+        """Instances of assets that are drawn as they are, after `mesh_blocks`."""
+        if self.drawing is None:
+            return explicit_plan(self.refinement, self.keeping)
+        return AssetPlan.of(self.refinement.assets.placed, self.keeping, self._shown)
 
     def facet_parts(self, again: bool = False) -> Iterator[Parts]:
         """Facets of all that is drawn as such, block by block, after `mesh_blocks`.
@@ -108,21 +113,6 @@ class Refined:
             self._waiting.clear()
         while waiting:
             yield waiting.pop(0)
-        form = self.drawing.form
-        more = []
-        if self.assets is not None:
-            sight, plan = self.assets
-            looks = self.asset_looks[plan.facets.parts.instance]
-            for look in np.unique(looks).tolist():
-                some = replace(plan, facets=plan.facets.take(looks == look))
-                more += [((ASSETS, look), made) for made in planned_facets(sight, some, self.pixels, form)]
-        polygons = hidden_polygon_facets(self.refinement, self.camera, self.pixels.seen, FACETS_AT_ONCE)
-        for look, facets, seen in polygons:
-            more.append(((None, look), (facets if form is None else form(facets, seen), seen)))
-        for species, look in dict.fromkeys(of for of, _ in more):
-            made = [(some, seen) for of, (some, seen) in more if of == (species, look) and len(some)]
-            if made:
-                yield Parts(species, tuple(made), look)
 
 
 @dataclass(frozen=True)
@@ -138,8 +128,6 @@ class EmissionForm:
     baked_blocks : callable or None
         The same with baked light, given that light and the number of the first facet in its list of sheets. None:
         proxies of this form are always lit by the renderer.
-    primitive_bytes : float
-        Memory that one face or point takes in Blender and in a renderer together.
     faces : float or None
         Faces per proxy tetrahedron; None where the proxies are facets, whose number follows from Facet Size.
     hidden_block, proxy_block : float
@@ -149,7 +137,6 @@ class EmissionForm:
     blocks: Callable[[Refined], Iterator[Buffers]]
     form: Callable[[Camera, float], Form] | None = None
     baked_blocks: Callable[[Refined, BakedLight, int], Iterator[Buffers]] | None = None
-    primitive_bytes: float = BYTES_PER_POLYGON
     faces: float | None = None
     hidden_block: float = math.inf
     proxy_block: float = math.inf
@@ -238,7 +225,7 @@ def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Ite
 
 
 MICROSURFACES = EmissionForm(facet_blocks, _triangles_everywhere, _baked_facets)
-MICROSPHERES = EmissionForm(facet_blocks, _spheres_everywhere, _baked_spheres, primitive_bytes=BYTES_PER_SPHERE)
+MICROSPHERES = EmissionForm(facet_blocks, _spheres_everywhere, _baked_spheres)
 #: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
 AUTOMATIC = EmissionForm(facet_blocks, _spheres_where_hidden, _baked_facets)
 #: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because

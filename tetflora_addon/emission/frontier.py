@@ -1,29 +1,27 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frontier: parts of plants, opened front to back until what becomes of each is known.
+"""The frontier: parts of all that there is, opened front to back until what becomes of each is known.
 
-Parts wait in a pool. In each cell of the image the nearest ones are tested against the coverage of all that was drawn
-before: what is hidden or outside stays whole, what is seen and large is opened, what is seen and small is to be drawn,
-and covers the image in its turn. Then the next ones follow. Each part is opened once, and everything that is made
-follows from it. The loop's tetrahedra say what to open before anything is drawn (`refinement`); what is hidden is
-decided here.
+Parts of plants, clusters of instances and faces of your own meshes wait in pools, one for each kind. In each cell of
+the image the nearest ones are tested against the coverage of all that was drawn before: what is hidden or outside stays
+whole, what is seen and large is opened, what is seen and small is to be drawn, and covers the image in its turn. Then
+the next ones follow. Each part is opened once, and everything that is made follows from it. The loop's tetrahedra say
+what to open before anything is drawn (`refinement`); what is hidden is decided here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, nested
-from ..compiled.flora import Flora
-from ..compiled.placed import extents
-from ..refinement.contents import PlantParts
-from ..refinement.shares import opened
+from ..arrays import Arrays
+from ..buffers import MeshBuffers
+from ..proxies.microsurfaces import Facets
 from .coverage import CELL, Coverage
-from .plants import Transition
 
 #: Pixels, and facets, down to which parts that are seen are opened: smaller ones are drawn at their samples.
 DETAIL, FEW = 3.0, 3.0
@@ -31,14 +29,22 @@ DETAIL, FEW = 3.0, 3.0
 #: these hide of each other is not known when they are made.
 SLAB, LEAST = 0.8, 40_000.0
 
+#: One-sided layers of leaves that are enough where nothing is seen, and how much of its box a crown fills.
+LAYERS, FILLED = 6.0, 0.6
+
+#: Whose facets some are: a species, assets, or None for your own meshes; and the look of those that are no plants.
+Whose = tuple[int | None, str]
+#: Things that are drawn as they are, and how.
+Shown = tuple[str, Arrays]
+
 
 @dataclass(frozen=True)
 class Waiting(Arrays):
-    """Parts (n), and spheres around them.
+    """Parts (n) of one kind, and spheres around them.
 
     Attributes
     ----------
-    parts : PlantParts of n
+    parts : Arrays of n
     centre : (n, 3) float64
     radius : (n,) float64
         Metres.
@@ -50,12 +56,91 @@ class Waiting(Arrays):
         Facets that they would have, all of them.
     """
 
-    parts: PlantParts = field(metadata=nested(PlantParts))
-    centre: NDArray[np.float64] = field(metadata=column(3))
+    parts: Arrays
+    centre: NDArray[np.float64]
     radius: NDArray[np.float64]
     near: NDArray[np.float64]
     cell: NDArray[np.int64]
     count: NDArray[np.float64]
+
+
+class Canvas(Protocol):
+    """Where kinds draw what is seen of them: a tile of the image."""
+
+    def add_facets(self, whose: Whose, facets: Facets) -> None:
+        """Facets, to be tested and drawn together with all else of the slab."""
+
+    def add_mesh(self, what: tuple[str, int, int], buffers: MeshBuffers | None, culled: bool = False) -> None:
+        """A mesh of a species, without faces behind full pixels if it is culled."""
+
+    def add_shown(self, corners: NDArray[np.floating], number: float = 0.0) -> None:
+        """Polygons with corners (n, k, 3) of what is drawn as it is; they count as so many."""
+
+
+class FrontierKind:
+    """One kind of things. Parts are `Arrays`; each kind says what is different about its own.
+
+    Attributes
+    ----------
+    larger : float
+        Sides of its facets over those of plants.
+    """
+
+    larger = 1.0
+
+    def spheres(self, parts: Arrays) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Middles (n, 3) of spheres around parts, and radii (n,), metres."""
+        raise NotImplementedError
+
+    def optical(self, parts: Arrays) -> NDArray[np.float64]:
+        """Area (n,) that parts block, of which something is to be drawn still, m²."""
+        raise NotImplementedError
+
+    def one_leaf(self, parts: Arrays) -> NDArray[np.float64]:
+        """Area (n,) of a leaf, m²; 0 where none is known."""
+        return np.zeros(len(parts))
+
+    def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], shown: list[Shown]) -> None:
+        """Draw parts that are seen, with facets of sides (n,), metres."""
+        raise NotImplementedError
+
+    def unseen(
+        self, parts: Arrays, side: NDArray[np.float64], kept: NDArray[np.float64], shown: list[Shown]
+    ) -> Iterator[tuple[Whose, Facets]]:
+        """Facets of sides (n,), metres, of a fraction (n,) of parts that nobody sees."""
+        raise NotImplementedError
+
+    def enough(self, parts: Arrays) -> NDArray[np.float64]:
+        """Fraction (n,) of their area with which parts keep out as much light as with all."""
+        return np.ones(len(parts))
+
+    def can_open(self, parts: Arrays) -> NDArray[np.bool_]:
+        """Parts (n,) that consist of others."""
+        return np.zeros(len(parts), bool)
+
+    def opened(self, parts: Arrays) -> tuple[Arrays, NDArray[np.int64]]:
+        """What parts consist of, and of which (m,) each is."""
+        return parts.take(slice(0)), np.zeros(0, np.int64)
+
+    def to_be_opened(self, parts: Arrays) -> NDArray[np.bool_]:
+        """Parts (n,) of which some is drawn as it is, however small they are."""
+        return np.zeros(len(parts), bool)
+
+    def met(self, parts: Arrays, shown: list[Shown]) -> Arrays:
+        """Parts that are seen, after it was decided which of them are drawn as they are."""
+        return parts
+
+    def ordered(self, parts: Arrays) -> Arrays:
+        """Parts in an order of their own, so that that of things in the scene does not matter."""
+        return parts
+
+
+def opaque_fractions(silhouette: NDArray[np.float64], optical: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Fraction (n,) of optical areas (n,) behind silhouettes (n,), m², that lets through a few hundredths of light.
+
+    A spruce has twenty layers of needles across its crown. Where it is hidden, the first of them cast its shadow.
+    """
+    return np.minimum(LAYERS * FILLED * silhouette / np.maximum(optical, 1e-300), 1.0)
 
 
 class Frontier:
@@ -63,96 +148,100 @@ class Frontier:
 
     Parameters
     ----------
-    flora : Flora
+    kinds : sequence of FrontierKind
     coverage : Coverage
-    transition : Transition
-        Parts of which leaves are drawn as they are have to be opened.
     facet : float
         Side of facets, pixels.
 
     Attributes
     ----------
-    hidden, outside : list of Waiting
-        What is not seen, as whole as it was left.
+    hidden, outside : list of list of Waiting
+        What is not seen of each kind, as whole as it was left.
+    shown : list of Shown
     """
 
-    def __init__(self, flora: Flora, coverage: Coverage, transition: Transition, facet: float) -> None:
-        self.flora, self.coverage, self.transition, self.facet = flora, coverage, transition, facet
-        self.hidden: list[Waiting] = []
-        self.outside: list[Waiting] = []
+    def __init__(self, kinds: Sequence[FrontierKind], coverage: Coverage, facet: float) -> None:
+        self.kinds, self.coverage, self.facet = kinds, coverage, facet
+        self.hidden: list[list[Waiting]] = [[] for _ in kinds]
+        self.outside: list[list[Waiting]] = [[] for _ in kinds]
+        self.shown: list[Shown] = []
 
-    def pool(self, parts: PlantParts) -> Waiting:
-        """Parts (n,) with spheres around them, as far as samples of their leaves and wood reach."""
-        branches, alone = parts.branches, parts.alone
-        across, low, high = extents(self.flora, branches).T
-        middle = np.where(alone, 0.5, 0.5 * (np.minimum(low, 0.0) + high)) * branches.length
-        half = np.where(alone, 0.5, 0.5 * (high - np.minimum(low, 0.0)))
-        across = np.where(alone, 0.5 * parts.extent / np.maximum(branches.length, 1e-12), across)
-        centre = branches.position + middle[:, None] * branches.frame[:, :, 2]
-        radius = branches.length * np.hypot(across, half) + branches.radius
+    def pool(self, kind: FrontierKind, parts: Arrays) -> Waiting:
+        """Parts (n,) of a kind with spheres around them."""
+        centre, radius = kind.spheres(parts)
         column, row, depth = self.coverage.project(centre)
-        side = self.facet * self.coverage.camera.extent_around(centre)
-        count = parts.totals.optical_area / np.maximum(side**2, 1e-12)
+        side = kind.larger * self.facet * self.coverage.camera.extent_around(centre)
+        count = kind.optical(parts) / np.maximum(side**2, 1e-12)
         return Waiting(parts, centre, radius, depth - radius, self.coverage.cells(column, row), count)
 
-    def slabs(self, parts: PlantParts, most: float = np.inf) -> Iterator[Waiting]:
-        """Parts that are to be drawn, some at a time; what they cover is to be drawn before more are asked for.
+    def slabs(self, parts: Sequence[Arrays], most: float = np.inf) -> Iterator[list[Waiting]]:
+        """Parts of each kind that are to be drawn, some at a time; what they cover is to be drawn before more follow.
 
         In each cell of the image these are the nearest ones, which have no more than about so many facets in all.
         """
-        pool, dense = self.pool(parts), SLAB * CELL**2
-        while len(pool):
-            depth, cells = self._depths(pool, dense)
-            ready, later = self._decided(pool.take(np.flatnonzero(pool.near <= depth)), depth[pool.near <= depth])
-            pool = Waiting.concatenate([pool.take(np.flatnonzero(pool.near > depth)), *later])
+        pools, dense = list(map(self.pool, self.kinds, parts)), SLAB * CELL**2
+        for pool, *left in zip(pools, self.hidden, self.outside, strict=True):
+            for one in left:
+                one.append(pool.take(slice(0)))
+        while any(map(len, pools)):
+            depths, cells = self._depths(pools, dense)
+            ready = []
+            for number, (pool, depth) in enumerate(zip(pools, depths, strict=True)):
+                soon = np.flatnonzero(pool.near <= depth)
+                made, later = self._decided(number, pool.take(soon), depth[soon])
+                pools[number] = Waiting.concatenate([pool.take(np.flatnonzero(pool.near > depth)), *later])
+                ready.append(made)
             # Where much was hidden, or little is left, the next ones are so many more.
             wanted = min(max(SLAB * CELL**2 * cells, LEAST), max(most, 1.0))
-            number = float(ready.count.sum())
+            number = float(sum(one.count.sum() for one in ready))
             dense *= float(np.clip(wanted / max(number, 1.0), 0.5, 2.0))
-            if len(ready):
+            if any(map(len, ready)):
                 yield ready
 
-    def _depths(self, pool: Waiting, number: float) -> tuple[NDArray[np.float64], int]:
+    def _depths(self, pools: Sequence[Waiting], number: float) -> tuple[list[NDArray[np.float64]], int]:
         """Depths (n,) for parts, before which these have so many facets in each cell, about; and how many cells."""
-        deepest = float(np.ptp(pool.near)) + 1.0
-        order = np.argsort(pool.cell * deepest + (pool.near - pool.near.min()), kind="stable")
-        cells, near = pool.cell[order], pool.near[order]
+        every, nearest, count, radius = (
+            np.concatenate([getattr(pool, name) for pool in pools]) for name in ("cell", "near", "count", "radius")
+        )
+        deepest = float(np.ptp(nearest)) + 1.0
+        order = np.argsort(every * deepest + (nearest - nearest.min()), kind="stable")
+        cells, near = every[order], nearest[order]
         first = np.flatnonzero(np.diff(cells, prepend=-1))
-        count = pool.count[order]
+        count = count[order]
         before = np.cumsum(count) - count
         group = np.repeat(np.arange(len(first)), np.diff(first, append=len(cells)))
         left = number - (before - before[first][group])
         # The part that the number ends in counts by the share of its depth; that is the last with any left.
         last = np.maximum.reduceat(np.where(left > 0.0, np.arange(len(cells)), -1), first)
-        end = near[last] + 2.0 * pool.radius[order][last] * np.minimum(left[last] / np.maximum(count[last], 1e-12), 1.0)
+        end = near[last] + 2.0 * radius[order][last] * np.minimum(left[last] / np.maximum(count[last], 1e-12), 1.0)
         depth = np.empty(len(cells))
         depth[order] = end[group]
-        return depth, len(first)
+        return np.split(depth, np.cumsum([len(pool) for pool in pools])[:-1]), len(first)
 
-    def _decided(self, slab: Waiting, depth: NDArray[np.float64]) -> tuple[Waiting, list[Waiting]]:
+    def _decided(self, number: int, slab: Waiting, depth: NDArray[np.float64]) -> tuple[Waiting, list[Waiting]]:
         """What is to be drawn of parts that begin before depths (n,), and what of theirs begins beyond."""
-        ready, later = [Waiting.empty()], []
+        kind, ready, later = self.kinds[number], [slab.take(slice(0))], []
         while len(slab):
             prints = self.coverage.of_spheres(slab.centre, slab.radius)
             outside = self.coverage.outside(prints)
             hidden = ~outside & self.coverage.hidden(prints)
-            self.outside.append(slab.take(np.flatnonzero(outside)))
-            self.hidden.append(slab.take(np.flatnonzero(hidden)))
+            self.outside[number].append(slab.take(np.flatnonzero(outside)))
+            self.hidden[number].append(slab.take(np.flatnonzero(hidden)))
             seen = np.flatnonzero(~outside & ~hidden)
             slab, depth = slab.take(seen), depth[seen]
-            large = self.large(slab)
+            slab = replace(slab, parts=kind.met(slab.parts, self.shown))
+            large = self.large(kind, slab)
             ready.append(slab.take(np.flatnonzero(~large)))
             some = np.flatnonzero(large)
-            made = list(opened(self.flora, slab.parts.take(some)))
-            new = self.pool(PlantParts.concatenate([parts for parts, _, _ in made]))
-            depth = depth[some][np.concatenate([np.zeros(0, np.int64), *(owner for _, owner, _ in made)])]
+            parts, owner = kind.opened(slab.parts.take(some))
+            new, depth = self.pool(kind, parts), depth[some][owner]
             later.append(new.take(np.flatnonzero(new.near > depth)))
             soon = np.flatnonzero(new.near <= depth)
             slab, depth = new.take(soon), depth[soon]
         return Waiting.concatenate(ready), later
 
-    def large(self, pool: Waiting) -> NDArray[np.bool_]:
+    def large(self, kind: FrontierKind, pool: Waiting) -> NDArray[np.bool_]:
         """Parts (n,) that are to be opened: more of them shows than their samples tell."""
         pixels = 2.0 * pool.radius / self.coverage.camera.extent_around(pool.centre)
         shows = (pixels > DETAIL) & (pool.count > FEW)
-        return pool.parts.can_open(self.flora) & (shows | (self.transition.of_branches(pool.parts.branches) > 0.0))
+        return kind.can_open(pool.parts) & (shows | kind.to_be_opened(pool.parts))

@@ -23,8 +23,6 @@ from ..subplants.wood_detail import Pixels
 
 #: Pixels by which the margin of a leaf may be off.
 TOLERANCE = 0.5
-#: Power of the visibility by which the width of things counts as smaller.
-FADING = 0.25
 #: A leaf is no more than so many times as near as its branch, as far as this counts.
 _NEARER = 4.0
 

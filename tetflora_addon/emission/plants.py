@@ -11,12 +11,13 @@ these can be told from what they stand for, finer ones, see `leaf_detail`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
@@ -25,11 +26,10 @@ from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, trunks
 from ..growth.seeds import Seeds
 from ..processes.pool import WORTH_PROCESSES, in_processes
-from ..refinement.contents import PlantParts, as_pieces, piece_totals
+from ..refinement.contents import as_pieces, piece_totals
 from ..refinement.decisions import Decision, real_fraction
 from ..refinement.loop import Refinement
-from ..refinement.shared_parts import SharePoints, lowered
-from ..refinement.shares import opened, share_points
+from ..refinement.shared_parts import SharedParts, SharePoints, lowered
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import chunks, expand
@@ -114,32 +114,47 @@ class Block:
     fraction: float
 
 
+def inside_explicit(
+    shared: SharedParts, result: Refinement, opening: Callable[[Arrays, NDArray[np.float64]], NDArray[np.bool_]]
+) -> Iterator[tuple[Arrays, NDArray[np.float64]]]:
+    """All parts of one kind, some at a time, and the fraction (n,) of each that lies in explicit tetrahedra.
+
+    Those of which something does are opened where ``opening`` wants it of parts and these fractions.
+    """
+    explicit, parts, points = result.chosen(Decision.EXPLICIT), shared.parts, shared.points
+    sure = np.zeros(len(parts), bool)
+    while len(parts):
+        area = points.optical_area.astype(np.float64)
+        whole = np.maximum(np.bincount(points.part, area, len(parts)), 1e-300)
+        inside = np.where(sure, 1.0, np.bincount(points.part, area * explicit[points.cell], len(parts)) / whole)
+        again = (inside > 0.0) & shared.can_open(parts) & opening(parts, inside)
+        yield parts.take(np.flatnonzero(~again)), inside[~again]
+        made, some = [], [np.zeros(0, bool)]
+        for new, owner, known in shared.opened(parts.take(np.flatnonzero(again))):
+            made.append((new, shared.points_on(new, known)))
+            some.append(inside[again][owner] >= 1.0)
+        sure = np.concatenate(some)
+        first = np.cumsum([0, *(len(new) for new, _ in made)])
+        parts = type(parts).concatenate([new for new, _ in made])
+        points = SharePoints.concatenate(
+            [replace(own, part=own.part + np.int32(start)) for (_, own), start in zip(made, first, strict=False)]
+        )
+        if len(points):
+            points = replace(points, cell=lowered(result.tree, points))
+
+
 def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance: float = np.inf) -> Iterator[Block]:
     """Polygons of all that lies in explicit tetrahedra for the most part, where shells stand for the rest.
 
     Parts that lie in explicit tetrahedra in part are opened; margins of near leaves may be off by a tolerance, pixels.
     """
-    tree, explicit, plants = result.tree, result.chosen(Decision.EXPLICIT), result.plants
-    parts, points = plants.parts, plants.points
+    plants = result.plants
     full, bodies = [Branches.empty()], [Branches.empty()]
-    while len(parts):
-        area = points.optical_area.astype(np.float64)
-        whole = np.maximum(np.bincount(points.part, area, len(parts)), 1e-300)
-        inside = np.bincount(points.part, area * explicit[points.cell], len(parts)) / whole
-        mixed = (inside > 0.0) & (inside < 1.0) & parts.can_open(flora) & (plants.pixels(parts) > MIXED)
-        real = ~mixed & (inside >= 0.5)
-        full.append(parts.branches.take(np.flatnonzero(real & ~parts.alone)))
-        bodies.append(parts.branches.take(np.flatnonzero(real & parts.alone)))
-        made = []
-        for new, _, lines in opened(flora, parts.take(np.flatnonzero(mixed))):
-            made.append((new, share_points(flora, new, plants.pixels(new), lines)))
-        first = np.cumsum([0, *(len(new) for new, _ in made)])
-        parts = PlantParts.concatenate([new for new, _ in made])
-        points = SharePoints.concatenate(
-            [replace(own, part=own.part + np.int32(start)) for (_, own), start in zip(made, first, strict=False)]
-        )
-        if len(points):
-            points = replace(points, cell=lowered(tree, points))
+    for parts, inside in inside_explicit(
+        plants, result, lambda parts, inside: (inside < 1.0) & (plants.pixels(parts) > MIXED)
+    ):
+        full.append(parts.branches.take(np.flatnonzero((inside >= 0.5) & ~parts.alone)))
+        bodies.append(parts.branches.take(np.flatnonzero((inside >= 0.5) & parts.alone)))
     detail = LeafDetail(flora, camera, tolerance)
     runs = []
     for alone, some in ((False, Branches.concatenate(full)), (True, Branches.concatenate(bodies))):

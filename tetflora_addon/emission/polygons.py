@@ -1,14 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Explicit polygons that refinement keeps, and facets that stand for the others.
+"""Polygons of your own meshes that stay as they are, as meshes in world space.
 
-Polygons are kept where they are seen and where a facet would be no smaller. A face whose fragments are all kept comes
-out as the face that it was.
-
-Facets are a stochastic simplification (Cook, Halstead, Planck and Ryu, SIGGRAPH 2007): of many small triangles few are
-chosen at random, in proportion to their area, and their facets make up for the rest. The facets of a triangle depend
-only on its own number: they stay when others come into view or are kept. Chances are spread evenly along the triangles
-of a mesh, which keeps its area with little noise.
+A face whose fragments are all kept comes out as the face that it was.
 """
 
 from __future__ import annotations
@@ -19,13 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread, unit
+from ..arrays import spread
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
-from ..camera.camera import Camera
-from ..growth.hashing import child_key, key_of_seed, mix, stepped, uniform
-from ..proxies.facet_sizes import polygon_facet_sizes
-from ..proxies.microsurfaces import Facets, kept_out_of_view
-from ..refinement.contents import Held
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons, area_fractions
@@ -61,31 +50,18 @@ class PolygonBlock:
     fraction: float
 
 
-def polygon_blocks(result: Refinement, camera: Camera, facet_pixels: float | None = 0.6) -> Iterator[PolygonBlock]:
-    """Polygons that are kept: all in explicit tetrahedra, and those in others that are no smaller than a facet.
-
-    Parameters
-    ----------
-    result : Refinement
-    camera : Camera
-    facet_pixels : float or None
-        Side of a facet that is seen, in pixels; None where proxies are shells, which stand for all but large polygons.
-    """
+def kept_polygons(result: Refinement) -> Polygons:
+    """Polygons that are kept where shells stand for all others: all in explicit tetrahedra, and large ones."""
     held = result.holdings.polygons
-    if not len(held):
-        return
-    cell = held.cell
-    kept = ~result.chosen(Decision.PROXY, Decision.HIDDEN)[cell]
-    if facet_pixels is None:
-        kept |= ~np.isfinite(held.totals.width)
-    else:
-        sizes = polygon_facet_sizes(held, camera, result.chosen(Decision.HIDDEN))
-        kept |= sizes.kept(facet_pixels)
+    proxy = result.chosen(Decision.PROXY, Decision.HIDDEN)[held.cell]
+    kept = np.flatnonzero(~proxy | np.isinf(held.totals.width))
     rank = np.zeros(len(result.tree), np.int64)
     rank[result.nodes] = result.rank
-    polygons, rank = held.items.take(kept), rank[cell[kept]]
-    order = np.argsort(rank, kind="stable")
-    polygons = mended(polygons.take(order))
+    return mended(held.items.take(kept[np.argsort(rank[held.cell[kept]], kind="stable")]))
+
+
+def polygon_blocks(polygons: Polygons) -> Iterator[PolygonBlock]:
+    """Polygons as meshes, some at a time."""
     runs = list(chunks(np.maximum(polygons.triangle_counts / 2, 1), BLOCK_POLYGONS))  # of quads; others by corners
     for number, run in enumerate(runs):
         own = polygons.take(run)
@@ -199,83 +175,3 @@ def _at_corners(
     """Values at corners of whole faces, then at those of fragments (n, 3, 3) of triangles (n, 3)."""
     between = (weights @ values[triangle].astype(np.float64)).reshape(-1, values.shape[1])
     return np.concatenate([values[corner].astype(np.float64), between])
-
-
-def hidden_polygon_facets(
-    result: Refinement, camera: Camera, facet_pixels: float, at_once: float
-) -> Iterator[tuple[str, Facets, bool]]:
-    """`polygon_facets` of all polygons in proxies, hidden or not, each with the look of their surfaces before."""
-    held = result.holdings.polygons
-    proxies = held.take(result.chosen(Decision.PROXY, Decision.HIDDEN)[held.cell])
-    if not len(proxies):
-        return
-    meshes = proxies.items.meshes
-    looks = np.array([surface.look for surface in meshes.surfaces])[meshes.surface[proxies.items.instance]]
-    for look in np.unique(looks).tolist():
-        for made in polygon_facets(proxies.take(looks == look), result, camera, facet_pixels, at_once):
-            yield look, *made
-
-
-def polygon_facets(
-    held: Held[Polygons], result: Refinement, camera: Camera, facet_pixels: float, at_once: float = np.inf
-) -> Iterator[tuple[Facets, bool]]:
-    """Facets of the polygons of proxies (``held``) that are not kept, about ``at_once`` at a time.
-
-    Yields facets and whether they are seen: neither hidden nor beside the view.
-    """
-    sizes = polygon_facet_sizes(held, camera, result.chosen(Decision.HIDDEN))
-    side, inside = sizes.sides(facet_pixels), result.in_view[held.cell]
-    left, expected = ~sizes.kept(facet_pixels), sizes.counts(facet_pixels) + 1  # polygons take memory too
-    for alike, seen, beside in (
-        (inside & ~sizes.hidden, True, False),
-        (inside & sizes.hidden, False, False),
-        (~inside, False, True),
-    ):
-        chosen = np.flatnonzero(left & alike)
-        for run in chunks(expected[chosen], at_once):
-            some = chosen[run]
-            made = chosen_facets(held.items.take(some), sizes.optical[some], side[some])
-            yield kept_out_of_view(made, camera.clearance) if beside else made, seen
-
-
-def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:
-    """Facets of polygons (n,) that stand for an area ``optical`` (n,) in m², with sides (n,) in metres.
-
-    Their number is random; its expectation is the area over that of a facet.
-    """
-    meshes = polygons.meshes
-    owner, triangle, fraction = polygons.triangles()
-    vector = meshes.vectors(triangle, polygons.instance[owner])
-    own = fraction * np.linalg.norm(vector, axis=1)
-    of_polygon = np.bincount(owner, own, len(polygons))
-    rate = optical / (np.maximum(of_polygon, 1e-300) * np.maximum(side, 1e-12) ** 2)
-    key = _keys(polygons, owner)
-    pick, number = spread(np.floor(own * rate[owner] + stepped(key, triangle)).astype(np.int64))
-
-    thing = owner[pick]
-    face, instance = polygons.face[thing], polygons.instance[thing]
-    key = child_key(mix(key_of_seed(triangle[pick]) ^ key[pick]), number)  # several facets of a triangle lie apart
-    weights = np.broadcast_to(np.eye(3), (len(pick), 3, 3)).copy()
-    cut = np.flatnonzero(polygons.part[thing] >= 0)
-    weights[cut] = polygons.weights[polygons.part[thing[cut]]]
-    corners = weights @ meshes.corners(triangle[pick], instance)
-    root, v = np.sqrt(uniform(key, _PLACE_U)), uniform(key, _PLACE_V)
-    at = np.stack([1 - root, root * (1 - v), root * v], axis=1)
-    centre = np.einsum("nk,nki->ni", at, corners)
-    normal = unit(vector[pick])
-    edges = np.roll(corners, -1, axis=1) - corners
-    longest = np.linalg.norm(edges, axis=2).argmax(axis=1)
-    along = unit(edges[np.arange(len(pick)), longest])
-    slot = meshes.slot[face]
-    material = meshes.colours[slot], meshes.transmission[slot]
-    return Facets(centre, np.cross(along, normal), along, side[thing], *material)
-
-
-def _keys(polygons: Polygons, owner: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """Keys (m,) of triangles of polygons by their instance and, for fragments, by their corners."""
-    key = key_of_seed(polygons.instance)
-    cut = np.flatnonzero(polygons.part >= 0)
-    corners = polygons.weights[polygons.part[cut]].reshape(-1, 9) + 0.0  # no negative zeros, which have other bits
-    for bits in np.ascontiguousarray(corners).view(np.uint64).T:
-        key[cut] = mix(key[cut] ^ bits)
-    return key[owner]

@@ -17,48 +17,14 @@ from ..assets.asset import COUNTS
 from ..growth.hashing import signed, uniform
 from ..refinement.asset_parts import AssetParts, PlacedAssets
 from ..refinement.contents import Totals
-from .facet_sizes import FacetPixels, FacetSizes
 from .facet_weights import by_number
 from .microsurfaces import Facets, facet_numbers, trapped
-from .thrown_shadows import ThrownShadows
 
 #: Child indices of facets of leaves and of wood start here; draws of their numbers, turns and places.
 _LEAF_PATH, _WOOD_PATH = 1 << 42, 1 << 43
 _LEAF_COUNT, _WOOD_COUNT, _TURN, _MOVE = 252, 253, 254, 255
 #: Sides of a facet by which one is moved that has the sample of another.
 _MOVED = 1.5
-#: One-sided layers that are enough where nothing is seen, and how much of its bound a cluster fills.
-_LAYERS, _FILLED = 6.0, 0.6
-
-
-def asset_facet_sizes(
-    placed: PlacedAssets,
-    parts: AssetParts,
-    shadows: ThrownShadows,
-    visibility: NDArray[np.float64],
-    coarse: NDArray[np.float64],
-    beside: NDArray[np.bool_],
-) -> FacetSizes:
-    """Facets of clusters (n,) of a visibility (n,), a coarseness (n,) where that is 0, all of them beside the view."""
-    clusters, scale = placed.assets.clusters, placed.scale[parts.instance] ** 2
-    cluster, count, totals = parts.cluster, len(parts), facet_totals(placed, parts)
-    side = clusters.high[cluster] - clusters.low[cluster]
-    shown = sum(side[:, i] * side[:, (i + 1) % 3] for i in range(3)) / 2.0 * scale * _FILLED
-    kept = np.minimum(_LAYERS * shown / np.maximum(totals.optical_area, 1e-300), 1.0)
-    away = shadows.camera.clearance(parts.centre)
-    return FacetSizes(
-        shadows.camera.extent_around(parts.centre),
-        clusters.one_leaf[cluster] * scale,
-        np.sqrt(totals.wood_area / 2 / np.maximum(totals.polygons, 1)),
-        visibility,
-        coarse,
-        # What is in the view in part gets facets that may be in the view.
-        np.where(beside, away, np.minimum(away, 0.0)),
-        shadows.distance(parts.centre, away, parts.reach),
-        totals,
-        np.ones(count),
-        kept,
-    )
 
 
 def facet_totals(placed: PlacedAssets, parts: AssetParts) -> Totals:
@@ -75,17 +41,20 @@ def asset_weights(placed: PlacedAssets, parts: AssetParts, number: NDArray[np.fl
 def facets_of_assets(
     placed: PlacedAssets,
     parts: AssetParts,
-    sizes: FacetSizes,
-    pixels: FacetPixels,
-    left_out: NDArray[np.float64],
+    totals: Totals,
+    leaf: NDArray[np.float64],
+    wood: NDArray[np.float64],
+    left_out: NDArray[np.float64] | None = None,
 ) -> Facets:
-    """Facets of clusters (n,), of which a fraction (n,) is left out."""
-    leaf, wood = sizes.sides(pixels)
-    weight = asset_weights(placed, parts, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
+    """Facets of clusters (n,) with `facet_totals`, of sides for leaves and for wood (n,), metres.
+
+    A fraction (n,) of them is left out.
+    """
+    weight = asset_weights(placed, parts, totals.optical_area / np.maximum(leaf, 1e-12) ** 2)
     key = placed.keys(parts)
     kinds = (
-        (True, sizes.totals.leaf_area, leaf, _LEAF_PATH, _LEAF_COUNT),
-        (False, sizes.totals.wood_area / 2, wood, _WOOD_PATH, _WOOD_COUNT),
+        (True, totals.leaf_area, leaf, _LEAF_PATH, _LEAF_COUNT),
+        (False, totals.wood_area / 2, wood, _WOOD_PATH, _WOOD_COUNT),
     )
     made = []
     for leafy, area, side, path, draw in kinds:

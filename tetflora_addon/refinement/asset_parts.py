@@ -14,7 +14,7 @@ from ..arrays import Arrays, column, nested, spread
 from ..assets.asset import AssetTable, Instances
 from ..camera.camera import Camera
 from ..growth.hashing import child_key, uniform
-from .contents import Held, Totals, sums
+from .contents import Totals
 from .shared_parts import SharedParts, SharePoints
 
 #: Pixels along a part for each of its points, and the fewest.
@@ -103,6 +103,20 @@ class PlacedAssets:
         centre = self.to_world((low + high) / 2, instance)
         return AssetParts(instance.astype(np.int32), cluster.astype(np.int32), centre, totals, side)
 
+    def children(self, parts: AssetParts) -> tuple[AssetParts, NDArray[np.int64]]:
+        """Children of clusters (n,), and whose each is (m,)."""
+        clusters = self.assets.clusters
+        owner, index = spread(clusters.children[parts.cluster].astype(np.int64))
+        return self.parts(parts.instance[owner], clusters.child[parts.cluster][owner] + index), owner
+
+    def kites(self, parts: AssetParts) -> NDArray[np.float64]:
+        """Corners (k, 4, 3) of kites for all leaves of clusters (n,), metres."""
+        leaves, clusters, asset = self.assets.leaves, self.assets.clusters, self.instances.asset[parts.instance]
+        owner, index = spread(clusters.leaves[parts.cluster].astype(np.int64))
+        own = leaves.take((self.assets.first_leaf[asset] + clusters.first_leaf[parts.cluster])[owner] + index)
+        corners = (own.centre - own.along, own.centre - own.across, own.centre + own.along, own.centre + own.across)
+        return np.stack([self.to_world(corner, parts.instance[owner]) for corner in corners], axis=1)
+
     def to_world(self, points: NDArray[np.floating], instance: NDArray[np.integer]) -> NDArray[np.float64]:
         """Points (n, 3) of assets' spaces in the world, by instances (n,)."""
         linear, out = self.instances.linear, self.instances.position[instance]
@@ -182,13 +196,10 @@ class SharedAssets(SharedParts[AssetParts]):
 
     def opened(self, parts: AssetParts) -> Iterator[tuple[AssetParts, NDArray[np.int64], None]]:
         """Children of clusters, as `SharedParts.opened`."""
-        clusters = self.placed.assets.clusters
-        owner, index = spread(clusters.children[parts.cluster].astype(np.int64))
-        child = clusters.child[parts.cluster][owner] + index
-        yield self.placed.parts(parts.instance[owner], child), owner, None
+        yield *self.placed.children(parts), None
 
-    def points_on(self, parts: AssetParts, known: None, most: int | None = None) -> SharePoints:
-        """Points on clusters, all in the root: at their samples; at most so many on each."""
+    def points_on(self, parts: AssetParts, known: None) -> SharePoints:
+        """Points on clusters, all in the root: at their samples."""
         pixels = parts.extent / self.camera.extent_around(parts.centre)
         clusters, key = self.placed.assets.clusters, self.placed.keys(parts)
         bodies = self.placed.bodies(parts)
@@ -200,8 +211,6 @@ class SharedAssets(SharedParts[AssetParts]):
             part = (sheets + solids / 2) / np.maximum(parts.totals.optical_area, 1e-300)
             there = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
             count = np.minimum(np.ceil(number * part), there)
-            if most is not None:
-                count = np.minimum(count, most)
             count = np.where((sheets + solids > 0.0) & (there > 0), np.maximum(count, 1), 0).astype(np.int64)
             owner, index = spread(count)
             pick = self.placed.picked(parts, key, leafy, owner, index)
@@ -210,10 +219,3 @@ class SharedAssets(SharedParts[AssetParts]):
             cell = np.zeros(len(owner), np.int32)
             made.append(SharePoints(owner.astype(np.int32), cell, place.astype(np.float32), leaf, wood))
         return SharePoints.concatenate(made)
-
-    def held(self, nodes: int) -> Held[AssetParts]:
-        """Clusters, once for each node that holds some of them, with the totals of that."""
-        parts, points = self.parts, self.points
-        pair, row = np.unique(points.part.astype(np.int64) * nodes + points.cell, return_inverse=True)
-        totals, _ = self.totals(np.ones(nodes, bool))
-        return Held(parts.take(pair // nodes), (pair % nodes).astype(np.int32), sums(totals, row, len(pair)))

@@ -26,9 +26,6 @@ FEW, NO_GAIN, NO_POLYGONS = 0.005, 0.002, 20_000
 UNKNOWN = 4.0
 #: How much smaller than the limit leaves are at the far end of a tetrahedron that is divided for it.
 DEEP = 1.5
-#: Side of tetrahedra that facets stand for, over that of those of real leaves. Were they smaller, more would be found
-#: hidden from where on the first leaves are real, and all facets around would change their sizes and places there.
-FACET_BLOCK = 1.0
 #: Width from which on all leaves are real over the width up to which none is.
 BAND = 2.5
 
@@ -136,7 +133,7 @@ def decide(cells: Terminals, transmittance: Floats, settings: RefinementSettings
     small = (contributions(cells, transmittance) <= settings.cutoff**2) & ~crossing
     # Facets take their places from the plants, not from their tetrahedra, which only tell how much is seen.
     facets = np.isinf(settings.proxy_block)
-    done = small | (no_gain & (cells.pixels <= (settings.block * FACET_BLOCK) ** 2)) if facets else small
+    done = small | (no_gain & (cells.pixels <= settings.block**2)) if facets else small
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
     # Large leaves never become a proxy: a barely visible block of them is divided until its hidden parts show.
     out[done & ~large_leaves & (cells.span <= settings.proxy_block)] = Decision.PROXY

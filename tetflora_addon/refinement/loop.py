@@ -91,6 +91,8 @@ class Refinement:
         What is left out.
     lights : sequence of Light
         Those that throw shadows.
+    polygons : Polygons
+        All of them, whole.
     """
 
     tree: TetrahedralTree
@@ -106,6 +108,7 @@ class Refinement:
     seconds: dict[str, float]
     strays: Strays = field(default_factory=Strays)
     lights: Sequence[Light] = ()
+    polygons: Polygons = field(default_factory=Polygons.empty)
 
     @property
     def nodes(self) -> NDArray[np.intp]:
@@ -120,7 +123,7 @@ class Refinement:
     @property
     def contents(self) -> Contents:
         """All plants and polygons, in terminal nodes: a copy, with a sub-plant for each node that it is shared by."""
-        subplants, bodies = self.plants.held(len(self.tree))
+        subplants, bodies = self.plants.held_apart(len(self.tree))
         return Contents(subplants, bodies, self.holdings.polygons)
 
     @property
@@ -184,6 +187,7 @@ def refine(
     own = Held.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
     bounds = _bounds(flora, plants, assets, polygons)
     tree = world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
+    whole = Polygons.empty() if polygons is None else polygons
     holdings, most = Holdings(push_down(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
     divided = np.arange(len(tree)) == 0
     shared = plants, assets
@@ -225,7 +229,7 @@ def refine(
             splitting &= ~barred
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
-        found = cells, transmittance, decision, ranks, passes, not limited, seconds, strays, lights
+        found = cells, transmittance, decision, ranks, passes, not limited, seconds, strays, lights, whole
         state = Refinement(tree, plants, assets, holdings, *found)
         if not splitting.any():
             return state

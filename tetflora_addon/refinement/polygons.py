@@ -23,8 +23,6 @@ from ..subplants.pieces import chunks
 
 #: Triangles that are measured at a time; bounds what that takes to some hundred megabytes.
 MEASURED_AT_ONCE = 200_000
-#: Faces of more corners are measured once, however many fragments of them there are.
-_FEW_CORNERS = 4
 #: Metres, and factors, from which on squares of areas need not be numbers any more.
 _FARTHEST = 1e12
 #: A fragment that reaches beyond a plane by less than this fraction of its size is not cut again by rounding errors.
@@ -207,23 +205,6 @@ class Meshes:
     def vectors(self, triangle: Integers, instance: Integers) -> Floats:
         """Area vectors (n, 3) of triangles of instances in world space, m²."""
         return np.einsum("ni,nij->nj", self.area_vectors[triangle], self.cofactors[instance])
-
-    def face_areas(self, face: Integers, instance: Integers) -> Floats:
-        """Areas (n,) of faces of instances, m²."""
-        many = np.flatnonzero(self.face_size[face] > _FEW_CORNERS)
-        key = instance[many].astype(np.int64) * len(self.face_size) + face[many]
-        _, first, again = np.unique(key, return_index=True, return_inverse=True)
-        once = np.ones(len(face), bool)
-        once[many], once[many[first]] = False, True
-        areas = np.zeros(len(face))
-        chosen = np.flatnonzero(once)
-        for run in chunks(self.face_size[face[chosen]] - 2, MEASURED_AT_ONCE):
-            some = chosen[run]
-            owner, index = spread(self.face_size[face[some]] - 2)
-            own = self.vectors(self.face_triangle[face[some]][owner] + index, instance[some][owner])
-            areas[some] = np.bincount(owner, np.linalg.norm(own, axis=1), len(some))
-        areas[many] = areas[many[first]][again.reshape(-1)]
-        return areas
 
 
 @dataclass(frozen=True)

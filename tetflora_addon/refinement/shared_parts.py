@@ -20,7 +20,7 @@ from ..arrays import Arrays, Chunks, Floats, Growing, Integers, Mask, column, re
 from ..camera.camera import Camera
 from ..parallel import blocks, each_on_all_cores
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Totals
+from .contents import Held, Totals, sums
 
 #: Parts larger than this many times the longest edge of a tetrahedron that is divided are opened.
 LARGE = 1.6
@@ -216,6 +216,13 @@ class SharedParts(Generic[Parts]):
             renumber(self._points.rows.part, (np.cumsum(there) - 1).astype(np.int32))
             self._figures = Growing(self._figures.rows.take(there))
         return self._parts.joined()
+
+    def held(self, nodes: int) -> Held[Parts]:
+        """Parts, once for each node that holds some of them, with the totals of that."""
+        parts, points = self.parts, self.points
+        pair, row = np.unique(points.part.astype(np.int64) * nodes + points.cell, return_inverse=True)
+        totals, _ = self.totals(np.ones(nodes, bool))
+        return Held(parts.take(pair // nodes), (pair % nodes).astype(np.int32), sums(totals, row, len(pair)))
 
     def totals(self, chosen: Mask) -> tuple[Totals, NDArray[np.int32]]:
         """Totals (k,) of points in chosen nodes, a mask (nodes,), and their nodes (k,)."""

@@ -29,7 +29,7 @@ from ..growth.growth import radius_at, trunks
 from ..growth.hashing import uniform
 from ..growth.seeds import Seeds
 from ..subplants.pieces import Pieces, open_branches
-from .contents import Held, PlantParts, as_pieces, sums
+from .contents import Held, PlantParts, as_pieces
 from .shared_parts import SharedParts, SharePoints
 
 #: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
@@ -208,16 +208,9 @@ class SharedPlants(SharedParts[PlantParts]):
             along = np.where(self.thick(parts), np.minimum(along, MOST_ALONG), 0.0).astype(np.int64)
         return share_points(self.flora, parts, self.pixels(parts), lines, times=self._times, along=along)
 
-    def held(self, nodes: int) -> tuple[Held[Branches], Held[Pieces]]:
-        """Sub-plants and branches alone, once for each node that holds some of them, with the totals of that."""
-        parts, points = self.parts, self.points
-        pair, row = np.unique(points.part.astype(np.int64) * nodes + points.cell, return_inverse=True)
-        totals, _ = self.totals(np.ones(nodes, bool))
-        found = sums(totals, row, len(pair))
-        part, cell = pair // nodes, (pair % nodes).astype(np.int32)
-        alone = parts.alone[part]
-        made = []
-        for chosen in (np.flatnonzero(~alone), np.flatnonzero(alone)):
-            made.append((parts.branches.take(part[chosen]), cell[chosen], found.take(chosen)))
-        subplants, bodies = made
-        return Held(*subplants), Held(as_pieces(bodies[0]), *bodies[1:])
+    def held_apart(self, nodes: int) -> tuple[Held[Branches], Held[Pieces]]:
+        """As `held`: sub-plants, and branches alone as one piece each."""
+        every = self.held(nodes)
+        own, bodies = (every.take(np.flatnonzero(every.items.alone == alone)) for alone in (False, True))
+        pieces = as_pieces(bodies.items.branches)
+        return Held(own.items.branches, own.cell, own.totals), Held(pieces, bodies.cell, bodies.totals)

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,15 +19,18 @@ from tests.engine.assets import trees
 from tests.engine.emission.test_emission import with_decision
 from tests.engine.refinement.test_asset_parts import check_cover, grove, placed_of, run
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.emission import asset_plan
 from tetflora_addon.emission.asset_costs import NEVER
-from tetflora_addon.emission.asset_expected import SHARED, AssetExpected
-from tetflora_addon.emission.asset_plan import FARTHER, AssetPlan, Keeping, plan_of, planned_facets
-from tetflora_addon.emission.asset_sight import AssetPortions, AssetSight
-from tetflora_addon.emission.seen import SOME, SeenNodes
+from tetflora_addon.emission.asset_plan import (
+    ASSETS,
+    AssetPlan,
+    ClusterRows,
+    Keeping,
+    PlacedClusters,
+    explicit_plan,
+)
 from tetflora_addon.proxies import asset_facets
-from tetflora_addon.proxies.facet_sizes import FacetPixels
-from tetflora_addon.refinement.asset_parts import AssetParts, PlacedAssets, SharedAssets
+from tetflora_addon.proxies.microsurfaces import Facets
+from tetflora_addon.refinement.asset_parts import AssetParts, PlacedAssets
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
 
@@ -69,18 +74,31 @@ def patchwork(seed: int) -> Refinement:
     return with_decision(result, decisions, rng.uniform(0.05, 1.0, count))
 
 
+def drawn(
+    result: Refinement, camera: Camera, limit: float, keeping: Keeping, facet: float = 1.0, **options: object
+) -> tuple[AssetPlan, Facets, Facets]:
+    """What is drawn as it is, facets that are seen, and those that are not."""
+    placed = result.assets.placed
+    clusters = PlacedClusters(placed, camera, keeping, limit, np.full(len(placed), ""))
+    scene = support.refined(support.small_flora(), result, camera, facet, 1e9, assets=clusters, **options)
+    scene = replace(scene, keeping=keeping)
+    assert not list(scene.mesh_blocks())
+    made: dict[bool, list[Facets]] = {True: [], False: []}
+    for parts in scene.facet_parts():
+        assert parts.species == ASSETS
+        for facets, seen in parts:
+            made[seen].append(facets)
+    seen, unseen = (Facets.concatenate(some) if some else Facets.empty() for some in made.values())
+    return scene.asset_plan(), seen, unseen
+
+
 def check_plan(placed: PlacedAssets, plan: AssetPlan) -> None:
-    """Each face of an instance that is not the original is in one mesh, or stood for by kites or facets."""
-    parts = AssetParts.concatenate([plan.meshes, plan.kites, plan.facets.parts])
-    assert not np.isin(parts.instance, plan.whole).any()
-    assert len(np.unique(plan.whole)) == len(plan.whole)
-    others = np.setdiff1d(np.arange(len(placed)), plan.whole)
-    if len(others):
-        number = np.cumsum(np.isin(np.arange(len(placed)), others)) - 1
-        check_cover(placed.take(others), replace(parts, instance=number[parts.instance].astype(np.int32)))
-    else:
-        assert not len(parts)
+    """No face is in two meshes, and kites stand for leaves alone."""
     clusters = placed.assets.clusters
+    assert len(np.unique(plan.whole)) == len(plan.whole)
+    both = AssetParts.concatenate([plan.meshes, plan.kites])
+    assert not np.isin(both.instance, plan.whole).any()
+    assert len(np.unique(both.instance.astype(np.int64) * len(clusters) + both.cluster)) == len(both)
     for own in (plan.meshes, plan.kites):
         assert clusters.meshes[own.cluster].all()
     assert (clusters.leaves[plan.kites.cluster] > 0).all()
@@ -88,53 +106,44 @@ def check_plan(placed: PlacedAssets, plan: AssetPlan) -> None:
     assert (bark[plan.kites.cluster] <= 1e-6 * clusters.optical_area[plan.kites.cluster]).all()
 
 
-def test_the_scene_has_every_decision() -> None:
+def optical(placed: PlacedAssets, plan: AssetPlan) -> float:
+    """Area that is drawn as it is, m²."""
+    whole = placed.wholes().totals.optical_area[plan.whole].sum()
+    return float(whole + plan.meshes.totals.optical_area.sum() + plan.kites.totals.optical_area.sum())
+
+
+def area(*facets: Facets) -> float:
+    return float(sum((own.side**2).sum() for own in facets))
+
+
+@pytest.mark.parametrize("limit", [0.2, 1.0, 4.0])
+@pytest.mark.parametrize("fraction", [0.3, NEVER])
+def test_every_part_is_drawn_once(limit: float, fraction: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of the area is there, as what it is or as facets; what nobody sees may be less."""
+    monkeypatch.setattr(asset_facets, "asset_weights", lambda _placed, parts, _number: np.ones(len(parts)))
     camera, result = scene()
-    assert {EXPLICIT, PROXY, HIDDEN} == set(result.decision.tolist())
-    plan = plan_of(AssetSight(result, camera), 0.2, keeping())
-    check_plan(result.assets.placed, plan)
-    assert not len(plan.whole)
-    assert len(plan.meshes) and len(plan.kites) and len(plan.facets)
-
-
-@given(st.integers(0, 2**31), st.sampled_from([None, 0.01, 1.0, 4.0, 100.0]), st.sampled_from([0.3, 0.6, 1.0, NEVER]))
-@settings(max_examples=25)
-def test_every_part_of_every_instance_is_drawn_once(seed: int, limit: float | None, fraction: float) -> None:
-    camera, _ = scene()
-    result = patchwork(seed)
-    always = tuple(np.random.default_rng(seed).random(4) < 0.2)
-    plan = plan_of(AssetSight(result, camera, limit is not None), limit, keeping(fraction, *always))
     placed = result.assets.placed
+    plan, seen, unseen = drawn(result, camera, limit, keeping(fraction))
     check_plan(placed, plan)
-    assert np.isin(np.flatnonzero(np.array(always)[placed.instances.asset]), plan.whole).all()
-    if fraction == NEVER:
-        assert np.array(always)[placed.instances.asset[plan.whole]].all()
+    assert len(seen) and len(unseen)
+    assert limit > 0.2 or (len(plan.meshes) and len(plan.kites))
+    assert fraction <= 1.0 or not len(plan.whole)
+    whole = placed.wholes().totals.optical_area.sum()
+    assert optical(placed, plan) + area(seen) < 1.01 * whole
+    assert 0.5 * whole < optical(placed, plan) + area(seen, unseen) < 1.02 * whole
 
 
-def test_what_is_empty_is_explicit_where_most_around_it_is() -> None:
-    """One explicit tetrahedron after the other: no region without points follows more than one of them."""
-    _, result = scene()
-    follows = np.zeros(len(result.tree), int)
-    for one in range(40):
-        alone = np.where(np.arange(len(result.nodes)) == one, EXPLICIT, PROXY)
-        follows += SeenNodes(with_decision(result, alone, 1.0), True).explicit
-    assert follows.max() == 1 and follows.sum() > 40
-
-
-def test_originals_are_those_of_which_most_is_real() -> None:
+def test_assets_that_are_always_originals_are_in_every_place() -> None:
     camera, result = scene()
-    placed, sight = result.assets.placed, AssetSight(with_decision(result, EXPLICIT, 1.0), camera)
-    some = plan_of(sight, 1.0, keeping())
-    faces = np.bincount(some.meshes.instance, some.meshes.totals.polygons, len(placed))
-    part = faces / placed.wholes().totals.polygons
-    for fraction in (0.2, 0.6, 0.95):
-        plan = plan_of(sight, 1.0, keeping(fraction))
-        check_plan(placed, plan)
-        assert plan.whole.tolist() == np.flatnonzero(part >= fraction).tolist()
-    assert len(plan_of(sight, 1e-6, keeping(0.999, kites=False)).whole) == len(placed)
-    assert not len(plan_of(sight, 1e6, keeping(0.001)).whole)
-    everything = plan_of(sight, 1e6, keeping(NEVER, True, True, True, True))
-    assert everything.whole.tolist() == list(range(len(placed))) and not len(everything.facets)
+    asset = result.assets.placed.instances.asset
+    plan, seen, _ = drawn(result, camera, 1e6, keeping(NEVER, True, False, True, True))
+    assert plan.whole.tolist() == np.flatnonzero(asset != 1).tolist()
+    assert not len(plan.meshes) and not len(plan.kites)
+    everything, *facets = drawn(result, camera, 1e6, keeping(NEVER, True, True, True, True))
+    assert everything.whole.tolist() == list(range(COUNT)) and not sum(map(len, facets))
+    # They hide what is behind all the same.
+    alone = result.assets.placed.take(asset == 1)
+    assert len(seen) < 0.8 * len(drawn(run(alone, camera), camera, 1e6, keeping())[1])
 
 
 def real(placed: PlacedAssets, plan: AssetPlan, kites: bool = False) -> set[tuple[int, int]]:
@@ -149,21 +158,16 @@ def real(placed: PlacedAssets, plan: AssetPlan, kites: bool = False) -> set[tupl
 
 
 @pytest.mark.parametrize("fraction", [0.6, NEVER])
-@pytest.mark.parametrize("sharper", ["nearer", "more pixels", "lower limit"])
+@pytest.mark.parametrize("sharper", ["nearer", "lower limit"])
 def test_what_is_real_stays_real_as_the_camera_comes_closer(fraction: float, sharper: str) -> None:
-    camera, result = scene()
-    result = with_decision(result, EXPLICIT, 1.0)
-    placed, before, numbers = result.assets.placed, (set(), set()), []
-    for step in range(9):
-        times = 1.5**step
-        own, limit = replace(camera, width=800, height=800), 2.0
-        if sharper == "nearer":
-            own = replace(camera, position=np.array([0, -40.0 + 3.5 * step, 2]))
-        elif sharper == "more pixels":
-            own = replace(camera, width=int(40 * times), height=int(40 * times))
-        else:
-            limit = 20.0 / times
-        plan = plan_of(AssetSight(result, own), limit, keeping(fraction))
+    """Of trees that nothing hides."""
+    placed = placed_of(*map(trees.compiled, KINDS), big(), at=[(x, 20.0, 0) for x in range(-15, 16, 5)])
+    before, numbers = (set(), set()), []
+    for step in range(6):
+        own, limit = support.camera((0, -60.0 + 12 * step, 2), (0, 60, 2.0), pixels=200, view=1.0), 1.0
+        if sharper == "lower limit":
+            own, limit = support.camera((0, -20.0, 2), (0, 60, 2.0), pixels=400, view=1.0), 4.0 / 1.7**step
+        plan, *_ = drawn(run(placed, own), own, limit, keeping(fraction))
         check_plan(placed, plan)
         now = real(placed, plan), real(placed, plan, kites=True)
         assert before[0] <= now[0] and before[1] <= now[1]
@@ -175,231 +179,125 @@ def test_what_is_real_stays_real_as_the_camera_comes_closer(fraction: float, sha
 def test_the_order_of_instances_does_not_matter() -> None:
     camera, result = scene()
     order = np.random.default_rng(2).permutation(COUNT)
-    shared = result.assets
-    inverse = np.argsort(order).astype(np.int32)
-    parts = replace(shared.parts, instance=inverse[shared.parts.instance])
-    moved = SharedAssets(shared.placed.take(order), camera)
-    moved.hold(parts, shared.points)
     found = []
-    for own in (shared, moved):
-        placed = own.placed
-        plan = plan_of(AssetSight(replace(result, assets=own), camera), 1.0, keeping(0.6))
-        made = [f for f, _ in planned_facets(AssetSight(replace(result, assets=own), camera), plan, FacetPixels(1.0))]
-        keys = [np.sort(placed.keys(p)) for p in (plan.meshes, plan.kites)] + [placed.keys(plan.facets.parts)]
-        found.append(
-            [np.sort(placed.instances.key[plan.whole]), *keys, *(f.centre for f in made), *(f.side for f in made)]
-        )
+    for placed in (result.assets.placed, result.assets.placed.take(order)):
+        plan, *facets = drawn(run(placed, camera), camera, 1.0, keeping(0.6))
+        keys = [np.sort(placed.keys(parts)) for parts in (plan.meshes, plan.kites)]
+        places = [np.sort(own, axis=0) for one in facets for own in (one.centre, one.side, one.colour)]
+        found.append([np.sort(placed.instances.key[plan.whole]), *keys, *places])
     for one, other in zip(*found, strict=True):
         assert np.array_equal(one, other)
 
 
-def test_without_facets_only_what_is_explicit_is_drawn() -> None:
-    camera, result = scene()
+@given(st.integers(0, 2**31), st.sampled_from([0.3, 0.6, 1.0, NEVER]))
+@settings(max_examples=3)
+def test_where_shells_stand_for_all_else_what_is_explicit_is_drawn(seed: int, fraction: float) -> None:
+    _, result = scene()
+    placed = result.assets.placed
     for decision in (PROXY, HIDDEN):
-        plan = plan_of(AssetSight(with_decision(result, decision), camera, False), None, keeping(0.6))
-        assert not len(plan.whole) and not len(plan.meshes)
-        check_plan(result.assets.placed, plan)
-    plan = plan_of(AssetSight(with_decision(result, EXPLICIT), camera, False), None, keeping(0.6))
-    assert len(plan.whole) == len(result.assets.placed)
+        plan = explicit_plan(with_decision(result, decision), keeping(fraction))
+        assert not any(map(len, (plan.whole, plan.meshes, plan.kites)))
+    assert len(explicit_plan(with_decision(result, EXPLICIT), keeping(min(fraction, 1.0))).whole) == COUNT
+    every = explicit_plan(with_decision(result, EXPLICIT), keeping())
+    check_cover(placed, every.meshes)
+    mixed = explicit_plan(patchwork(seed), keeping(fraction))
+    check_plan(placed, mixed)
+    part = np.bincount(mixed.meshes.instance, mixed.meshes.totals.polygons, COUNT)
+    assert (part < fraction * placed.wholes().totals.polygons).all()
 
 
-def test_nothing_hidden_is_real_and_nothing_at_all_makes_nothing() -> None:
+def test_what_is_behind_a_wall_is_few_large_facets_wherever_it_is() -> None:
+    """Hidden means covered, by whatever it is: nothing behind is real, however near."""
     camera, result = scene()
-    sight = AssetSight(with_decision(result, HIDDEN, 0.0), camera)
-    plan = plan_of(sight, 1.0, keeping(0.6))
-    check_plan(result.assets.placed, plan)
-    assert not len(plan.whole)
-    portions = sight.portions()
-    assert (portions.visibility > 0).mean() < 0.2  # thick wood close to the camera
-    none = SharedAssets(PlacedAssets.none(), camera)
-    plan = plan_of(AssetSight(replace(result, assets=none), camera), 1.0, Keeping(np.zeros(0, bool)))
-    assert not any(map(len, (plan.whole, plan.meshes, plan.kites, plan.facets)))
+    placed = result.assets.placed
+    result = run(placed.take(placed.instances.position[:, 1] > 10.0), camera)
+    wall = np.array([[[-40.0, -5.5, -20], [40, -5.5, -20], [0, -5.5, 60]]])
+    open_, walled = (drawn(result, camera, 0.2, keeping(), occluders=own) for own in (None, wall))
+    plan, seen, unseen = walled
+    assert not any(map(len, (plan.whole, plan.meshes, plan.kites, seen)))
+    assert len(open_[0].meshes) > 10 and 0 < len(unseen) < 0.2 * len(open_[1])
 
 
-@given(st.integers(0, 2**31))
-@settings(max_examples=8)
-def test_what_is_seen_of_clusters_is_the_mean_over_their_points(seed: int) -> None:
-    result = patchwork(seed)
+def test_nothing_at_all_makes_nothing() -> None:
     camera, _ = scene()
-    sight = AssetSight(result, camera)
-    found, points = sight.portions(), result.assets.points
-    assert (np.diff(found.rank) >= 0).all()
-    seen = np.zeros(len(result.tree))
-    shown = result.decision != HIDDEN
-    seen[result.nodes[shown]] = result.transmittance[shown]
-    place = {key: i for i, key in enumerate(result.assets.placed.keys(result.assets.parts).tolist())}
-    for row, key in enumerate(result.assets.placed.keys(found.parts).tolist()):
-        own = np.flatnonzero(points.part == place[key])
-        weight = points.optical_area[own].astype(float)
-        weight /= weight.sum()
-        if weight @ (seen[points.cell[own]] > 0) > SOME:
-            # What is hidden and near counts a little.
-            assert found.visibility[row] >= weight @ seen[points.cell[own]] - 1e-6
-            assert found.visibility[row] <= weight @ seen[points.cell[own]] + 1 / 200
+    placed = placed_of(trees.compiled("tree"), at=[(0, -50.0, 0), (0, 30, 0)])
+    plan, seen, unseen = drawn(run(placed, camera), camera, 1e6, Keeping(np.zeros(1, bool), NEVER))
+    assert not any(map(len, (plan.whole, plan.meshes, plan.kites)))
+    assert len(seen) and len(unseen)
+    none = PlacedClusters(PlacedAssets.none(), camera, Keeping(np.zeros(0, bool)), 1.0, np.zeros(0, str))
+    assert not len(none.everything()) and not list(none.unseen(ClusterRows.empty(), np.zeros(0), np.zeros(0), []))
 
 
-@given(st.integers(0, 2**31))
-@settings(max_examples=8)
-def test_opening_keeps_all_that_there_is(seed: int) -> None:
-    camera, _ = scene()
-    sight = AssetSight(patchwork(seed), camera)
-    left = sight.portions()
-    before = left.parts.totals.optical_area @ left.visibility
-    done = [AssetPortions.empty()]
-    while len(left):
-        again = sight.assets.can_open(left.parts)
-        done.append(left.take(~again))
-        left, _ = sight.opened(left.take(again))
-    after = AssetPortions.concatenate(done)
-    check_cover(sight.placed, after.parts)
-    whole = sight.portions().parts.totals.optical_area.sum()
-    assert after.parts.totals.optical_area.sum() == pytest.approx(whole, rel=1e-5)
-    assert after.parts.totals.optical_area @ after.visibility == pytest.approx(before, abs=0.1 * whole)
+def test_other_processes_get_what_they_draw_and_no_more() -> None:
+    """Faces of all assets are gigabytes, and meshes of clusters are made here."""
+    placed = scene()[1].assets.placed
+    rows = placed.wholes()
+    sent = pickle.loads(pickle.dumps(placed))
+    assert np.array_equal(sent.kites(rows), placed.kites(rows))
+    assert np.array_equal(sent.keys(rows), placed.keys(rows))
+    assert sum(asset.part.nbytes + asset.face.nbytes for asset in sent.assets.every) == 0
 
 
 # Facets.
 
 
-def facets_of(sight: AssetSight, plan: AssetPlan, pixels: FacetPixels) -> tuple[float, int, float, int]:
-    """Area and number of facets of what is seen, and of what is not."""
-    out = [0.0, 0, 0.0, 0]
-    for facets, seen in planned_facets(sight, plan, pixels):
-        for column in (facets.centre, facets.across, facets.along, facets.side, facets.colour):
-            assert np.isfinite(column).all()
-        assert np.linalg.norm(facets.normal, axis=1) == pytest.approx(1.0, abs=1e-6)
-        assert (facets.side > 0).all()
-        out[0 if seen else 2] += float((facets.side**2).sum())
-        out[1 if seen else 3] += len(facets)
-    return tuple(out)
+def free(*, at: list, linear: np.ndarray | None = None, kind: str = "tree") -> tuple[PlacedAssets, Camera]:
+    """Trees that nothing hides, and a camera."""
+    return placed_of(trees.compiled(kind), at=at, linear=linear), support.camera((0, -7, 2), (0, 60, 1.0), 400, 1.0)
 
 
-def by_chance(sight: AssetSight, plan: AssetPlan, pixels: float) -> float:
+def by_chance(facets: Facets) -> float:
     """What an area of facets may be off, as their numbers are whole: four deviations."""
-    sizes = asset_plan.sizes_of(sight, plan.facets)
-    leaf, wood = sizes.sides(FacetPixels(pixels))
-    return 2.0 * float(np.sqrt((sizes.totals.leaf_area * leaf**2 + sizes.totals.wood_area / 2 * wood**2).sum()))
+    return 4.0 * float(np.sqrt((facets.side**4).sum()))
 
 
-@pytest.mark.parametrize("pixels", [0.5, 1.0, 3.0])
-@pytest.mark.parametrize("visibility", [1.0, 0.2])
-def test_facets_have_the_optical_area_of_what_they_stand_for(
-    pixels: float, visibility: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    camera, result = scene()
-    sight = AssetSight(with_decision(result, PROXY, visibility), camera)
-    plan = plan_of(sight, 1.0, keeping())
-    assert not len(plan.meshes) and not len(plan.kites)
-    whole = plan.facets.parts.totals.optical_area.sum()
-    weighted = facets_of(sight, plan, FacetPixels(pixels))[0]
-    assert 0.2 * whole < weighted < 1.02 * whole + by_chance(sight, plan, pixels)
-    monkeypatch.setattr(asset_facets, "asset_weights", lambda _placed, parts, _number: np.ones(len(parts)))
-    assert facets_of(sight, plan, FacetPixels(pixels))[0] == pytest.approx(
-        whole, abs=0.01 * whole + by_chance(sight, plan, pixels)
-    )
-
-
-def test_facets_that_are_few_have_the_weights_of_their_clusters() -> None:
-    """Those of clusters that are not opened, one by one."""
+def test_facets_have_the_weights_of_their_clusters() -> None:
     placed = placed_of(big(), at=[(0, 40.0 + 4 * i, 0) for i in range(200)])
     camera = support.camera((0, -7, 2), (0, 60, 1.0), pixels=160, view=1.0)
-    sight = AssetSight(with_decision(run(placed, camera), PROXY, 1.0), camera)
-    plan = plan_of(sight, 1.0, Keeping(np.zeros(1, bool)))
-    sizes = asset_plan.sizes_of(sight, plan.facets)
-    pixels = FacetPixels(4.0)
-    assert (sizes.counts(pixels) < asset_plan.MANY).all()
-    leaf, _ = sizes.sides(pixels)
-    weight = asset_facets.asset_weights(placed, plan.facets.parts, sizes.whole_optical / leaf**2)
-    wanted = plan.facets.parts.totals.optical_area @ weight
-    found = facets_of(sight, plan, pixels)[0]
-    assert found == pytest.approx(wanted, abs=0.01 * wanted + by_chance(sight, plan, pixels.seen))
+    clusters = PlacedClusters(placed, camera, Keeping(np.zeros(1, bool), NEVER), 1e6, np.full(200, ""))
+    rows = clusters.everything()
+    for side in (0.3, 1.0, 3.0):
+        sides = np.full(len(rows), side)
+        made = Facets.concatenate([own for _, own in clusters.unseen(rows, sides, np.ones(len(rows)), [])])
+        assert np.linalg.norm(made.normal, axis=1) == pytest.approx(1.0, abs=1e-6)
+        weight = asset_facets.asset_weights(placed, rows, rows.totals.optical_area / side**2)
+        assert area(made) == pytest.approx(rows.totals.optical_area @ weight, abs=by_chance(made))
 
 
 def test_facets_of_stretched_and_mirrored_instances_face_as_their_faces() -> None:
     """Moments of normals by area against those of the real triangles."""
     for stretch in ((1, 1, 3), (-1, 1, 1), (-2, 0.5, 1)):
         linear = np.diag(stretch).astype(float)
-        placed = placed_of(trees.compiled("tree"), at=[(0, 30.0, 0)], linear=linear[None])
-        camera = support.camera((0, -7, 2), (0, 60, 1.0), pixels=400, view=1.0)
-        sight = AssetSight(with_decision(run(placed, camera), PROXY, 1.0), camera)
-        plan = plan_of(sight, 1.0, Keeping(np.zeros(1, bool)))
-        made = [f for f, _ in planned_facets(sight, plan, FacetPixels(0.5))]
-        normal, area = np.concatenate([f.normal for f in made]), np.concatenate([f.side**2 for f in made])
-        found = (normal * area[:, None]).T @ normal / area.sum()
+        placed, camera = free(at=[(0, 30.0, 0)], linear=linear[None])
+        _, *made = drawn(run(placed, camera), camera, 1e6, Keeping(np.zeros(1, bool), NEVER), 0.5)
+        normal, size = (
+            np.concatenate([of for of in own]) for own in zip(*((f.normal, f.side**2) for f in made), strict=True)
+        )
+        found = (normal * size[:, None]).T @ normal / size.sum()
         corners, *_ = trees.triangles_of(trees.source("tree"))
         vector = np.cross(*np.moveaxis((corners[:, 1:] - corners[:, :1]) @ linear.T, 1, 0))
         size = np.linalg.norm(vector, axis=1)
-        optical = np.where(np.arange(len(size)) < 176, 0.5, 1.0) * size
+        blocked = np.where(np.arange(len(size)) < 176, 0.5, 1.0) * size
         unit = vector / size[:, None]
-        assert found == pytest.approx((unit * optical[:, None]).T @ unit / optical.sum(), abs=0.06)
+        assert found == pytest.approx((unit * blocked[:, None]).T @ unit / blocked.sum(), abs=0.06)
         centre = np.concatenate([f.centre for f in made])
         world = corners.reshape(-1, 3) @ linear.T + placed.instances.position[0]
         assert (centre >= world.min(axis=0) - 0.1).all() and (centre <= world.max(axis=0) + 0.1).all()
 
 
 def test_colours_of_facets_are_those_of_faces() -> None:
-    placed = placed_of(trees.compiled("card"), at=[(x, 30.0, 0) for x in range(20)])
-    camera = support.camera((0, -7, 2), (0, 60, 1.0), pixels=400, view=1.0)
-    sight = AssetSight(with_decision(run(placed, camera), PROXY, 1.0), camera)
-    plan = plan_of(sight, 1.0, Keeping(np.zeros(1, bool)))
-    colours = np.concatenate([f.colour for f, _ in planned_facets(sight, plan, FacetPixels(1.0))])
-    assert len(colours)
+    placed, camera = free(at=[(x, 30.0, 0) for x in range(20)], kind="card")
+    _, seen, unseen = drawn(run(placed, camera), camera, 1e6, Keeping(np.zeros(1, bool), NEVER))
+    assert len(seen)
+    colours = np.concatenate([own.colour for own in (seen, unseen) if len(own)])
     assert colours.mean(axis=0) == pytest.approx(trees.GREEN, rel=0.1)
 
 
-@pytest.mark.parametrize("limit", [0.2, 1.0, 5.0, 1e3])
-@pytest.mark.parametrize("pixels", [0.7, 2.0])
-def test_what_is_expected_is_about_what_is_made(limit: float, pixels: float) -> None:
-    """Never far fewer; more where wood and leaves of a tree that is seen as a whole differ in width."""
+def test_finer_facets_are_more_and_fewer_are_real_beyond_a_higher_limit() -> None:
     camera, result = scene()
-    sight = AssetSight(result, camera)
-    for kites in (True, False):
-        own = keeping(NEVER, False, True, False, False, kites=kites)
-        plan = plan_of(sight, limit, own)
-        assert kites or not len(plan.kites)
-        _, seen, _, hidden = facets_of(sight, plan, FacetPixels(pixels))
-        made = plan.meshes.totals.polygons.sum() + sight.placed.assets.clusters.leaves[plan.kites.cluster].sum()
-        expected = AssetExpected(sight, own)
-        assert expected.seen(pixels, limit, 0.0) > 0.7 * made - 2500.0
-        assert expected.seen(pixels, limit, 1.0) > 0.7 * (made + seen) - 2500.0
-        if limit / (1.0 if kites else FARTHER) >= 1.0:
-            assert expected.seen(pixels, limit, 1.0) == pytest.approx(made + seen, rel=0.3, abs=2500.0)
-        assert expected.unseen(FacetPixels(pixels)) == pytest.approx(hidden, rel=0.35, abs=200.0)
-
-
-def test_of_leaves_alone_it_is_what_is_made() -> None:
-    at = np.array([((i % 8 - 4) * 3.0, 6.0 + 3 * (i // 8), 0) for i in range(64)])
-    placed = placed_of(trees.compiled("leaves"), at=at)
-    camera = support.camera((0, -7, 2), (0, 60, 1.0), pixels=300, view=1.0)
-    sight = AssetSight(run(placed, camera), camera)
-    own = Keeping(np.zeros(1, bool), NEVER)
-    expected = AssetExpected(sight, own)
-    for limit in (0.5, 1.0, 2.0, 4.0):
-        plan = plan_of(sight, limit, own)
-        made = plan.meshes.totals.polygons.sum() + sight.placed.assets.clusters.leaves[plan.kites.cluster].sum()
-        assert expected.seen(1.0, limit, 0.0) == pytest.approx(made, rel=0.15, abs=1500.0)
-
-
-def test_meshes_in_many_places_cost_memory_once() -> None:
-    camera, result = scene()
-    sight = AssetSight(with_decision(result, EXPLICIT, 1.0), camera)
-    each, shared = (AssetExpected(sight, keeping(shared=shared, kites=False)) for shared in (False, True))
-    there = sum(one.faces for one in sight.placed.assets.every)
-    whole = sight.placed.wholes().totals.polygons.sum()
-    assert each.seen(1.0, 1e-9, 0.0) == each.seen(1.0, 1e-9, 0.0, memory=True) == pytest.approx(whole)
-    assert shared.seen(1.0, 1e-9, 0.0) == pytest.approx(SHARED * whole)
-    assert shared.seen(1.0, 1e-9, 0.0, memory=True) == pytest.approx(SHARED * whole + there)
-    none = AssetExpected(
-        AssetSight(replace(result, assets=SharedAssets(PlacedAssets.none(), camera)), camera), keeping()
-    )
-    assert none.seen(1.0, 1.0, 1.0, memory=True) == none.unseen(FacetPixels(1.0)) == 0.0
-
-
-def test_more_is_expected_of_finer_detail() -> None:
-    camera, result = scene()
-    expected = AssetExpected(AssetSight(result, camera), keeping())
-    by_limit = [expected.seen(1.0, limit, 0.0) for limit in (0.01, 0.1, 1.0, 10.0, 100.0)]
-    assert by_limit == sorted(by_limit, reverse=True)
-    by_pixels = [expected.seen(pixels, 1e6, 1.0) for pixels in (0.3, 1.0, 3.0, 9.0)]
-    assert by_pixels == sorted(by_pixels, reverse=True)
-    everything = AssetExpected(AssetSight(result, camera), keeping(NEVER, True, True, True, True))
-    assert everything.seen(1.0, 0.1, 1.0) == everything.unseen(FacetPixels(1.0)) == 0.0
+    numbers = [len(drawn(result, camera, 1e6, keeping(), pixels)[1]) for pixels in (0.5, 1.0, 2.0, 4.0)]
+    assert all(a > b for a, b in pairwise(numbers))
+    faces = [
+        drawn(result, camera, limit, keeping())[0].meshes.totals.polygons.sum() for limit in (0.05, 0.5, 5.0, 50.0)
+    ]
+    assert all(a >= b for a, b in pairwise(faces)) and faces[0] > faces[-1]

@@ -237,9 +237,8 @@ def number_of(most: int | None = None) -> int:
     flora, _, camera, result = wood()
     settings = RefinementSettings() if most is None else RefinementSettings(max_polygons=most)
     detail = afford(result, camera, settings)
-    sizes = detail.pixels
-    options = {"hidden": sizes.hidden, "most": detail.most}
-    blocks, facets, _ = support.drawn(flora, result, camera, sizes.seen, detail.leaf_limit, **options)
+    options = {"hidden": detail.coarser, "most": detail.most}
+    blocks, facets, _ = support.drawn(flora, result, camera, detail.facet, detail.leaf_limit, **options)
     return sum(b.buffers.polygons for b in blocks) + len(facets)
 
 
@@ -253,9 +252,7 @@ def test_a_budget_holds(share: float) -> None:
 def test_less_memory_is_coarser_everywhere() -> None:
     """Error grows evenly: facets grow with the root of what is missing."""
     _, _, camera, result = wood()
-    sides = [
-        afford(result, camera, RefinementSettings(max_polygons=most)).pixels.seen for most in (100_000, 25_000, 6_000)
-    ]
+    sides = [afford(result, camera, RefinementSettings(max_polygons=most)).facet for most in (100_000, 25_000, 6_000)]
     assert sides == sorted(sides)
     assert sides[2] / sides[1] == pytest.approx(2.0, rel=0.5)
 
@@ -269,7 +266,7 @@ def test_qualities_are_in_order() -> None:
     for name in ("FINAL", "PREVIEW", "DRAFT"):
         quality = QUALITIES[name]
         settings = RefinementSettings(facet=quality["facet"], leaf_limit=quality["leaf_limit"])
-        sides.append(afford(result, camera, settings).pixels.seen)
+        sides.append(afford(result, camera, settings).facet)
     assert sides == sorted(sides)
 
 

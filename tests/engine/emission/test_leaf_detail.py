@@ -130,7 +130,7 @@ def test_limits_hold_up_close() -> None:
     def number(settings: RefinementSettings) -> int:
         detail = afford(result, camera, settings)
         given = support.refined(
-            flora, result, camera, detail.pixels.seen, detail.leaf_limit, weighted=False, most=detail.most
+            flora, result, camera, detail.facet, detail.leaf_limit, weighted=False, most=detail.most
         )
         blocks = list(given.mesh_blocks())
         return sum(b.buffers.polygons for b in blocks) + sum(

@@ -93,7 +93,7 @@ def divided(
         dividing = np.zeros(len(tree), bool)
         dividing[nodes] = True
         plants.update(tree, dividing, np.zeros(len(tree)))
-    return tree, Contents(*plants.held(len(tree)))
+    return tree, Contents(*plants.held_apart(len(tree)))
 
 
 @given(st.integers(0, 2**31), st.sampled_from(["PERSP", "ORTHO"]))

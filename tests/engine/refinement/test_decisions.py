@@ -16,7 +16,6 @@ from tests.engine import support
 from tetflora_addon.refinement.contents import Totals
 from tetflora_addon.refinement.decisions import (
     BAND,
-    FACET_BLOCK,
     Decision,
     Terminals,
     decide,
@@ -117,7 +116,7 @@ def test_what_can_never_be(case: dict, cutoff: float) -> None:
         assert out != Decision.EXPLICIT
     if out == Decision.PROXY:  # facets take their places from the plants, to which a part of a block is enough
         small = case["pixels"] * case["transmittance"] * case["opacity"] <= cutoff**2
-        assert small or case["pixels"] <= (FACET_BLOCK * options.block) ** 2
+        assert small or case["pixels"] <= options.block**2
         shells = replace(options, proxy_block=1e9)
         assert small or become(**case, settings=shells) == Decision.SPLIT
     if out == Decision.SPLIT:
@@ -172,7 +171,7 @@ def test_the_last_few_cells_are_not_worth_a_pass() -> None:
 
 
 @given(
-    st.floats(6.0, 40.0).filter(lambda side: abs(side - FACET_BLOCK * SETTINGS.block) > 0.01),
+    st.floats(6.0, 40.0).filter(lambda side: abs(side - SETTINGS.block) > 0.01),
     st.floats(0.3, 1.0),
     st.floats(0.01, 2.0 * BAND),
 )
@@ -180,4 +179,4 @@ def test_how_finely_space_is_divided_does_not_tell_leaves_from_facets(side: floa
     """Else what is seen of all the others would be known better, or worse, from where on the first leaves are real."""
     width *= SETTINGS.leaf_limit  # a pixel is a metre wide there
     divided = become(side**2, seen, width=width) == Decision.SPLIT
-    assert divided == (side > FACET_BLOCK * SETTINGS.block)
+    assert divided == (side > SETTINGS.block)

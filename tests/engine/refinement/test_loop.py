@@ -316,7 +316,7 @@ def test_what_is_hidden_is_not_opened_more_than_what_is_seen(species: str, view:
     """In a small wood, hidden tetrahedra hold no more of the parts that plants have been opened into than seen ones."""
     flora, which = support.flora(), support.SPECIES.index(species)
     _, result = run(flora, support.grove(49, 4.0, which), support.camera(*view, pixels=480, view=1.0))
-    subplants, bodies = result.plants.held(len(result.tree))
+    subplants, bodies = result.plants.held_apart(len(result.tree))
     of_opened = subplants.cell[subplants.items.row != flora.first_row[which]]
     cell = np.concatenate([of_opened, bodies.cell])
     hidden = result.chosen(Decision.HIDDEN)[cell]

@@ -137,7 +137,7 @@ def test_sums_over_nodes_are_sums_over_parts(view: tuple[int, str]) -> None:
     every = sums(*plants.totals(np.ones(nodes, bool)), nodes)
     chosen = np.random.default_rng(view[0]).random(nodes) < 0.5
     some = sums(*plants.totals(chosen), nodes)
-    subplants, bodies = plants.held(nodes)
+    subplants, bodies = plants.held_apart(nodes)
     cells = np.concatenate([subplants.cell, bodies.cell])
     held = sums(Totals.concatenate([subplants.totals, bodies.totals]), cells, nodes)
     for name in ("leaf_area", "wood_area", "polygons", "width"):
@@ -265,7 +265,7 @@ def check_same(one: SharedPlants, other: SharedPlants) -> None:
 QUESTIONS = {
     "parts": lambda plants, tree: plants.parts,
     "points": lambda plants, tree: plants.points,
-    "held": lambda plants, tree: plants.held(len(tree)),
+    "held": lambda plants, tree: plants.held_apart(len(tree)),
     "numbers": lambda plants, tree: plants.numbers,
     "bytes": lambda plants, tree: plants.nbytes,
 }
@@ -352,7 +352,7 @@ def test_nobody_is_shared_by_nobody() -> None:
     tree = view_root(plants.camera, np.array([[-1.0, -1, 0], [1, 1, 2]]))
     dividing = np.arange(len(tree)) == 0
     assert (plants.update(tree, dividing, np.ones(len(tree))) == dividing).all()
-    assert [len(held) for held in plants.held(len(tree))] == [0, 0]
+    assert [len(held) for held in plants.held_apart(len(tree))] == [0, 0]
     assert plants.nbytes == 0
 
 

@@ -27,13 +27,12 @@ from ...assets.kites import kite_mesh
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
-from ...emission.asset_plan import AssetPlan, plan_of
-from ...emission.asset_sight import AssetSight
+from ...emission.asset_plan import AssetPlan, PlacedClusters
 from ...emission.budget import afford
 from ...emission.drawing import drawing
 from ...emission.forms import Refined
 from ...emission.plants import Block, Transition, expanded_blocks
-from ...emission.polygons import PolygonBlock, polygon_blocks
+from ...emission.polygons import PolygonBlock
 from ...jobs import Progress, mapped
 from ...processes import pool
 from ...proxies.facet_weights import facet_weights, measuring, unmeasured
@@ -553,42 +552,40 @@ def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, Refined
     form = run.form.emission
     refinement = yield from _run_loop(run)
     yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
-    assets = None if bound is None else (AssetSight(refinement, camera, form.facets), bound.keeping)
     if form.facets and unmeasured(flora):
         yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
         for name, done in measuring(flora, range(len(flora.species))):
             yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
         yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
-    detail = afford(refinement, camera, run.settings, form.faces, form.primitive_bytes, assets)
+    detail = afford(refinement, camera, run.settings, form.faces)
     run.clock.lap("refine")
     _count(statistics, detail.refinement)
     statistics.strays = given.named(refinement.strays)
-    planned = None
-    if assets is not None:
-        sight = assets[0] if detail.refinement is refinement else AssetSight(detail.refinement, camera, form.facets)
-        planned = sight, plan_of(sight, detail.asset_limit if form.facets else None, bound.keeping)
-    refinement = detail.refinement
+    refinement, keeping = detail.refinement, None if bound is None else bound.keeping
     if not form.facets:
-        return Refined(flora, refinement, camera, tolerance=detail.tolerance, assets=planned)
-    transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
+        return Refined(flora, refinement, camera, tolerance=detail.tolerance, keeping=keeping)
+    clusters = None
+    if bound is not None:
+        looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner]
+        how = bound.keeping, detail.asset_limit, looks, detail.asset_larger
+        clusters = PlacedClusters(refinement.assets.placed, camera, *how)
     # Light is baked for facets, whatever is made of them then.
     becomes = None if run.baking is not None else form.form(camera, disc)
-    sizes, weights = detail.pixels, facet_weights(flora)
     with_all = drawing(
         flora,
         refinement,
         camera,
-        transition,
-        sizes.seen,
-        weights,
-        sizes.hidden,
+        Transition(flora, camera, detail.leaf_limit, detail.tolerance),
+        detail.facet,
+        facet_weights(flora),
+        detail.coarser,
         given.occluders,
         becomes,
         detail.most,
         run.settings.shadow_cutoff,
+        clusters,
     )
-    looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner] if bound else np.zeros(0, str)
-    return Refined(flora, refinement, camera, detail.of_assets, with_all, detail.tolerance, planned, disc, looks)
+    return Refined(flora, refinement, camera, with_all, detail.tolerance, keeping, disc)
 
 
 def _write_refined(run: _Run) -> Generator[Progress, bool | None, None]:
@@ -604,10 +601,9 @@ def _write_refined(run: _Run) -> Generator[Progress, bool | None, None]:
     in_main_thread(run.results.open)
     yield from _write_blocks(run, refined.mesh_blocks(), _LOOP_FRACTION)
     if given.explicit is not None:
-        pixels = None if refined.pixels is None else refined.pixels.seen
-        yield from _write_polygons(run, polygon_blocks(refined.refinement, run.camera, pixels))
-    if refined.assets is not None:
-        yield from write_assets(run, refined.assets[1])
+        yield from _write_polygons(run, refined.polygon_blocks())
+    if run.bound is not None:
+        yield from write_assets(run, refined.asset_plan())
     if run.baking is not None:
         run.clock.lap("emit")
         yield from _bake_light(run.baking, refined)

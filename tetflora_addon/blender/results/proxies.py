@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...buffers import MeshBuffers, PointBuffers
-from ...emission.forms import ASSETS, Buffers, Refined
+from ...emission.asset_plan import ASSETS
+from ...emission.forms import Buffers, Refined
 from ...emission.light import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ...jobs import Progress
 from ...refinement.statistics import Statistics

@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts of plants as the frontier draws them: leaves, wood and facets.
+
+A leaf is drawn as itself where a facet would be about as large (`plants.Transition`). Branches that are opened are
+tubes while they are macroscopic, and else one thin triangle each, with the direction and the area of the branch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..compiled.placed import extents
+from ..growth.axes import axes
+from ..growth.branches import Branches
+from ..growth.growth import WholeBranches
+from ..growth.hashing import Draw, uniform
+from ..proxies.facet_weights import FacetWeights
+from ..proxies.hotspots import light_ratios
+from ..proxies.microsurfaces import Facets, piece_facets, subplant_facets
+from ..refinement.contents import PlantParts, as_pieces
+from ..refinement.decisions import real_fraction
+from ..refinement.lights import Light
+from ..refinement.shares import opened
+from ..species.species import LEAF_KINDS
+from ..subplants.leaf_meshes import leaf_meshes
+from ..subplants.pieces import Pieces, whole_pieces
+from ..subplants.tubes import tube_buffers
+from ..subplants.twigs import twig_buffers
+from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
+from .plants import Transition
+
+#: Pixels from which on a branch that nothing else grows on has a line of its own; smaller ones are as straight.
+LINES = 6.0
+#: Width in pixels up to which wood is thin triangles; tubes take their place up to `decisions.BAND` times that.
+TUBES = 0.8
+#: Pixels that the axis of a branch may be off a straight line; ribbons follow those that bend more.
+BENT = 0.5
+#: Width in pixels from which on tubes have all of their sides, and how many they have below.
+BROAD, SIDES = 4.0, 4
+#: Fraction of a facet's area from which on each branch has a triangle; of smaller ones fewer have a wider one.
+TWIG = 0.6
+#: Draw of this module.
+_THIN = 231
+
+
+@dataclass(frozen=True)
+class GrownPlants(FrontierKind):
+    """Sub-plants, and branches without what grows on them.
+
+    Attributes
+    ----------
+    flora : Flora
+    camera : Camera
+    transition : Transition
+    weights : FacetWeights
+    lights : sequence of Light
+    """
+
+    flora: Flora
+    camera: Camera
+    transition: Transition
+    weights: FacetWeights
+    lights: Sequence[Light]
+
+    def spheres(self, parts: PlantParts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As far as samples of their leaves and wood reach."""
+        branches, alone = parts.branches, parts.alone
+        across, low, high = extents(self.flora, branches).T
+        middle = np.where(alone, 0.5, 0.5 * (np.minimum(low, 0.0) + high)) * branches.length
+        half = np.where(alone, 0.5, 0.5 * (high - np.minimum(low, 0.0)))
+        across = np.where(alone, 0.5 * parts.extent / np.maximum(branches.length, 1e-12), across)
+        centre = branches.position + middle[:, None] * branches.frame[:, :, 2]
+        return centre, branches.length * np.hypot(across, half) + branches.radius
+
+    def optical(self, parts: PlantParts) -> NDArray[np.float64]:
+        """As of `FrontierKind`."""
+        return parts.totals.optical_area
+
+    def one_leaf(self, parts: PlantParts) -> NDArray[np.float64]:
+        """As of `FrontierKind`."""
+        return self.flora.one_leaf_area(parts.branches)
+
+    def enough(self, parts: PlantParts) -> NDArray[np.float64]:
+        """As of `FrontierKind`."""
+        bound = extents(self.flora, parts.branches, farthest=False)
+        silhouette = 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * parts.branches.length**2
+        whole = parts.alone | ~parts.can_open(self.flora)
+        return np.where(whole, 1.0, opaque_fractions(silhouette, parts.totals.optical_area))
+
+    def can_open(self, parts: PlantParts) -> NDArray[np.bool_]:
+        """As of `FrontierKind`."""
+        return parts.can_open(self.flora)
+
+    def opened(self, parts: PlantParts) -> tuple[PlantParts, NDArray[np.int64]]:
+        """As of `FrontierKind`."""
+        made = list(opened(self.flora, parts))
+        owner = np.concatenate([np.zeros(0, np.int64), *(of for _, of, _ in made)])
+        return PlantParts.concatenate([new for new, _, _ in made]), owner
+
+    def to_be_opened(self, parts: PlantParts) -> NDArray[np.bool_]:
+        """Those of which leaves are real."""
+        return self.transition.of_branches(parts.branches) > 0.0
+
+    def ordered(self, parts: PlantParts) -> PlantParts:
+        """As of `FrontierKind`."""
+        return parts.take(np.lexsort([*parts.branches.position.T, parts.branches.key]))
+
+    def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], _shown: list[Shown]) -> None:
+        """As of `FrontierKind`."""
+        parts, branches = slab.parts, slab.parts.branches
+        extent = self.camera.extent_around(slab.centre)
+        lines = parts.alone | ~parts.can_open(self.flora)
+        lines &= parts.alone | (2.0 * slab.radius > LINES * extent) | (self.transition.of_branches(branches) > 0)
+        self._draw_subplants(canvas, branches.take(np.flatnonzero(~lines)), side[~lines])
+        self._draw_branches(canvas, branches.take(np.flatnonzero(lines)), side[lines])
+
+    def unseen(
+        self, parts: PlantParts, side: NDArray[np.float64], kept: NDArray[np.float64], _shown: list[Shown]
+    ) -> Iterator[tuple[Whose, Facets]]:
+        """As of `FrontierKind`."""
+        species = self.flora.species_of(parts.branches.row)
+        for s in np.unique(species).tolist():
+            some = np.flatnonzero((species == s) & ~parts.alone)
+            if len(some):
+                yield (s, ""), self._of_subplants(parts.branches.take(some), side[some], side[some], 1.0 - kept[some])
+            some = np.flatnonzero((species == s) & parts.alone)
+            if len(some):
+                yield (s, ""), self._of_pieces(as_pieces(parts.branches.take(some)), side[some])
+
+    def _draw_subplants(self, canvas: Canvas, branches: Branches, side: NDArray[np.float64]) -> None:
+        if not len(branches):
+            return
+        leaf, species = (
+            np.maximum(side, np.sqrt(self.flora.one_leaf_area(branches))),
+            self.flora.species_of(branches.row),
+        )
+        for s in np.unique(species).tolist():
+            some = np.flatnonzero(species == s)
+            own = branches.take(some)
+            canvas.add_facets((s, ""), self._of_subplants(own, leaf[some], side[some], seen=True))
+
+    def _of_subplants(
+        self,
+        branches: Branches,
+        leaf: NDArray[np.float64],
+        wood: NDArray[np.float64],
+        left_out: NDArray[np.float64] | None = None,
+        seen: bool = False,
+    ) -> Facets:
+        count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
+        weight = self.weights.of_subplants(branches.row, count, self._share(branches))
+        once = self._once(branches, leaf) if seen else None
+        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, once)
+
+    def _draw_branches(self, canvas: Canvas, branches: Branches, side: NDArray[np.float64]) -> None:
+        """Branches alone: leaves that are large are real, wood is tubes or thin triangles, the rest is facets."""
+        if not len(branches):
+            return
+        flora, transition = self.flora, self.transition
+        branches = replace(branches, plant=np.arange(len(branches), dtype=np.int32))
+        whole, real = WholeBranches(branches, axes(flora.rows, branches)), transition.of_own_leaves(branches)
+        pieces, owner = whole_pieces(flora.rows, whole)
+        species = flora.species_of(branches.row)
+        extent = np.maximum(transition.camera.extent_around(branches.position), 1e-300)
+        wide = 2.0 * branches.radius / extent
+        tubes = uniform(branches.key, Draw.TRANSITION) < real_fraction(wide, TUBES)
+        thin, detail = wide < BROAD, transition.detail
+        for s in np.unique(species).tolist():
+            own = species == s
+            left = np.flatnonzero(own[owner] & (real[owner] < 1.0))
+            if len(left):
+                canvas.add_facets(
+                    (s, ""), self._of_pieces(pieces.take(left), side[owner[left]], real[owner[left]], seen=True)
+                )
+            some = whole.take(np.flatnonzero(own & (real > 0.0)))
+            made = leaf_meshes(flora, s, [some], lambda b: (real[b.plant], transition.of_kites(b)), detail.lengths)
+            for one in made if len(some) else ():
+                canvas.add_mesh((LEAF_KINDS[one.kind], one.form, s), one.buffers, True)
+            # What is a few pixels wide has few sides; of wider wood all is drawn, or its shading would end at holes.
+            slender, broad = (whole.take(np.flatnonzero(own & tubes & (thin == is_thin))) for is_thin in (True, False))
+            canvas.add_mesh(("bark", 0, s), tube_buffers(flora, [slender], None, SIDES), True)
+            canvas.add_mesh(("bark", 0, s), tube_buffers(flora, [broad], detail.wood))
+            self._draw_twigs(canvas, s, whole.take(np.flatnonzero(own & ~tubes)), side, extent)
+
+    def _draw_twigs(
+        self,
+        canvas: Canvas,
+        species: int,
+        whole: WholeBranches,
+        side: NDArray[np.float64],
+        extent: NDArray[np.float64],
+    ) -> None:
+        """One thin triangle or ribbon each, or of very thin ones wider ones of fewer."""
+        branches = whole.branches
+        area = np.pi * branches.radius * branches.length
+        likely = np.clip(area / (TWIG * side[branches.plant] ** 2), 0.02, 1.0)
+        some = np.flatnonzero(uniform(branches.key, _THIN) < likely)
+        if not len(some):
+            return
+        whole = whole.take(some)
+        # The parts of a bow are off their chords by the square of their share of it.
+        off = whole.lines.bend() / (BENT * extent[branches.plant[some]])
+        parts = np.clip(np.ceil(np.sqrt(off)).astype(np.int64), 1, whole.lines.segments)
+        canvas.add_mesh(("bark", 0, species), twig_buffers(self.flora, whole, 1.0 / likely[some], parts), True)
+
+    def _of_pieces(
+        self, pieces: Pieces, side: NDArray[np.float64], real: NDArray[np.float64] | None = None, seen: bool = False
+    ) -> Facets:
+        """Facets of pieces: of their leaves where they are seen, of their wood as well where they are not."""
+        flora, branches = self.flora, pieces.branches
+        leaf = np.maximum(side, np.sqrt(flora.one_leaf_area(branches)))
+        count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
+        weight = self.weights.of_pieces(branches.row, count, self._share(branches))
+        wood = np.ones(len(pieces), bool) if seen else None
+        once = self._once(branches, leaf) if seen else None
+        return piece_facets(flora, pieces, leaf, side, weight, real, wood, once)
+
+    def _optical(self, branches: Branches) -> NDArray[np.float64]:
+        return self.flora.leaf_areas(branches) + self.flora.wood_areas(branches) / 2
+
+    def _share(self, branches: Branches) -> NDArray[np.float64] | None:
+        """Part (n,) of their leaves that branches have on the day; None in summer."""
+        return None if branches.year is None else self.flora.day.leaf_share(branches)
+
+    def _once(self, branches: Branches, side: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Light (n,) that leaves of branches send to the eye once over what facets do."""
+        return light_ratios(self.flora, branches, side, self.camera, self.lights)
