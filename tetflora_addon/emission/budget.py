@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..camera.camera import Camera
 from ..proxies.facet_sizes import FacetPixels
 from ..refinement.decisions import Decision, contributions
+from ..refinement.estimate import FINEST, NEVER_TOO_MANY
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
 from .asset_expected import AssetExpected
@@ -31,9 +32,6 @@ BYTES_PER_POLYGON = 610
 BYTES_PER_SPHERE = 210
 #: Polygons and facets for each pixel that plants cover, about, with facets of a pixel.
 A_PIXEL = 6.0
-#: Polygons and facets that are never too many: facets are finer than asked for as long as there are no more, up to so
-#: many times.
-NEVER_TOO_MANY, FINEST = 1_200_000.0, 3.0
 #: What an expected number may be off by, and how often a detail is made coarser until it fits.
 RESERVE, _TRIES = 0.15, 24
 #: Facets of what is instanced are so many times finer than those of plants: its originals are at hand.
