@@ -7,9 +7,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..growth.growth import trunks
 from ..growth.seeds import Seeds
+from ..leaves.levels import chosen_polygons
+from ..leaves.models import LeafModel
 from ..species.members import expected_polygons
 from ..species.species import Species
 from .flora import compile_species
@@ -43,6 +46,8 @@ class Crown:
         Mean linear RGB of both, weighted by how much of them is seen from above.
     leaf : float
         Mean width of a leaf, or of a trunk without leaves, meters.
+    form : LeafModel or None
+        One of its leaves, where these are known.
     """
 
     radius: float
@@ -53,11 +58,16 @@ class Crown:
     wood: float = 0.0
     colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
     leaf: float = 0.02
+    form: LeafModel | None = None
 
     @property
     def seen(self) -> float:
         """Area that leaves and wood hide from above, counted singly, m²."""
         return LEVEL * self.leaves + self.wood / np.pi
+
+    def leaf_polygons(self, widths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Polygons (n,) of leaves that are so many times as wide in the image as their margins may be off."""
+        return np.ones(len(widths)) if self.form is None else chosen_polygons(self.form, widths / self.form.width)
 
 
 def known_crown(species: Species) -> Crown | None:
@@ -98,4 +108,5 @@ def _crown_of(species: Species) -> Crown:
     colour = tuple((areas @ colours / areas.sum()).tolist())
     polygons = expected_polygons(flora.species[0])
     leaf = float(flora.leaf_width[row]) if flora.leaf_count[row] > 0 else 2.0 * float(trunk.radius.mean())
-    return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), colour, leaf)
+    form = next((form for forms in flora.forms[0] for form in forms), None) if flora.leaf_count[row] > 0 else None
+    return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), colour, leaf, form)

@@ -11,6 +11,8 @@ import pytest
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import memory
 from tetflora_addon.blender.job import plant_mesh
+from tetflora_addon.blender.results.hiding import hide_originals
+from tetflora_addon.blender.worker import at_once
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -77,6 +79,24 @@ def test_it_is_the_artists_and_survives_clear():
     names = [m.name for m in made.data.materials]
     assert names == ["TetFlora Bush bark", "TetFlora Bush leaf"]
     assert all(m.node_tree.nodes for m in made.data.materials)
+
+
+def test_it_looks_as_the_plant_does_to_renders():
+    scene, plant, lit = bpy.context.scene, add_plant(), bpy.data.collections.new("lit")
+    plant.is_holdout, plant.is_shadow_catcher, plant.hide_render = True, True, True
+    plant.visible_shadow = plant.visible_camera = False
+    plant.pass_index, plant.lightgroup, plant.color = 7, "key", (0.2, 0.4, 0.6, 1.0)
+    plant.light_linking.receiver_collection = lit
+    select(plant)
+    hide_originals(scene, 'VIEW', [plant])  # as results do, which is not the artist's doing
+    (made,) = at_once(plant_mesh.make_plant_mesh_steps(scene, depsgraph(), [plant]))
+    names = ("is_holdout", "is_shadow_catcher", "visible_shadow", "visible_camera", "visible_glossy", "pass_index")
+    for name in (*names, "lightgroup", "hide_render"):
+        assert getattr(made, name) == getattr(plant, name), name
+    assert made.light_linking.receiver_collection == lit
+    assert list(made.color) == list(plant.color)
+    assert not made.hide_viewport
+    assert "tetflora" not in " ".join(made.keys())
 
 
 def test_wood_is_smooth_and_leaves_are_flat_with_materials_of_their_own():

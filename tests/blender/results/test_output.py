@@ -190,6 +190,32 @@ def test_copies_of_results_are_the_artists_when_these_are_gone(scene):
     assert list(scene.collection.children) == [copied]
 
 
+def test_a_full_copy_of_a_scene_has_results_of_its_own(scene):
+    rock = add_mesh("rock", size=0.5)
+    rock.tetflora.is_explicit = True
+    refined(scene)
+    theirs = next(o for o in result_collections(scene)[0].objects if o.type == 'MESH').copy()
+    result_collections(scene)[0].objects.link(theirs)
+    bpy.ops.scene.new(type='FULL_COPY')
+    copy = bpy.context.scene
+    bpy.context.view_layer.update()
+    (found,), (before,) = result_collections(copy), result_collections(scene)
+    assert found != before
+    assert not has_results(bpy.data.scenes.new("empty"))
+    inside = set(before.objects)
+    assert bpy.ops.tetflora.clear() == {'FINISHED'}
+    assert [o.name for o in copy.objects if "tetflora_kind" in o] == [f"{theirs.name[:-4]}.003"]
+    assert not [o.name for o in copy.objects if o.type == 'MESH' and o.hide_render]
+    assert set(result_collections(scene)[0].objects) == inside
+    assert rock.hide_render
+    refined(copy)
+    assert has_results(copy)
+    refine.clear(scene)
+    assert not has_results(scene)
+    assert not rock.hide_render
+    assert has_results(copy)
+
+
 def test_there_is_nothing_to_keep_without_results(scene):
     assert not bpy.ops.tetflora.keep_results.poll()
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -161,11 +161,10 @@ def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | N
             crowns[identifier] = crown_to_draw(scene, identifier)
         if None in crowns.values():
             return None
-        left = {identifier: _in_leaf(scene, identifier) for identifier in set(species)}
-        found = [(crowns[identifier], left[identifier]) for identifier in species]
-        known = np.array([[c.radius, c.height, c.polygons * part, c.leaf] for c, part in found])
-        rows.append((number, foot, known * np.column_stack([scale, scale, np.ones(len(scale)), scale])))
-    return _merged(rows)
+        index = {identifier: i for i, identifier in enumerate(crowns)}
+        rows.append((number, foot, scale, np.array([index[identifier] for identifier in species], dtype=np.int64)))
+    left = [replace(c, polygons=c.polygons * _in_leaf(scene, identifier)) for identifier, c in crowns.items()]
+    return _merged(rows, tuple(left))
 
 
 def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
@@ -182,16 +181,17 @@ def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
     return 1.0 - _LEAVES * (1.0 - float(left[0]))
 
 
-def _merged(rows: list[tuple[int, NDArray[np.float64], NDArray[np.float64]]]) -> Stand:
+def _merged(
+    rows: list[tuple[int, NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]], crowns: tuple[Crown, ...]
+) -> Stand:
     """Samples of all parts as one, in which each part has the weight of its plants."""
     whole = sum(number for number, *_ in rows)
-    foot, known = [np.zeros((0, 3))], [np.zeros((0, 4))]
-    for number, place, values in rows:
+    found: list[tuple] = [(np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))]
+    for number, *values in rows:
         wanted = max(round(_LOOKED_AT * number / whole), 1) if whole > _LOOKED_AT else number
-        chosen = np.linspace(0, len(place) - 1, wanted).round().astype(np.int64)
-        foot.append(place[chosen])
-        known.append(values[chosen])
-    return Stand(whole, np.concatenate(foot), *np.concatenate(known).T)
+        chosen = np.linspace(0, len(values[0]) - 1, wanted).round().astype(np.int64)
+        found.append(tuple(one[chosen] for one in values))
+    return Stand(whole, *map(np.concatenate, zip(*found, strict=True)), crowns)
 
 
 def _some(number: int) -> NDArray[np.int64]:

@@ -20,11 +20,13 @@ from ...growth.seeds import Seeds
 from ...jobs import Progress
 from ...species.species import Species
 from ..attributes import frames_of, world_matrix, write
+from ..results.hiding import artists_flags
 from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.meshes import write_mesh
 from ..results.output import remove_made
 from ..runtime import JobData, guarded, is_there
 from ..scene.ages import classed
+from ..scene.looks import LIKE, look_like
 from ..scene.own_ages import stored_ages
 from ..scene.skeletons import kind_of
 from ..worker import call_in_thread
@@ -158,7 +160,7 @@ def _make_plant_mesh_steps(
 def _placed(
     mesh: bpy.types.Mesh, plant: bpy.types.Object, frame: NDArray[np.float64], position: NDArray[np.float64]
 ) -> bpy.types.Object:
-    """An object of a plant's mesh in the plant's collections, at its place (3,) with its axes (3, 3)."""
+    """An object of a plant's mesh with the plant's look and collections, at its place (3,) with its axes (3, 3)."""
     obj = bpy.data.objects.new(mesh.name, mesh)
     for collection in plant.users_collection:
         collection.objects.link(obj)
@@ -169,4 +171,7 @@ def _placed(
     place = Matrix(frame.tolist()).to_4x4()
     place.translation = position.tolist()
     obj.matrix_world = place
+    look_like(obj, plant)
+    del obj[LIKE]  # it is the artist's
+    obj.hide_render, obj.hide_viewport = artists_flags(plant)
     return obj

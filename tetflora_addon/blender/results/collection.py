@@ -17,6 +17,7 @@ from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
 from ..scene.looks import LIKE
 from ..species.catalogue import SpeciesChoice
+from .hiding import adopt_copies
 from .meshes import mesh_steps, point_object
 from .output import (
     KIND,
@@ -250,6 +251,7 @@ class Results:
 
 def dress_results(scene: bpy.types.Scene) -> None:
     """Apply the output settings of a scene to the artist's results."""
+    adopt_copies()
     for collection in result_collections(scene, 'VIEW'):
         dress_collection(scene, collection)
 
@@ -264,6 +266,7 @@ def leave_out_of_file() -> None:
 
     Not only when they are made, because undo brings datablocks back without the mark.
     """
+    adopt_copies()
     for scene in bpy.data.scenes:
         saved = scene.tetflora.output.save_results
         for collection in result_collections(scene) if scene.library is None else ():

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 import bpy
 
 from ...errors import SceneError
-from ..materials.nodes import is_own, tag, untag
+from ..materials.nodes import MADE, is_ours, is_own, tag, untag
 from ..scene.motion import curves_of
 from .output import (
     KIND,
@@ -231,10 +231,30 @@ def remove_results(
     scene: bpy.types.Scene, purpose: str | None = None, keep: Sequence[bpy.types.Collection] = ()
 ) -> int:
     """Remove result collections and show what they replace; returns the number of datablocks removed."""
+    adopt_copies()
     for which in ('RENDER', 'VIEW'):
         if purpose in {None, which}:
             show_originals(scene, which)
     return sum(remove_collection(scene, c) for c in result_collections(scene, purpose) if c not in keep)
+
+
+def adopt_copies() -> None:
+    """Mark results of full copies of scenes as these scenes' own, before results are changed or removed.
+
+    Copies inherit marks but not names, and what their originals hide is hidden for the scene that was copied.
+    """
+    for scene in bpy.data.scenes:
+        copies = [c for c in result_collections(scene) if not is_ours(c) and (c[MADE], None) in bpy.data.collections]
+        for collection in copies:
+            every = [collection, *collection.objects, *(o.data for o in collection.objects if o.data is not None)]
+            ours = [d for d in every if MADE in d and d.library is None]
+            # The artist's own copies of results come later in a collection than these.
+            for datablock in {(type(d), d[MADE]): d for d in reversed(ours)}.values():
+                tag(datablock)
+        for original in scene.objects if copies else ():
+            for purpose in HIDDEN:
+                if (marker := _marker(original, purpose)) is not None and list(original.users_scene) == [scene]:
+                    _mark(original, purpose, marker[0], [scene.name])
 
 
 def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Object]:
@@ -314,6 +334,7 @@ def _others(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) ->
 
 def keep_results(scene: bpy.types.Scene) -> int:
     """Turn a scene's results into ordinary meshes; returns their number. Objects that they replace stay hidden."""
+    adopt_copies()
     for original in _marked('VIEW'):
         if _concerns(scene, original, 'VIEW') and not _others(scene, original, 'VIEW'):
             del original[HIDDEN['VIEW']]

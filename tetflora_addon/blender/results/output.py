@@ -178,16 +178,24 @@ def release_materials() -> None:
 def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
     """Result collections of a scene and this file, of one purpose or of all, wherever the artist has moved them.
 
-    One that was renamed still is: only where another one bears the name under which it was made, it is a copy of that.
+    One that was renamed still is: only where another one of the scene bears the name under which it was made, or shares
+    its objects, it is a copy of that.
     """
+    inside = scene.collection.children_recursive
+
+    def copied(one: bpy.types.Collection) -> bool:
+        other = bpy.data.collections.get((one[MADE], None))
+        return other not in {None, one} and (other in inside or not {*one.objects}.isdisjoint(other.objects))
+
     return [
         c
-        for c in scene.collection.children_recursive
+        for c in inside
         if PURPOSE in c
+        and MADE in c
         and (purpose is None or c[PURPOSE] == purpose)
         and c.library is None
         and c.override_library is None
-        and (is_ours(c) or (c.get(MADE, c.name), None) not in bpy.data.collections)
+        and not copied(c)
     ]
 
 
