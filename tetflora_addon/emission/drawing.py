@@ -43,7 +43,7 @@ TILE, AROUND = 240, 64
 #: Batches, front to back, in which the parts of a slab are tested and cover the image.
 _BATCHES = 6
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
-MERGED = (64.0, 16.0, 4.0)
+MERGED = (64.0, 16.0, 4.0, 2.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
 #: the shade over which it grows by e; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Integers, Keys, Mask
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..setting import LENGTH, setting
-from .plane import NO_DISTANCE, Spacing, cells_of, packed
+from .plane import NO_DISTANCE, cells_of, packed
 from .rules import species_by_weight
 
 #: Cells that one dab looks at; a wider circle, or a higher density, is refused by `paint`.
@@ -227,7 +227,43 @@ def admitted(places: Floats, standing: Floats, distance: float) -> Integers:
 
     The earlier of two places goes first, as if they were set one after the other.
     """
-    return Spacing(distance, standing).admit(places, len(places))
+    free = np.ones(len(places), bool)
+    if distance <= NO_DISTANCE or not len(places):
+        return np.flatnonzero(free)
+    free[_close(places, standing, distance)[0]] = False
+    undecided = np.flatnonzero(free)
+    first, second = _close(places[undecided], places[undecided], distance)
+    early = first < second
+    first, second = first[early], second[early]
+    state = np.zeros(len(undecided), np.int8)  # 0 undecided, 1 in, -1 out
+    while (open_ := state == 0).any():
+        # Whoever has no earlier neighbour that may yet come in is in; its later neighbours are out.
+        waits = np.zeros(len(state), bool)
+        waits[second[state[first] == 0]] = True
+        state[open_ & ~waits] = 1
+        state[second[state[first] == 1]] = -1
+    return undecided[state == 1]
+
+
+def _close(a: Floats, b: Floats, distance: float) -> tuple[Integers, Integers]:
+    """Pairs of numbers of places, (n, 2) and (m, 2), that are closer than a distance."""
+    if not len(a) or not len(b):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    cells_b = packed(np.floor(b / distance).astype(np.int64))
+    order = np.argsort(cells_b, kind="stable")
+    sorted_b, home = cells_b[order], np.floor(a / distance).astype(np.int64)
+    firsts, seconds = [], []
+    for step in np.ndindex(3, 3):
+        wanted = packed(home + (np.array(step) - 1))
+        begin, end = np.searchsorted(sorted_b, wanted), np.searchsorted(sorted_b, wanted, side="right")
+        counts = end - begin
+        i = np.repeat(np.arange(len(a)), counts)
+        j = order[np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts - begin, counts)]
+        gap = a[i] - b[j]
+        near = np.einsum("ij,ij->i", gap, gap) < distance * distance
+        firsts.append(i[near])
+        seconds.append(j[near])
+    return np.concatenate(firsts), np.concatenate(seconds)
 
 
 def _drawn(brush: Brush, numbers: Integers, key: Keys, dab: int) -> Mask:

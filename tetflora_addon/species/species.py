@@ -41,7 +41,7 @@ BARKS = (
     "interlaced", "pitted", "papery",
 )  # fmt: skip
 """Characters of bark that materials know."""
-QUALITY_LIMITS = (0.001, 1000.0)
+QUALITY_LIMITS = (0.0001, 1000.0)
 
 
 #: A fork is there once its stems are so long, in lengths of the full-grown branch.

@@ -86,7 +86,7 @@ def test_what_is_wrong_with_an_asset_is_told_by_refine_and_by_renders(scatter, c
 def test_only_plants_are_missed_in_renders_of_what_is_not_refined(scatter, monkeypatch):
     """What objects scatter shows without; plants of an asset do not."""
     warned = []
-    monkeypatch.setattr(render, "_warn_of_nothing", lambda: warned.append(True))
+    monkeypatch.setattr(render, "_warn", lambda text, about: warned.append("shows no plants" in text))
     settings = scene().tetflora
     settings.refine_at_render = False
     for expected in ("", "Nothing is refined, so renders show no plants"):

@@ -155,9 +155,9 @@ def test_forks_short_shoots_and_the_pipe_model(quality: float) -> None:
     assert after.quality == 1
 
 
-@pytest.mark.parametrize("quality", [0.0, -1.0, 0.0009, 1001.0, math.inf, math.nan])
+@pytest.mark.parametrize("quality", [0.0, -1.0, 0.00009, 1001.0, math.inf, math.nan])
 def test_what_a_quality_may_be(quality: float) -> None:
-    with pytest.raises(SpeciesError, match=r"oak: quality must be from 0\.001 to 1000"):
+    with pytest.raises(SpeciesError, match=r"oak: quality must be from 0\.0001 to 1000"):
         with_quality(kind("oak"), quality)
 
 

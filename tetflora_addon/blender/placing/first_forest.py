@@ -45,7 +45,7 @@ _PATH = 2.2  # metres from the middle of the path to its edge
 
 def tread(material: bpy.types.Material) -> None:
     """Trodden earth on a soil where the attribute ``aside`` (meters from the middle of the path) is small."""
-    graph = Graph(shader_tree(material), clear=False)
+    graph = Graph(shader_tree(material), fresh=False)
     color = next(node for node in graph.tree.nodes if node.type == 'BSDF_PRINCIPLED').inputs["Base Color"]
     floor = color.links[0].from_socket
     place = find_socket(graph.node("ShaderNodeTexCoord").outputs, "Object")
