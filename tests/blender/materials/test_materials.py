@@ -329,3 +329,14 @@ def test_every_link_is_valid_and_every_species_shares_the_group():
 def test_every_bark_that_species_may_name_is_there():
     """In the same order: the number of a character is part of its materials' version."""
     assert bark.BARKS == species.BARKS
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+def test_bark_that_is_stopped_while_it_is_made_leaves_nothing(steps):
+    """Esc may come between its groups and the material that uses them."""
+    work = materials.bark_steps("Oak", "smooth")
+    for _ in range(steps):
+        next(work)
+    assert len(bpy.data.node_groups) == steps
+    work.close()
+    assert not bpy.data.node_groups

@@ -15,6 +15,7 @@ import bpy
 from ...emission.light import BACK, FRONT
 from ...light.scattering import GLOSS
 from ..compat import disable_bump_correction
+from ..runtime import is_there
 from .bark import bark_group, bark_version, place_group
 from .blade import HAIRY, WAXY, blade_group, blade_version, paler, sheen
 from .microsphere import WHITE, scatter_group
@@ -112,11 +113,18 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
 
 def bark_steps(species_name: str, character: str) -> Iterator[None]:
     """What `bark_material` needs and this file has not yet, piece by piece: nodes take some hundredths of a second."""
-    if f"TetFlora {species_name} bark" not in bpy.data.materials:
-        place_group()
-        yield
-        bark_group(character)
-        yield
+    made = []
+    try:
+        if f"TetFlora {species_name} bark" not in bpy.data.materials:
+            made.append(place_group())
+            yield
+            made.append(bark_group(character))
+            yield
+    except GeneratorExit:  # Esc, before there is a material that uses them and goes with the results
+        for group in reversed(made):
+            if is_there(group) and not group.users:
+                bpy.data.node_groups.remove(group)
+        raise
 
 
 def proxy_material(own: bool = False) -> bpy.types.Material:
