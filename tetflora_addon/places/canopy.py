@@ -55,7 +55,13 @@ class Trees:
 
 
 def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
-    """Heights of a surface above the ground, where both are known: a canopy of two elevation models."""
+    """Heights of a surface above the ground, where both are known: a canopy of two elevation models.
+
+    Raises
+    ------
+    SceneError
+        Nobody can tell where one lies on the other; ``what`` begins the message.
+    """
     if (surface.system.code == 0) != (ground.system.code == 0):
         raise SceneError(f"{what}the coordinate system of one of the two rasters is not known; set Coordinate System")
     h, w = surface.values.shape
@@ -73,7 +79,13 @@ def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
 
 
 def checked_canopy(values: NDArray[np.float32], what: str) -> tuple[NDArray[np.float32], list[str]]:
-    """Canopy heights without what no tree can be, and what is to be told of them; elevations are refused."""
+    """Canopy heights without what no tree can be, and what is to be told of them.
+
+    Raises
+    ------
+    SceneError
+        They are elevations, or in another unit; ``what`` begins the message.
+    """
     known = values[np.isfinite(values)]
     low, high = np.percentile(known, (1.0, 99.0)).tolist()
     if low > _GROUND:

@@ -49,7 +49,15 @@ _PALETTE = 3
 
 
 def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
-    """Read a GeoTIFF, or a TIFF with a world file; yields progress."""
+    """Read a GeoTIFF, or a TIFF with a world file; yields progress.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken, or of a kind that cannot be used; names the tag.
+    """
     check_regular(path)
     with path.open("rb") as file:
         tags = _Tags(file, path.name)
@@ -73,7 +81,13 @@ def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
 
 
 def place_of_image(path: Path) -> Raster:
-    """Where the pixels of an image lie, as a raster of one value: a TIFF by its tags, others by world files."""
+    """Where the pixels of an image lie, as a raster of one value: a TIFF by its tags, others by world files.
+
+    Raises
+    ------
+    OSError, SceneError
+        As `read_tiff`.
+    """
     check_regular(path)
     if path.suffix.lower() not in (".tif", ".tiff"):
         place, system = _place(path)

@@ -45,6 +45,13 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
     ----------
     chosen : int
         As of `chosen_system`.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the feature.
     """
     name = path.name
     if path.suffix.lower() in (".shp", ".gpkg"):
@@ -87,7 +94,13 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
 
 
 def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]:
-    """Points, lines and areas of a geometry: type and coordinates of each, as GeoJSON has them."""
+    """Points, lines and areas of a geometry: type and coordinates of each, as GeoJSON has them.
+
+    Raises
+    ------
+    SceneError
+        It is no geometry of GeoJSON; ``where`` begins the message.
+    """
     kind = geometry["type"] if geometry else "Point"
     parts = [geometry] if geometry else []
     if kind == "GeometryCollection":
@@ -105,7 +118,13 @@ def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]
 
 
 def list_of(value: Any, where: str) -> list[Any]:
-    """Coordinates that are a list."""
+    """Coordinates that are a list.
+
+    Raises
+    ------
+    SceneError
+        They are none; ``where`` begins the message.
+    """
     if not isinstance(value, list):
         raise SceneError(f"{where}: its coordinates are {shown(value)}, not a list; correct them")
     return value

@@ -80,6 +80,13 @@ def read_outlines(path: Path, code: int = 0, kind: str = "") -> tuple[list[MapFe
         As of `chosen_system`.
     kind : str
         What all are taken for; empty to tell them by their keys.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken, or has no outlines; names the feature.
     """
     features, system = read_features(path, code)
     found: list[MapFeature] = []

@@ -491,7 +491,13 @@ class MapOrigin:
     north: float
 
     def local(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
-        """Metres from the origin, (n, 2), of points (n, 2) of a system."""
+        """Metres from the origin, (n, 2), of points (n, 2) of a system.
+
+        Raises
+        ------
+        SceneError
+            Nobody can tell where they lie, or they are too far away; ``what`` begins the message.
+        """
         local = self.offsets(points, system, what)
         far = np.abs(local).max(initial=0.0)
         if not far < MOST_AWAY:
@@ -503,7 +509,13 @@ class MapOrigin:
         return local
 
     def offsets(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
-        """Metres from the origin, (n, 2), of points (n, 2) of a system, however far."""
+        """Metres from the origin, (n, 2), of points (n, 2) of a system, however far.
+
+        Raises
+        ------
+        SceneError
+            Nobody can tell where they lie; ``what`` begins the message.
+        """
         if (system.code == 0) != (self.system.code == 0):
             known, other = ("the scene", "the file") if system.code == 0 else ("the file", "the scene")
             raise SceneError(
@@ -518,7 +530,13 @@ MOST_AWAY = 250_000.0
 
 
 def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float64], what: str = "") -> MapOrigin:
-    """The place for a scene whose first data lie between two corners, (2,) each; in whole metres."""
+    """The place for a scene whose first data lie between two corners, (2,) each; in whole metres.
+
+    Raises
+    ------
+    SceneError
+        They are no places on Earth.
+    """
     middle = (np.asarray(low, np.float64) + high) / 2.0
     if system.metric or system.code == 0:
         east, north = np.round(system.unit * middle).tolist()

@@ -85,6 +85,13 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
         Leave out rows with other numbers of values than the first line.
     most : int, optional
         Rows at most, for a preview.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line.
     """
     content = read_whole(path, MAX_BYTES)
     name = path.name
@@ -140,6 +147,13 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
         Features at most, for a preview.
     chosen : int
         As of `read_features`.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the feature.
     """
     features, system = read_features(path, chosen)
     name, without = path.name, 0
@@ -186,7 +200,13 @@ def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
 
 
 def coordinates(values: Any, where: str, texts: bool = False) -> NDArray[np.float64]:
-    """Positions of GeoJSON as (n, 2); heights do not count, and numbers may be texts if asked for."""
+    """Positions of GeoJSON as (n, 2); heights do not count, and numbers may be texts if asked for.
+
+    Raises
+    ------
+    SceneError
+        They are no positions; ``where`` begins the message.
+    """
     try:
         points = np.array([(x, y) for x, y, *_ in values], np.float64).reshape(-1, 2)
         kinds = {type(number) for x, y, *_ in values for number in (x, y)}

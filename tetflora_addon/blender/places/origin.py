@@ -151,7 +151,13 @@ class Import:
         return place or place_about(system, points.min(axis=0), points.max(axis=0), self.what)
 
     def local(self, place: MapOrigin, points: NDArray[np.float64], system: System) -> NDArray[np.float64]:
-        """Metres from the scene's origin, (n, 2), of points of the file."""
+        """Metres from the scene's origin, (n, 2), of points of the file.
+
+        Raises
+        ------
+        SceneError
+            As `MapOrigin.local`.
+        """
         return place.local(points, self.known(place, system), self.what)
 
     @staticmethod

@@ -58,6 +58,13 @@ def read_raster(order: Import, path: Path | None = None) -> Generator[Progress, 
     ----------
     path : Path, optional
         Another file, which is read whole, in its place.
+
+    Raises
+    ------
+    OSError
+        One cannot be read.
+    SceneError
+        One is broken, or lacks a place.
     """
     tiles, paths, code = [], [order.path, *order.tiles] if path is None else [path], order.code
     for path in paths:
@@ -133,7 +140,7 @@ def _loaded(path: Path, unreadable: str) -> bpy.types.Image:
 
 @importing
 def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
-    """Make ground.
+    """Make ground; yields progress. Closing the steps leaves all as it was.
 
     Parameters
     ----------
@@ -141,6 +148,11 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
         Faces.
     image : Path, optional
         An orthophoto, which becomes its color.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
     """
     raster = yield from read_raster(order)
     photo = None if image is None else _photo_place(image, raster.system)
