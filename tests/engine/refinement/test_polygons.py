@@ -263,19 +263,21 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
     whole = Polygons.everything(meshes)
     assert result.holdings.polygons.items.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
     assert {Decision.PROXY, Decision.EXPLICIT} <= set(result.decision.tolist())
-    blocks, facets = emitted(result, camera, 1.5, 1.2)
+    blocks, facets = emitted(result, camera, 0.4)
     kept = sum(support.face_areas(b.buffers).sum() for b in blocks)
     drawn = (facets.side**2).sum()
+    chance = 2 * np.sqrt((facets.side**4).sum())  # facets are there or not; of a mesh, not independently
+    assert chance < 0.1 * drawn
     assert 0.1 < kept / (kept + drawn) < 0.95
-    # What nobody sees may be fewer, or smaller.
-    assert 0.8 * whole.areas().sum() <= kept + drawn <= 1.02 * whole.areas().sum()
-    assert sum(b.buffers.polygons for b in blocks) + len(facets) < 0.9 * len(whole)
+    # Facets beside the view may have been made smaller, so that they do not reach into it.
+    loss = 0.5 * whole.areas()[camera.clearance(whole.centre) > 0.0].sum()
+    assert whole.areas().sum() - loss - chance <= kept + drawn <= whole.areas().sum() + chance
+    assert sum(b.buffers.polygons for b in blocks) + len(facets) < 0.7 * len(whole)
     near = whole.take(np.linalg.norm(whole.centre - camera.position, axis=1) < 7)
-    near = near.take(near.areas() > (1.5 * camera.extent_around(near.centre)) ** 2)
     inside = camera.clearance(near.centre) < -0.5
     points = np.concatenate([b.buffers.positions for b in blocks])
     away = np.abs(points[None] - meshes.corners(meshes.face_triangle[near.face], near.instance)[inside][:60, :1]).max(2)
-    assert (away.min(axis=1) < 1e-5).mean() > 0.9  # others hide the rest
+    assert away.min(axis=1).max() < 1e-5
 
 
 def test_faces_behind_a_wall_are_few_and_the_wall_stays() -> None:
