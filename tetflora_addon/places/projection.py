@@ -414,7 +414,13 @@ def known_systems() -> dict[int, Definition]:
 
 
 def system_of(code: int, what: str = "") -> System:
-    """The system of an EPSG code, if it is known here."""
+    """The system of an EPSG code, if it is known here.
+
+    Raises
+    ------
+    SceneError
+        It is none of those that are known here; says what to do.
+    """
     if code in known_systems():
         return System(code)
     raise SceneError(

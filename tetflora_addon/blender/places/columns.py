@@ -38,7 +38,13 @@ class TetFloraInventoryColumn(bpy.types.PropertyGroup):
 
 
 def show_columns(table: bpy.types.bpy_prop_collection, path: Path) -> None:
-    """Fill a table with the columns of a file."""
+    """Fill a table with the columns of a file.
+
+    Raises
+    ------
+    OSError, SceneError
+        As `preview`.
+    """
     for column in preview(path):
         row = table.add()
         row.name, row.field, row.values = column.title, column.field.upper() or 'NONE', ", ".join(column.values)
@@ -51,7 +57,13 @@ def chosen_columns(table: Iterable[TetFloraInventoryColumn]) -> str:
 
 
 def columns_in(text: str) -> dict[str, str]:
-    """What columns hold by their titles, from JSON."""
+    """What columns hold by their titles, from JSON.
+
+    Raises
+    ------
+    SceneError
+        It is none.
+    """
     try:
         columns = json.loads(text or "{}")
     except (ValueError, RecursionError) as error:
