@@ -337,10 +337,10 @@ class _Tile:
         self._meshes.setdefault(what, []).append(buffers)
 
     def _fill(self, column: NDArray, row: NDArray, depth: NDArray) -> None:
-        """Cover what polygons with corners (n, k) cover."""
-        for k in range(1, column.shape[1] - 1):
+        """Cover what polygons with corners (k, n) cover."""
+        for k in range(1, len(column) - 1):
             fan = [0, k, k + 1]
-            self.coverage.draw(column[:, fan], row[:, fan], depth[:, fan])
+            self.coverage.draw(column[fan], row[fan], depth[fan])
 
     def _cover(self) -> None:
         """Test what was made, front to back, and let what is seen cover the image; few stand for the rest."""
@@ -358,7 +358,7 @@ class _Tile:
                 some = batch[(batch >= first) & (batch < end)] - first
                 gone = self.coverage.hidden(prints.take(some))
                 hidden[first + some[gone]] = True
-                seen.append([of[some[~gone]] for of in corners])
+                seen.append([of[:, some[~gone]] for of in corners])
             for corners in seen:
                 self._fill(*corners)
         flags = dict(zip(groups, np.split(hidden, ends[1:-1]), strict=True)) if waiting else {}
@@ -382,7 +382,7 @@ class _Tile:
         if not tested:
             return []
         near = np.concatenate([prints.near for prints, *_ in tested])
-        cell = self.coverage.cells(*(np.concatenate([of[k][:, 0] for of in tested]) for k in (1, 2)))
+        cell = self.coverage.cells(*(np.concatenate([of[k][0] for of in tested]) for k in (1, 2)))
         order = np.lexsort((near, cell))
         count = np.bincount(cell)
         own = cell[order]
