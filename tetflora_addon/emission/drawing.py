@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, unit
+from ..arrays import Arrays, Keys, gathered, unit
 from ..buffers import MeshBuffers, concatenate_buffers, kept_faces
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
@@ -44,6 +44,8 @@ TILE, AROUND = 240, 64
 _BATCHES = 6
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
 MERGED = (64.0, 16.0, 4.0, 2.0)
+#: The same of those that are hidden when they are about to be made.
+SOONER = (16.0, 4.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
 #: the shade over which it grows by e; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
@@ -70,7 +72,7 @@ _SLAB = 0.06
 #: Part of all that may be drawn which plants out of view have.
 _UNSEEN = 0.05
 #: Draws of this module.
-_MERGE, _LEFT = 230, 232
+_MERGE, _LEFT, _THIN = 230, 232, 233
 
 #: What becomes of facets, which the camera sees or not. Another process may call it.
 Form = Callable[[Facets, bool], Any]
@@ -316,6 +318,20 @@ class _Tile:
         """As of `Canvas`."""
         if len(facets):
             self._waiting.append((whose, facets, triangle_corners(facets)))
+
+    def thin(
+        self, key: Keys, place: NDArray[np.floating], away: NDArray[np.floating], radius: NDArray[np.floating]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """As of `Canvas`."""
+        times, left = np.ones(len(key)), np.arange(len(key))
+        place = place.astype(np.float32)
+        for more in SOONER:
+            reach = away[left] + np.sqrt(more) * radius[left]
+            hidden = self.coverage.hidden(self.coverage.of_spheres(gathered(place, left), reach))
+            times[left[hidden]] = more
+            left = left[~hidden]
+        kept = np.flatnonzero(uniform(key, _THIN) < 1.0 / times)
+        return kept, times[kept]
 
     def add_shown(self, corners: NDArray[np.floating], number: float = 0.0) -> None:
         """As of `Canvas`."""

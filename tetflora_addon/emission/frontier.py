@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, Keys
 from ..buffers import MeshBuffers
 from ..proxies.microsurfaces import Facets
 from .coverage import CELL, Coverage
@@ -72,6 +72,11 @@ class Canvas(Protocol):
 
     def add_mesh(self, what: tuple[str, int, int], buffers: MeshBuffers | None, culled: bool = False) -> None:
         """A mesh of a species, without faces behind full pixels if it is culled."""
+
+    def thin(
+        self, key: Keys, place: NDArray[np.floating], away: NDArray[np.floating], radius: NDArray[np.floating]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """As of `pieces.Thin`: few large ones are made in the place of many that are hidden already."""
 
     def add_shown(self, corners: NDArray[np.floating], number: float = 0.0) -> None:
         """Polygons with corners (n, k, 3) of what is drawn as it is; they count as so many."""

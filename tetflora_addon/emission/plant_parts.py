@@ -30,7 +30,7 @@ from ..refinement.lights import Light
 from ..refinement.shares import opened
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
-from ..subplants.pieces import Pieces, whole_pieces
+from ..subplants.pieces import Pieces, Thin, whole_pieces
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
@@ -144,7 +144,7 @@ class GrownPlants(FrontierKind):
         for s in np.unique(species).tolist():
             some = np.flatnonzero(species == s)
             own = branches.take(some)
-            canvas.add_facets((s, ""), self._of_subplants(own, leaf[some], side[some], seen=True))
+            canvas.add_facets((s, ""), self._of_subplants(own, leaf[some], side[some], thin=canvas.thin))
 
     def _of_subplants(
         self,
@@ -152,12 +152,12 @@ class GrownPlants(FrontierKind):
         leaf: NDArray[np.float64],
         wood: NDArray[np.float64],
         left_out: NDArray[np.float64] | None = None,
-        seen: bool = False,
+        thin: Thin | None = None,
     ) -> Facets:
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_subplants(branches.row, count, self._share(branches))
-        once = self._once(branches, leaf) if seen else None
-        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, once)
+        once = None if thin is None else self._once(branches, leaf)
+        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, once, thin)
 
     def _draw_branches(self, canvas: Canvas, branches: Branches, side: NDArray[np.float64]) -> None:
         """Branches alone: leaves that are large are real, wood is tubes or thin triangles, the rest is facets."""
@@ -176,12 +176,11 @@ class GrownPlants(FrontierKind):
             own = species == s
             left = np.flatnonzero(own[owner] & (real[owner] < 1.0))
             if len(left):
-                canvas.add_facets(
-                    (s, ""), self._of_pieces(pieces.take(left), side[owner[left]], real[owner[left]], seen=True)
-                )
+                of = whole, owner[left]
+                canvas.add_facets((s, ""), self._of_pieces(pieces.take(left), side, real, of, canvas.thin))
             some = whole.take(np.flatnonzero(own & (real > 0.0)))
-            made = leaf_meshes(flora, s, [some], lambda b: (real[b.plant], transition.of_kites(b)), detail.lengths)
-            for one in made if len(some) else ():
+            given = lambda b: (real[b.plant], transition.of_kites(b)), detail.lengths, canvas.thin
+            for one in leaf_meshes(flora, s, [some], *given) if len(some) else ():
                 canvas.add_mesh((LEAF_KINDS[one.kind], one.form, s), one.buffers, True)
             # What is a few pixels wide has few sides; of wider wood all is drawn, or its shading would end at holes.
             slender, broad = (whole.take(np.flatnonzero(own & tubes & (thin == is_thin))) for is_thin in (True, False))
@@ -211,16 +210,25 @@ class GrownPlants(FrontierKind):
         canvas.add_mesh(("bark", 0, species), twig_buffers(self.flora, whole, 1.0 / likely[some], parts), True)
 
     def _of_pieces(
-        self, pieces: Pieces, side: NDArray[np.float64], real: NDArray[np.float64] | None = None, seen: bool = False
+        self,
+        pieces: Pieces,
+        side: NDArray[np.float64],
+        real: NDArray[np.float64] | None = None,
+        whole: tuple[WholeBranches, NDArray[np.integer]] | None = None,
+        thin: Thin | None = None,
     ) -> Facets:
-        """Facets of pieces: of their leaves where they are seen, of their wood as well where they are not."""
-        flora, branches = self.flora, pieces.branches
+        """Facets of pieces: of their leaves where whole branches (n,) are seen, else of their wood as well.
+
+        Sides (n,) and real fractions (n,) are those of branches.
+        """
+        flora, branches = self.flora, pieces.branches if whole is None else whole[0].branches
         leaf = np.maximum(side, np.sqrt(flora.one_leaf_area(branches)))
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_pieces(branches.row, count, self._share(branches))
-        wood = np.ones(len(pieces), bool) if seen else None
-        once = self._once(branches, leaf) if seen else None
-        return piece_facets(flora, pieces, leaf, side, weight, real, wood, once)
+        if whole is None:
+            return piece_facets(flora, pieces, leaf, side, weight, real)
+        own = (of[whole[1]] for of in (leaf, side, weight, real, self._once(branches, leaf)))
+        return piece_facets(flora, pieces, *own, thin, whole)
 
     def _optical(self, branches: Branches) -> NDArray[np.float64]:
         return self.flora.leaf_areas(branches) + self.flora.wood_areas(branches) / 2
