@@ -31,7 +31,7 @@ from ..refinement.contents import polygon_totals
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
-from .coverage import Coverage, Footprints
+from .coverage import Coverage
 from .faces import FaceRows, Faces
 from .frontier import DETAIL, FEW, Frontier, FrontierKind, Shown, Waiting, Whose
 from .plant_parts import GrownPlants
@@ -40,8 +40,6 @@ from .shade import Shade
 
 #: Least width of a tile, pixels, and pixels around it that its coverage knows.
 TILE, AROUND = 240, 64
-#: Batches, front to back, in which the parts of a slab are tested and cover the image.
-_BATCHES = 6
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
 MERGED = (64.0, 16.0, 4.0, 2.0)
 #: The same of those that are hidden when they are about to be made.
@@ -359,52 +357,32 @@ class _Tile:
             self.coverage.draw(column[fan], row[fan], depth[fan])
 
     def _cover(self) -> None:
-        """Test what was made, front to back, and let what is seen cover the image; few stand for the rest."""
+        """Let what was made cover the image and test it; few stand for what is hidden."""
         waiting, self._waiting = self._waiting, []
-        groups = sorted({corners.shape[1] for _, _, corners in waiting})
-        tested = [
-            self.coverage.of_corners(np.concatenate([of for _, _, of in waiting if of.shape[1] == group]))
-            for group in groups
-        ]
-        ends = np.cumsum([0, *(len(prints) for prints, *_ in tested)])
-        hidden = np.zeros(ends[-1], bool)
-        for batch in self._batches(tested):
-            seen = []
-            for first, end, (prints, *corners) in zip(ends, ends[1:], tested, strict=False):
-                some = batch[(batch >= first) & (batch < end)] - first
-                gone = self.coverage.hidden(prints.take(some))
-                hidden[first + some[gone]] = True
-                seen.append([of[:, some[~gone]] for of in corners])
-            for corners in seen:
-                self._fill(*corners)
-        flags = dict(zip(groups, np.split(hidden, ends[1:-1]), strict=True)) if waiting else {}
-        for what, made, corners in waiting:
-            gone, flags[corners.shape[1]] = np.split(flags[corners.shape[1]], [len(corners)])
-            lost = np.flatnonzero(gone)
+        tested = [self.coverage.of_corners(corners) for _, _, corners in waiting]
+        for _, *drawn in tested:
+            self._fill(*drawn)
+        lost: dict[Whose, list[tuple[Facets, NDArray[np.float64]]]] = {}
+        for (what, made, corners), (prints, *_) in zip(waiting, tested, strict=True):
+            gone = self.coverage.hidden(prints)
+            some = np.flatnonzero(gone)
+            number = uniform(_keys_of(corners[some, 0]), _MERGE)
+            likely = np.flatnonzero(number < max(1.0 / MERGED[-1], self._left))
+            some, number = some[likely], number[likely]
             if isinstance(made, Facets):
                 self._keep(made.take(np.flatnonzero(~gone)), True, what)
-                self._merge(made.take(lost), what)
+                lost.setdefault(what, []).append((made.take(some), number))
                 continue
-            if len(lost):
-                size = np.diff(made.face_offsets)[lost]
-                self._merge(_facets_of_faces(corners[lost], size, made, lost), (what[2], ""))
-                made = kept_faces(made, ~gone)
+            if len(some):
+                size = np.diff(made.face_offsets)[some]
+                facets = _facets_of_faces(corners[some], size, made, some)
+                lost.setdefault((what[2], ""), []).append((facets, number))
+            made = kept_faces(made, ~gone) if gone.any() else made
             if made.polygons:
                 self.number += made.polygons
                 self._meshes.setdefault(what, []).append(made)
-
-    def _batches(self, tested: list[tuple[Footprints, NDArray, NDArray, NDArray]]) -> list[NDArray[np.intp]]:
-        """Numbers of what was tested in batches: in each cell of the image the nearest come first."""
-        if not tested:
-            return []
-        near = np.concatenate([prints.near for prints, *_ in tested])
-        cell = self.coverage.cells(*(np.concatenate([of[k][0] for of in tested]) for k in (1, 2)))
-        order = np.lexsort((near, cell))
-        count = np.bincount(cell)
-        own = cell[order]
-        place = np.arange(len(near)) - (np.cumsum(count) - count)[own]
-        batch = _BATCHES * place // np.maximum(count[own], 1)
-        return [order[batch == number] for number in range(_BATCHES)]
+        for whose, every in lost.items():
+            self._merge(joined([facets for facets, _ in every]), np.concatenate([n for _, n in every]), whose)
 
     def _few(self, a_pixel: float, share: float, most: float) -> float:
         """Facets that nobody sees, for each pixel of a share of the image, of the few that are left of so many.
@@ -417,13 +395,19 @@ class _Tile:
 
     # -- what is not seen -----------------------------------------------------------------------------------------
 
-    def _merge(self, facets: Facets, whose: Whose) -> None:
-        """Few large facets for many that are hidden; each lies behind full pixels as a whole, or is as it was."""
-        number = uniform(_keys_of(facets.centre), _MERGE)
-        # Where there are few, all of the last are kept; where there are many, as if they had been merged as well.
-        likely = 1.0 / (MERGED[-1] * self.given.hidden**2)
-        some = np.flatnonzero(number < max(1.0 / MERGED[-1], likely))
-        facets, number = facets.take(some), number[some]
+    @property
+    def _left(self) -> float:
+        """Part of hidden facets that are kept as they are.
+
+        Where there are few, all of the last are kept; where there are many, as if they had been merged as well.
+        """
+        return 1.0 / (MERGED[-1] * self.given.hidden**2)
+
+    def _merge(self, facets: Facets, number: NDArray[np.float64], whose: Whose) -> None:
+        """Few large facets for many that are hidden, by a random number (n,) of each.
+
+        Each lies behind full pixels as a whole, or is as it was.
+        """
         for times in MERGED:
             larger = replace(facets, side=facets.side * np.sqrt(times))
             hidden = self._hidden(larger)
@@ -431,7 +415,7 @@ class _Tile:
             rest = np.flatnonzero(~hidden)
             facets, number = facets.take(rest), number[rest]
         # A facet has another outline than the face for which it stands.
-        self._keep(facets.take(np.flatnonzero((number < likely) & self._hidden(facets))), False, whose)
+        self._keep(facets.take(np.flatnonzero((number < self._left) & self._hidden(facets))), False, whose)
 
     def _hidden(self, facets: Facets) -> NDArray[np.bool_]:
         """Facets (n,) behind full pixels."""
