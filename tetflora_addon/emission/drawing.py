@@ -25,7 +25,7 @@ from ..growth.hashing import mix, uniform
 from ..processes.pool import in_processes
 from ..proxies.drawn import Drawn, Triangles, joined, triangle_corners
 from ..proxies.facet_weights import FacetWeights
-from ..proxies.microsurfaces import Facets, kept_out_of_view
+from ..proxies.microsurfaces import CIRCUMRADIUS, STRETCH, Facets, kept_out_of_view
 from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.contents import polygon_totals
 from ..refinement.loop import Refinement
@@ -542,7 +542,9 @@ def _facets_of_faces(
         return (values.sum(axis=1) - (values.shape[1] - size)[:, None] * values[:, -1]) / size[:, None]
 
     centre = middle(corners)
-    along = unit(corners[:, 1] - corners[:, 0])
+    edges = np.stack([corners[:, b] - corners[:, a] for a, b in ((0, 1), (0, 2), (1, 2))])
+    longest = np.sqrt(np.einsum("kni,kni->kn", edges, edges))
+    along = unit(edges[longest.argmax(axis=0), np.arange(len(centre))])
     vector = np.zeros_like(centre)
     for k in range(1, corners.shape[1] - 1):
         vector += 0.5 * np.cross(corners[:, k] - corners[:, 0], corners[:, k + 1] - corners[:, 0])
@@ -555,4 +557,7 @@ def _facets_of_faces(
         moving = buffers.attributes["velocity"][1].astype(np.float64)
         every = np.minimum(np.arange(corners.shape[1]), size[:, None] - 1) + buffers.face_offsets[faces, None]
         velocity = middle(moving[buffers.corner_verts[every]])
-    return Facets(centre, across, along, np.sqrt(area), colour, through, velocity, stretch=np.ones(len(area)))
+    side = np.sqrt(area)
+    # As long as the face, as far as facets of wood are.
+    stretch = np.clip(longest.max(axis=0) / np.maximum(1.5 * CIRCUMRADIUS * side, 1e-12), 1.0, STRETCH)
+    return Facets(centre, across, along, side, colour, through, velocity, stretch=stretch)

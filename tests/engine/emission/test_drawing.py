@@ -174,12 +174,19 @@ def optical(blocks: list, facets: Facets) -> np.ndarray:
     return out
 
 
-def test_area_is_that_of_the_plants() -> None:
-    """Of leaves and of wood, whatever they are drawn as and merged into, where nothing is thinned out."""
+def test_area_is_that_of_the_plants(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of leaves and of wood, whatever they are drawn as and merged into, where nothing is thinned out.
+
+    Single draws of what is merged are off by a twentieth of the wood: their mean is asked for.
+    """
     flora, seeds, camera, result = scene()
-    whole = optical(list(expanded_blocks(flora, seeds)), Facets.empty())
-    blocks, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False, hidden=0.33)
-    assert optical(blocks, facets) == pytest.approx(whole, rel=0.06)
+    monkeypatch.setenv("TETFLORA_THREADS", "1")  # other processes know nothing of the draws
+    whole, found = optical(list(expanded_blocks(flora, seeds)), Facets.empty()), []
+    for draw in range(8):
+        monkeypatch.setattr(subject, "_MERGE", 300 + draw)
+        blocks, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False, hidden=0.33)
+        found.append(optical(blocks, facets))
+    assert np.mean(found, axis=0) == pytest.approx(whole, rel=0.06)
 
 
 def test_thinning_of_what_nobody_sees_loses_little() -> None:
