@@ -70,7 +70,7 @@ _SLAB = 0.06
 #: Part of all that may be drawn which plants out of view have.
 _UNSEEN = 0.05
 #: Draws of this module.
-_MERGE, _LEFT, _THIN = 230, 232, 233
+_MERGE, _LEFT, _THIN, _SCARCE = 230, 232, 233, 234
 
 #: What becomes of facets, which the camera sees or not. Another process may call it.
 Form = Callable[[Facets, bool], Any]
@@ -495,13 +495,18 @@ class _Tile:
         """Facets of parts that nobody sees, of sides (n,) in metres or so many leaves; no more than so many."""
         drawn = []
         for kind, pool, side in zip(self.given.kinds, pools, sides, strict=True):
-            parts, kept = pool.parts, kind.enough(pool.parts)
-            side = np.maximum(self.given.hidden * side, np.sqrt(leaves * kind.one_leaf(parts)))
-            drawn.append((kind, parts, side, kept, kept * kind.optical(parts) / np.maximum(side, 1e-9) ** 2))
+            kept = kind.enough(pool.parts)
+            side = np.maximum(self.given.hidden * side, np.sqrt(leaves * kind.one_leaf(pool.parts)))
+            drawn.append((kind, pool, side, kept, kept * kind.optical(pool.parts) / np.maximum(side, 1e-9) ** 2))
         times = max(np.sqrt(float(sum(number.sum() for *_, number in drawn)) / max(most, 1.0)), 1.0)
-        for kind, parts, side, kept, _ in drawn:
-            for whose, facets in kind.unseen(parts, times * side, kept, self.frontier.shown) if len(parts) else ():
-                add(facets, whose)
+        for kind, pool, side, kept, number in drawn:
+            # Most parts have a small part of a facet each: so many fewer of them have so much more, which is as much.
+            scarce = (number > 0.0) & (number < 0.5 * times**2 / leaves)
+            chosen = scarce & (uniform(_keys_of(pool.centre), _SCARCE) < 1.0 / leaves)
+            for more, some in ((1.0, np.flatnonzero(~scarce)), (np.sqrt(leaves), np.flatnonzero(chosen))):
+                given = pool.parts.take(some), times * side[some] / more, kept[some], self.frontier.shown
+                for whose, facets in kind.unseen(*given) if len(some) else ():
+                    add(replace(facets, side=more * facets.side), whose)
 
     def _keep(self, facets: Facets, seen: bool, whose: Whose) -> None:
         facets = facets.take(np.flatnonzero(facets.side > 0.0))
