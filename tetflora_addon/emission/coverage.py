@@ -12,6 +12,7 @@ all of that is full before it begins.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ class Coverage:
         first, end = (0, wide.width) if tile is None else tile
         self.first, self.end = max(first, 0), min(end, wide.width)
         self.depth = np.full((wide.height, self.end - self.first), np.inf, np.float32)
-        self._maxima: list[NDArray[np.float32]] = []
+        self._maxima: NDArray[np.float32] | None = None
         left, right, bottom, top = wide.window
         self._scale = np.array([wide.width / (right - left), wide.height / (top - bottom)])
 
@@ -164,7 +165,7 @@ class Coverage:
 
     def hidden(self, prints: Footprints) -> NDArray[np.bool_]:
         """Things (n,) behind full pixels wherever they are in the image; those outside are."""
-        if not self._maxima:
+        if self._maxima is None:
             self._maxima = _maxima(self.depth)
         size, first = np.array([self.end - self.first, self.height]), np.array([self.first, 0])
         # Pixels that this buffer does not know of, and those of what reaches around the eye, may all be empty.
@@ -174,18 +175,15 @@ class Coverage:
             np.clip(np.floor(np.clip(of, -1.0, 1e9)) - first, 0, size - 1).astype(np.int64)
             for of in (prints.low, prints.high)
         )
-        level = np.log2((high - low).max(axis=1) + 1).astype(np.int64)
-        out = np.zeros(len(low), bool)
-        for number in np.unique(level):
-            some, table = np.flatnonzero(level == number), self._maxima[number].ravel()
-            # Four overlapping squares cover a rectangle, and more where one side is much longer.
-            low_, last = low[some], np.maximum(high[some] - (1 << number) + 1, low[some])
-            farthest = np.zeros(len(some), np.float32)
-            for row in (low_[:, 1], last[:, 1]):
-                for column in (low_[:, 0], last[:, 0]):
-                    np.maximum(farthest, np.take(table, row * size[0] + column), out=farthest)
-            out[some] = farthest < prints.near[some]
-        return (out & known) | self.outside(prints)
+        level = np.frexp(np.maximum(*(high - low).T) + 1)[1] - 1
+        # Four overlapping squares cover a rectangle, and more where one side is much longer.
+        last = np.maximum(high - (1 << level)[:, None] + 1, low)
+        farthest = np.zeros(len(low), np.float32)
+        for row in (low[:, 1], last[:, 1]):
+            row = (level * self.height + row) * size[0]
+            for column in (low[:, 0], last[:, 0]):
+                np.maximum(farthest, np.take(self._maxima, row + column), out=farthest)
+        return ((farthest < prints.near) & known) | self.outside(prints)
 
     def draw(self, column: NDArray, row: NDArray, depth: NDArray) -> None:
         """Fill pixels whose centres triangles cover, given the columns, rows and depths (3, n) of their corners."""
@@ -204,7 +202,7 @@ class Coverage:
         some = np.flatnonzero(ok & (count > 0))
         if not len(some):
             return
-        self._maxima = []
+        self._maxima = None
         flat = self.depth.reshape(-1)
         ends = np.cumsum(count[some])
         start = 0
@@ -253,15 +251,14 @@ def _covered(
     return inside, np.abs(whole) / np.maximum(inverse, 1e-30)
 
 
-def _maxima(depth: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+def _maxima(depth: NDArray[np.float32]) -> NDArray[np.float32]:
     """Largest depths of squares of 1, 2, 4, ... pixels whose lower left is each pixel; beyond the image nothing is."""
-    levels, side = [depth], 1
-    while 2 * side <= max(depth.shape):
-        last = levels[-1]
+    out = np.empty((int(np.log2(max(depth.shape))) + 1, *depth.shape), np.float32)
+    out[0] = depth
+    for number, (last, wide) in enumerate(pairwise(out)):
+        side = 1 << number
         new = last.copy()
         np.maximum(new[:-side], last[side:], out=new[:-side])
-        wide = new.copy()
+        wide[:] = new
         np.maximum(wide[:, :-side], new[:, side:], out=wide[:, :-side])
-        levels.append(wide)
-        side *= 2
-    return levels
+    return out

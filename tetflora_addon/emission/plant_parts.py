@@ -126,7 +126,7 @@ class GrownPlants(FrontierKind):
     ) -> Iterator[tuple[Whose, Facets]]:
         """As of `FrontierKind`."""
         species = self.flora.species_of(parts.branches.row)
-        for s in np.unique(species).tolist():
+        for s in np.flatnonzero(np.bincount(species)).tolist():
             some = np.flatnonzero((species == s) & ~parts.alone)
             if len(some):
                 yield (s, ""), self._of_subplants(parts.branches.take(some), side[some], side[some], 1.0 - kept[some])
@@ -141,7 +141,7 @@ class GrownPlants(FrontierKind):
             np.maximum(side, np.sqrt(self.flora.one_leaf_area(branches))),
             self.flora.species_of(branches.row),
         )
-        for s in np.unique(species).tolist():
+        for s in np.flatnonzero(np.bincount(species)).tolist():
             some = np.flatnonzero(species == s)
             own = branches.take(some)
             canvas.add_facets((s, ""), self._of_subplants(own, leaf[some], side[some], thin=canvas.thin))
@@ -172,7 +172,7 @@ class GrownPlants(FrontierKind):
         wide = 2.0 * branches.radius / extent
         tubes = uniform(branches.key, Draw.TRANSITION) < real_fraction(wide, TUBES)
         thin, detail = wide < BROAD, transition.detail
-        for s in np.unique(species).tolist():
+        for s in np.flatnonzero(np.bincount(species)).tolist():
             own = species == s
             left = np.flatnonzero(own[owner] & (real[owner] < 1.0))
             if len(left):
