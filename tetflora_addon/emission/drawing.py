@@ -43,7 +43,7 @@ TILE, AROUND = 240, 64
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
 MERGED = (64.0, 16.0, 4.0, 2.0)
 #: The same of those that are hidden when they are about to be made.
-SOONER = (16.0, 4.0)
+SOONER = (4.0, 16.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
 #: the shade over which it grows by e; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
@@ -325,9 +325,8 @@ class _Tile:
         place = place.astype(np.float32)
         for more in SOONER:
             reach = away[left] + np.sqrt(more) * radius[left]
-            hidden = self.coverage.hidden(self.coverage.of_spheres(gathered(place, left), reach))
-            times[left[hidden]] = more
-            left = left[~hidden]
+            left = left[self.coverage.hidden(self.coverage.of_spheres(gathered(place, left), reach))]
+            times[left] = more
         kept = np.flatnonzero(uniform(key, _THIN) < 1.0 / times)
         return kept, times[kept]
 
