@@ -117,6 +117,19 @@ class Coverage:
             low[round_], high[round_] = -np.inf, np.inf
         return Footprints(low.astype(np.float32), high.astype(np.float32), near.astype(np.float32))
 
+    def of_lines(
+        self, start: NDArray[np.float64], end: NDArray[np.float64], radius: NDArray[np.float64], within: Footprints
+    ) -> Footprints:
+        """Footprints of what reaches so far (n,) from lines between points (n, 3), within others (n,); metres.
+
+        Those of which an end reaches behind the eye's plane have the others.
+        """
+        a, b = (self.of_spheres(of, radius) for of in (start, end))
+        ahead = (np.isfinite(a.low) & np.isfinite(b.low)).all(axis=1)
+        low = np.where(ahead[:, None], np.maximum(np.minimum(a.low, b.low), within.low), within.low)
+        high = np.where(ahead[:, None], np.minimum(np.maximum(a.high, b.high), within.high), within.high)
+        return Footprints(low, high, np.where(ahead, np.maximum(np.minimum(a.near, b.near), within.near), within.near))
+
     def of_corners(self, corners: NDArray[np.floating]) -> tuple[Footprints, NDArray, NDArray, NDArray]:
         """Footprints of polygons with corners (n, k, 3), and the columns, rows and depths (k, n) of these."""
         n, k = corners.shape[:2]

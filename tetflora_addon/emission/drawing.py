@@ -34,7 +34,7 @@ from .asset_plan import PlacedClusters
 from .coverage import Coverage
 from .faces import FaceRows, Faces
 from .frontier import DETAIL, FEW, Frontier, FrontierKind, Shown, Waiting, Whose
-from .plant_parts import GrownPlants
+from .plant_parts import GrownPlants, PlantRows
 from .plants import Block, Transition
 from .shade import Shade
 
@@ -153,7 +153,7 @@ def drawing(
     lowest = result.plants.parts.branches.position[:, 2].min(initial=places[:, 2].min(initial=np.inf))
     shadows = ThrownShadows(camera, result.lights, float(lowest))
     kinds: list[FrontierKind] = [GrownPlants(flora, camera, transition, weights, result.lights)]
-    parts: list[Arrays] = [result.plants.parts]
+    parts: list[Arrays] = [PlantRows.of(flora, result.plants.parts)]
     if assets is not None:
         kinds.append(assets)
         parts.append(assets.everything())

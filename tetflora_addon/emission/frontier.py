@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, Keys
 from ..buffers import MeshBuffers
 from ..proxies.microsurfaces import Facets
-from .coverage import CELL, Coverage
+from .coverage import CELL, Coverage, Footprints
 
 #: Pixels, and facets, down to which parts that are seen are opened: smaller ones are drawn at their samples.
 DETAIL, FEW = 3.0, 3.0
@@ -96,6 +96,10 @@ class FrontierKind:
     def spheres(self, parts: Arrays) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Middles (n, 3) of spheres around parts, and radii (n,), metres."""
         raise NotImplementedError
+
+    def prints(self, coverage: Coverage, slab: Waiting) -> Footprints:
+        """What parts may touch of the image."""
+        return coverage.of_spheres(slab.centre, slab.radius)
 
     def optical(self, parts: Arrays) -> NDArray[np.float64]:
         """Area (n,) that parts block, of which something is to be drawn still, m²."""
@@ -227,7 +231,7 @@ class Frontier:
         """What is to be drawn of parts that begin before depths (n,), and what of theirs begins beyond."""
         kind, ready, later = self.kinds[number], [slab.take(slice(0))], []
         while len(slab):
-            prints = self.coverage.of_spheres(slab.centre, slab.radius)
+            prints = kind.prints(self.coverage, slab)
             outside = self.coverage.outside(prints)
             hidden = ~outside & self.coverage.hidden(prints)
             self.outside[number].append(slab.take(np.flatnonzero(outside)))

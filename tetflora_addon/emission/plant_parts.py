@@ -9,15 +9,17 @@ tubes while they are macroscopic, and else one thin triangle each, with the dire
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import column, length
 from ..camera.camera import Camera
+from ..compiled.bounds import own_leaf_reaches
 from ..compiled.flora import Flora
 from ..compiled.placed import extents
-from ..growth.axes import axes
+from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, uniform
@@ -33,6 +35,7 @@ from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import Pieces, Thin, whole_pieces
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
+from .coverage import Coverage, Footprints
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
 from .plants import Transition
 
@@ -48,6 +51,43 @@ BROAD, SIDES = 4.0, 4
 TWIG = 0.6
 #: Draw of this module.
 _THIN = 231
+
+
+@dataclass(frozen=True)
+class PlantRows(PlantParts):
+    """Parts of plants (n) as the frontier has them: about straight lines.
+
+    Attributes
+    ----------
+    start, end : (n, 3) float64
+        Of the line, metres.
+    beside : (n,) float64
+        How far they reach from it, metres.
+    """
+
+    start: NDArray[np.float64] = field(metadata=column(3))
+    end: NDArray[np.float64] = field(metadata=column(3))
+    beside: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, flora: Flora, parts: PlantParts, lines: Axes | None = None) -> PlantRows:
+        """Parts (n,), of which the axes are known where they are branches alone that were opened just now.
+
+        Sub-plants reach as far as samples of their leaves and wood.
+        """
+        branches, across = parts.branches, 0.5 * parts.extent
+        low, high = np.zeros(len(parts)), branches.length
+        if lines is None:
+            whole, (wide, first, last) = ~parts.alone, extents(flora, branches).T * branches.length
+            low, high = np.where(whole, np.minimum(first, 0.0), low), np.where(whole, last, high)
+            across = np.where(whole, wide, across)
+        ends = [branches.position + of[:, None] * branches.frame[:, :, 2] for of in (low, high)]
+        if lines is not None:
+            leaf = own_leaf_reaches(flora.rows, flora.leaf.reach)[branches.row] * branches.scale
+            solid = flora.rows["envelope"][branches.row] > 0
+            ends, across = [lines.knots[:, 0], lines.knots[:, -1]], np.where(solid, across, 0.0) + lines.bend() + leaf
+        own = (getattr(parts, each.name) for each in fields(PlantParts))
+        return cls(*own, *ends, across + branches.radius)
 
 
 @dataclass(frozen=True)
@@ -69,15 +109,13 @@ class GrownPlants(FrontierKind):
     weights: FacetWeights
     lights: Sequence[Light]
 
-    def spheres(self, parts: PlantParts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """As far as samples of their leaves and wood reach."""
-        branches, alone = parts.branches, parts.alone
-        across, low, high = extents(self.flora, branches).T
-        middle = np.where(alone, 0.5, 0.5 * (np.minimum(low, 0.0) + high)) * branches.length
-        half = np.where(alone, 0.5, 0.5 * (high - np.minimum(low, 0.0)))
-        across = np.where(alone, 0.5 * parts.extent / np.maximum(branches.length, 1e-12), across)
-        centre = branches.position + middle[:, None] * branches.frame[:, :, 2]
-        return centre, branches.length * np.hypot(across, half) + branches.radius
+    def spheres(self, parts: PlantRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As of `FrontierKind`."""
+        return 0.5 * (parts.start + parts.end), np.hypot(0.5 * length(parts.end - parts.start), parts.beside)
+
+    def prints(self, coverage: Coverage, slab: Waiting) -> Footprints:
+        """As of `FrontierKind`: most parts are long and thin."""
+        return coverage.of_lines(slab.parts.start, slab.parts.end, slab.parts.beside, super().prints(coverage, slab))
 
     def optical(self, parts: PlantParts) -> NDArray[np.float64]:
         """As of `FrontierKind`."""
@@ -98,11 +136,11 @@ class GrownPlants(FrontierKind):
         """As of `FrontierKind`."""
         return parts.can_open(self.flora)
 
-    def opened(self, parts: PlantParts) -> tuple[PlantParts, NDArray[np.int64]]:
+    def opened(self, parts: PlantRows) -> tuple[PlantRows, NDArray[np.int64]]:
         """As of `FrontierKind`."""
-        made = list(opened(self.flora, parts))
-        owner = np.concatenate([np.zeros(0, np.int64), *(of for _, of, _ in made)])
-        return PlantParts.concatenate([new for new, _, _ in made]), owner
+        made = [(PlantRows.of(self.flora, new, lines), of) for new, of, lines in opened(self.flora, parts)]
+        owner = np.concatenate([np.zeros(0, np.int64), *(of for _, of in made)])
+        return PlantRows.concatenate([new for new, _ in made]), owner
 
     def to_be_opened(self, parts: PlantParts) -> NDArray[np.bool_]:
         """Those of which leaves are real."""
