@@ -41,7 +41,7 @@ from .shade import Shade
 #: Least width of a tile, pixels, and pixels around it that its coverage knows.
 TILE, AROUND = 240, 64
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
-MERGED = (64.0, 16.0, 4.0, 2.0)
+MERGED = (4.0, 16.0, 64.0)
 #: The same of those that are hidden when they are about to be made.
 SOONER = (4.0, 16.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
@@ -366,7 +366,7 @@ class _Tile:
             gone = self.coverage.hidden(prints)
             some = np.flatnonzero(gone)
             number = uniform(_keys_of(corners[some, 0]), _MERGE)
-            likely = np.flatnonzero(number < max(1.0 / MERGED[-1], self._left))
+            likely = np.flatnonzero(number < max(0.5, self._left))
             some, number = some[likely], number[likely]
             if isinstance(made, Facets):
                 self._keep(made.take(np.flatnonzero(~gone)), True, what)
@@ -396,25 +396,33 @@ class _Tile:
 
     @property
     def _left(self) -> float:
-        """Part of hidden facets that are kept as they are.
-
-        Where there are few, all of the last are kept; where there are many, as if they had been merged as well.
-        """
-        return 1.0 / (MERGED[-1] * self.given.hidden**2)
+        """Part of hidden facets that are kept as they are, at most, where nothing near can stand for them."""
+        return 0.5 / self.given.hidden**2
 
     def _merge(self, facets: Facets, number: NDArray[np.float64], whose: Whose) -> None:
         """Few large facets for many that are hidden, by a random number (n,) of each.
 
-        Each lies behind full pixels as a whole, or is as it was.
+        Each lies behind full pixels as a whole. Those that can be large stand for all others in their cell of the
+        image, leaves for leaves and wood for wood.
         """
-        for times in MERGED:
-            larger = replace(facets, side=facets.side * np.sqrt(times))
-            hidden = self._hidden(larger)
-            self._keep(larger.take(np.flatnonzero(hidden & (number < 1.0 / times))), False, whose)
-            rest = np.flatnonzero(~hidden)
-            facets, number = facets.take(rest), number[rest]
+        prints, column, row, _ = self.coverage.of_corners(triangle_corners(facets))
         # A facet has another outline than the face for which it stands.
-        self._keep(facets.take(np.flatnonzero((number < self._left) & self._hidden(facets))), False, whose)
+        left = np.flatnonzero(self.coverage.hidden(prints))
+        times = np.zeros(len(facets))
+        times[left] = 1.0
+        for more in MERGED:
+            larger = facets.take(left)
+            left = left[self._hidden(replace(larger, side=larger.side * np.sqrt(more)))]
+            times[left] = more
+        cell, area = 2 * self.coverage.cells(column[0], row[0]) + (facets.transmission > 0.0), facets.side**2
+        large, alike = (np.where(of, area, 0.0) for of in (times > 1.0, times == 1.0))
+        lost, borne, most, own = (np.bincount(cell, of) for of in (area, large, large * times, alike))
+        rest = np.maximum(lost - min(max(0.5, self._left), 1.0) * most, 0.0) / np.maximum(own, 1e-300)
+        likely = (lost / np.maximum(borne, 1e-300))[cell] / np.maximum(times, 1.0)
+        likely = np.where(times > 1.0, likely, np.minimum(rest[cell], self._left) * times)
+        kept = np.flatnonzero(number < likely)
+        facets = facets.take(kept)
+        self._keep(replace(facets, side=facets.side * np.sqrt(times[kept])), False, whose)
 
     def _hidden(self, facets: Facets) -> NDArray[np.bool_]:
         """Facets (n,) behind full pixels."""
