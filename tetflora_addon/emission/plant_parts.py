@@ -27,7 +27,7 @@ from ..proxies.facet_weights import FacetWeights
 from ..proxies.hotspots import light_ratios
 from ..proxies.microsurfaces import Facets, piece_facets, subplant_facets
 from ..refinement.contents import PlantParts, as_pieces
-from ..refinement.decisions import real_fraction
+from ..refinement.decisions import explicit_fraction
 from ..refinement.lights import Light
 from ..refinement.shares import opened
 from ..species.species import LEAF_KINDS
@@ -60,9 +60,9 @@ class PlantRows(PlantParts):
     Attributes
     ----------
     start, end : (n, 3) float64
-        Of the line, metres.
+        Of the line, meters.
     beside : (n,) float64
-        How far they reach from it, metres.
+        How far they reach from it, meters.
     """
 
     start: NDArray[np.float64] = field(metadata=column(3))
@@ -78,7 +78,7 @@ class PlantRows(PlantParts):
         branches, across = parts.branches, 0.5 * parts.extent
         low, high = np.zeros(len(parts)), branches.length
         if lines is None:
-            whole, (wide, first, last) = ~parts.alone, extents(flora, branches).T * branches.length
+            whole, (wide, first, last) = ~parts.branch_only, extents(flora, branches).T * branches.length
             low, high = np.where(whole, np.minimum(first, 0.0), low), np.where(whole, last, high)
             across = np.where(whole, wide, across)
         ends = [branches.position + of[:, None] * branches.frame[:, :, 2] for of in (low, high)]
@@ -129,7 +129,7 @@ class GrownPlants(FrontierKind):
         """As of `FrontierKind`."""
         bound = extents(self.flora, parts.branches, farthest=False)
         silhouette = 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * parts.branches.length**2
-        whole = parts.alone | ~parts.can_open(self.flora)
+        whole = parts.branch_only | ~parts.can_open(self.flora)
         return np.where(whole, 1.0, opaque_fractions(silhouette, parts.totals.optical_area))
 
     def can_open(self, parts: PlantParts) -> NDArray[np.bool_]:
@@ -153,9 +153,9 @@ class GrownPlants(FrontierKind):
     def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], _shown: list[Shown]) -> None:
         """As of `FrontierKind`."""
         parts, branches = slab.parts, slab.parts.branches
-        extent = self.camera.extent_around(slab.centre)
-        lines = parts.alone | ~parts.can_open(self.flora)
-        lines &= parts.alone | (2.0 * slab.radius > LINES * extent) | (self.transition.of_branches(branches) > 0)
+        extent = self.camera.extent_around(slab.center)
+        lines = parts.branch_only | ~parts.can_open(self.flora)
+        lines &= parts.branch_only | (2.0 * slab.radius > LINES * extent) | (self.transition.of_branches(branches) > 0)
         self._draw_subplants(canvas, branches.take(np.flatnonzero(~lines)), side[~lines])
         self._draw_branches(canvas, branches.take(np.flatnonzero(lines)), side[lines])
 
@@ -165,10 +165,10 @@ class GrownPlants(FrontierKind):
         """As of `FrontierKind`."""
         species = self.flora.species_of(parts.branches.row)
         for s in np.flatnonzero(np.bincount(species)).tolist():
-            some = np.flatnonzero((species == s) & ~parts.alone)
+            some = np.flatnonzero((species == s) & ~parts.branch_only)
             if len(some):
                 yield (s, ""), self._of_subplants(parts.branches.take(some), side[some], side[some], 1.0 - kept[some])
-            some = np.flatnonzero((species == s) & parts.alone)
+            some = np.flatnonzero((species == s) & parts.branch_only)
             if len(some):
                 yield (s, ""), self._of_pieces(as_pieces(parts.branches.take(some)), side[some])
 
@@ -194,8 +194,8 @@ class GrownPlants(FrontierKind):
     ) -> Facets:
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_subplants(branches.row, count, self._share(branches))
-        once = None if thin is None else self._once(branches, leaf)
-        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, once, thin)
+        hotspot_factor = None if thin is None else self._once(branches, leaf)
+        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, hotspot_factor, thin)
 
     def _draw_branches(self, canvas: Canvas, branches: Branches, side: NDArray[np.float64]) -> None:
         """Branches alone: leaves that are large are real, wood is tubes or thin triangles, the rest is facets."""
@@ -203,21 +203,21 @@ class GrownPlants(FrontierKind):
             return
         flora, transition = self.flora, self.transition
         branches = replace(branches, plant=np.arange(len(branches), dtype=np.int32))
-        whole, real = WholeBranches(branches, axes(flora.rows, branches)), transition.of_own_leaves(branches)
+        whole, explicit = WholeBranches(branches, axes(flora.rows, branches)), transition.of_own_leaves(branches)
         pieces, owner = whole_pieces(flora.rows, whole)
         species = flora.species_of(branches.row)
         extent = np.maximum(transition.camera.extent_around(branches.position), 1e-300)
         wide = 2.0 * branches.radius / extent
-        tubes = uniform(branches.key, Draw.TRANSITION) < real_fraction(wide, TUBES)
+        tubes = uniform(branches.key, Draw.TRANSITION) < explicit_fraction(wide, TUBES)
         thin, detail = wide < BROAD, transition.detail
         for s in np.flatnonzero(np.bincount(species)).tolist():
             own = species == s
-            left = np.flatnonzero(own[owner] & (real[owner] < 1.0))
+            left = np.flatnonzero(own[owner] & (explicit[owner] < 1.0))
             if len(left):
                 of = whole, owner[left]
-                canvas.add_facets((s, ""), self._of_pieces(pieces.take(left), side, real, of, canvas.thin))
-            some = whole.take(np.flatnonzero(own & (real > 0.0)))
-            given = lambda b: (real[b.plant], transition.of_kites(b)), detail.lengths, canvas.thin
+                canvas.add_facets((s, ""), self._of_pieces(pieces.take(left), side, explicit, of, canvas.thin))
+            some = whole.take(np.flatnonzero(own & (explicit > 0.0)))
+            given = lambda b: (explicit[b.plant], transition.of_kites(b)), detail.lengths, canvas.thin
             for one in leaf_meshes(flora, s, [some], *given) if len(some) else ():
                 canvas.add_mesh((LEAF_KINDS[one.kind], one.form, s), one.buffers, True)
             # What is a few pixels wide has few sides; of wider wood all is drawn, or its shading would end at holes.
@@ -251,7 +251,7 @@ class GrownPlants(FrontierKind):
         self,
         pieces: Pieces,
         side: NDArray[np.float64],
-        real: NDArray[np.float64] | None = None,
+        explicit: NDArray[np.float64] | None = None,
         whole: tuple[WholeBranches, NDArray[np.integer]] | None = None,
         thin: Thin | None = None,
     ) -> Facets:
@@ -264,8 +264,8 @@ class GrownPlants(FrontierKind):
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_pieces(branches.row, count, self._share(branches))
         if whole is None:
-            return piece_facets(flora, pieces, leaf, side, weight, real)
-        own = (of[whole[1]] for of in (leaf, side, weight, real, self._once(branches, leaf)))
+            return piece_facets(flora, pieces, leaf, side, weight, explicit)
+        own = (of[whole[1]] for of in (leaf, side, weight, explicit, self._once(branches, leaf)))
         return piece_facets(flora, pieces, *own, thin, whole)
 
     def _optical(self, branches: Branches) -> NDArray[np.float64]:
