@@ -133,6 +133,7 @@ class Illumination:
         cells: Integers,
         camera: Camera | None = None,
         sheets: Integers | None = None,
+        dull: Floats | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Outgoing radiance of facets or leaves.
 
@@ -150,6 +151,8 @@ class Illumination:
             For the gloss; without, it is even.
         sheets : (m,) int, optional
             As for `direct`.
+        dull : (m,) float64, optional
+            Part of the gloss that is lost.
 
         Returns
         -------
@@ -159,7 +162,8 @@ class Illumination:
         front, back = np.zeros((2, len(centre), 3), np.float32)
         for start in range(0, len(centre), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
-            fractions = scattering.scattered_fractions(colour[part], transmission[part])
+            hidden = 0.0 if dull is None else dull[part]
+            fractions = scattering.scattered_fractions(colour[part], transmission[part], hidden)
             view = None if camera is None else to_eye(camera, centre[part])
             sides = scattering.facet_ambient(normal[part], fractions, self.around(centre[part], cells[part]), view)
             on = None if sheets is None else sheets[part]

@@ -71,6 +71,8 @@ class Facets(Arrays):
         Of the gloss of assets; None where the material knows.
     stretch : (n,) float64 or None
         Length along ``along`` over that of an equilateral triangle of the same area; None for 1.
+    dull : (n,) float64 or None
+        Part of the gloss of leaves that these hide from each other, 0 to 1; None for 0.
     """
 
     centre: Floats
@@ -82,6 +84,7 @@ class Facets(Arrays):
     velocity: Floats | None = None
     roughness: Floats | None = None
     stretch: Floats | None = None
+    dull: Floats | None = None
 
     @property
     def normal(self) -> Floats:
@@ -275,6 +278,7 @@ def _leaves_of_subplants(
         dimmed(colour, owner, weight, once),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, centre),
+        dull=_dull(owner, weight, once),
     )
     return made if of_day is None else made.take(np.flatnonzero(of_day > 0))
 
@@ -328,7 +332,8 @@ def _leaves_of_pieces(
     if own.later is not None:
         there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
         velocity = (there.position - leaves.position) / moment(rows)
-    return Facets(centre, across, along, np.sqrt(area * weight[owner]), colour, transmission, velocity)
+    side, dull = np.sqrt(area * weight[owner]), _dull(owner, weight, once)
+    return Facets(centre, across, along, side, colour, transmission, velocity, dull=dull)
 
 
 def _wood_of_subplants(
@@ -367,7 +372,7 @@ def _strips(
     # Turned about their axes at random, since closed tubes face all ways around.
     aside, turn = perpendicular(axis), 2 * np.pi * uniform(key, _TURN)[:, None]
     across = np.cos(turn) * aside + np.sin(turn) * np.cross(axis, aside)
-    return Facets(centre, across, axis, side, colour, none, velocity, stretch=stretch)
+    return Facets(centre, across, axis, side, colour, none, velocity, stretch=stretch, dull=none)
 
 
 def _carried(flora: Flora, subplants: Branches, owner: Integers, centre: Floats) -> Floats | None:
@@ -436,6 +441,11 @@ def dimmed(colour: NDArray, owner: NDArray, weight: NDArray, once: NDArray | Non
     """Colours (m, 3) of facets of owners (m,), by the weights of these (n,) and what light and eye share of them."""
     colour = trapped(colour, weight[owner])
     return colour if once is None else balanced_colours(colour, once[owner])
+
+
+def _dull(owner: NDArray, weight: NDArray, once: NDArray | None) -> Floats:
+    """Part (m,) of the gloss of leaves that facets lack: what is mirrored and meets another leaf is lost as such."""
+    return 1.0 - np.minimum(weight if once is None else weight * once, 1.0)[owner]
 
 
 def trapped(colour: Floats, weight: Floats) -> Floats:

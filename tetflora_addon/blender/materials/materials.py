@@ -28,9 +28,9 @@ ASSET_SPHERE = "TetFlora asset microsphere"
 BAKED = "TetFlora baked"
 
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
-_PROXY_VERSION = 3
-_SPHERE_VERSION = 1
-_BAKED_VERSION = 1
+_PROXY_VERSION = 4
+_SPHERE_VERSION = 2
+_BAKED_VERSION = 2
 
 
 def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> bpy.types.Material:
@@ -203,9 +203,9 @@ def baked_material() -> bpy.types.Material:
 
 
 def _proxy_looks(graph: Graph, normal: Any) -> dict[str, Any]:
-    """What proxies feed the scatter group with: gloss where light goes through, as in leaves."""
+    """What proxies feed the scatter group with: gloss where light goes through, as in leaves, as far as it is seen."""
     colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
-    gloss = (transmission > 0.0) * GLOSS
+    gloss = (transmission > 0.0) * GLOSS * (graph.attribute("tf_dull", "Fac") * -1.0 + 1.0)
     return {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": normal}
 
 
