@@ -278,7 +278,7 @@ def _leaves_of_subplants(
         dimmed(colour, owner, weight, once),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, centre),
-        dull=_dull(owner, weight, once),
+        dull=_dull(flora, leaf_row, owner, weight, once),
     )
     return made if of_day is None else made.take(np.flatnonzero(of_day > 0))
 
@@ -332,7 +332,7 @@ def _leaves_of_pieces(
     if own.later is not None:
         there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
         velocity = (there.position - leaves.position) / moment(rows)
-    side, dull = np.sqrt(area * weight[owner]), _dull(owner, weight, once)
+    side, dull = np.sqrt(area * weight[owner]), _dull(flora, row[owner], owner, weight, once)
     return Facets(centre, across, along, side, colour, transmission, velocity, dull=dull)
 
 
@@ -443,9 +443,10 @@ def dimmed(colour: NDArray, owner: NDArray, weight: NDArray, once: NDArray | Non
     return colour if once is None else balanced_colours(colour, once[owner])
 
 
-def _dull(owner: NDArray, weight: NDArray, once: NDArray | None) -> Floats:
+def _dull(flora: Flora, row: NDArray, owner: NDArray, weight: NDArray, once: NDArray | None) -> Floats:
     """Part (m,) of the gloss of leaves that facets lack: what is mirrored and meets another leaf is lost as such."""
-    return 1.0 - np.minimum(weight if once is None else weight * once, 1.0)[owner]
+    left = np.minimum(weight if once is None else weight * once, 1.0)
+    return 1.0 - left[owner] * (1.0 - flora.leaf.dull[row])
 
 
 def trapped(colour: Floats, weight: Floats) -> Floats:
