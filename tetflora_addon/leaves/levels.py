@@ -35,7 +35,7 @@ _FINER = 0.75
 _DEARER = 1.35
 #: Faces with less than this as texture coordinate v, negative, are stems; their tints, of petioles and of shoots.
 _STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
-#: Steps of needles towards an area, the relative thickness from which on one tells how it grows with the thickness, and
+#: Steps of needles toward an area, the relative thickness from which on one tells how it grows with the thickness, and
 #: the power by which it is taken to grow before: shoots stay, and needles hide more of each other.
 _FITS, _FITTED, _GROWTH = 3, 0.01, 0.75
 #: Factors of thickness and width at most, and that of a width by which is seen how the area grows with it.
@@ -61,7 +61,7 @@ class LeafLevel:
     error : float
         Largest distance of the margin from that of the shape, in lengths of the leaf.
     tint : (f, 3) float32
-        What the colour of a leaf is times that of each face: shoots are brown, petioles pale.
+        What the color of a leaf is times that of each face: shoots are brown, petioles pale.
     again : (f,) float32
         Probability that light which a face scatters meets another: needles on a shoot hide each other.
     solid : bool
@@ -75,8 +75,8 @@ class LeafLevel:
     again: NDArray[np.float32]
     solid: bool = False
 
-    def colours(self, whole: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Colours (n, f, 3) of faces, from those of leaves: that of a species with needles is that of its shoots.
+    def colors(self, whole: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Colors (n, f, 3) of faces, from those of leaves: that of a species with needles is that of its shoots.
 
         A shoot sends back w (1 - p) / (1 - p w) where its needles send back w: p of what one scatters meets another
         (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform broadleaved and

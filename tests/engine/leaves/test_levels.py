@@ -27,7 +27,7 @@ from tetflora_addon.leaves.levels import (
 from tetflora_addon.leaves.models import _COARSE, LEAF_MODELS, LeafModel, mean_silhouette
 from tetflora_addon.leaves.needles import SPARSE, Needles
 from tetflora_addon.leaves.outlines import distance_to_links
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 #: Polygons that no level has.
 MOST = 4000
@@ -66,7 +66,7 @@ def test_levels_have_the_area_of_their_model(name: str) -> None:
 @pytest.mark.parametrize("species", ["conifer", "juniper", "larch", "scots_pine", "silver_fir", "spruce", "stone_pine"])
 def test_needles_hide_as_much_as_the_polygons_that_stand_for_them(species: str) -> None:
     """From any side on average, though needles hide each other: a shoot is no denser from afar."""
-    (model,) = catalogue.load_species(species).leaf
+    (model,) = catalog.load_species(species).leaf
     for level in leaf_levels(model)[:2]:
         assert 2.0 * mean_silhouette(level.model) == pytest.approx(model.area, rel=0.03)
         assert level.model.area > 1.1 * model.area
@@ -139,9 +139,9 @@ def test_shoots_are_as_bright_as_the_polygons_that_stand_for_them(number: int) -
     level = leaf_levels(LEAF_MODELS["needles"], number)[number - 1]
     needles, shoots = level.again > 0.0, np.random.default_rng(3).random((20, 1, 3), np.float32)
     shown = 2.0 * mean_silhouette(level.model)
-    colour = np.repeat(shoots, level.model.polygons, axis=1)
-    one, p = level.colours(colour)[:, needles], level.again[needles].max()
-    assert one * (1.0 - p) / (1.0 - p * one) == pytest.approx(colour[:, needles], abs=1e-4)
+    color = np.repeat(shoots, level.model.polygons, axis=1)
+    one, p = level.colors(color)[:, needles], level.again[needles].max()
+    assert one * (1.0 - p) / (1.0 - p * one) == pytest.approx(color[:, needles], abs=1e-4)
     areas = np.linalg.norm(level.model.face_vectors, axis=1)  # of closed things both sides are there
     assert 1.0 - p == pytest.approx(shown / np.where(needles & (not level.solid), areas, areas / 2).sum(), rel=0.02)
 
@@ -188,6 +188,6 @@ def test_levels_are_made_as_far_as_they_are_asked_for(name: str) -> None:
 
 def test_leaflets_that_close_up_are_one_surface_from_afar() -> None:
     """A frond of moss is its outline until gaps between leaflets can be seen, though they are deeper than wide."""
-    model = catalogue.load_species("moss").leaf[0]
+    model = catalog.load_species("moss").leaf[0]
     gap = (model.shape.last - model.shape.first) / (model.shape.pairs - 1)
     assert coarse_error(model) < 1.3 * gap

@@ -31,10 +31,10 @@ def test_each_copy_is_the_model(name: str, parts: list[int]) -> None:
     model, number = LEAF_MODELS[name], sum(parts)
     rng = np.random.default_rng(1)
     frame, size = frames(number), rng.uniform(0.01, 0.3, number)
-    position, colour = rng.normal(size=(number, 3)) * 10, rng.random((number, 3))
+    position, color = rng.normal(size=(number, 3)) * 10, rng.random((number, 3))
     copies = LeafCopies(model, number, 0.25)
     for part in np.split(np.arange(number), np.cumsum(parts)[:-1]):
-        copies.add(part.astype(np.uint64), position[part], frame[part].astype(np.float32), size[part], colour[part])
+        copies.add(part.astype(np.uint64), position[part], frame[part].astype(np.float32), size[part], color[part])
     mesh = copies.buffers()
 
     expected = np.einsum("nij,vj->nvi", frame * size[:, None, None], model.positions) + position[:, None]
@@ -48,8 +48,8 @@ def test_each_copy_is_the_model(name: str, parts: list[int]) -> None:
     assert (mesh.face_offsets[:-1].reshape(number, -1) == model.face_offsets[:-1] + copy * corners).all()
     assert mesh.face_offsets[-1] == number * corners
     assert (mesh.attributes["UVMap"][1].reshape(number, -1) == model.uv.reshape(-1)).all()
-    by_copy = mesh.attributes["tf_colour"][1].reshape(number, -1, 3)
-    np.testing.assert_allclose(by_copy, np.broadcast_to(colour[:, None], by_copy.shape), atol=1e-7)
+    by_copy = mesh.attributes["tf_color"][1].reshape(number, -1, 3)
+    np.testing.assert_allclose(by_copy, np.broadcast_to(color[:, None], by_copy.shape), atol=1e-7)
     assert (mesh.attributes["tf_transmission"][1] == np.float32(0.25)).all()
 
 
@@ -58,12 +58,12 @@ def test_kites_lie_where_their_keys_say() -> None:
     kites, number = leaf_kites(LEAF_MODELS["needles"]), 4000
     rng = np.random.default_rng(2)
     frame, size, position = frames(number), rng.uniform(0.01, 0.3, number), rng.normal(size=(number, 3))
-    key, colour = rng.integers(0, 2**63, number).astype(np.uint64), rng.random((number, 3))
+    key, color = rng.integers(0, 2**63, number).astype(np.uint64), rng.random((number, 3))
     meshes = []
     for parts in ([number], [1500, 2500]):
         copies = KiteCopies(kites, number, 0.25)
         for part in np.split(np.arange(number), np.cumsum(parts)[:-1]):
-            copies.add(key[part], position[part], frame[part].astype(np.float32), size[part], colour[part])
+            copies.add(key[part], position[part], frame[part].astype(np.float32), size[part], color[part])
         meshes.append(copies.buffers())
     assert (meshes[0].positions == meshes[1].positions).all()
     placed = np.einsum("nij,kvj->nkvi", frame * size[:, None, None], kites.positions) + position[:, None, None]
@@ -108,16 +108,16 @@ def test_no_copies_are_a_mesh_without_faces() -> None:
 
 
 @given(st.floats(0.01, 0.9), st.floats(0.05, 0.9))
-def test_solid_needles_send_on_as_much_light_as_sheets(colour: float, transmission: float) -> None:
+def test_solid_needles_send_on_as_much_light_as_sheets(color: float, transmission: float) -> None:
     """Light that enters a prism meets faces from within until it comes out."""
     level = next(level for level in leaf_levels(LEAF_MODELS["needles"]) if level.solid)
     plain = replace(level, again=np.zeros_like(level.again))
     copies = LevelCopies(plain, 1, transmission)
-    copies.colour[:] = colour
+    copies.color[:] = color
     made = copies.buffers().attributes
     needles = level.again > 0.0
-    face = made["tf_colour"][1][needles].astype(np.float64)
+    face = made["tf_color"][1][needles].astype(np.float64)
     through = made["tf_transmission"][1][needles].astype(np.float64)[:, None]
     reflected, entering = (1.0 - through) * face, through * face
-    assert reflected + entering**2 / (1.0 - reflected) == pytest.approx(np.full_like(face, colour), rel=1e-3)
+    assert reflected + entering**2 / (1.0 - reflected) == pytest.approx(np.full_like(face, color), rel=1e-3)
     assert (face <= 1.0).all() and (through < 1.0).all()
