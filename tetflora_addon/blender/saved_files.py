@@ -21,7 +21,7 @@ from pathlib import Path
 
 import bpy
 
-from ..errors import SceneError, shown
+from ..errors import SceneError, quoted
 from ..files import IDENTIFIER_RULE, PART, is_identifier, replace
 from .runtime import Handlers, complain
 
@@ -141,7 +141,7 @@ def clear_unreadable() -> None:
     odd = [identifier for identifier in edits if identifier and not is_identifier(identifier)]
     if odd:
         print(
-            f"TetFlora: warning: this file has species of its own that are ignored: {shown(odd[0])} cannot name a "
+            f"TetFlora: warning: this file has species of its own that are ignored: {quoted(odd[0])} cannot name a "
             f"species. Use only {IDENTIFIER_RULE}",
             file=sys.stderr,
         )

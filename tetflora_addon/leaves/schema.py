@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SpeciesError, shown
+from ..errors import SpeciesError, quoted
 from ..parameters import FileReader
 from .blades import check_outline
 from .bodies import closed_parts
@@ -64,7 +64,7 @@ def _read_leaf(reader: FileReader, data: Any, where: str) -> LeafModel | str:
         return replace(_read_leaf(reader, rest, where), shape=shape)
     if "model" in data:
         if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
-            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {shown(data['model'])}")
+            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {quoted(data['model'])}")
         return LEAF_MODELS[data["model"]]
     if "object" in data:
         return reader.text(data["object"], f"{where}.object")

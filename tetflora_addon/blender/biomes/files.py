@@ -16,8 +16,8 @@ from typing import Any
 
 import bpy
 
-from ...errors import SceneError, SpeciesError, shown
-from ...files import IDENTIFIER_RULE, is_identifier, json_of, read_whole
+from ...errors import SceneError, SpeciesError, quoted
+from ...files import IDENTIFIER_RULE, is_identifier, parse_json, read_whole
 from ...planting.zones import Limits
 from ...species.schema import species_from_dict
 from ..file_library import MAX_FILE_BYTES, as_text
@@ -55,7 +55,7 @@ _MORE = {"description", "species", "limits", "gives_way", "ground", "season"}
 #: Settings of populations that mean something in one file only.
 _LOCAL = ("grounds", "ground_collection", "vertex_group", "image", "uv_layer", "areas", "paths")
 #: Settings of a species of a stand.
-STAND_ENTRY = ("species", "planted", "rain")
+STAND_ENTRY = ("species", "planted", "incoming_seeds")
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def read_biome(path: Path) -> Biome:
         It cannot be read, or breaks a rule of the format; names file and key.
     """
     try:
-        return checked(json_of(read_whole(path, MAX_FILE_BYTES), refuse_constant), path.stem)
+        return checked(parse_json(read_whole(path, MAX_FILE_BYTES), refuse_constant), path.stem)
     except OSError as error:
         raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
     except (ValueError, SpeciesError) as error:
@@ -120,7 +120,7 @@ def checked(data: Any, identifier: str) -> Biome:
         raise ValueError('"name" is empty')
     _check_limits(data.get("limits", {}))
     if not isinstance(data.get("gives_way", True), bool):
-        raise ValueError(f'"gives_way" is {shown(data["gives_way"])}; it must be true or false')
+        raise ValueError(f'"gives_way" is {quoted(data["gives_way"])}; it must be true or false')
     _check_ground(data.get("ground", {}))
     season = data.get("season", {})
     check_keys('"season"', season, set(), set(SEASON))
@@ -221,14 +221,14 @@ def _check_ground(ground: Any) -> None:
             _check_number(f'"ground": "{key}"', value, low, high)
             continue
         if not isinstance(value, list) or len(value) != 3:
-            raise ValueError(f'"ground": "{key}" is {shown(value)}; it must be three numbers')
+            raise ValueError(f'"ground": "{key}" is {quoted(value)}; it must be three numbers')
         for part in value:
             _check_number(f'"ground": "{key}"', part, low, high)
 
 
 def _check_number(where: str, value: Any, low: float, high: float) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise ValueError(f"{where} is {shown(value)}; it must be a number from {low:g} to {high:g}")
+        raise ValueError(f"{where} is {quoted(value)}; it must be a number from {low:g} to {high:g}")
 
 
 def _check_species(species: Any) -> None:
@@ -236,15 +236,15 @@ def _check_species(species: Any) -> None:
     for identifier, page in species.items():
         where = f'species "{identifier}"'
         if not is_identifier(identifier):
-            raise ValueError(f"{shown(identifier)} cannot name a species; use only {IDENTIFIER_RULE}")
+            raise ValueError(f"{quoted(identifier)} cannot name a species; use only {IDENTIFIER_RULE}")
         if not isinstance(page, dict):
             raise ValueError(f"{where} is {type(page).__name__}; it must be an object with keys")
         if "of" not in page:
             species_from_dict(page, identifier, where)
         elif not isinstance(page["of"], str) or not is_identifier(page["of"]):
-            raise ValueError(f'{where}: "of" is {shown(page["of"])}; use only {IDENTIFIER_RULE}')
+            raise ValueError(f'{where}: "of" is {quoted(page["of"])}; use only {IDENTIFIER_RULE}')
         elif not isinstance(page.get("every_order", {}), dict):
-            raise ValueError(f'{where}: "every_order" is {shown(page["every_order"])}; it must be an object with keys')
+            raise ValueError(f'{where}: "every_order" is {quoted(page["every_order"])}; it must be an object with keys')
 
 
 def _check_layer(where: str, layer: Any) -> None:
@@ -252,7 +252,7 @@ def _check_layer(where: str, layer: Any) -> None:
         raise ValueError(f"{where} is {type(layer).__name__}; it must be an object with keys")
     kind = layer.get("kind")
     if kind not in KINDS:
-        raise ValueError(f'{where}: "kind" is {shown(kind)}; it must be one of {", ".join(KINDS)}')
+        raise ValueError(f'{where}: "kind" is {quoted(kind)}; it must be one of {", ".join(KINDS)}')
     if kind == "stand":
         check_keys(where, layer, {"kind", "name", "species"}, {"kind", "name", "species", *stand_settings()})
         check_text(f'{where}: "name"', layer["name"])
