@@ -70,7 +70,11 @@ def test_forms_and_ages_do_not_get_into_each_others_way(scene):
     (plant,) = row_of_plants([7.0])
     plant.tetflora.skeleton = form
     (kind,) = seeds(scene).identifiers
-    assert (skeletons.species_of(kind), skeletons.form_of(kind), skeletons.age_of(kind)) == (SPECIES, form, 7.0)
+    assert (skeletons.species_of(kind), skeletons.skeleton_object_of(kind), skeletons.age_of(kind)) == (
+        SPECIES,
+        form,
+        7.0,
+    )
     assert contents.estimate(scene, depsgraph()).polygons_full > 0
 
 
