@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tetflora_addon.places import table, tables
 
 from benchmarks import places_files as files
 from benchmarks import places_inventories as inventories
 from tetflora_addon.errors import SceneError
+from tetflora_addon.geodata import table, tables
 from tetflora_addon.geodata.inventories import IMPERIAL, preview, read_inventory
 from tetflora_addon.geodata.species_names import (
     GENUS,
