@@ -322,7 +322,7 @@ def _broken():
         (changed(species={"a": {"name": "A"}}), "missing"),
         (in_layer(kind="tree"), '"kind"'),
         (changed(layers=[{**STAND, "years": 0}]), '"years"'),
-        (changed(layers=[{**STAND, "species": [{"species": "birch", "incoming_seeds": "some"}]}]), '"rain"'),
+        (changed(layers=[{**STAND, "species": [{"species": "birch", "incoming_seeds": "some"}]}]), '"incoming_seeds"'),
         (in_layer(density="many"), '"density"'),
         (in_layer(species=[]), 'no "species"'),
         (in_layer(species=[{"species": "bush", "weight": -1}]), '"weight"'),
