@@ -23,10 +23,11 @@ import bpy
 
 from ..errors import SceneError, quoted
 from ..files import IDENTIFIER_RULE, PART, is_identifier, replace
+from ..formats import FORMATS
 from .runtime import Handlers, complain
 
-#: Version of the layout of properties; a later one adds steps from earlier ones to `migrate`.
-VERSION = 2
+#: Of the properties of an object or a scene. Steps from earlier ones stand in `migrate`, when there are any.
+VERSION = FORMATS["properties"]
 _COMPRESSED = b"\x28\xb5\x2f\xfd"
 _END = b"\xb1\xea\x92\x8f"
 

@@ -572,4 +572,4 @@ def _facets_of_faces(
     side = np.sqrt(area)
     # As long as the face, as far as facets of wood are.
     stretch = np.clip(longest.max(axis=0) / np.maximum(1.5 * CIRCUMRADIUS * side, 1e-12), 1.0, STRETCH)
-    return Facets(center, across, along, side, color, through, velocity, stretch=stretch)
+    return Facets(center, across, along, side, color, through, velocity, stretch=stretch, dull=np.zeros(len(area)))

@@ -18,16 +18,17 @@ import bpy
 
 from ...errors import SceneError, SpeciesError, quoted
 from ...files import IDENTIFIER_RULE, is_identifier, parse_json, read_whole
+from ...formats import FORMATS
 from ...planting.zones import Limits
 from ...species.schema import species_from_dict
 from ..file_library import MAX_FILE_BYTES, as_text
 from ..placing.population_data import (
-    check_format,
     check_keys,
     check_population,
     check_settings,
     check_species,
     check_text,
+    in_newest_format,
     list_of,
     population_data,
     refuse_constant,
@@ -44,7 +45,6 @@ from . import library
 from .properties import GROUND, TetFloraBiome, data_of
 
 FORMAT = "TetFlora biome"
-VERSION = 1
 #: What a layer is: plants that keep their distance from others and shade the ground; what grows and lies under them,
 #: and does neither; a stand that grows.
 KINDS = ("population", "cover", "stand")
@@ -112,8 +112,8 @@ def checked(data: Any, identifier: str) -> Biome:
     ValueError, SpeciesError
         Something is not as it must be; names the key.
     """
+    data = in_newest_format(data, FORMAT, "biome", "files of biomes")
     check_keys("the file", data, _KEYS, _KEYS | _MORE)
-    check_format(data, FORMAT, VERSION, "files of biomes")
     for key in ("name", "description"):
         check_text(f'"{key}"', data.get(key, ""))
     if not data["name"].strip():
@@ -144,7 +144,7 @@ def biome_data(
     description: str,
 ) -> dict[str, Any]:
     """Populations as the layers of a file, with the limits of their biome and species that only this file has."""
-    data: dict[str, Any] = {"format": FORMAT, "version": VERSION, "name": name, "description": description}
+    data: dict[str, Any] = {"format": FORMAT, "version": FORMATS["biome"], "name": name, "description": description}
     stored = data_of(biome) if biome is not None else {}
     data |= {key: value for key, value in stored.items() if key in ("ground", "season") and value}
     layers = [_layer_data(population) for population in populations]

@@ -14,6 +14,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ... import formats
 from ...errors import NAME, quoted, readable
 from ...files import IDENTIFIER_RULE, is_identifier
 from ..settings import limits_of
@@ -133,14 +134,16 @@ def _named(kind: str, name: str | None, missing: list[str]) -> bpy.types.ID | No
     return found
 
 
-def check_format(data: dict[str, Any], expected: str, version: int, files: str) -> None:
-    """Refuse a file of another format or version with a `ValueError`."""
+def in_newest_format(data: Any, expected: str, what: str, files: str) -> Any:
+    """A decoded file in the newest format; one of another kind or of a later version is refused with a `ValueError`."""
+    if not isinstance(data, dict) or not {"format", "version"} <= data.keys():
+        return data  # keys are checked next
     if data["format"] != expected:
         raise ValueError(f'"format" is {quoted(data["format"])}; {files} have "{expected}"')
-    if data["version"] != version or isinstance(data["version"], bool):
-        raise ValueError(
-            f'"version" is {quoted(data["version"])}; this version of TetFlora reads {version}; update the extension'
-        )
+    try:
+        return formats.newest(what, data, data["version"])
+    except ValueError as error:
+        raise ValueError(f'"version" {error}') from None
 
 
 def check_value(where: str, prop: bpy.types.Property, value: Any) -> None:
