@@ -41,8 +41,8 @@ from .shade import Shade
 #: Least width of a tile, pixels, and pixels around it that its coverage knows.
 TILE, AROUND = 240, 64
 #: Pixels by which what was made is tested as if it were wider: full pixels are open beside their centers. With none,
-#: 8.3 % of 16 points in each pixel of a wood see what counts as hidden; so they are 7.5 %, with .25 6.7 %.
-_WIDER = np.float32(0.12)
+#: 8.3 % of 16 points in each pixel of a wood see what counts as hidden; with .12 they are 7.5 %, so 6.7 %.
+_WIDER = np.float32(0.25)
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
 MERGED = (4.0, 16.0, 64.0)
 #: The same of those that are hidden when they are about to be made.
