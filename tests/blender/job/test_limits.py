@@ -66,7 +66,7 @@ def test_other_processes_have_a_part_of_the_limit(scene, monkeypatch) -> None:
 
 def test_a_job_tells_processes_how_much_they_may_take(scene, monkeypatch) -> None:
     told = []
-    monkeypatch.setattr(pool, "use", told.append)
+    monkeypatch.setattr(pool, "set_memory_limit", told.append)
     scene.tetflora.max_memory = 3.0
     refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     assert told == [3e9]
