@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers
+from ..optics import needle_color
 from .blades import blade_surface
 from .bodies import closed_parts, rounded, spined
 from .compounds import Compound, compound_surface
@@ -76,15 +77,9 @@ class LeafLevel:
     solid: bool = False
 
     def colors(self, whole: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Colors (n, f, 3) of faces, from those of leaves: that of a species with needles is that of its shoots.
-
-        A shoot sends back w (1 - p) / (1 - p w) where its needles send back w: p of what one scatters meets another
-        (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform broadleaved and
-        coniferous canopies", 2005).
-        """
+        """Colors (n, f, 3) of faces, from those of leaves: that of a species with needles is that of its shoots."""
         whole = np.minimum(whole * self.tint, 1.0)
-        again = self.again[:, None]
-        return whole / (1.0 - again * (1.0 - whole)) if again.any() else whole
+        return needle_color(whole, self.again[:, None]) if self.again.any() else whole
 
 
 def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: float = 1.0) -> LeafSurface:
