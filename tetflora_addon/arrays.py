@@ -252,6 +252,21 @@ def products(a: NDArray, b: NDArray) -> NDArray:
     return np.moveaxis(out, -1, 0)
 
 
+def in_axes(points: NDArray, frame: NDArray, origin: NDArray | tuple[float, ...] = (0.0, 0.0, 0.0)) -> NDArray:
+    """Coordinates (..., 3) of points along the columns of a frame (3, 3), in the points' precision, by component.
+
+    A product with a matrix of three rows takes ten times as long.
+    """
+    x, y, z = (points[..., i] - points.dtype.type(origin[i]) for i in range(3))
+    frame = frame.astype(points.dtype)
+    return np.moveaxis(np.stack([x * frame[0, k] + y * frame[1, k] + z * frame[2, k] for k in range(3)]), 0, -1)
+
+
+def length(a: NDArray) -> NDArray:
+    """Lengths (n,) of vectors (n, 3), by component."""
+    return np.sqrt(dot(a, a)[:, 0])
+
+
 def unit(a: NDArray) -> NDArray:
     """Vectors (n, 3) scaled to length 1, in the precision that they have; zero vectors stay."""
     return a / np.maximum(np.sqrt(dot(a, a)), np.finfo(a.dtype).tiny)

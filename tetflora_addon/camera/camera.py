@@ -20,6 +20,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import in_axes, length
+
 #: Side of the grid, meters. Up to half of it from the world's origin, coordinates are those of the world.
 GRID = 1024.0
 #: Cosine of the latitude from which on panoramas count as if no pixels were added toward the poles: 84 degrees.
@@ -127,7 +129,7 @@ class Camera:
 
     def to_camera_space(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """World points ``(..., 3)`` to (x right, y up, depth) ``(..., 3)``, meters."""
-        return ((points - self.position) @ self.frame) * np.array([1.0, 1.0, -1.0])
+        return in_axes(np.asarray(points, np.float64), self.frame * [1.0, 1.0, -1.0], self.position)
 
     def distance_to_view(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance of world points (n, 3) from the space that the image shows, meters; negative within it."""
@@ -250,7 +252,7 @@ class Camera:
         """
         extent = self.pixel_extent(points)
         if self.kind == "PERSP":
-            away = np.linalg.norm(points - self.eye, axis=-1)
+            away = length(points - self.eye)
             extent = np.maximum(extent, self.pixel_size * (away - self.cell_radius))
         return extent
 

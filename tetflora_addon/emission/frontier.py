@@ -18,10 +18,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, Keys
 from ..buffers import MeshBuffers
 from ..proxies.microsurfaces import Facets
-from .coverage import CELL, Coverage
+from .coverage import CELL, Coverage, Footprints
 
 #: Pixels, and facets, down to which parts that are seen are opened: smaller ones are drawn at their samples.
 DETAIL, FEW = 3.0, 3.0
@@ -73,6 +73,11 @@ class Canvas(Protocol):
     def add_mesh(self, what: tuple[str, int, int], buffers: MeshBuffers | None, culled: bool = False) -> None:
         """A mesh of a species, without faces behind full pixels if it is culled."""
 
+    def thin(
+        self, key: Keys, place: NDArray[np.floating], away: NDArray[np.floating], radius: NDArray[np.floating]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """As of `pieces.Thin`: few large ones are made in the place of many that are hidden already."""
+
     def add_shown(self, corners: NDArray[np.floating], number: float = 0.0) -> None:
         """Polygons with corners (n, k, 3) of what is drawn as it is; they count as so many."""
 
@@ -91,6 +96,10 @@ class FrontierKind:
     def spheres(self, parts: Arrays) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Middles (n, 3) of spheres around parts, and radii (n,), meters."""
         raise NotImplementedError
+
+    def prints(self, coverage: Coverage, slab: Waiting) -> Footprints:
+        """What parts may touch of the image."""
+        return coverage.of_spheres(slab.center, slab.radius)
 
     def optical(self, parts: Arrays) -> NDArray[np.float64]:
         """Area (n,) that parts block, of which something is to be drawn still, m²."""
@@ -222,7 +231,7 @@ class Frontier:
         """What is to be drawn of parts that begin before depths (n,), and what of theirs begins beyond."""
         kind, ready, later = self.kinds[number], [slab.take(slice(0))], []
         while len(slab):
-            prints = self.coverage.of_spheres(slab.center, slab.radius)
+            prints = kind.prints(self.coverage, slab)
             outside = self.coverage.outside(prints)
             hidden = ~outside & self.coverage.hidden(prints)
             self.outside[number].append(slab.take(np.flatnonzero(outside)))

@@ -9,15 +9,17 @@ tubes while they are macroscopic, and else one thin triangle each, with the dire
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import column, length
 from ..camera.camera import Camera
+from ..compiled.bounds import own_leaf_reaches
 from ..compiled.flora import Flora
 from ..compiled.placed import extents
-from ..growth.axes import axes
+from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, uniform
@@ -30,9 +32,10 @@ from ..refinement.lights import Light
 from ..refinement.shares import opened
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
-from ..subplants.pieces import Pieces, whole_pieces
+from ..subplants.pieces import Pieces, Thin, whole_pieces
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
+from .coverage import Coverage, Footprints
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
 from .plants import Transition
 
@@ -48,6 +51,43 @@ BROAD, SIDES = 4.0, 4
 TWIG = 0.6
 #: Draw of this module.
 _THIN = 231
+
+
+@dataclass(frozen=True)
+class PlantRows(PlantParts):
+    """Parts of plants (n) as the frontier has them: about straight lines.
+
+    Attributes
+    ----------
+    start, end : (n, 3) float64
+        Of the line, meters.
+    beside : (n,) float64
+        How far they reach from it, meters.
+    """
+
+    start: NDArray[np.float64] = field(metadata=column(3))
+    end: NDArray[np.float64] = field(metadata=column(3))
+    beside: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, flora: Flora, parts: PlantParts, lines: Axes | None = None) -> PlantRows:
+        """Parts (n,), of which the axes are known where they are branches alone that were opened just now.
+
+        Sub-plants reach as far as samples of their leaves and wood.
+        """
+        branches, across = parts.branches, 0.5 * parts.extent
+        low, high = np.zeros(len(parts)), branches.length
+        if lines is None:
+            whole, (wide, first, last) = ~parts.branch_only, extents(flora, branches).T * branches.length
+            low, high = np.where(whole, np.minimum(first, 0.0), low), np.where(whole, last, high)
+            across = np.where(whole, wide, across)
+        ends = [branches.position + of[:, None] * branches.frame[:, :, 2] for of in (low, high)]
+        if lines is not None:
+            leaf = own_leaf_reaches(flora.rows, flora.leaf.reach)[branches.row] * branches.scale
+            solid = flora.rows["envelope"][branches.row] > 0
+            ends, across = [lines.knots[:, 0], lines.knots[:, -1]], np.where(solid, across, 0.0) + lines.bend() + leaf
+        own = (getattr(parts, each.name) for each in fields(PlantParts))
+        return cls(*own, *ends, across + branches.radius)
 
 
 @dataclass(frozen=True)
@@ -69,15 +109,13 @@ class GrownPlants(FrontierKind):
     weights: FacetWeights
     lights: Sequence[Light]
 
-    def spheres(self, parts: PlantParts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """As far as samples of their leaves and wood reach."""
-        branches, alone = parts.branches, parts.branch_only
-        across, low, high = extents(self.flora, branches).T
-        middle = np.where(alone, 0.5, 0.5 * (np.minimum(low, 0.0) + high)) * branches.length
-        half = np.where(alone, 0.5, 0.5 * (high - np.minimum(low, 0.0)))
-        across = np.where(alone, 0.5 * parts.extent / np.maximum(branches.length, 1e-12), across)
-        center = branches.position + middle[:, None] * branches.frame[:, :, 2]
-        return center, branches.length * np.hypot(across, half) + branches.radius
+    def spheres(self, parts: PlantRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As of `FrontierKind`."""
+        return 0.5 * (parts.start + parts.end), np.hypot(0.5 * length(parts.end - parts.start), parts.beside)
+
+    def prints(self, coverage: Coverage, slab: Waiting) -> Footprints:
+        """As of `FrontierKind`: most parts are long and thin."""
+        return coverage.of_lines(slab.parts.start, slab.parts.end, slab.parts.beside, super().prints(coverage, slab))
 
     def optical(self, parts: PlantParts) -> NDArray[np.float64]:
         """As of `FrontierKind`."""
@@ -98,11 +136,11 @@ class GrownPlants(FrontierKind):
         """As of `FrontierKind`."""
         return parts.can_open(self.flora)
 
-    def opened(self, parts: PlantParts) -> tuple[PlantParts, NDArray[np.int64]]:
+    def opened(self, parts: PlantRows) -> tuple[PlantRows, NDArray[np.int64]]:
         """As of `FrontierKind`."""
-        made = list(opened(self.flora, parts))
-        owner = np.concatenate([np.zeros(0, np.int64), *(of for _, of, _ in made)])
-        return PlantParts.concatenate([new for new, _, _ in made]), owner
+        made = [(PlantRows.of(self.flora, new, lines), of) for new, of, lines in opened(self.flora, parts)]
+        owner = np.concatenate([np.zeros(0, np.int64), *(of for _, of in made)])
+        return PlantRows.concatenate([new for new, _ in made]), owner
 
     def to_be_opened(self, parts: PlantParts) -> NDArray[np.bool_]:
         """Those of which leaves are real."""
@@ -126,7 +164,7 @@ class GrownPlants(FrontierKind):
     ) -> Iterator[tuple[Whose, Facets]]:
         """As of `FrontierKind`."""
         species = self.flora.species_of(parts.branches.row)
-        for s in np.unique(species).tolist():
+        for s in np.flatnonzero(np.bincount(species)).tolist():
             some = np.flatnonzero((species == s) & ~parts.branch_only)
             if len(some):
                 yield (s, ""), self._of_subplants(parts.branches.take(some), side[some], side[some], 1.0 - kept[some])
@@ -141,10 +179,10 @@ class GrownPlants(FrontierKind):
             np.maximum(side, np.sqrt(self.flora.one_leaf_area(branches))),
             self.flora.species_of(branches.row),
         )
-        for s in np.unique(species).tolist():
+        for s in np.flatnonzero(np.bincount(species)).tolist():
             some = np.flatnonzero(species == s)
             own = branches.take(some)
-            canvas.add_facets((s, ""), self._of_subplants(own, leaf[some], side[some], seen=True))
+            canvas.add_facets((s, ""), self._of_subplants(own, leaf[some], side[some], thin=canvas.thin))
 
     def _of_subplants(
         self,
@@ -152,12 +190,12 @@ class GrownPlants(FrontierKind):
         leaf: NDArray[np.float64],
         wood: NDArray[np.float64],
         left_out: NDArray[np.float64] | None = None,
-        seen: bool = False,
+        thin: Thin | None = None,
     ) -> Facets:
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_subplants(branches.row, count, self._share(branches))
-        hotspot_factor = self._once(branches, leaf) if seen else None
-        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, hotspot_factor)
+        hotspot_factor = None if thin is None else self._once(branches, leaf)
+        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, hotspot_factor, thin)
 
     def _draw_branches(self, canvas: Canvas, branches: Branches, side: NDArray[np.float64]) -> None:
         """Branches alone: leaves that are large are real, wood is tubes or thin triangles, the rest is facets."""
@@ -172,16 +210,15 @@ class GrownPlants(FrontierKind):
         wide = 2.0 * branches.radius / extent
         tubes = uniform(branches.key, Draw.TRANSITION) < explicit_fraction(wide, TUBES)
         thin, detail = wide < BROAD, transition.detail
-        for s in np.unique(species).tolist():
+        for s in np.flatnonzero(np.bincount(species)).tolist():
             own = species == s
             left = np.flatnonzero(own[owner] & (explicit[owner] < 1.0))
             if len(left):
-                canvas.add_facets(
-                    (s, ""), self._of_pieces(pieces.take(left), side[owner[left]], explicit[owner[left]], seen=True)
-                )
+                of = whole, owner[left]
+                canvas.add_facets((s, ""), self._of_pieces(pieces.take(left), side, explicit, of, canvas.thin))
             some = whole.take(np.flatnonzero(own & (explicit > 0.0)))
-            made = leaf_meshes(flora, s, [some], lambda b: (explicit[b.plant], transition.of_kites(b)), detail.lengths)
-            for one in made if len(some) else ():
+            given = lambda b: (explicit[b.plant], transition.of_kites(b)), detail.lengths, canvas.thin
+            for one in leaf_meshes(flora, s, [some], *given) if len(some) else ():
                 canvas.add_mesh((LEAF_KINDS[one.kind], one.form, s), one.buffers, True)
             # What is a few pixels wide has few sides; of wider wood all is drawn, or its shading would end at holes.
             slender, broad = (whole.take(np.flatnonzero(own & tubes & (thin == is_thin))) for is_thin in (True, False))
@@ -211,16 +248,25 @@ class GrownPlants(FrontierKind):
         canvas.add_mesh(("bark", 0, species), twig_buffers(self.flora, whole, 1.0 / likely[some], parts), True)
 
     def _of_pieces(
-        self, pieces: Pieces, side: NDArray[np.float64], explicit: NDArray[np.float64] | None = None, seen: bool = False
+        self,
+        pieces: Pieces,
+        side: NDArray[np.float64],
+        explicit: NDArray[np.float64] | None = None,
+        whole: tuple[WholeBranches, NDArray[np.integer]] | None = None,
+        thin: Thin | None = None,
     ) -> Facets:
-        """Facets of pieces: of their leaves where they are seen, of their wood as well where they are not."""
-        flora, branches = self.flora, pieces.branches
+        """Facets of pieces: of their leaves where whole branches (n,) are seen, else of their wood as well.
+
+        Sides (n,) and real fractions (n,) are those of branches.
+        """
+        flora, branches = self.flora, pieces.branches if whole is None else whole[0].branches
         leaf = np.maximum(side, np.sqrt(flora.one_leaf_area(branches)))
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_pieces(branches.row, count, self._share(branches))
-        wood = np.ones(len(pieces), bool) if seen else None
-        hotspot_factor = self._once(branches, leaf) if seen else None
-        return piece_facets(flora, pieces, leaf, side, weight, explicit, wood, hotspot_factor)
+        if whole is None:
+            return piece_facets(flora, pieces, leaf, side, weight, explicit)
+        own = (of[whole[1]] for of in (leaf, side, weight, explicit, self._once(branches, leaf)))
+        return piece_facets(flora, pieces, *own, thin, whole)
 
     def _optical(self, branches: Branches) -> NDArray[np.float64]:
         return self.flora.leaf_areas(branches) + self.flora.wood_areas(branches) / 2

@@ -24,8 +24,6 @@ from ..subplants.pieces import chunks
 _FLOATS = {1: (), 2: (2,), 3: (3,)}
 #: Part of a face that may be missing through rounding errors alone.
 _WHOLE = 1e-6
-#: Draws of the place of a facet in its triangle.
-_PLACE_U, _PLACE_V = 222, 223
 
 
 @dataclass(frozen=True)

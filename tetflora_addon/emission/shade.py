@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import in_axes
 from ..refinement.lights import Light, frame_toward
 
 #: Cells of the grid across the light along each side, and layers along it, at most.
@@ -42,24 +43,24 @@ class Shade:
         if not len(position):
             self._table = None
             return
-        local = np.asarray(position, np.float64) @ self._frame
-        low, high = local.min(axis=0), local.max(axis=0)
+        places = in_axes(np.asarray(position, np.float64), self._frame)
+        low, high = places.min(axis=0), places.max(axis=0)
         step = np.maximum((high - low)[:2].max() / CELLS, LEAST)
         self._low, self._high, self._step = low, high, np.array([step, step, max((high - low)[2] / LAYERS, LEAST)])
         self._size = np.floor((high - low) / self._step).astype(np.int64) + 1
-        table = np.bincount(self._index(local), np.asarray(area, np.float64), int(self._size.prod()))
+        table = np.bincount(self._index(places), np.asarray(area, np.float64), int(self._size.prod()))
         # Randomly turned sheets show half of their area. Light comes from where the third coordinate is largest.
         table = table.reshape(self._size) * (0.5 / step**2)
         self._table = (np.cumsum(table[:, :, ::-1], axis=2)[:, :, ::-1] - 0.5 * table).ravel()
 
-    def _index(self, local: NDArray[np.float64]) -> NDArray[np.int64]:
-        at = np.clip(np.floor((local - self._low) / self._step), 0, self._size - 1).astype(np.int64)
+    def _index(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        at = np.clip(np.floor((places - self._low) / self._step), 0, self._size - 1).astype(np.int64)
         return (at[:, 0] * self._size[1] + at[:, 1]) * self._size[2] + at[:, 2]
 
     def depth(self, points: NDArray[np.float64], nearer: NDArray[np.float64] | float = 0.0) -> NDArray[np.float64]:
         """Optical depth (n,) of all that is between the light and points (n, 3), moved so many meters toward it."""
         if self._table is None:
             return np.zeros(len(points))
-        local = points @ self._frame
-        local[:, 2] += nearer
-        return self._table[self._index(local)]
+        places = in_axes(points, self._frame)
+        places[:, 2] += nearer
+        return np.take(self._table, self._index(places))

@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_ANGLE, Arrays, Floats, Integers, Keys, Mask, gathered, perpendicular, products, spread
+from ..arrays import GOLDEN_ANGLE, Arrays, Floats, Integers, Keys, gathered, perpendicular, products, spread, unit
 from ..compiled.flora import Flora
 from ..compiled.placed import placed_samples
 from ..compiled.samples import Points
@@ -27,12 +27,13 @@ from ..growth.axes import axes
 from ..growth.branches import Branches
 from ..growth.colors import leaf_colors_at, mean_leaf_colors
 from ..growth.foliage import leaf_start, outwardness, place_leaves, settled, youth
+from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, child_key, mix, signed, uniform
 from ..growth.seasons import AREA, PRESENT, leaf_stages
 from ..growth.wind import moment
 from ..optics import GLOSS, cluster_color
-from ..refinement.contents import Totals, piece_totals, subplant_totals
-from ..subplants.pieces import Pieces
+from ..refinement.contents import piece_leaves
+from ..subplants.pieces import Pieces, Thin, wood_areas
 from .hotspots import balanced_colors
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
@@ -101,6 +102,7 @@ def subplant_facets(
     weight: Floats | None = None,
     explicit: Floats | None = None,
     hotspot_factor: Floats | None = None,
+    thin: Thin | None = None,
 ) -> Facets:
     """Facets of sub-plants.
 
@@ -117,12 +119,12 @@ def subplant_facets(
         Fraction of each sub-plant that is drawn as it is; as many of its facets are left out at random.
     hotspot_factor : (n,) float64, optional
         Light that leaves send to the eye once over what facets do, see `hotspots`.
+    thin : Thin, optional
     """
-    totals = subplant_totals(flora, subplants)
     part = np.ones(len(subplants)) if weight is None else weight
     wood_side = leaf_side if wood_side is None else wood_side
-    leaves = _leaves_of_subplants(flora, subplants, totals, leaf_side, part, explicit, hotspot_factor)
-    made = _joined([leaves, _wood_of_subplants(flora, subplants, totals, wood_side, part, explicit)])
+    leaves = _leaves_of_subplants(flora, subplants, leaf_side, part, explicit, hotspot_factor, thin)
+    made = _joined([leaves, _wood_of_subplants(flora, subplants, wood_side, part, explicit, thin)])
     return made if subplants.crown is None else made.take(np.flatnonzero(made.side > 0))
 
 
@@ -133,23 +135,20 @@ def piece_facets(
     wood_side: Floats | None = None,
     weight: Floats | None = None,
     explicit: Floats | None = None,
-    explicit_wood: Mask | None = None,
     hotspot_factor: Floats | None = None,
+    thin: Thin | None = None,
+    whole: tuple[WholeBranches, Integers] | None = None,
 ) -> Facets:
     """Facets of pieces of branches; parameters as for `subplant_facets`.
 
-    Here ``explicit`` is the fraction of the leaves, and ``explicit_wood`` (n,) marks pieces whose wood is drawn.
+    Here ``explicit`` is the fraction of the leaves. Where whole branches are given, and that (n,) of each piece, their
+    wood is drawn as it is.
     """
-    totals = piece_totals(flora, pieces)
-    if explicit_wood is not None:
-        totals = replace(totals, wood_area=np.where(explicit_wood, 0.0, totals.wood_area))
     part = np.ones(len(pieces)) if weight is None else weight
-    return _joined(
-        [
-            _leaves_of_pieces(flora, pieces, totals, leaf_side, part, explicit, hotspot_factor),
-            _wood_of_pieces(flora, pieces, totals, leaf_side if wood_side is None else wood_side, part),
-        ]
-    )
+    made = [_leaves_of_pieces(flora, pieces, leaf_side, part, explicit, hotspot_factor, thin, whole)]
+    if whole is None:
+        made.append(_wood_of_pieces(flora, pieces, leaf_side if wood_side is None else wood_side, part))
+    return _joined(made)
 
 
 def _joined(parts: list[Facets]) -> Facets:
@@ -251,17 +250,21 @@ def _turned(base: Floats, again: Integers, some: Integers) -> None:
 def _leaves_of_subplants(
     flora: Flora,
     subplants: Branches,
-    totals: Totals,
     side: NDArray,
     weight: NDArray,
     explicit: NDArray | None,
     hotspot_factor: NDArray | None,
+    thin: Thin | None,
 ) -> Facets:
     rows, points = flora.rows, flora.samples.leaves
-    one = flora.one_leaf_area(subplants)
+    one, all_ = flora.one_leaf_area(subplants), flora.leaf_areas(subplants)
     facet = np.maximum(side**2, one)
-    owner, index, key, area = facet_numbers(subplants.key, totals.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, explicit)
+    owner, index, key, area = facet_numbers(subplants.key, all_, facet, _FACET_PATH, _LEAF_COUNT, explicit)
     pick, place, base, area = _picked(flora, points, subplants, owner, index, key, area)
+    if thin is not None:
+        kept, times = thin(key, place, flora.leaf_reach[subplants.row[owner]] * subplants.scale[owner], _reach(area))
+        owner, key, pick, place, base = (gathered(of, kept) for of in (owner, key, pick, place, base))
+        area = times * area[kept]
     leaf_row = points.row[pick]
     frame = products(base, gathered(points.frame, pick).astype(np.float64))
     frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
@@ -302,11 +305,12 @@ def _of_kinds(flora: Flora, subplants: Branches, owner: NDArray, kind: NDArray) 
 def _leaves_of_pieces(
     flora: Flora,
     pieces: Pieces,
-    totals: Totals,
     side: NDArray,
     weight: NDArray,
     explicit: NDArray | None,
     hotspot_factor: NDArray | None,
+    thin: Thin | None,
+    whole: tuple[WholeBranches, Integers] | None,
 ) -> Facets:
     branches, rows = pieces.branches, flora.rows
     row = branches.row
@@ -317,13 +321,20 @@ def _leaves_of_pieces(
         one = one * shown / np.maximum(number, 1e-300)
     facet = np.maximum(side**2, one)
     start = leaf_start(rows, branches)
-    owner, index, key, area, t = _along(
-        flora, pieces, totals.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, explicit
-    )
-    bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # many pieces get no facet
-    own = branches.take(bearers)
-    lines = axes(rows, own)
-    leaves = place_leaves(rows, own, lines, np.searchsorted(bearers, owner), index, key, t)
+    areas = piece_leaves(flora, pieces)[1]
+    owner, index, key, area, t = _along(flora, pieces, areas, facet, start, _FACET_PATH, _LEAF_COUNT, explicit)
+    if thin is not None and not rows["envelope"][row].any():
+        near = flora.leaf_reach[row[owner]] * branches.scale[owner]
+        kept, times = thin(key, _on_axis(pieces, owner, t), near, _reach(area))
+        owner, index, key, t = (of[kept] for of in (owner, index, key, t))
+        area = times * area[kept]
+    if whole is None:
+        bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # many pieces get no facet
+        own, of = branches.take(bearers), np.searchsorted(bearers, owner)
+        lines = axes(rows, own)
+    else:
+        own, lines, of = whole[0].branches, whole[0].lines, whole[1][owner]
+    leaves = place_leaves(rows, own, lines, of, index, key, t)
     frame = settled(rows, row[owner], leaves.frame, leaves.light, leaves.sky)
     center = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     across, along = _in_a_face(flora, row[owner], key, frame)
@@ -343,25 +354,37 @@ def _leaves_of_pieces(
 
 
 def _wood_of_subplants(
-    flora: Flora, subplants: Branches, totals: Totals, side: NDArray, weight: NDArray, explicit: NDArray | None
+    flora: Flora, subplants: Branches, side: NDArray, weight: NDArray, explicit: NDArray | None, thin: Thin | None
 ) -> Facets:
     points = flora.samples.wood
-    wood = totals.wood_area / 2
+    wood = flora.wood_areas(subplants) / 2
     owner, index, key, area = facet_numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, explicit)
     pick, center, base, area = _picked(flora, points, subplants, owner, index, key, area)
+    if thin is not None:
+        kept, times = thin(key, center, np.zeros(len(key)), STRETCH * _reach(area))
+        owner, key, pick, center, base = (gathered(of, kept) for of in (owner, key, pick, center, base))
+        area = times * area[kept]
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     color = flora.rows["branch_color"][points.row[pick], 0]
     velocity = _carried(flora, subplants, owner, center)
     return _strips(center, axis, key, np.sqrt(area * weight[owner]), facet_albedo(color, owner, weight, None), velocity)
 
 
-def _wood_of_pieces(flora: Flora, pieces: Pieces, totals: Totals, side: NDArray, weight: NDArray) -> Facets:
-    none, wood = np.zeros(len(pieces)), totals.wood_area / 2
+def _reach(area: Floats) -> Floats:
+    """Distance (n,) of the corners of facets of areas (n,) from their middle."""
+    return CIRCUMRADIUS * np.sqrt(area)
+
+
+def _on_axis(pieces: Pieces, owner: Integers, t: Floats) -> Floats:
+    """Places (m, 3) at fractions t (m,) of the branches that pieces (m,) are part of."""
+    part = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
+    return pieces.start[owner] + part[:, None] * (pieces.end - pieces.start)[owner]
+
+
+def _wood_of_pieces(flora: Flora, pieces: Pieces, side: NDArray, weight: NDArray) -> Facets:
+    none, wood = np.zeros(len(pieces)), wood_areas(flora, pieces) / 2
     owner, _, key, area, t = _along(flora, pieces, wood, side**2, none, _WOOD_PATH, _WOOD_COUNT)
-    vector = (pieces.end - pieces.start)[owner]
-    place = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
-    center = pieces.start[owner] + place[:, None] * vector
-    axis = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300)
+    center, axis = _on_axis(pieces, owner, t), unit(pieces.end - pieces.start)[owner]
     color = flora.rows["branch_color"][pieces.branches.row[owner], 0]
     velocity = None
     if pieces.branches.later is not None:

@@ -94,8 +94,8 @@ def feature_width(flora: Flora, subplants: Branches) -> Floats:
     return flora.day.widths(subplants, width, np.minimum(width, TWIGS * flora.day.twig[row] * subplants.scale))
 
 
-def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
-    """Compiled means for pieces: the wood, and the leaves that the branch itself bears there."""
+def piece_leaves(flora: Flora, pieces: Pieces) -> tuple[Floats, Floats]:
+    """Expected number (n,) of leaves that branches themselves bear on pieces, and their area (n,), m²."""
     branches = pieces.branches
     row, leaf = branches.row, flora.leaf
     size, variation = flora.rows["leaf_size"][row].T
@@ -106,6 +106,14 @@ def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
     if branches.year is not None:
         left = flora.day.left(branches, flora.rows["leaf_kind"][row], AREA, PRESENT)
         area, leaves = area * left[0], leaves * left[1]
+    return leaves, area
+
+
+def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
+    """Compiled means for pieces: the wood, and the leaves that the branch itself bears there."""
+    branches, (leaves, area) = pieces.branches, piece_leaves(flora, pieces)
+    row, leaf = branches.row, flora.leaf
+    size = flora.rows["leaf_size"][row, 0]
     width = np.where(leaves > 0, leaf.width[row] * size * branches.scale, 2 * branches.radius)
     if branches.year is not None:
         width = flora.day.widths(branches, width, np.minimum(width, TWIGS * 2 * branches.radius))

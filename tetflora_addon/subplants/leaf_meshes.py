@@ -40,7 +40,7 @@ from ..growth.wind import moment
 from ..leaves.kites import KITE, LeafKites, leaf_kites
 from ..leaves.levels import LeafLevel, chosen_level, hidden_gloss, leaf_levels
 from ..leaves.models import LeafModel
-from .pieces import chunks
+from .pieces import Thin, chunks
 
 _ROW_BATCH = 4096
 
@@ -52,7 +52,7 @@ class LeafCopies:
     ----------
     model : LeafModel
     number : int
-        Of copies in the end.
+        Of copies in the end, at most.
     transmission : float
         Fraction of the light scattered through the leaf, the same for all.
     moving : bool
@@ -109,24 +109,24 @@ class LeafCopies:
 
     def buffers(self) -> MeshBuffers:
         """The mesh, once all copies are placed."""
-        model, n = self.model, len(self.positions)
+        model, n = self.model, self.done
         edges, edge_of_corner = model.edges
         vertices, corners = len(model.positions), len(model.corner_verts)
         starts = _stepped(model.face_offsets[:-1], corners, n)
         index = self._materials()
         materials = {} if index is None else {"material_index": ("FACE", index)}
-        motion = {} if self.velocity is None else {"velocity": ("POINT", self.velocity.reshape(-1, 3))}
+        motion = {} if self.velocity is None else {"velocity": ("POINT", self.velocity[:n].reshape(-1, 3))}
         faces = n * model.polygons
         dull = {"tf_dull": ("FACE", np.full(faces, self.dull, np.float32))} if self.dull else {}
         return MeshBuffers(
-            positions=self.positions.reshape(-1, 3),
+            positions=self.positions[:n].reshape(-1, 3),
             edge_verts=_stepped(edges.reshape(-1), vertices, n).reshape(-1, 2),
             corner_verts=_stepped(model.corner_verts, vertices, n),
             corner_edges=_stepped(edge_of_corner, len(edges), n),
             face_offsets=np.append(starts, np.int32(n * corners)),
             attributes={
                 "UVMap": ("CORNER", self._texture()),
-                "tf_color": ("FACE", self.color.reshape(-1, 3)),
+                "tf_color": ("FACE", self.color[:n].reshape(-1, 3)),
                 "tf_transmission": ("FACE", np.full(faces, self.transmission, np.float32)),
                 **dull,
                 **materials,
@@ -137,12 +137,12 @@ class LeafCopies:
 
     def _texture(self) -> NDArray[np.float32]:
         """Texture coordinates (corners, 2)."""
-        return _stepped(self.model.uv.reshape(-1), 0, len(self.positions)).reshape(-1, 2)
+        return _stepped(self.model.uv.reshape(-1), 0, self.done).reshape(-1, 2)
 
     def _materials(self) -> NDArray[np.int32] | None:
         """Material (faces,) of each face, where there are several."""
         model = self.model
-        return None if model.material_index is None else _stepped(model.material_index, 0, len(self.positions))
+        return None if model.material_index is None else _stepped(model.material_index, 0, self.done)
 
 
 class KiteCopies(LeafCopies):
@@ -167,11 +167,11 @@ class KiteCopies(LeafCopies):
         return self.kites.positions.astype(np.float32).transpose(1, 2, 0)[:, :, self.plane[new]]
 
     def _texture(self) -> NDArray[np.float32]:
-        return self.kites.uv[self.plane].reshape(-1, 2)
+        return self.kites.uv[self.plane[: self.done]].reshape(-1, 2)
 
     def _materials(self) -> NDArray[np.int32] | None:
         index = self.kites.material_index
-        return None if index is None else index[self.plane]
+        return None if index is None else index[self.plane[: self.done]]
 
 
 class LevelCopies(LeafCopies):
@@ -278,6 +278,7 @@ def leaf_meshes(
     whole: Sequence[WholeBranches],
     fractions_of: Callable[[Branches], tuple[Floats, Floats]] | None = None,
     lengths_of: Callable[[WholeBranches], Floats] | None = None,
+    thin: Thin | None = None,
 ) -> Iterator[LeafMesh]:
     """Copies of the leaf models for the leaves on branches of one species, form by form.
 
@@ -292,6 +293,7 @@ def leaf_meshes(
         random numbers decide which.
     lengths_of : callable, optional
         Lengths (n,) of the leaves of branches in the image, in errors that do not show; those of long ones are finer.
+    thin : Thin, optional
     """
     groups = [group for some in whole for group in _bearers(flora, some)]
     if fractions_of is not None:
@@ -306,8 +308,9 @@ def leaf_meshes(
             given = int(numbers[form]), float(flora.leaf.transmission[own[0].row[0]]), moment(flora.rows) > 0
             copies = _copies(forms[form], step, *given)
             for group in own:
-                group.add(copies, int(form))
-            yield LeafMesh(kind, int(form), copies.buffers())
+                group.add(copies, int(form), thin)
+            if copies.done:
+                yield LeafMesh(kind, int(form), copies.buffers())
 
 
 def _copies(model: LeafModel, step: int, number: int, transmission: float, moving: bool) -> LeafCopies:
@@ -390,11 +393,16 @@ class _LeafBearers:
             out += np.bincount(self._leaves(part)[3], minlength=len(self.forms))
         return out
 
-    def add(self, copies: LeafCopies, form: int) -> None:
-        """Place all leaves of one of the forms."""
+    def add(self, copies: LeafCopies, form: int, thin: Thin | None) -> None:
+        """Place all leaves of one of the forms that are worth it."""
         rows, vertices = self.flora.rows, len(copies.model.positions)
         for bearers, counts, owner, index, key in self._runs(form, vertices):
-            t = leaf_places(rows, bearers.branches, owner, index, counts, key)
+            t, larger = leaf_places(rows, bearers.branches, owner, index, counts, key), None
+            if thin is not None and not rows["envelope"][self.row[0]]:
+                reach = self.flora.leaf_reach[self.row[0]] * np.take(bearers.branches.scale, owner)
+                kept, times = thin(key, bearers.lines.at(owner, t)[0], np.zeros(len(t)), reach)
+                owner, index, key, t = (np.take(of, kept) for of in (owner, index, key, t))
+                larger = np.sqrt(times)
             leaves = place_leaves(rows, bearers.branches, bearers.lines, owner, index, key, t)
             frame = in_wind(
                 rows, bearers.branches, leaves, settled(rows, self.row, leaves.frame, leaves.light, leaves.sky)
@@ -411,7 +419,8 @@ class _LeafBearers:
             if leaves.stages is not None:
                 places = (*(places or (None, None)), leaves.stages, np.take(bearers.branches.year[:, 1], owner))
             colors = leaf_colors(rows, self.row, key, *places)
-            copies.add(key, leaves.position, frame, leaves.size, colors, motion)
+            size = leaves.size if larger is None else larger * leaves.size
+            copies.add(key, leaves.position, frame, size, colors, motion)
 
     def _runs(self, form: int, vertices: int) -> Iterator[tuple[WholeBranches, *tuple[NDArray, ...]]]:
         """Branches and their counts; branch, number and key of some leaves of a form, which has a number of vertices.

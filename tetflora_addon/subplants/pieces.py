@@ -7,12 +7,12 @@ Pieces are straight parts of an axis with the leaves on them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays import Arrays, Floats, Integers, Table, column, gathered, nested
+from ..arrays import Arrays, Floats, Integers, Keys, Table, column, gathered, nested
 from ..compiled.averages import own_leaf_integrals, tube_perimeter
 from ..compiled.flora import Flora
 from ..growth.axes import axes, profile_integral
@@ -20,6 +20,10 @@ from ..growth.branches import Branches
 from ..growth.envelopes import leaf_start
 from ..growth.foliage import outwardness
 from ..growth.growth import WholeBranches, children, drawn_children
+
+#: What of leaves or facets is worth making, before it is made. Given keys (m,), places (m, 3), how far they may be from
+#: there and their own radii (m,), meters: which (k,) are made, and how many times as large the area (k,) of each is.
+Thin = Callable[[Keys, Floats, Floats, Floats], tuple[Integers, Floats]]
 
 
 @dataclass(frozen=True)

@@ -174,21 +174,28 @@ def optical(blocks: list, facets: Facets) -> np.ndarray:
     return out
 
 
-def test_area_is_that_of_the_plants() -> None:
+def optical_fractions(monkeypatch: pytest.MonkeyPatch, **options: float) -> np.ndarray:
+    """Means (2,) over several draws of what is merged, of which single ones are off by some hundredths."""
+    flora, seeds, camera, result = scene()
+    monkeypatch.setenv("TETFLORA_THREADS", "1")  # other processes know nothing of the draws
+    whole, found = optical(list(expanded_blocks(flora, seeds)), Facets.empty()), []
+    for draw in range(6):
+        monkeypatch.setattr(subject, "_MERGE", 300 + draw)
+        blocks, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False, **options)
+        found.append(optical(blocks, facets) / whole)
+    return np.mean(found, axis=0)
+
+
+def test_area_is_that_of_the_plants(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of leaves and of wood, whatever they are drawn as and merged into, where nothing is thinned out."""
-    flora, seeds, camera, result = scene()
-    whole = optical(list(expanded_blocks(flora, seeds)), Facets.empty())
-    blocks, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False, hidden=0.33)
-    assert optical(blocks, facets) == pytest.approx(whole, rel=0.06)
+    assert (np.abs(optical_fractions(monkeypatch, hidden=0.33) - 1.0) < [0.04, 0.09]).all()
 
 
-def test_thinning_of_what_nobody_sees_loses_little() -> None:
+def test_thinning_of_what_nobody_sees_loses_little(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of primitives that cannot be merged behind full pixels a part is left out where there are many."""
-    flora, seeds, camera, result = scene()
-    whole = optical(list(expanded_blocks(flora, seeds)), Facets.empty())
-    blocks, facets, _ = support.drawn(flora, result, camera, 0.5, weighted=False)
-    assert (optical(blocks, facets) > 0.85 * whole).all()
-    assert (optical(blocks, facets) < 1.06 * whole).all()
+    found = optical_fractions(monkeypatch)
+    assert (found > 0.85).all()
+    assert (found < 1.06).all()
 
 
 def digest(made: tuple) -> list:
