@@ -13,7 +13,7 @@ import numpy as np
 
 from examples import stands
 
-from .compare import colour_error, coverage, flip_map, linear_light, read_picture, render
+from .compare import color_error, coverage, flip_map, linear_light, read_picture, render
 from .fidelity_frames import LEAST_COVERAGE
 from .report import ROOT, Targets
 from .row80 import timed_refine
@@ -24,12 +24,12 @@ EACH, SIDE, PIXELS = 6, 60.0, 480
 #: Samples of the images, and of coverage.
 SAMPLES, QUICK_SAMPLES, COVERED = 32, 16, 32
 
-TARGETS: Targets = {"flip_beyond_noise": {"max": 0.01}, "colour_error": {"max": 0.02}}
-QUICK_TARGETS: Targets = {"flip_beyond_noise": {"max": 0.02}, "colour_error": {"max": 0.03}}
+TARGETS: Targets = {"flip_beyond_noise": {"max": 0.01}, "color_error": {"max": 0.02}}
+QUICK_TARGETS: Targets = {"flip_beyond_noise": {"max": 0.02}, "color_error": {"max": 0.03}}
 
 
 def run(quick: bool, light: str = "side") -> dict[str, float]:
-    """Measure: FLIP and its noise where plants are, colour, luminance and transmittance, of all and of each species."""
+    """Measure: FLIP and its noise where plants are, color, luminance and transmittance, of all and of each species."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     scene = bpy.context.scene
     made = stands.above(scene, SPECIES, EACH, SIDE, PIXELS // 2 if quick else PIXELS, light)
@@ -67,7 +67,7 @@ def _compared(
         "flip": flip,
         "flip_noise": noise,
         "flip_beyond_noise": flip - noise,
-        "colour_error": colour_error(expanded, refined, mask),
+        "color_error": color_error(expanded, refined, mask),
         "brightness": light / dark - 1.0,
         "dT": float(bare[mask].mean()),
     }

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from devtools import session
 from tetflora_addon import parallel
-from tetflora_addon.assets import kept
+from tetflora_addon.assets import asset_cache
 from tetflora_addon.assets.compiled import compile_asset
 from tetflora_addon.blender.assets.parts import Target, digest_of, read_source_steps
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.processes import pool
 
 from . import asset_scenes, asset_trees
@@ -97,10 +97,10 @@ def compiled(kind: str, quick: bool) -> dict[str, float]:
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     target = Target(tree, None, None, tree.name)
-    parallel.use(1)
+    parallel.set_threads(1)
     forget_peak()
     before, begun = resident_mb("VmRSS"), cpu_s()
-    source, _ = at_once(read_source_steps(target, depsgraph))
+    source, _ = run_to_end(read_source_steps(target, depsgraph))
     read = cpu_s()
     asset = compile_asset(source)
     done = cpu_s()
@@ -113,12 +113,12 @@ def compiled(kind: str, quick: bool) -> dict[str, float]:
         "bytes_per_triangle": (resident_mb() - before) * 1e6 / triangles,
         "held_bytes_per_triangle": asset.nbytes / triangles,
     }
-    kept.keep(asset)
-    kept.forget()
+    asset_cache.keep(asset)
+    asset_cache.forget()
     begun = cpu_s()
     digest = digest_of(target, depsgraph)
     figures["digest_s"] = cpu_s() - begun
-    found = kept.find(digest)
+    found = asset_cache.find(digest)
     figures["again_s"] = cpu_s() - begun
     if found is None or len(found.clusters) != len(asset.clusters):
         raise RuntimeError("the compiled asset was not found again")

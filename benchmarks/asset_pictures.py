@@ -30,13 +30,13 @@ INSTANCES = 16
 SAMPLES, QUICK_DIVISOR = {"near": 64, "middle": 256, "far": 256}, 8
 COVERAGE_SAMPLES = 64
 LEAST_COVERAGE = 0.05
-#: Metres of the pixels that crowns are refined for, and of those of the pictures that are compared, with samples.
+#: Meters of the pixels that crowns are refined for, and of those of the pictures that are compared, with samples.
 #: Cards of .4 m are real in smaller ones.
 COARSE, FINE, CROWN_SAMPLES = (0.8, 1.0, 1.2), 0.1, 256
 TENTHS = 10
-#: Of the renderer's passes, those that sum up to the colour of a surface.
+#: Of the renderer's passes, those that sum up to the color of a surface.
 _PASSES = "diffuse", "glossy", "transmission"
-#: Least of a crown's row that is covered where its colour counts.
+#: Least of a crown's row that is covered where its color counts.
 _LEAST_ROW = 0.02
 
 
@@ -62,7 +62,7 @@ def woods(kind: str, folder: Path, quick: bool, warped: bool = False) -> dict[st
         pair = folder / f"{name}-plain.png", folder / f"{name}-refined.png"
         made = difference(*pair, masks[distance])
         key = f"{kind}_{distance}_{light}"
-        found |= {f"flip_{key}": made.flip, f"colour_{key}": made.colour}
+        found |= {f"flip_{key}": made.flip, f"color_{key}": made.color}
         found[f"polygons_{kind}_{distance}"] = statistics.polygons_meshed + statistics.polygons_proxy
     return found
 
@@ -88,8 +88,8 @@ def _samples(distance: str, quick: bool) -> int:
 
 def _views(scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
     """Names of distances and lights, which the scene has while each lasts."""
-    for distance, metres in DISTANCES.items():
-        asset_scenes.aim(scene, metres)
+    for distance, meters in DISTANCES.items():
+        asset_scenes.aim(scene, meters)
         for light in LIGHTS:
             asset_scenes.set_sun(scene, light)
             bpy.context.view_layer.update()
@@ -97,7 +97,7 @@ def _views(scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
 
 
 def crown(kind: str, folder: Path, quick: bool) -> dict[str, float]:
-    """How much light a crown lets through, and the colour of its tenths from below to above, refined and plain."""
+    """How much light a crown lets through, and the color of its tenths from below to above, refined and plain."""
     scene = bpy.context.scene
     asset_scenes.alone(scene, kind, quick)
     samples = CROWN_SAMPLES // (QUICK_DIVISOR if quick else 1)
@@ -118,7 +118,7 @@ def crown(kind: str, folder: Path, quick: bool) -> dict[str, float]:
 
 
 def _compared(plain: tuple[NDArray, NDArray], test: tuple[NDArray, NDArray]) -> dict[str, float]:
-    """How much less of the image a crown covers than a plain one, and how far the colours of its tenths are from its.
+    """How much less of the image a crown covers than a plain one, and how far the colors of its tenths are from its.
 
     Both are given as what `silhouette` and `albedo` return. ``tenth`` is of the albedo, ``lit`` under the sky, where
     the crown shades itself.
@@ -141,7 +141,7 @@ def crown_rows(silhouette: NDArray[np.float32]) -> tuple[int, int]:
 
 
 def tenths(silhouette: NDArray[np.float32], rows: tuple[int, int]) -> NDArray[np.float64]:
-    """Mean colour (10, 3) of what is covered in each tenth of a crown's rows, from below to above."""
+    """Mean color (10, 3) of what is covered in each tenth of a crown's rows, from below to above."""
     bands = np.array_split(silhouette[::-1].astype(np.float64)[slice(*rows)], TENTHS)
     return np.array([band[..., :3].sum(axis=(0, 1)) / band[..., 3].sum() for band in bands])
 
@@ -159,7 +159,7 @@ def silhouette(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0) 
 
 
 def albedo(scene: bpy.types.Scene, path: Path, seed: int = 0) -> NDArray[np.float32]:
-    """Colour of surfaces, all that they do with light, and alpha (height, width, 4), premultiplied, without ground."""
+    """Color of surfaces, all that they do with light, and alpha (height, width, 4), premultiplied, without ground."""
     bpy.utils.expose_bundled_modules()
     import OpenImageIO  # Blender's own, which it shows only now
 
@@ -186,8 +186,8 @@ def albedo(scene: bpy.types.Scene, path: Path, seed: int = 0) -> NDArray[np.floa
     for part in parts:
         pixels = part.get_pixels(OpenImageIO.FLOAT)
         named |= {name.split(".", 1)[1]: pixels[..., i] for i, name in enumerate(part.spec().channelnames)}
-    colours = [sum(named[f"{kind.title()} Color.{c}"] for kind in _PASSES) for c in "RGB"]
-    return np.stack([*colours, named["Combined.A"]], axis=2)
+    colors = [sum(named[f"{kind.title()} Color.{c}"] for kind in _PASSES) for c in "RGB"]
+    return np.stack([*colors, named["Combined.A"]], axis=2)
 
 
 def coverage(scene: bpy.types.Scene, path: Path) -> NDArray[np.float32]:

@@ -16,16 +16,16 @@ from tetflora_addon.blender import compat
 
 from . import asset_trees
 
-#: Metres between trees, and of the eye above the ground.
+#: Meters between trees, and of the eye above the ground.
 SPACING, EYE = 7.0, 1.7
-#: Metres from the eye to the edge of the wood.
+#: Meters from the eye to the edge of the wood.
 DISTANCES = {"near": 5.0, "middle": 50.0, "far": 250.0}
 #: Elevation of the sun and where its light goes, degrees; the camera looks to 0.
 LIGHTS = {"front": (42.0, 35.0), "back": (28.0, 160.0)}
 SIZE, PICTURE = (1920, 1080), (320, 180)
 #: Holes behind holes that rays go through; Blender's default of 8 makes crowns of cards black.
 _TRANSPARENT = 64
-#: One tree is seen from so far, in an image so wide, metres.
+#: One tree is seen from so far, in an image so wide, meters.
 _ALONE, _WIDE = 200.0, 18.0
 
 
@@ -223,7 +223,7 @@ def alone(scene: bpy.types.Scene, kind: str, quick: bool = False) -> bpy.types.O
 
 
 def frame(scene: bpy.types.Scene, pixel: float) -> None:
-    """Let a pixel of the view of one tree be so large, metres."""
+    """Let a pixel of the view of one tree be so large, meters."""
     scene.camera.data.ortho_scale = _WIDE
     scene.render.resolution_x = scene.render.resolution_y = round(_WIDE / pixel)
     bpy.context.view_layer.update()
@@ -251,10 +251,10 @@ def store_trees(path: Path, trees: list[bpy.types.Object], instances: int, unsee
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
 
 
-def _plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+def _plain(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
     material = bpy.data.materials.new(name)
     principled = next(node for node in compat.shader_tree(material).nodes if node.type == 'BSDF_PRINCIPLED')
-    principled.inputs["Base Color"].default_value = (*colour, 1.0)
+    principled.inputs["Base Color"].default_value = (*color, 1.0)
     principled.inputs["Roughness"].default_value = 1.0
     principled.inputs["Specular IOR Level"].default_value = 0.0
     return material

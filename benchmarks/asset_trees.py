@@ -43,7 +43,7 @@ ORDERS = (
     Order(13, 0.4, 0.2, (35, 65), 0.25, 6, 5, 0.5),
     Order(9, 0.42, 0.12, (30, 62), 0.1, 4, 3, 0.5),
 )
-#: Length of leaves of each kind and width relative to it, metres.
+#: Length of leaves of each kind and width relative to it, meters.
 _LEAF, _NODE_LEAF, _CARD = (0.095, 0.62), 0.13, (0.42, 0.8)
 _BARK, _GREEN = (0.17, 0.12, 0.08), (0.10, 0.24, 0.05)
 #: Fraction of light that goes through leaves that are one sheet.
@@ -111,7 +111,7 @@ def noded(name: str, seed: int = 7, number: int = LEAVES, realized: bool = False
 
 
 def different(number: int, triangles: int, first: int = 100) -> Iterator[bpy.types.Object]:
-    """Trees of kind ``leaves``, one after another, all with shapes and colours of their own."""
+    """Trees of kind ``leaves``, one after another, all with shapes and colors of their own."""
     for seed in range(first, first + number):
         tree = leafy(f"Tree {seed}", triangles, seed)
         materials = tree.data.materials

@@ -9,7 +9,7 @@
     python -m benchmarks.assets --case time leaves plain CYCLES 20 near    # one case, as a line of JSON
 
 Parts: ``compile`` (seconds, bytes, areas and bounds), ``pictures`` (FLIP), ``crown`` (light through a crown of cards,
-colour of its tenths), ``forest`` (10,000 and a million instances), ``cycles`` and ``eevee`` (from a .blend file to an
+color of its tenths), ``forest`` (10,000 and a million instances), ``cycles`` and ``eevee`` (from a .blend file to an
 image of 64 samples, of which few are rendered, and of 2), ``many`` (different assets), ``window`` (redraws of the
 viewport; needs a full Blender, named by the environment variable BLENDER, and a virtual screen).
 
@@ -133,7 +133,7 @@ def pictures(quick: bool, plain: bool) -> dict[str, float]:
 
 
 def crowns(quick: bool, plain: bool) -> dict[str, float]:
-    """Transmittance of a crown of cards, and colour of its tenths: of its surfaces, and as they are lit."""
+    """Transmittance of a crown of cards, and color of its tenths: of its surfaces, and as they are lit."""
     if plain:
         return {}
     found = apart("crown", "cards", quick=quick)
@@ -250,7 +250,7 @@ def measure(words: list[str], given: argparse.Namespace) -> dict[str, float]:
 
     name, *rest = words
     if given.cache:
-        storage.use(given.cache)
+        storage.set_folder(given.cache)
     if name == "compile":
         return asset_cases.compiled(rest[0], given.quick)
     if name in {"woods", "plain_woods", "crown"}:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Predictions of compiled species against a thousand grown plants: areas, colours and orientation by order.
+"""Predictions of compiled species against a thousand grown plants: areas, colors and orientation by order.
 
 All sub-plants of one order together are predicted from their rows and compared with the leaves and branches that grow
 on them. Errors are relative; that of orientation is the largest entry of the difference of both moments.
@@ -22,7 +22,7 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.growth import foliage, growth
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.refinement import contents
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 from tetflora_addon.subplants import pieces
 from tetflora_addon.subplants.pieces import chunks, open_subplants
 
@@ -30,23 +30,23 @@ from .plants import Targets, plants_of
 
 SEEDS, QUICK_SEEDS = 1000, 100
 #: Polygons that are grown at a time, and leaves of each species whose orientation is looked at.
-AT_ONCE = 400_000
+BATCH = 400_000
 ORIENTED = 3_000_000
 #: Groups into which the plants of a species are divided at least.
 GROUPS = 20
 
-KINDS = ("leaf_area", "wood_area", "colour", "moment")
+KINDS = ("leaf_area", "wood_area", "color", "moment")
 TARGETS: Targets = {f"{kind}_excess_max": {"max": 0.01} for kind in KINDS}
 QUICK_TARGETS: Targets = {name: {"max": 0.05} for name in TARGETS}
 
-_FIELDS = 14  # leaf area, wood area, leaf area × colour, moment × leaf area of the oriented ones
+_FIELDS = 14  # leaf area, wood area, leaf area × color, moment × leaf area of the oriented ones
 
 
 def run(quick: bool) -> dict[str, float]:
     """Measure all species."""
     figures: dict[str, float] = {}
-    for name in catalogue.list_species():
-        flora = compile_species([catalogue.load_species(name)])
+    for name in catalog.list_species():
+        flora = compile_species([catalog.load_species(name)])
         for kind, found in species_errors(flora, QUICK_SEEDS if quick else SEEDS).items():
             figures |= {f"{kind}_{what}_{name}": value for what, value in found.items()}
     worst = {
@@ -61,7 +61,7 @@ def species_errors(flora: Any, seeds: int) -> dict[str, dict[str, float]]:
     """Largest error over the orders of each kind, its standard error, and the largest excess."""
     trunks = growth.trunks(flora.rows, plants_of(flora, seeds * float(flora.polygons[flora.first_row[0]])))
     polygons = flora.polygons[trunks.row]
-    groups = list(chunks(polygons, min(AT_ONCE, polygons.sum() / GROUPS)))
+    groups = list(chunks(polygons, min(BATCH, polygons.sum() / GROUPS)))
     found, predicted = np.zeros((2, len(groups), 8, _FIELDS))
     leaves, looked_at = 0, 0
     for g, group in enumerate(groups):
@@ -80,14 +80,14 @@ def species_errors(flora: Any, seeds: int) -> dict[str, dict[str, float]]:
     held, wood = predicted.sum(axis=0)[:, 0] > 1e-9, predicted.sum(axis=0)[:, 1] > 1e-9
     found, predicted, bark = found[:, held], predicted[:, held], (found[:, wood, 1:2], predicted[:, wood, 1:2])
     area = found[..., :1], predicted[..., :1]
-    colour = [deviations(sums[..., 2:5], whole) for sums, whole in zip((found, predicted), area, strict=True)]
-    scale = colour[1][0].max(axis=1, keepdims=True)
+    color = [deviations(sums[..., 2:5], whole) for sums, whole in zip((found, predicted), area, strict=True)]
+    scale = color[1][0].max(axis=1, keepdims=True)
     turned = [sums[:looked_at, :, 5:] for sums in (found, predicted)]
     moment = [deviations(sums, sums[..., [0, 4, 8]].sum(axis=2, keepdims=True)) for sums in turned]
     return {
         "leaf_area": summed_up(*of_ratio(*area)),
         "wood_area": summed_up(*of_ratio(*bark)),
-        "colour": summed_up((colour[0][0] - colour[1][0]) / scale, (colour[0][1] - colour[1][1]) / scale),
+        "color": summed_up((color[0][0] - color[1][0]) / scale, (color[0][1] - color[1][1]) / scale),
         "moment": summed_up(moment[0][0] - moment[1][0], moment[0][1] - moment[1][1]),
     }
 
@@ -123,7 +123,7 @@ def prediction(flora: Any, subplants: Any, oriented: bool) -> np.ndarray:
     expected = contents.subplant_totals(flora, subplants)
     out = np.zeros(_FIELDS)
     out[0], out[1] = expected.leaf_area.sum(), expected.wood_area.sum()
-    out[2:5] = expected.leaf_area @ flora.leaf_colours(subplants)
+    out[2:5] = expected.leaf_area @ flora.leaf_colors(subplants)
     if oriented:
         each = orientation.leaf_moments(flora.orientation, subplants)
         out[5:] = np.einsum("n,nij->ij", expected.leaf_area, each).ravel()
@@ -152,7 +152,7 @@ def grown(flora: Any, wood: Any, oriented: bool) -> tuple[np.ndarray, int]:
         area = leaves.size**2 * np.array([m.area for m in forms])[form]
         out[0] += area.sum()
         only = np.array([row])
-        out[2:5] += area @ foliage.leaf_colours(rows, only, key, foliage.outwardness(rows, branches, owner, t))
+        out[2:5] += area @ foliage.leaf_colors(rows, only, key, foliage.outwardness(rows, branches, owner, t))
         if oriented:
             frame = foliage.settled(rows, only, leaves.frame, leaves.light, np.array([0.0, 0.0, 1.0])).astype(float)
             model = np.array([m.moment for m in forms])[form]

@@ -13,7 +13,7 @@ import bpy
 
 from devtools import session
 from tetflora_addon.blender.biomes import adding, files, ground, library
-from tetflora_addon.blender.worker import at_once
+from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.compiled import crowns, flora
 from tetflora_addon.species import ages
 
@@ -45,7 +45,7 @@ def run(quick: bool) -> dict[str, float]:
         land = ground.make_land(scene, biome.ground)
         bpy.context.view_layer.update()
         begin = time.perf_counter()
-        added = at_once(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
+        added = run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
         figures[f"seconds_{path.stem}"] = time.perf_counter() - begin
         for name, number in added.layers:
             figures[f"plants_{path.stem}: {name}"] = float(number)

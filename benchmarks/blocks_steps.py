@@ -14,7 +14,7 @@ sys.path.insert(0, str(ROOT))
 
 from devtools import session  # noqa: E402  (found only now)
 
-SIDE = 1000.0  # metres of ground
+SIDE = 1000.0  # meters of ground
 MOVES = 20
 
 

@@ -22,7 +22,7 @@ from tetflora_addon.compiled import bounds
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.growth import foliage, growth
 from tetflora_addon.growth.branches import Branches
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 from tetflora_addon.subplants import bodies, pieces, tubes
 
 from .plants import plants_of
@@ -32,7 +32,7 @@ SEEDS, QUICK_SEEDS = 1000, 20
 #: Sub-plants of each order whose hulls are measured, as far as their polygons allow.
 SUBPLANTS, QUICK_SUBPLANTS = 24, 5
 HULL_POLYGONS, QUICK_HULL_POLYGONS = 400_000, 50_000
-AT_ONCE = 400_000
+BATCH = 400_000
 _FLOAT32 = 1e-6
 
 TARGETS: Targets = {"outside": {"max": 0}}
@@ -44,8 +44,8 @@ def run(quick: bool) -> dict[str, float]:
     beyond, begun = 0, time.perf_counter()
     ratios: dict[str, float] = {}
     seconds = 0.0
-    for name in catalogue.list_species():
-        flora = compile_species([catalogue.load_species(name)])
+    for name in catalog.list_species():
+        flora = compile_species([catalog.load_species(name)])
         begun = time.perf_counter()
         beyond += vertices_outside(flora, QUICK_SEEDS if quick else SEEDS)
         seconds += time.perf_counter() - begun
@@ -102,9 +102,9 @@ def vertices_outside(flora: Any, seeds: int) -> int:
     trunks = growth.trunks(flora.rows, plants_of(flora, seeds * float(flora.polygons[0])))
     wide = np.maximum(1 + flora.rows["flare"], bounds.ring_stretch(flora.rows))
     out = 0
-    for chunk in pieces.chunks(flora.polygons[trunks.row], AT_ONCE):
+    for chunk in pieces.chunks(flora.polygons[trunks.row], BATCH):
         plants = trunks.take(chunk)
-        around, first = bodies.bounding_bodies(flora, plants), plants.plant[0]
+        around, first = bodies.bounding_capsules(flora, plants), plants.plant[0]
         whole = list(pieces.expand(flora, plants))
         doubtful = np.zeros(len(plants), bool)
         for some in whole:
@@ -123,7 +123,7 @@ def vertices_outside(flora: Any, seeds: int) -> int:
 
 
 def excess(around: NDArray[np.float64], which: NDArray, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far points (n, 3) lie outside some of `bodies.bounding_bodies`, metres; negative inside."""
+    """How far points (n, 3) lie outside some of `bodies.bounding_capsules`, meters; negative inside."""
     body = np.take(around, which, axis=1)
     offset = points.T - body[:3]
     along = np.einsum("in,in->n", offset, body[3:6])
@@ -152,7 +152,7 @@ def subplants(flora: Any, number: int, polygons: float) -> dict[int, Any]:
 
 def hull_ratio(flora: Any, subplant: Any) -> float:
     """Volume of the compiled body of a sub-plant over that of its vertices' hull."""
-    radius, half, pad = bodies.bounding_bodies(flora, subplant)[6:, 0]
+    radius, half, pad = bodies.bounding_capsules(flora, subplant)[6:, 0]
     # A cylinder with rounded edges (Steiner's formula).
     area = 2 * np.pi * radius * (radius + 2 * half)
     mean_width = np.pi * (np.pi * radius + 2 * half)

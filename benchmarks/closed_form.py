@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shells against closed formulas, in Cycles and EEVEE: transmittance, white furnace, baked light.
 
-Images are of single rays through the centres of pixels, so that what differs from the formula is the shader's.
+Images are of single rays through the centers of pixels, so that what differs from the formula is the shader's.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _place(cells: NDArray, kappa: NDArray, light: NDArray | None = None, **value
     matrices = kappa[:, None] ** 2 * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
     buffers = shells.shell_buffers(
         cells,
-        np.full((count, 3), values.pop("colour", 1.0)),
+        np.full((count, 3), values.pop("color", 1.0)),
         np.full(count, values.pop("transmission", 0.0)),
         matrices,
         axes,
@@ -127,7 +127,7 @@ def _picture() -> NDArray[np.float64]:
 
 
 def _rays() -> NDArray[np.float64]:
-    """Points (SIZE, SIZE, 4) at z = 0 under the pixels' centres, homogeneous."""
+    """Points (SIZE, SIZE, 4) at z = 0 under the pixels' centers, homogeneous."""
     across = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * WIDTH
     x, y = np.meshgrid(across, across)
     return np.stack([x, y, np.zeros_like(x), np.ones_like(x)], axis=-1)
@@ -147,7 +147,7 @@ def _shell_error(engine: str, stack: tuple[NDArray, NDArray]) -> float:
     """RMS of black cells before a white sky against e^{−Σκℓ}."""
     cells, kappa = stack
     _scene(engine, 1)
-    _place(cells, kappa, colour=0.0, s=0.0)
+    _place(cells, kappa, color=0.0, s=0.0)
     depth = np.zeros((SIZE, SIZE))
     for cell, k in zip(cells, kappa, strict=True):
         enter, leave, _ = _spans(cell)

@@ -23,9 +23,9 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.species import edits
 from tetflora_addon.compiled import flora as compiled
 from tetflora_addon.compiled.flora import Flora, compile_species
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import facet_weights
-from tetflora_addon.species.catalogue import list_species
+from tetflora_addon.species.catalog import list_species
 
 from .report import Targets
 
@@ -113,4 +113,4 @@ def shares(flora: Flora) -> tuple[float, float, float]:
             break
         longest, before = max(longest, time.thread_time() - before), time.thread_time()
     taken = time.thread_time() - begun
-    return taken, longest, float(np.abs(found - at_once(facet_weights.fitting(flora, 0))).max())
+    return taken, longest, float(np.abs(found - run_to_end(facet_weights.fitting(flora, 0))).max())

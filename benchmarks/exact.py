@@ -59,7 +59,7 @@ KINDS = ("", "proxy", "leaf", "blossom", "triangle", "bark")
 _FACETS = ("proxy", "triangle")
 #: What a truth follows from, besides its numbers: folders and files of this repository.
 _SOURCES = (
-    *(f"tetflora_addon/{room}" for room in ("catalogue", "species", "growth", "leaves", "subplants", "planting")),
+    *(f"tetflora_addon/{room}" for room in ("catalog", "species", "growth", "leaves", "subplants", "planting")),
     "tetflora_addon/blender/materials",
     "benchmarks/exact_scene.py",
     "benchmarks/forest_scene.py",
@@ -110,7 +110,7 @@ class Spec:
     seeds : int
         Different plants of each species; 0: all as Populate makes them, which have no truth.
     distance : float
-        Minimum distance between the plants of ``eye``, metres.
+        Minimum distance between the plants of ``eye``, meters.
     few : int
         Plants of a patch; 0: the whole wood.
     """
@@ -401,7 +401,7 @@ def main() -> int:
     add("--window", type=_pair, default=(), metavar="WxH", help="compare only so much in the middle of the image")
     add("--samples", type=int, default=SAMPLES)
     add("--seeds", type=int, default=SEEDS, help="different plants of each species; 0: all, without a truth")
-    add("--distance", type=float, default=Spec.distance, help="between the plants of eye, metres")
+    add("--distance", type=float, default=Spec.distance, help="between the plants of eye, meters")
     add("--set", type=_setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")
     add("--threads", type=int, default=0)
     add("--keep-truth", action=argparse.BooleanOptionalAction, default=True, help="use what an earlier run has left")

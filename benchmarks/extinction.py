@@ -25,7 +25,7 @@ from tetflora_addon.compiled import clumping, rays
 from tetflora_addon.compiled.flora import _compiled
 from tetflora_addon.growth import growth, seeds
 from tetflora_addon.refinement import contents
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 from tetflora_addon.subplants import leaf_meshes, pieces, tubes
 
 from .plants import Targets
@@ -51,7 +51,7 @@ def run(quick: bool) -> dict[str, float]:
     all_errors: dict[str, list[float]] = {f"{kind}_{when}": [] for kind in KINDS for when in ("before", "after")}
     taken = []
     for name in QUICK_SPECIES if quick else SPECIES:
-        flora = _compiled.__wrapped__((catalogue.load_species(name),))
+        flora = _compiled.__wrapped__((catalog.load_species(name),))
         start = time.process_time()
         _ = flora.clumping
         taken.append(time.process_time() - start)
@@ -74,7 +74,7 @@ def species_errors(flora: Any, seeds: tuple[int, ...]) -> dict[str, list[float]]
     out: dict[str, list[float]] = {f"{kind}_{when}": [] for kind in KINDS for when in ("before", "after")}
     for seed in seeds:
         surfaces, places, weights, coefficients = grown(flora, seed)
-        points = np.concatenate([centre for _, _, _, centre, _, _ in surfaces])
+        points = np.concatenate([center for _, _, _, center, _, _ in surfaces])
         low, high = points.min(axis=0), points.max(axis=0)
         extent = float((high - low).max())
         width = float(flora.leaf_width[flora.first_row[0]])
@@ -117,11 +117,11 @@ def polygons(buffers: Any, weight: float) -> tuple:
     following = np.arange(1, len(corners) + 1)
     following[first + number - 1] = first
     x, y, z = np.ascontiguousarray(corners.T)
-    centre = np.stack([np.add.reduceat(axis, first) / number for axis in (x, y, z)], axis=1)
-    x, y, z = (axis - np.repeat(middle, number) for axis, middle in zip((x, y, z), centre.T, strict=True))
+    center = np.stack([np.add.reduceat(axis, first) / number for axis in (x, y, z)], axis=1)
+    x, y, z = (axis - np.repeat(middle, number) for axis, middle in zip((x, y, z), center.T, strict=True))
     pairs = ((y, z), (z, x), (x, y))
     vector = [np.add.reduceat(a * b[following] - b * a[following], first) / 2 for a, b in pairs]
-    return corners, first, number, centre, np.stack(vector, axis=1), weight
+    return corners, first, number, center, np.stack(vector, axis=1), weight
 
 
 def seen(surfaces: list[tuple], direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -157,8 +157,8 @@ def depths(
     shape = np.maximum(np.ceil((box[1] - corner) / side), 1).astype(np.int64)
     count = 6 * int(shape.prod())
     kappa = np.zeros(count)
-    for _, _, _, centre, vector, weight in surfaces:
-        cell = rays.cell_numbers((centre - corner).T / side, shape)
+    for _, _, _, center, vector, weight in surfaces:
+        cell = rays.cell_numbers((center - corner).T / side, shape)
         kappa += np.bincount(cell, weight * np.abs(vector @ direction), count) / size**3
     cell = rays.cell_numbers((places - corner).T / side, shape)
     area = np.bincount(cell, weights, count)

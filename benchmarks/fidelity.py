@@ -41,7 +41,7 @@ TARGETS: Targets = {
     "flip_mean": {"max": 0.05},
     "flip_max": {"max": 0.08},
     "dT_max": {"max": 0.01},
-    "colour_error_mean": {"max": 0.03},
+    "color_error_mean": {"max": 0.03},
     "engine_gap": {"max": 0.02},
     "shell_rms": {"max": 0.005},
     "shell_stack_rms": {"max": 0.005},
@@ -56,7 +56,7 @@ QUICK_TARGETS: Targets = {
     "flip_mean": {"max": 0.09},
     "flip_max": {"max": 0.14},
     "dT_max": {"max": 0.03},
-    "colour_error_mean": {"max": 0.06},
+    "color_error_mean": {"max": 0.06},
     "time_ratio": {"max": 1.0},
 }
 
@@ -144,7 +144,7 @@ def line(frame: object) -> str:
     """A frame in a line."""
     return (
         f"{frame.pixels:4d} px {frame.light:9s}{frame.engine:7s}{frame.form:14s}{frame.species:8s}"
-        f"FLIP {frame.flip:.3f} (noise {frame.noise:.3f})  dT {frame.dT:+.4f}  colour {frame.colour:.3f} "
+        f"FLIP {frame.flip:.3f} (noise {frame.noise:.3f})  dT {frame.dT:+.4f}  color {frame.color:.3f} "
         f"({frame.brightness:+.3f})  gap {frame.gap:.3f} ({frame.gap_expanded:.3f})  "
         f"{frame.seconds:.1f} of {frame.expanded_seconds:.1f} s  {frame.memory_mb:.0f} of {frame.expanded_mb:.0f} MB"
     )

@@ -21,7 +21,7 @@ from devtools import session
 from examples import stands
 from tetflora_addon.blender import compat
 
-from .compare import colour_error, coverage, flip_map, linear_light, read_picture, render
+from .compare import color_error, coverage, flip_map, linear_light, read_picture, render
 from .row80 import timed_refine
 
 COVERAGE_SAMPLES = 64
@@ -71,8 +71,8 @@ class Frame:
         no seeds).
     dT : float
         Mean difference of transmittance, form less expanded.
-    colour, brightness : float
-        Difference of the mean colours relative to the expanded plants' mean, and of luminance with its sign.
+    color, brightness : float
+        Difference of the mean colors relative to the expanded plants' mean, and of luminance with its sign.
     gap, gap_expanded : float
         FLIP between this image and that of the other engine, and between those of the expanded plants; NaN where
         the other engine has none.
@@ -91,7 +91,7 @@ class Frame:
     flip: float
     noise: float
     dT: float  # noqa: N815  (the figure's name)
-    colour: float
+    color: float
     brightness: float
     gap: float
     gap_expanded: float
@@ -103,7 +103,7 @@ class Frame:
 
 def forms() -> tuple[tuple[str, ...], str]:
     """All forms of proxies that the extension has, and the one that it takes by itself."""
-    choice = bpy.context.scene.tetflora.bl_rna.properties["proxy_form"]
+    choice = bpy.context.scene.tetflora.bl_rna.properties["proxy_kind"]
     return tuple(choice.enum_items.keys()), choice.default
 
 
@@ -174,7 +174,7 @@ class _Stand:
                 # What size spheres have depends on the engine; all other forms are the same in both.
                 if number == 0 or form == 'MICROSPHERES':
                     self.scene.render.engine = _identifier(one.engine)
-                    statistics, _ = timed_refine(self.scene, expand_everything=False, proxy_form=form)
+                    statistics, _ = timed_refine(self.scene, expand_everything=False, proxy_kind=form)
                     self.memory_mb[form] = statistics.memory_mb
                 samples = min(one.samples, COVERAGE_SAMPLES) if one.engine == "eevee" else COVERAGE_SAMPLES
                 alpha = coverage(self.scene, self.folder / "coverage.png", samples, _identifier(one.engine))
@@ -227,7 +227,7 @@ class _Stand:
                 form,
                 species,
                 dT=float(bare[mask].mean()),
-                colour=colour_error(expanded, proxies, mask),
+                color=color_error(expanded, proxies, mask),
                 brightness=float(light_of[1] / light_of[0] - 1.0),
                 seconds=self.seconds[light, engine, form],
                 expanded_seconds=self.seconds[light, engine, EXPANDED],

@@ -44,7 +44,7 @@ def _sums(frames: Sequence[Frame], suffix: str) -> dict[str, float]:
         "flip_max": max(f.flip for f in frames),
         "flip_noise": np.mean(noise) if noise else None,
         "dT_max": max(abs(f.dT) for f in frames),
-        "colour_error_mean": np.mean([f.colour for f in frames]),
+        "color_error_mean": np.mean([f.color for f in frames]),
         "brightness_mean": np.mean([f.brightness for f in frames]),
         "engine_gap": max(_gaps(frames), default=None),
         "frame_time_ratio_max": max(f.seconds / f.expanded_seconds for f in frames),

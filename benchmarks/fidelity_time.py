@@ -76,7 +76,7 @@ def run(folder: Path, chosen: tuple[str, ...], quick: bool) -> dict[str, float]:
 def variants(scene: bpy.types.Scene, chosen: tuple[str, ...], baked: bool) -> dict[str, dict[str, object]]:
     """Settings by name: expanded plants first, the forms, and each of them with baked light if that is asked for."""
     out: dict[str, dict[str, object]] = {"expanded": {"expand_everything": True}}
-    out |= {f.lower(): {"expand_everything": False, "proxy_form": f, "baked_light": 'OFF'} for f in chosen}
+    out |= {f.lower(): {"expand_everything": False, "proxy_kind": f, "baked_light": 'OFF'} for f in chosen}
     choices = scene.tetflora.bl_rna.properties["baked_light"].enum_items.keys()
     for bake in [c for c in choices if c != 'OFF'] if baked else ():
         out |= {f"{form.lower()}_baked_{bake.lower()}": out[form.lower()] | {"baked_light": bake} for form in chosen}

@@ -26,7 +26,7 @@ from .row80 import timed_refine, timed_render
 
 TREES, QUICK_TREES = 18, 6
 SAMPLES, QUICK_SAMPLES = 64, 8
-#: Metres from the eye to the foremost trees.
+#: Meters from the eye to the foremost trees.
 DISTANCES = (15.0, 60.0, 240.0)
 #: Children of a branch, their length in relation to it, segments and sides of their tubes, by order.
 ORDERS = ((1, 9.0, 12, 8), (26, 0.42, 6, 6), (12, 0.4, 4, 5), (9, 0.45, 3, 4))
@@ -125,8 +125,8 @@ def build(scene: bpy.types.Scene, trees: int) -> list[bpy.types.Object]:
     mesh.uv_layers.new(name="UVMap").uv.foreach_set("vector", uv[triangles.ravel()].astype(np.float32).ravel())
     mesh.update(calc_edges=True)
     mesh.shade_flat()
-    for name, colour in (("Foreign bark", (0.16, 0.11, 0.07)), ("Foreign leaf", (0.13, 0.3, 0.06))):
-        mesh.materials.append(_material(name, colour))
+    for name, color in (("Foreign bark", (0.16, 0.11, 0.07)), ("Foreign leaf", (0.13, 0.3, 0.06))):
+        mesh.materials.append(_material(name, color))
     rng = np.random.default_rng(3)
     made = []
     for i in range(trees):
@@ -147,11 +147,11 @@ def build(scene: bpy.types.Scene, trees: int) -> list[bpy.types.Object]:
     return made
 
 
-def _material(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+def _material(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
     """Principled with an image, as exporters write it."""
     image = bpy.data.images.new(name, 64, 64)
     shade = 0.7 + 0.6 * np.random.default_rng(1).random((64, 64, 1))
-    encoded = 1.055 * (shade * np.array(colour)) ** (1 / 2.4) - 0.055
+    encoded = 1.055 * (shade * np.array(color)) ** (1 / 2.4) - 0.055
     image.pixels.foreach_set(np.concatenate([encoded, np.ones((64, 64, 1))], axis=2).astype(np.float32).ravel())
     image.pack()
     material = bpy.data.materials.new(name)

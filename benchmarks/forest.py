@@ -142,7 +142,7 @@ def one(arguments: argparse.Namespace) -> dict:
         if arguments.what == "instances":
             figures |= forest_instances.build(scene)
         else:
-            figures |= forest_case.refined(scene, arguments.at_once)
+            figures |= forest_case.refined(scene, arguments.run_to_end)
         if not arguments.no_render:
             figures |= forest_case.rendered(scene, folder, arguments.samples)
             figures["peak_render_mb"] = max(figures["peak_mb"], figures["peak_render_mb"])
@@ -169,9 +169,9 @@ def main() -> int:
     add("--what", choices=WHATS, default="refine", help="refine, variants as instances, or a part against expansion")
     add("--asked", "--plants", type=int, help="plants that Populate is asked for, by default 100,000")
     add("--side", type=float, help="of the ground, by default 300 m: a smaller wood of the same density")
-    add("--distance", type=float, help="minimum distance between plants, metres")
-    add("--eye", type=float, help="height of the camera, metres")
-    add("--away", type=float, help="least distance of the camera from the middle, metres; it looks so far")
+    add("--distance", type=float, help="minimum distance between plants, meters")
+    add("--eye", type=float, help="height of the camera, meters")
+    add("--away", type=float, help="least distance of the camera from the middle, meters; it looks so far")
     add("--cover", action="store_true", help="with ground cover")
     add("--size", type=_size, default=(1920, 1080), metavar="WxH")
     add("--set", type=_setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")

@@ -37,17 +37,17 @@ SAMPLES = 64
 @contextmanager
 def watching(look: Callable[[Refinement, Detail], Detail | None]) -> Iterator[None]:
     """While it lasts, jobs show what the loop left and the detail they can afford, and take what it returns."""
-    afford = refine.afford
+    fit_to_budget = refine.fit_to_budget
 
     def watched(refinement: Refinement, *rest: object) -> Detail:
-        detail = afford(refinement, *rest)
+        detail = fit_to_budget(refinement, *rest)
         return look(refinement, detail) or detail
 
-    refine.afford = watched
+    refine.fit_to_budget = watched
     try:
         yield
     finally:
-        refine.afford = afford
+        refine.fit_to_budget = fit_to_budget
 
 
 def detail_of(scene: bpy.types.Scene) -> Detail:
@@ -59,7 +59,7 @@ def detail_of(scene: bpy.types.Scene) -> Detail:
             yield from takewhile(lambda _: not kept, steps)
 
     with watching(lambda _, detail: kept.append(replace(detail, refinement=None))):
-        worker.at_once(begun())
+        worker.run_to_end(begun())
     return kept[0]
 
 
@@ -68,10 +68,10 @@ def as_fine_as(detail: Detail) -> AbstractContextManager:
     return watching(lambda _, own: replace(detail, refinement=own.refinement))
 
 
-def refined(scene: bpy.types.Scene, at_once: bool = False) -> dict:
+def refined(scene: bpy.types.Scene, run_to_end: bool = False) -> dict:
     """Refine as the operator does; figures of the job and of what the loop left.
 
-    at_once: as scripts and renders do, without a thread; steps are then those of the engine, which nobody waits for.
+    run_to_end: as scripts and renders do, without a thread; steps are then those of the engine, which nobody waits for.
     """
     kept: list[Refinement] = []
     taken: list[tuple[float, str]] = []
@@ -79,7 +79,7 @@ def refined(scene: bpy.types.Scene, at_once: bool = False) -> dict:
     with watching(lambda refinement, _: kept.append(refinement)):
         start, processor = time.perf_counter(), time.process_time()
         steps = _timed(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get()), taken)
-        statistics = worker.at_once(steps) if at_once else worker.run(steps)
+        statistics = worker.run_to_end(steps) if run_to_end else worker.run(steps)
         seconds, processor = time.perf_counter() - start, time.process_time() - processor
     peak = peak_mb()
     found = left_open(kept.pop()) if kept else {}
@@ -134,7 +134,7 @@ def left_open(refinement: Refinement) -> dict[str, float]:
     parts, points = refinement.plants.parts, refinement.plants.points
     # Plants grow from the first row of their species.
     trunks = np.flatnonzero(np.diff(refinement.plants.flora.rows["species"], prepend=-1))
-    whole = ~parts.alone & np.isin(parts.branches.row, trunks)
+    whole = ~parts.branch_only & np.isin(parts.branches.row, trunks)
     area = points.optical_area.astype(np.float64)
     share = area / np.maximum(np.bincount(points.part, area, len(parts)), 1e-300)[points.part]
     share[whole[points.part]] = 0.0

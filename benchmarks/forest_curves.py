@@ -33,7 +33,7 @@ HECTARE = (100, 200, 400, 800, 1_600, 4_000)
 HEIGHTS = (0.5, 1.7, 5.0, 10.0, 30.0, 100.0)
 CURVES = {"pixels": PIXELS, "plants": PLANTS, "hectare": HECTARE, "height": HEIGHTS}
 LABELS = {"pixels": "pixels", "plants": "plants", "hectare": "plants a hectare", "height": "height of the camera, m"}
-#: A wood in which 14,891 plants have room on 9 hectares, metres and hectares.
+#: A wood in which 14,891 plants have room on 9 hectares, meters and hectares.
 _SIDE, _HECTARES, _DENSITY = 300.0, 9.0, 14_891 / 9.0
 #: Processor seconds: other programs hardly change them.
 _FIGURES = {"s": "refine_emit_cpu_s", "mb": "peak_mb"}

@@ -4,7 +4,7 @@
 
 Three small scenes. Of each the mean luminance of what receives the light, where no plant stands before it, is compared
 between refined and expanded plants. Facets are as large, seen and hidden ones, as in the wood of `forest`, since
-these scenes would not exhaust what an image can afford. Images are of light, not of colours as a film shows them.
+these scenes would not exhaust what an image can afford. Images are of light, not of colors as a film shows them.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Scene:
     Attributes
     ----------
     wood, receiver : tuple of float
-        West, east, south and north border, metres.
+        West, east, south and north border, meters.
     sun : tuple of float
         Elevation, and azimuth from which its light comes (0: north), degrees.
     pitch : float
@@ -152,12 +152,12 @@ def build(scene: bpy.types.Scene, given: Scene) -> int:
     return len(x)
 
 
-def _material(name: str, kind: str, colour: tuple[float, float, float, float]) -> bpy.types.Material:
+def _material(name: str, kind: str, color: tuple[float, float, float, float]) -> bpy.types.Material:
     material = bpy.data.materials.new(name)
     tree = shader_tree(material)
     tree.nodes.clear()
     shader, output = tree.nodes.new(kind), tree.nodes.new("ShaderNodeOutputMaterial")
-    shader.inputs["Color"].default_value, shader.inputs["Roughness"].default_value = colour, 0.0
+    shader.inputs["Color"].default_value, shader.inputs["Roughness"].default_value = color, 0.0
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
     return material
 

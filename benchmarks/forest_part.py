@@ -31,7 +31,7 @@ from .row80 import timed_refine, timed_render
 WINDOW = 1.0 / 6.0
 #: Plants in the part, and polygons that they have when expanded.
 MOST, MOST_POLYGONS = 200, 5_000_000
-#: Where plants must be seen to count as standing in the window, metres above the ground.
+#: Where plants must be seen to count as standing in the window, meters above the ground.
 _MIDDLE = 7.0
 
 
@@ -70,7 +70,7 @@ def measure(scene: bpy.types.Scene, folder: Path, samples: int, noise: bool = Tr
         "part_leaf_limit": detail.leaf_limit,
         "part_covered": float(mask.mean()),
         "flip": found.flip,
-        "colour_error": found.colour,
+        "color_error": found.color,
     }
     if noise:
         timed_render(scene, folder / "again.png", samples, seed=1)
@@ -99,7 +99,7 @@ def keep(scene: bpy.types.Scene) -> int:
 
 
 def _seen(scene: bpy.types.Scene, seeds: Seeds) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Distance (n,) of plants from the camera, metres, and whether they are in the window (n,)."""
+    """Distance (n,) of plants from the camera, meters, and whether they are in the window (n,)."""
     camera = scene.camera
     middle = seeds.position + [0.0, 0.0, min(_MIDDLE, camera.location.z)]
     matrix: Matrix = camera.matrix_world.normalized().inverted()

@@ -19,16 +19,16 @@ from tetflora_addon.blender.job.plant_mesh import single_seed
 from tetflora_addon.blender.placing.first_forest import sky
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission.plants import expanded_blocks
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
-#: Ground: metres along each side, and faces. With these 14,891 plants have room, 2,446 at 5 m.
+#: Ground: meters along each side, and faces. With these 14,891 plants have room, 2,446 at 5 m.
 SIDE, SUBDIVISIONS = 300.0, 120
 WIDTH, HEIGHT = 1920, 1080
 MIX = ("birch", "spruce", "oak", "beech", "scots_pine")
-#: The catalogue does not say what a tree is: all that grow at least so high, metres.
+#: The catalog does not say what a tree is: all that grow at least so high, meters.
 TREE = 4.0
 MILLION_GB = 6.0
-#: The eye looks at this height above the middle of the ground, metres.
+#: The eye looks at this height above the middle of the ground, meters.
 _CROWNS = 7.0
 
 
@@ -43,15 +43,15 @@ class Case:
     asked : int
         Plants that Populate is asked for; as many come as have room.
     distance : float
-        Minimum distance between plants, metres.
+        Minimum distance between plants, meters.
     eye : float
-        Height of the camera, metres.
+        Height of the camera, meters.
     inside : bool
         The camera stands in the middle of the wood and looks ahead, not at the edge.
     side : float
-        Of the ground, metres.
+        Of the ground, meters.
     away : float
-        Least distance of the camera from the middle of the ground, metres, and how far ahead it then looks. 0: to the
+        Least distance of the camera from the middle of the ground, meters, and how far ahead it then looks. 0: to the
         middle.
     cover : bool
         The ground is covered.
@@ -77,14 +77,14 @@ def case_of(name: str) -> Case:
 
 
 def height_of(identifier: str) -> float:
-    """Height of one plant of a species, metres."""
-    flora = compile_species([catalogue.load_species(identifier)])
+    """Height of one plant of a species, meters."""
+    flora = compile_species([catalog.load_species(identifier)])
     return max(float(b.buffers.positions[:, 2].max()) for b in expanded_blocks(flora, single_seed(identifier, 1)))
 
 
 def trees() -> tuple[str, ...]:
-    """Species of the catalogue that are trees."""
-    return tuple(name for name in catalogue.list_species() if height_of(name) >= TREE)
+    """Species of the catalog that are trees."""
+    return tuple(name for name in catalog.list_species() if height_of(name) >= TREE)
 
 
 def build(scene: bpy.types.Scene, case: Case, size: tuple[int, int] = (WIDTH, HEIGHT)) -> int:

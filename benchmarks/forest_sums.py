@@ -23,7 +23,7 @@ _OURS = (
     "peak_render_mb",
 )
 _THEIRS = ("build_s", "render_s", "peak_render_mb")
-_PART = ("flip", "flip_noise", "colour_error", "part_plants")
+_PART = ("flip", "flip_noise", "color_error", "part_plants")
 #: Bytes of a megabyte of `report.peak_mb`, which counts thousands of kibibytes.
 _MEGABYTE = 1024e3
 

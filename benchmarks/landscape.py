@@ -79,7 +79,7 @@ def run(quick: bool) -> dict[str, float]:
         "tenth_polygons_meshed": part.polygons_meshed,
         "flip": error.flip,
         "flip_noise": noise.flip,
-        "colour_error": error.colour,
+        "color_error": error.color,
     }
 
 

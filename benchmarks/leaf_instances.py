@@ -62,7 +62,7 @@ def run(quick: bool) -> dict[str, float]:
                     if engine == "CYCLES":
                         figures[f"{name}_{way}_peak_mb"] = found["peak_mb"]
                 figures[f"{name}_wins"] = ours["total"] / theirs["total"]
-                figures[f"{name}_colour_error"] = abs(theirs["mean"] / ours["mean"] - 1.0)
+                figures[f"{name}_color_error"] = abs(theirs["mean"] / ours["mean"] - 1.0)
     return figures
 
 

@@ -23,7 +23,7 @@ from devtools.formats import set_format
 from tetflora_addon.blender.attributes import members
 from tetflora_addon.blender.job import plant_mesh
 from tetflora_addon.blender.materials import materials
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 
 from .looks import plain_material
 from .report import Targets
@@ -75,7 +75,7 @@ def _crown(identifier: str, distance: float, samples: int, part: str = " leaf") 
     empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, 3
     scene.collection.objects.link(empty)
     bpy.context.view_layer.update()
-    (plant,) = at_once(plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty]))
+    (plant,) = run_to_end(plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty]))
     points = members(plant.data.vertices, "co", 3)
     height, middle = float(points[:, 2].max()), points.mean(axis=0)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))

@@ -23,7 +23,7 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.leaves.kites import KITE, leaf_kites
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.leaves.models import LeafModel, leaf_model
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 from tetflora_addon.subplants.leaf_meshes import LeafCopies
 
 from .forest_instances import placing_nodes
@@ -31,7 +31,7 @@ from .forest_instances import placing_nodes
 SPECIES = "broadleaf_tree"
 #: Has a leaf so coarse that the species has none of as few polygons.
 COARSE = "beech"
-#: Trees of each view, and how far the camera is from their middle, metres.
+#: Trees of each view, and how far the camera is from their middle, meters.
 TREES = {"crown": 1, "stand": 6}
 AWAY = {"crown": 9.0, "stand": 90.0}
 _APART = 9.0
@@ -48,7 +48,7 @@ class Leaves:
     position: NDArray[np.float64]
     frame: NDArray[np.float32]
     size: NDArray[np.float64]
-    colour: NDArray[np.float64]
+    color: NDArray[np.float64]
 
     def every(self, step: int) -> Leaves:
         """Every so many-th of them."""
@@ -56,12 +56,12 @@ class Leaves:
 
     def arrays(self) -> tuple[NDArray, ...]:
         """All fields."""
-        return self.key, self.position, self.frame, self.size, self.colour
+        return self.key, self.position, self.frame, self.size, self.color
 
 
 def leaves_of(view: str) -> Leaves:
     """All leaves of the trees of a view."""
-    flora = compile_species([catalogue.load_species(SPECIES)])
+    flora = compile_species([catalog.load_species(SPECIES)])
     parts = []
     for tree in range(TREES[view]):
         with _noted() as noted:
@@ -113,7 +113,7 @@ def add_leaves(scene: bpy.types.Scene, leaves: Leaves, unit: str, way: str) -> N
         made = bpy.data.objects.new("Leaves", write_mesh("Leaves", _copies(model, leaves, unit), [material]))
     else:
         one = Leaves(
-            np.zeros(1, np.uint64), np.zeros((1, 3)), np.eye(3, dtype=np.float32)[None], np.ones(1), leaves.colour[:1]
+            np.zeros(1, np.uint64), np.zeros((1, 3)), np.eye(3, dtype=np.float32)[None], np.ones(1), leaves.color[:1]
         )
         mesh = write_mesh("Leaf", _copies(model, one, unit), [_of_instances(material)])
         source = bpy.data.objects.new("Leaf", mesh)  # of no scene: only its instances are rendered
@@ -124,12 +124,12 @@ def add_leaves(scene: bpy.types.Scene, leaves: Leaves, unit: str, way: str) -> N
 
 def model_of(unit: str, leaves: Leaves) -> LeafModel:
     """A leaf of so many polygons, or a twig of kites."""
-    (own,) = catalogue.load_species(SPECIES).leaf
+    (own,) = catalog.load_species(SPECIES).leaf
     if unit == "twig":
         return _twig(leaves)
     if unit == "1":
         return replace(KITE, positions=leaf_kites(own).positions[0])
-    (coarse,) = catalogue.load_species(COARSE).leaf
+    (coarse,) = catalog.load_species(COARSE).leaf
     levels = *leaf_levels(own), *leaf_levels(coarse)
     level = next(level for level in levels if level.model.polygons == int(unit))
     return replace(level.model, positions=level.shapes[0])
@@ -174,7 +174,7 @@ def _points(leaves: Leaves) -> bpy.types.Mesh:
     for name, kind, key, values in (
         ("turn", 'QUATERNION', "value", turn),
         ("size", 'FLOAT', "value", leaves.size),
-        ("tf_colour", 'FLOAT_VECTOR', "vector", leaves.colour),
+        ("tf_color", 'FLOAT_VECTOR', "vector", leaves.color),
         ("tf_transmission", 'FLOAT', "value", np.full(len(leaves.size), TRANSMISSION)),
     ):
         mesh.attributes.new(name, kind, 'POINT').data.foreach_set(key, values.astype(np.float32).ravel())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What bark costs in Cycles where a trunk fills the image, over a plain material of the same colour.
+"""What bark costs in Cycles where a trunk fills the image, over a plain material of the same color.
 
 Times are those of the processor, of all threads, which other programs disturb less than they do the clock. Each bark
 is rendered next to the plain material, and the least time of each counts.
@@ -19,7 +19,7 @@ from tetflora_addon.blender.materials import bark, materials
 from .report import Targets
 
 RADIUS, LENGTH = 0.4, 6.0
-COLOUR = (0.4, 0.3, 0.2)
+COLOR = (0.4, 0.3, 0.2)
 
 #: A guard against more: where bark is a few pixels wide, as nearly always, nobody measures any of it.
 TARGETS: Targets = {"cycles_worst": {"max": 4.0}}
@@ -49,8 +49,8 @@ def _trunk_scene(scene: bpy.types.Scene) -> bpy.types.Object:
     mesh.uv_layers[0].name = "UVMap"
     for loop, corner in zip(mesh.uv_layers[0].data, mesh.loops, strict=True):
         loop.uv = (loop.uv[0], mesh.vertices[corner.vertex_index].co.z / (tau * RADIUS))
-    colour = mesh.attributes.new("tf_colour", 'FLOAT_VECTOR', 'FACE')
-    colour.data.foreach_set("vector", COLOUR * len(mesh.polygons))
+    color = mesh.attributes.new("tf_color", 'FLOAT_VECTOR', 'FACE')
+    color.data.foreach_set("vector", COLOR * len(mesh.polygons))
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type, camera.data.ortho_scale = 'ORTHO', 0.75
     camera.location, camera.rotation_euler = (0.0, -5.0, 0.0), (pi / 2, 0.0, 0.0)
@@ -68,13 +68,13 @@ def _trunk_scene(scene: bpy.types.Scene) -> bpy.types.Object:
 
 
 def plain_material() -> bpy.types.Material:
-    """Principled as Blender gives it, with the colour of the faces."""
+    """Principled as Blender gives it, with the color of the faces."""
     material = bpy.data.materials.new("Plain")
     tree = compat.shader_tree(material)
-    colour = tree.nodes.new("ShaderNodeAttribute")
-    colour.attribute_name = "tf_colour"
+    color = tree.nodes.new("ShaderNodeAttribute")
+    color.attribute_name = "tf_color"
     principled = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
-    tree.links.new(colour.outputs["Color"], principled.inputs["Base Color"])
+    tree.links.new(color.outputs["Color"], principled.inputs["Base Color"])
     return material
 
 

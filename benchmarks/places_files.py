@@ -138,13 +138,13 @@ def geotiff(
     cell: float = 1.0,
     west: float = EAST,
     north: float = NORTH,
-    code: int = CODE,
+    epsg: int = CODE,
     nothing: bytes | None = b"-9999\0",
     **options: Any,
 ) -> bytes:
     """A GeoTIFF with square cells, whose first one has its upper left corner at a place."""
-    model = 2 if code == 4326 else 1
-    keys = [1, 1, 0, 3, 1024, 0, 1, model, 1025, 0, 1, 1, 2048 if model == 2 else 3072, 0, 1, code]
+    model = 2 if epsg == 4326 else 1
+    keys = [1, 1, 0, 3, 1024, 0, 1, model, 1025, 0, 1, 1, 2048 if model == 2 else 3072, 0, 1, epsg]
     extra = {
         33550: (12, [cell, cell, 0.0]),
         33922: (12, [0.0, 0.0, 0.0, west, north, 0.0]),
@@ -236,14 +236,14 @@ def dbase(**columns: list[str]) -> bytes:
     return head + fields + b"\r" + rows + b"\x1a"
 
 
-def geopackage(table: str, *rows: tuple[bytes, dict[str, str]], code: int = CODE) -> bytes:
+def geopackage(table: str, *rows: tuple[bytes, dict[str, str]], epsg: int = CODE) -> bytes:
     """A GeoPackage with a layer of geometries in well-known binary, and a text of each under some names."""
     names = list(rows[0][1])
     with closing(sqlite3.connect(":memory:")) as base:
         base.execute(
             "CREATE TABLE gpkg_spatial_ref_sys (srs_name, srs_id, organization, organization_coordsys_id, definition)"
         )
-        base.execute("INSERT INTO gpkg_spatial_ref_sys VALUES ('x', 7, 'EPSG', ?, '')", (code,))
+        base.execute("INSERT INTO gpkg_spatial_ref_sys VALUES ('x', 7, 'EPSG', ?, '')", (epsg,))
         base.execute("CREATE TABLE gpkg_geometry_columns (table_name, column_name, geometry_type_name, srs_id, z, m)")
         base.execute("INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', 'GEOMETRY', 7, 0, 0)", (table,))
         base.execute(f'CREATE TABLE "{table}" (fid, geom, {", ".join(names)})')
@@ -262,7 +262,7 @@ def binary_area(*rings: Any) -> bytes:
     return out + b"".join(struct.pack(f"<I{2 * len(r)}d", len(r), *(v for p in r for v in p)) for r in rings)
 
 
-def _in_metres(size: float, east: float = 0.0) -> list[list[float]]:
+def _in_meters(size: float, east: float = 0.0) -> list[list[float]]:
     """A square, clockwise."""
     ring = [[0.0, 0.0], [0.0, size], [size, size], [size, 0.0], [0.0, 0.0]]
     return [[EAST + east + x, NORTH + y] for x, y in ring]
@@ -321,15 +321,15 @@ FILES: dict[str, tuple[str, str, bytes]] = {
     "csv": ("import_inventory", "trees.csv", INVENTORY.encode()),
     "points": ("import_inventory", "trees.geojson", collection(*TREES).encode()),
     "lines": ("import_outlines", "map.geojsonl", b"\n".join(json.dumps(f).encode() for f in OUTLINES)),
-    "shape": ("import_outlines", "shape.shp", shapefile([_in_metres(50.0)], [_in_metres(9.0, 80.0)])),
+    "shape": ("import_outlines", "shape.shp", shapefile([_in_meters(50.0)], [_in_meters(9.0, 80.0)])),
     "dbase": ("import_outlines", "dbase.dbf", dbase(fclass=["forest", "building"], height=["", "9.5"])),
     "geopackage": (
         "import_outlines",
         "map.gpkg",
         geopackage(
             "areas",
-            (binary_area(_in_metres(50.0)), {"kind": "Wald"}),
-            (binary_area(_in_metres(9.0, 80.0)), {"kind": "Haus"}),
+            (binary_area(_in_meters(50.0)), {"kind": "Wald"}),
+            (binary_area(_in_meters(9.0, 80.0)), {"kind": "Haus"}),
         ),
     ),
     "outlines": ("import_outlines", "map.geojson", collection(*OUTLINES).encode()),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Throughput of plants: from seeds to finished Blender meshes, for every species of the catalogue.
+"""Throughput of plants: from seeds to finished Blender meshes, for every species of the catalog.
 
 Seconds are processor time of the whole process, with one thread, so that they are those of one core; on two cores they
 are those of the clock, with many blocks and processes that have begun. Memory is what numpy holds at most, by
@@ -24,7 +24,7 @@ from tetflora_addon.blender.results import meshes
 from tetflora_addon.compiled.flora import _compiled
 from tetflora_addon.emission.plants import BLOCK_POLYGONS, expanded_blocks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 from .report import Targets
 
@@ -126,17 +126,17 @@ def peak_over_mesh(flora: Any) -> float:
 def run(quick: bool) -> dict[str, float]:
     """Measure all species; see the table in ``docs/results.md`` for what the figures mean."""
     found = _on_one_core(QUICK_REPEATS if quick else REPEATS, QUICK_POLYGONS if quick else POLYGONS)
-    parallel.use(2)
+    parallel.set_threads(2)
     try:
         found["mtri_per_s_two_cores"] = median(on_two_cores(name) for name in TWO_CORES)
     finally:
-        parallel.use(0)
+        parallel.set_threads(0)
     return found
 
 
 def on_two_cores(name: str) -> float:
     """Million triangles a second of a species, by the clock, least of three; many blocks, and the first has begun."""
-    flora = _compiled((catalogue.load_species(name),))
+    flora = _compiled((catalog.load_species(name),))
     seeds = plants_of(flora, BLOCKS * BLOCK_POLYGONS)
     triangles, taken = 0, []
     for _ in range(4):
@@ -149,12 +149,12 @@ def on_two_cores(name: str) -> float:
 
 
 def _on_one_core(repeats: int, polygons: float) -> dict[str, float]:
-    parallel.use(1)
+    parallel.set_threads(1)
     compile_species = _compiled.__wrapped__  # never from the cache
     speed, memory, compiling, sampling, copying = {}, {}, {}, {}, {}
     triangles_in_all = bytes_in_all = 0
-    for name in catalogue.list_species():
-        species = [catalogue.load_species(name)]
+    for name in catalog.list_species():
+        species = [catalog.load_species(name)]
         flora = compile_species(species)
         compiling[name] = 1e3 * seconds(lambda s=species: compile_species(s), repeats)
         sampling[name] = 1e3 * seconds(lambda s=species: sampled(compile_species(s)), repeats) - compiling[name]

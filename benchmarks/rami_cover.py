@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How much of the ground RAMI-V's abstract canopies cover from above: proxies, discrete leaves, formula, published.
 
-``python -m benchmarks.rami_cover`` prints a row for each canopy, form and size; sizes are pixels for each metre, which
+``python -m benchmarks.rami_cover`` prints a row for each canopy, form and size; sizes are pixels for each meter, which
 is also a crown. What was measured stays in ``out/rami``.
 """
 
@@ -61,7 +61,7 @@ def cover(name: str, form: str, size: int, again: bool = False) -> float:
     form : str
         `EXPANDED` or one of `FORMS`.
     size : int
-        Pixels a metre; does not count for expanded plants.
+        Pixels a meter; does not count for expanded plants.
     again : bool
         Measure what is known already.
     """
@@ -84,7 +84,7 @@ def _measured(stand: Canopy, form: str, size: int) -> float:
     else:
         rami_species.add_plants(scene, stand)
         bpy.context.view_layer.update()
-        timed_refine(scene, expand_everything=False, proxy_form=form)
+        timed_refine(scene, expand_everything=False, proxy_kind=form)
     scene.render.film_transparent = True
     rami.set_bounces(scene, 0)
     rays = scene.render.resolution_x * scene.render.resolution_y
@@ -98,7 +98,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", choices=COVERS, nargs="+", default=COVERS)
     parser.add_argument("--form", choices=FORMS, nargs="+", default=FORMS)
-    parser.add_argument("--pixels", type=int, nargs="+", default=SIZES, help="pixels a metre")
+    parser.add_argument("--pixels", type=int, nargs="+", default=SIZES, help="pixels a meter")
     parser.add_argument("--again", action="store_true", help="measure what is known, too")
     given = parser.parse_args()
     for name in given.scene:

@@ -28,7 +28,7 @@ from examples.rami_discs import CURVES, canopy, published
 from .rami_measure import EXPANDED, FORMS, POLYGONS, Measured, errors
 from .report import ROOT
 
-COLOURS = {
+COLORS = {
     POLYGONS: "black",
     EXPANDED: "tab:gray",
     'MICROSURFACES': "tab:blue",
@@ -60,7 +60,7 @@ def draw(path: Path, pixels: dict[str, int]) -> None:
             at, factors = found.curve(form, pixels[name])
             if not len(at):
                 continue
-            style = {"color": COLOURS[form], "linewidth": 1.1, "marker": "." if form != POLYGONS else "", "ms": 4}
+            style = {"color": COLORS[form], "linewidth": 1.1, "marker": "." if form != POLYGONS else "", "ms": 4}
             label = LABELS.get(form, form.lower())
             above.plot(at, factors, label=label, **style)
             below.plot(at, 100 * (factors / interp(at, angles, known) - 1), **style)

@@ -190,7 +190,7 @@ def _view(scene: bpy.types.Scene, stand: Canopy, form: str, pixels: int, angle: 
     if refined:
         forget_peak()
         bpy.context.view_layer.update()
-        statistics, seconds = timed_refine(scene, expand_everything=False, proxy_form=form)
+        statistics, seconds = timed_refine(scene, expand_everything=False, proxy_kind=form)
         rami_species.make_lambertian()
         row |= {"refine_s": round(seconds, 2), "facets": statistics.polygons_proxy, "real": statistics.polygons_meshed}
     samples = ceil(_RAYS / (scene.render.resolution_x * scene.render.resolution_y))

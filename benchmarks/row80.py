@@ -76,7 +76,7 @@ def run(quick: bool) -> dict[str, float]:
             "flip": error.flip,
             "flip_noise": noise.flip,
             "flip_whole_picture": error.flip_all,
-            "colour_error": error.colour,
+            "color_error": error.color,
             "peak_mb": peak,
             "render_refined_s": render_refined_s,
             "render_expanded_s": render_expanded_s,

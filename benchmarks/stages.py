@@ -22,7 +22,7 @@ from tetflora_addon.blender.job.contents import compile_for
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.emission.drawing import drawing
-from tetflora_addon.emission.forms import Refined, as_triangles, facet_blocks
+from tetflora_addon.emission.emitters import EmissionInput, as_triangles, facet_blocks
 from tetflora_addon.emission.plants import Transition
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.refinement.settings import RefinementSettings
@@ -83,7 +83,7 @@ def run(quick: bool) -> dict[str, float]:
     camera, result = refine.partition(scene, depsgraph)
     wall = time.perf_counter() - wall
     taken, begun = time.process_time() - begun, time.process_time()
-    shared = result.plants.nbytes + result.holdings.nbytes
+    shared = result.plants.nbytes + result.cell_polygons.nbytes
     sizes = {"update": shared, "visibility": held(result.cells), "refinement": result.tree.nbytes}
     for stage, wall_s in result.seconds.items():  # wall clock, scaled to processor time
         seconds[stage], left[stage] = wall_s / wall * taken, sizes[stage]
@@ -91,7 +91,7 @@ def run(quick: bool) -> dict[str, float]:
     settings = RefinementSettings()
     transition, weights = Transition(flora, camera, settings.leaf_limit), facet_weights(flora)
     given = drawing(flora, result, camera, transition, settings.facet, weights, form=as_triangles)
-    refined = Refined(flora, result, camera, given)
+    refined = EmissionInput(flora, result, camera, given)
     for block in refined.mesh_blocks():
         lap("polygons", block.buffers.nbytes)
         meshes.write_mesh("block", block.buffers)

@@ -21,10 +21,10 @@ def measured(plants: int) -> dict[str, float]:
     """One stand; ``alive`` is the sum over all years of those that were there."""
     import numpy as np
 
-    from tetflora_addon.species.catalogue import load_species
+    from tetflora_addon.species.catalog import load_species
     from tetflora_addon.stands.grow import StandSettings, begun
-    from tetflora_addon.stands.guilds import Guild
     from tetflora_addon.stands.site import StandSite
+    from tetflora_addon.stands.traits import StandSpecies
 
     from .report import forget_peak, peak_mb
 
@@ -32,9 +32,9 @@ def measured(plants: int) -> dict[str, float]:
     side = 100.0 * (plants / DENSITY) ** 0.5
     cells = max(round(side / 5.0), 1)
     site = StandSite(0.0, 0.0, side / cells, np.zeros((cells, cells)))
-    guilds = [Guild(load_species(name)) for name in SPECIES]
+    members = [StandSpecies(load_species(name)) for name in SPECIES]
     start, alive = time.perf_counter(), 0
-    stand = begun(site, guilds, StandSettings(density=DENSITY, years=YEARS, interval=20))
+    stand = begun(site, members, StandSettings(density=DENSITY, years=YEARS, interval=20))
     for year in range(YEARS):
         stand.step(year)
         alive += len(stand.plants)

@@ -18,7 +18,7 @@ from devtools import session
 from tetflora_addon.blender.job import refine
 from tetflora_addon.compiled.flora import Flora, _compiled
 from tetflora_addon.growth.seasons import Season
-from tetflora_addon.species import ages, catalogue
+from tetflora_addon.species import ages, catalog
 
 from .year_scene import MIX, digest, set_day, wood
 
@@ -77,9 +77,9 @@ def compiling(quick: bool) -> dict[str, float]:
     repeats = 3 if quick else 7
     figures: dict[str, float] = {}
     bare: dict[str, float] = {}
-    names = tuple(MIX) if quick else tuple(catalogue.list_species())
+    names = tuple(MIX) if quick else tuple(catalog.list_species())
     for name in names:
-        species = catalogue.load_species(name)
+        species = catalog.load_species(name)
         plain = _seconds(lambda one=species: _compiled.__wrapped__((one,)), repeats)
         flora = _compiled.__wrapped__((species,))
         slowest = max(_seconds(lambda d=day, f=flora: _on_day(f, d), repeats) for day in DAYS)
@@ -95,7 +95,7 @@ def compiling(quick: bool) -> dict[str, float]:
             f"memory_ratio_{name}": held,
             f"memory_kb_{name}": nbytes(flora) / 1e3,
         }
-    mixed = tuple(catalogue.load_species(name) for name in names)
+    mixed = tuple(catalog.load_species(name) for name in names)
     plain = _seconds(lambda: _compiled.__wrapped__(mixed), repeats)
     flora = _compiled.__wrapped__(mixed)
     slowest = max(_seconds(lambda d=day: _on_day(flora, d), repeats) for day in DAYS)

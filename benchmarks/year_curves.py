@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Leaf area by day against published courses, and height and girth by age against published ranges.
+"""Leaf area by day against published courses, and height and diameter by age against published ranges.
 
 The leaf area of a species on a day is what its compiled form expects of `PLANTS` plants, each early or late as its key
 has it, over what they have in summer. Courses of a near relative tell how fast leaves come and go, not when: there the
@@ -20,14 +20,14 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 
 PLANTS = 256
 
 
 def run() -> dict[str, float]:
     """Figures of leaf area and of sizes."""
-    return leaf_areas() | heights_and_girths()
+    return leaf_areas() | heights_and_diameters()
 
 
 def leaf_areas() -> dict[str, float]:
@@ -46,11 +46,11 @@ def leaf_areas() -> dict[str, float]:
     } | {name: float(value) for name, value in figures.items()}
 
 
-def heights_and_girths() -> dict[str, float]:
+def heights_and_diameters() -> dict[str, float]:
     """Whether sizes are within the published ranges, and how far from the middle of these, as a fraction."""
     figures: dict[str, float] = {}
     every = [one for name in sizes.published()["species"] for one in sizes.compared(name)]
-    for quantity, plural in (("height", "heights"), ("diameter", "girths")):
+    for quantity, plural in (("height", "heights"), ("diameter", "diameters")):
         own = [one for one in every if one.quantity == quantity]
         off = np.array([one.measured / one.middle - 1.0 for one in own])
         figures |= {

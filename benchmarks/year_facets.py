@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mean colour and opacity of proxies against fully expanded plants, at ten days and five ages.
+"""Mean color and opacity of proxies against fully expanded plants, at ten days and five ages.
 
 Plants of one species stand in a row, some of each age, all as high in the image, before nothing: the film is
 transparent. They are expanded once a day, and refined at each height in pixels. The opacity's error is the difference
-of what both cover, over the area of the silhouette; the colour's is the largest difference of a channel between mean
+of what both cover, over the area of the silhouette; the color's is the largest difference of a channel between mean
 radiances of what is covered, in linear light of which a white sheet that faces the sun has about 1.
 """
 
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from devtools import session
 from examples import stands
 from tetflora_addon.compiled.crowns import crown_of
-from tetflora_addon.species import ages, catalogue
+from tetflora_addon.species import ages, catalog
 
 from .compare import read_picture, render
 from .fidelity_frames import LEAST_COVERAGE
@@ -53,7 +53,7 @@ class Compared:
         Which plants.
     opacity, expanded_opacity : float
         What refined and expanded plants cover, over the area of the silhouette.
-    colour, expanded_colour : tuple of float
+    color, expanded_color : tuple of float
         Mean linear radiance of what is covered.
     """
 
@@ -63,8 +63,8 @@ class Compared:
     pixels: int
     opacity: float
     expanded_opacity: float
-    colour: tuple[float, float, float]
-    expanded_colour: tuple[float, float, float]
+    color: tuple[float, float, float]
+    expanded_color: tuple[float, float, float]
 
     @property
     def opacity_error(self) -> float:
@@ -72,9 +72,9 @@ class Compared:
         return self.opacity - self.expanded_opacity
 
     @property
-    def colour_error(self) -> float:
+    def color_error(self) -> float:
         """The largest of the channels."""
-        return float(np.abs(np.subtract(self.colour, self.expanded_colour)).max())
+        return float(np.abs(np.subtract(self.color, self.expanded_color)).max())
 
 
 def run(
@@ -105,7 +105,7 @@ def run(
 
 def row(scene: bpy.types.Scene, species: str) -> None:
     """Fill an empty scene with plants of all ages side by side, each as high as the others."""
-    loaded = catalogue.load_species(species)
+    loaded = catalog.load_species(species)
     crowns = [crown_of(ages.with_age(loaded, age) if age else loaded) for age in AGES]
     slot = _HEIGHT * max(0.85, max(2.3 * crown.radius / crown.height for crown in crowns))
     width = slot * EACH * len(AGES)
@@ -146,8 +146,8 @@ def compare(
             one = Compared(species, day, age, pixels, both[0][0], both[1][0], both[0][1], both[1][1])
             print(
                 f"  {species} day {day:g} age {age:g} {pixels} px: opacity {one.expanded_opacity:.3f} "
-                f"{one.opacity_error:+.4f} colour {np.round(one.expanded_colour, 3)} "
-                f"{np.round(np.subtract(one.colour, one.expanded_colour), 4)}",
+                f"{one.opacity_error:+.4f} color {np.round(one.expanded_color, 3)} "
+                f"{np.round(np.subtract(one.color, one.expanded_color), 4)}",
                 flush=True,
             )
             yield one
@@ -165,13 +165,13 @@ def figures(found: list[Compared]) -> dict[str, float]:
 
 
 def _sums(found: list[Compared], suffix: str) -> dict[str, float]:
-    opacity, colour = [abs(one.opacity_error) for one in found], [one.colour_error for one in found]
+    opacity, color = [abs(one.opacity_error) for one in found], [one.color_error for one in found]
     return {
         f"opacity_error_max{suffix}": max(opacity),
         f"opacity_error_mean{suffix}": float(np.mean(opacity)),
         f"opacity_bias{suffix}": float(np.mean([one.opacity_error for one in found])),
-        f"colour_error_max{suffix}": max(colour),
-        f"colour_error_mean{suffix}": float(np.mean(colour)),
+        f"color_error_max{suffix}": max(color),
+        f"color_error_mean{suffix}": float(np.mean(color)),
     }
 
 
@@ -193,7 +193,7 @@ def _columns(picture: NDArray[np.float32]) -> list[NDArray[np.float32]]:
 
 
 def _means(picture: NDArray[np.float32], area: float) -> tuple[float, tuple[float, float, float]]:
-    """What plants cover over the area of the silhouette, and their mean colour; colours come premultiplied."""
+    """What plants cover over the area of the silhouette, and their mean color; colors come premultiplied."""
     covered = picture[:, :, 3].mean(dtype=float)
-    colour = picture[:, :, :3].mean(axis=(0, 1), dtype=float) / max(covered, 1e-9)
-    return float(covered / max(area, 1e-9)), tuple(colour.tolist())
+    color = picture[:, :, :3].mean(axis=(0, 1), dtype=float) / max(covered, 1e-9)
+    return float(covered / max(area, 1e-9)), tuple(color.tolist())

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Frames of a year and of a life: by how much more refined frames differ from each other than expanded ones.
 
-A year of a mixed wood goes by in steps of five days, and a birch grows from its first year to its eightieth. Camera,
+A year of a mixed forest goes by in steps of five days, and a birch grows from its first year to its eightieth. Camera,
 light and seeds of noise stay the same, so that whatever differs between two frames is what the plants do. Two figures
 tell whether proxies follow: FLIP between refined frames less FLIP between expanded ones, as the benchmark `dolly` has
 it; and FLIP between a refined frame and the one before to which the change of the expanded plants was added, which also
@@ -35,7 +35,7 @@ KINDS = ("refined", "expanded")
 PLANTS, ROOM, AGES = 32, 14.0, (6.0, 16.0)
 WOOD_SIZE, BIRCH_SIZE = (320, 180), (200, 280)
 WOOD_SAMPLES, BIRCH_SAMPLES = 16, 24
-#: Height that the birch's camera sees, metres; difference of a pixel from the empty place in which a plant is seen.
+#: Height that the birch's camera sees, meters; difference of a pixel from the empty place in which a plant is seen.
 _BIRCH, _SEEN = 24.0, 0.02
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes of the benchmark `year`: a mixed wood at the height of the eye, and a birch by itself."""
+"""Scenes of the benchmark `year`: a mixed forest at the height of the eye, and a birch by itself."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tetflora_addon.growth.hashing import uniform
 
 #: Species of the wood with their relative numbers: two that turn yellow, one that turns brown, one evergreen, a shrub.
 MIX = {"birch": 0.3, "beech": 0.2, "oak": 0.2, "spruce": 0.15, "hazel": 0.15}
-#: Nearest distance to the eye and height of the eye, metres; horizontal field of view.
+#: Nearest distance to the eye and height of the eye, meters; horizontal field of view.
 _NEAREST, _EYE, _VIEW = 7.0, 1.7, radians(54.0)
 _ELEVATION, _AZIMUTH = 35.0, -60.0
 
@@ -57,7 +57,7 @@ def wood(
 
 
 def lone(scene: bpy.types.Scene, species: str, height: float, size: tuple[int, int], age: float) -> None:
-    """Fill an empty scene with one plant, and a camera that sees so many metres of its height."""
+    """Fill an empty scene with one plant, and a camera that sees so many meters of its height."""
     add_plant(scene, species, 1, (0.0, 0.0, 0.0), 1.0, age)
     _ground(60.0 * height)
     view = radians(24.0)

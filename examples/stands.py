@@ -19,13 +19,13 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission import plants
 from tetflora_addon.growth import seeds
 from tetflora_addon.growth.hashing import signed, uniform
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 SPECIES = ("oak", "birch", "spruce", "aspen")
 #: Directions of the sun's light as its azimuth over the direction of view, degrees: 0 shines over the viewer's
 #: shoulder. None: nothing but an even sky.
 LIGHTS: dict[str, float | None] = {"front": 25.0, "side": 95.0, "back": 170.0, "overcast": None}
-#: Height that every plant is scaled to, metres.
+#: Height that every plant is scaled to, meters.
 HEIGHT = 12.0
 _ELEVATION = 40.0
 _FIELD_OF_VIEW = radians(30.0)
@@ -104,11 +104,11 @@ def receding(scene: bpy.types.Scene, largest: int, smallest: int, light: str) ->
     """
     step = 0.92
     heights = largest * step ** np.arange(int(np.log(smallest / largest) / np.log(step)) + 1)
-    centres = 0.4 * (heights.cumsum() - heights / 2) + 0.25 * largest
-    columns = round(centres[-1] + heights[-1])
+    centers = 0.4 * (heights.cumsum() - heights / 2) + 0.25 * largest
+    columns = round(centers[-1] + heights[-1])
     focal = columns / 2 / tan(_FIELD_OF_VIEW / 2)
     distance = focal * HEIGHT / heights
-    x = (centres - columns / 2) * HEIGHT / heights
+    x = (centers - columns / 2) * HEIGHT / heights
     scales = {identifier: HEIGHT / _height(identifier) for identifier in SPECIES}
     for i, place in enumerate(zip(x.tolist(), distance.tolist(), strict=True)):
         identifier = SPECIES[i % len(SPECIES)]
@@ -161,7 +161,7 @@ def above(scene: bpy.types.Scene, species: tuple[str, ...], each: int, side: flo
     each : int
         Plants of each species.
     side : float
-        Of the square that the image shows, metres.
+        Of the square that the image shows, meters.
     pixels : int
         The same in pixels.
     light : str
@@ -198,8 +198,8 @@ def _add_plant(
 
 
 def _height(identifier: str) -> float:
-    """Height of a plant of a species, metres."""
-    flora = compile_species([catalogue.load_species(identifier)])
+    """Height of a plant of a species, meters."""
+    flora = compile_species([catalog.load_species(identifier)])
     one = seeds.Seeds(
         (identifier,), np.zeros(1, np.int32), np.zeros(1, np.int64), np.zeros((1, 3)), np.eye(3)[None], np.ones(1)
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays import GOLDEN_ANGLE, GOLDEN_TURN, Arrays, Floats, Integers, column, spiral
-from ..growth.envelopes import reaches
+from ..growth.envelopes import envelope_reach
 from ..growth.growth import trunks
 from ..growth.seeds import Seeds
 from ..leaves.levels import level_errors
@@ -87,7 +87,7 @@ class Crown:
         Meters below which there are next to no leaves.
     leaves, wood : float
         Expected one-sided area of the leaves and surface of the branches, m².
-    colour : tuple of float
+    color : tuple of float
         Mean linear RGB of both, weighted by how much of them is seen from above.
     forms : tuple of LeafModel or None
         One of its leaves and one of its blossoms, where these are known.
@@ -101,7 +101,7 @@ class Crown:
     base: float = 0.0
     leaves: float = 0.0
     wood: float = 0.0
-    colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    color: tuple[float, float, float] = (0.0, 0.0, 0.0)
     forms: tuple[LeafModel | None, ...] = (None,)
     parts: CrownParts = field(default_factory=CrownParts.empty, compare=False)
 
@@ -163,12 +163,12 @@ def _crown_of(species: Species) -> Crown:
     base = max(float(np.quantile(place[:, 2], _LOWEST)), 0.0) if flora.leaf_count[row] > 0 else 0.0
     leaves, wood = flora.leaf_areas(trunk), flora.wood_areas(trunk)
     areas = np.array([LEVEL * leaves.mean(), wood.mean() / np.pi])
-    colours = np.stack([flora.leaf_colours(trunk).mean(axis=0), flora.wood_colour[row]])
-    colour = tuple((areas @ colours / areas.sum()).tolist())
+    colors = np.stack([flora.leaf_colors(trunk).mean(axis=0), flora.wood_color[row]])
+    color = tuple((areas @ colors / areas.sum()).tolist())
     polygons = expected_polygons(flora.species[0])
     forms = tuple(next(iter(own), None) for own in flora.forms[0])
     parts = CrownParts.concatenate([_leaf_parts(flora, row, length), _branch_parts(flora, row, length)])
-    return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), colour, forms, parts)
+    return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), color, forms, parts)
 
 
 def _even_parts(crown: Crown) -> CrownParts:
@@ -209,7 +209,7 @@ def _leaf_parts(flora: Flora, row: int, length: float) -> CrownParts:
     # The level of detail is that of the largest leaf of a branch.
     table = flora.rows[rows]
     size = table["leaf_size"].sum(axis=1) * np.maximum(table["leaf_size_tip"], 1.0)
-    reach = _REACH * totals.length[rows] + reaches(table) * totals.length[rows] + size
+    reach = _REACH * totals.length[rows] + envelope_reach(table) * totals.length[rows] + size
     none = np.zeros(len(rows), np.int64)
     place = place + 0.5 * size[:, None] * along  # the middle of the leaf
     form = table["leaf_kind"].astype(np.int64)

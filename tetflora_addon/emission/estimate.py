@@ -21,7 +21,7 @@ from ..arrays import GOLDEN_ANGLE, GOLDEN_TURN, Floats, Integers, Mask, spread
 from ..camera.camera import Camera
 from ..compiled.crowns import LEVEL, Crown, CrownParts
 from ..leaves.levels import chosen_polygons
-from ..refinement.decisions import real_fraction
+from ..refinement.decisions import explicit_fraction
 from ..refinement.settings import RefinementSettings
 from ..subplants.buds import BUD_RINGS, bud_sides
 from ..subplants.wood_detail import finer, round_up_to
@@ -58,7 +58,7 @@ class Stand:
     number : int
         All plants.
     foot : (k, 3) float64
-        Where some of them stand, metres.
+        Where some of them stand, meters.
     scale : (k,) float64
     which : (k,) int64
         Their crowns, as indices into the next.
@@ -74,7 +74,7 @@ class Stand:
     def in_view(self, camera: Camera) -> Mask:
         """Plants (k,) of which something is in the image, as far as their crowns are upright spheroids."""
         radius, height = self._of_crowns("radius"), self._of_crowns("height")
-        return camera.clearance(self.foot + height[:, None] * (0.0, 0.0, 0.5)) < radius
+        return camera.distance_to_view(self.foot + height[:, None] * (0.0, 0.0, 0.5)) < radius
 
     def _of_crowns(self, name: str) -> Floats:
         return np.array([getattr(crown, name) for crown in self.crowns])[self.which] * self.scale
@@ -185,10 +185,10 @@ def _number(stand: Stand, camera: Camera, settings: RefinementSettings, everythi
     coarser = _coarser(covered, pixels, settings.facet)
     facet = (coarser * settings.facet) ** 2
     # Leaves are facets, kites, or have their polygons; branches are triangles, or tubes.
-    real = real_fraction(wide, coarser * settings.leaf_limit)
-    leaf = (1.0 - real) * np.minimum(area / facet, 1.0) + real * (1.0 + (whole - 1.0) * real_fraction(wide, KITES))
+    real = explicit_fraction(wide, coarser * settings.leaf_limit)
+    leaf = (1.0 - real) * np.minimum(area / facet, 1.0) + real * (1.0 + (whole - 1.0) * explicit_fraction(wide, KITES))
     tube = np.where(wide < BROAD, np.minimum(parts.sides, SIDES) * parts.segments, whole)
-    tubes = real_fraction(wide, TUBES)
+    tubes = explicit_fraction(wide, TUBES)
     drawn = np.where(wood & (wide >= BROAD), 1.0, drawn)
     bows = np.clip(np.sqrt(_BEND * parts.length / (BENT * extent)), 1.0, np.maximum(parts.segments, 1))
     branch = tubes * tube + (1.0 - tubes) * bows * np.clip(area / (TWIG * facet), 0.0, 1.0)
@@ -213,7 +213,7 @@ def _inside(parts: CrownParts, camera: Camera, extent: Floats) -> Mask:
     reach = np.where(parts.form < 0, branch, 0.25 * parts.length)
     depth = camera.to_camera_space(parts.position)[:, 2]
     between = (camera.kind == "PANO") | ((depth + reach > camera.near) & (depth - reach < camera.far))
-    return between & (camera.clearance(parts.position) <= reach)
+    return between & (camera.distance_to_view(parts.position) <= reach)
 
 
 def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, camera: Camera, extent: Floats) -> Floats:
@@ -281,6 +281,6 @@ def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floa
 
 
 def _coarser(covered: float, pixels: float, facet: float) -> float:
-    """Sides of facets over those that are asked for, as of `budget.afford` without limits."""
+    """Sides of facets over those that are asked for, as of `budget.fit_to_budget` without limits."""
     number = A_PIXEL * covered / facet**2 + (HIDDEN_A_PIXEL + OUTSIDE_A_PIXEL) * pixels
     return float(np.clip(np.sqrt(number / NEVER_TOO_MANY), 1.0 / FINEST, 1.0))

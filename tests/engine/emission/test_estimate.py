@@ -19,11 +19,11 @@ from tetflora_addon.emission.drawing import HIDDEN_LEAVES, Parts, drawing, drawn
 from tetflora_addon.emission.estimate import Stand, estimate
 from tetflora_addon.emission.expansion import expanded_faces
 from tetflora_addon.emission.plants import Transition
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.refinement.loop import refine
 from tetflora_addon.refinement.settings import QUALITIES, RefinementSettings
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 
 SETTINGS = RefinementSettings()
 
@@ -115,8 +115,8 @@ def test_as_many_are_made(name, monkeypatch):
     for module in (budget, model):
         monkeypatch.setattr(module, "NEVER_TOO_MANY", 0.01 * budget.NEVER_TOO_MANY)
     flora, seeds, camera, stand = _seeds(name)
-    result = at_once(refine(flora, seeds, camera, SETTINGS))
-    detail = budget.afford(result, camera, SETTINGS)
+    result = run_to_end(refine(flora, seeds, camera, SETTINGS))
+    detail = budget.fit_to_budget(result, camera, SETTINGS)
     how = Transition(flora, camera, detail.leaf_limit, detail.tolerance), detail.facet, facet_weights(flora)
     made = 0
     for one in drawn_blocks(drawing(flora, detail.refinement, camera, *how, detail.coarser)):

@@ -18,7 +18,7 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.rows import build_rows
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.species.quality import with_quality
 from tetflora_addon.species.schema import ORDER_KEYS, species_from_dict
@@ -116,9 +116,9 @@ def test_plants_keep_their_height_and_width(name: str, quality: float) -> None:
     for species in (kind(name), with_quality(kind(name), quality)):
         flora = compile_species([species])
         tubes, leaves = support.meshes(flora, support.grown(flora, support.plants(np.arange(2)))[1])
-        centres = np.concatenate([support.face_centres(m) for m in (*tubes, *leaves)])
+        centers = np.concatenate([support.face_centers(m) for m in (*tubes, *leaves)])
         weight = np.concatenate([support.face_areas(m) for m in (*tubes, *leaves)])
-        for measure in (centres[:, 2], np.hypot(centres[:, 0], centres[:, 1])):
+        for measure in (centers[:, 2], np.hypot(centers[:, 0], centers[:, 1])):
             order = np.argsort(measure)
             extents.append(measure[order][np.searchsorted(np.cumsum(weight[order]), 0.9 * weight.sum())])
     assert extents[2:] == pytest.approx(extents[:2], rel=0.12)
