@@ -19,7 +19,7 @@ import numpy as np
 from tetflora_addon.arrays import spread
 from tetflora_addon.compiled import orientation
 from tetflora_addon.compiled.flora import compile_species
-from tetflora_addon.growth import foliage, growth
+from tetflora_addon.growth import colors, foliage, growth
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.refinement import contents
 from tetflora_addon.species import catalog
@@ -152,7 +152,7 @@ def grown(flora: Any, wood: Any, oriented: bool) -> tuple[np.ndarray, int]:
         area = leaves.size**2 * np.array([m.area for m in forms])[form]
         out[0] += area.sum()
         only = np.array([row])
-        out[2:5] += area @ foliage.leaf_colors(rows, only, key, foliage.outwardness(rows, branches, owner, t))
+        out[2:5] += area @ colors.leaf_colors(rows, only, key, foliage.outwardness(rows, branches, owner, t))
         if oriented:
             frame = foliage.settled(rows, only, leaves.frame, leaves.light, np.array([0.0, 0.0, 1.0])).astype(float)
             model = np.array([m.moment for m in forms])[form]

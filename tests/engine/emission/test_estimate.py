@@ -66,7 +66,7 @@ def test_numbers_follow_pixels_and_not_plants_once_the_picture_is_full():
     assert more.primitives < 1.2 * wood.primitives
     assert more.seconds > wood.seconds
     half = _estimate(_stand(10_000), _camera(960, 540))
-    assert wood.primitives == pytest.approx(4.0 * half.primitives, rel=0.1)
+    assert 2.0 * half.primitives < wood.primitives < 4.0 * half.primitives  # where there are few, they are finer
     assert _estimate(_stand(10)).primitives < 0.2 * wood.primitives
 
 
