@@ -23,6 +23,8 @@ from .leaf_detail import TOLERANCE
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
+#: The same of a triangle of expanded plants, whose leaves have many corners: 310 to 380 in Blender and Cycles together.
+BYTES_PER_TRIANGLE = 380
 #: Polygons and facets for each pixel that plants cover, about, with facets of a pixel.
 A_PIXEL = 6.0
 #: Polygons and facets that are never too many: facets are finer than asked for as long as there are no more, up to so

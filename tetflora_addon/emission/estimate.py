@@ -25,7 +25,7 @@ from ..refinement.decisions import explicit_fraction
 from ..refinement.settings import RefinementSettings
 from ..subplants.buds import BUD_RINGS, bud_sides
 from ..subplants.wood_detail import finer, round_up_to
-from .budget import A_PIXEL, BYTES_PER_POLYGON, FINEST, NEVER_TOO_MANY
+from .budget import A_PIXEL, BYTES_PER_POLYGON, BYTES_PER_TRIANGLE, FINEST, NEVER_TOO_MANY
 from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, OUTSIDE_A_PIXEL
 from .drawing import NEVER_TOO_MANY as NEVER_TOO_MANY_UNSEEN
 from .leaf_detail import NEARER, TOLERANCE
@@ -36,6 +36,8 @@ from .plants import KITES
 SECONDS = 1.0
 SECONDS_PER_PLANT = 2.5e-5
 SECONDS_PER_PRIMITIVE = 5.5e-6
+#: Seconds of each polygon that is expanded, and of each triangle that these consist of.
+SECONDS_EXPANDED = np.array([5e-7, 1.2e-7])
 #: Bytes of each plant.
 BYTES_PER_PLANT = 500.0
 #: Leaves and branches that are looked at, about, how many of them lie in a cell of the image, and how many of a plant
@@ -158,22 +160,30 @@ def estimate(
     everything : bool
         Whether plants are expanded instead of refined; limits do not hold then.
     """
-    wanted = made = _number(stand, camera, settings, everything) if stand.number else 0.0
-    if not everything:
-        most = min(settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
-        made = min(wanted, most)
-    seconds = SECONDS + SECONDS_PER_PLANT * stand.number + SECONDS_PER_PRIMITIVE * made
-    memory = used + BYTES_PER_PLANT * stand.number + BYTES_PER_POLYGON * made
-    return Estimate(stand.number, made, seconds, memory, wanted > made)
-
-
-def _number(stand: Stand, camera: Camera, settings: RefinementSettings, everything: bool) -> float:
-    """Polygons and facets without limits."""
     parts, plant = stand.parts(camera)
     extent = camera.extent_around(parts.position)
     whole = _polygons(stand.crowns, parts, stand.which[plant], camera, extent)
+    seconds, memory = SECONDS + SECONDS_PER_PLANT * stand.number, used + BYTES_PER_PLANT * stand.number
     if everything:
-        return float(parts.number @ whole)
+        made = whole @ parts.number
+        memory += BYTES_PER_TRIANGLE * float(made[1])
+        return Estimate(stand.number, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
+    wanted = _number(stand, camera, settings, parts, plant, extent, whole[0])
+    made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
+    seconds, memory = seconds + SECONDS_PER_PRIMITIVE * made, memory + BYTES_PER_POLYGON * made
+    return Estimate(stand.number, made, seconds, memory, wanted > made)
+
+
+def _number(
+    stand: Stand,
+    camera: Camera,
+    settings: RefinementSettings,
+    parts: CrownParts,
+    plant: Integers,
+    extent: Floats,
+    whole: Floats,
+) -> float:
+    """Polygons and facets without limits; ``whole`` (n,) is `_polygons` of parts, ``extent`` (n,) meters of a pixel."""
     pixels = camera.width * camera.height
     inside = _inside(parts, camera, extent)
     leaves = np.where(inside | (parts.form < 0), 0.0, parts.number) / HIDDEN_LEAVES
@@ -217,20 +227,21 @@ def _inside(parts: CrownParts, camera: Camera, extent: Floats) -> Mask:
 
 
 def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, camera: Camera, extent: Floats) -> Floats:
-    """Polygons (n,) of whole leaves and branches at the level of detail that they have where they come nearest."""
+    """Polygons and triangles (2, n) of leaves and branches at the level of detail they have where they come nearest."""
     slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
     extent = np.maximum(extent - slope * parts.reach, extent / NEARER)
-    out = np.ones(len(parts))
+    out = np.ones((2, len(parts)))
     for number, crown in enumerate(crowns):
         for kind, form in enumerate(crown.forms):
             own = np.flatnonzero((which == number) & (parts.form == kind))
             if form is not None and len(own):
-                out[own] = chosen_polygons(form, _SHARE * parts.length[own] / extent[own] / TOLERANCE)
+                out[:, own] = chosen_polygons(form, _SHARE * parts.length[own] / extent[own] / TOLERANCE)
     wood = np.flatnonzero(parts.form < 0)
     sides, size = parts.sides[wood], parts.width[wood] / extent[wood] / 2.0
     around, along = finer(sides, size)
     buds = np.where(size > round_up_to(sides), parts.buds[wood], 0.0)
-    out[wood] = around * parts.segments[wood] * along + buds * (BUD_RINGS - 1) * bud_sides(around)
+    out[:, wood] = around * parts.segments[wood] * along + buds * (BUD_RINGS - 1) * bud_sides(around)
+    out[1, wood] *= 2.0
     return out
 
 
