@@ -106,4 +106,5 @@ def _placed(
             center[again] += (_MOVED * side[again] * signed(key[again], by))[:, None] * axis[again]
     color = recollision_albedo(samples.color[pick].astype(np.float64), weight)
     through, rough = (own[pick].astype(np.float64) for own in (samples.transmission, samples.roughness))
-    return Facets(center, across, along, side, color, through, roughness=rough)
+    dull = 1.0 - np.clip(weight, 0.0, 1.0)
+    return Facets(center, across, along, side, color, through, roughness=rough, dull=dull)

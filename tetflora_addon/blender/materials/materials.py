@@ -218,9 +218,8 @@ def _gloss_left(graph: Graph) -> Term:
 def _principled(graph: Graph) -> Term:
     """What stands for the artist's materials: Fresnel's gloss, which is most of what leaves show against the light."""
     color, transmission = graph.attribute("tf_color", "Color"), graph.attribute("tf_transmission", "Fac")
-    front = graph.node(
-        "ShaderNodeBsdfPrincipled", {"Base Color": color, "Roughness": graph.attribute("tf_roughness", "Fac")}
-    )
+    given = {"Base Color": color, "Roughness": graph.attribute("tf_roughness", "Fac")}
+    front = graph.node("ShaderNodeBsdfPrincipled", {**given, "Specular IOR Level": _gloss_left(graph) * 0.5})
     back = graph.node("ShaderNodeBsdfTranslucent", {"Color": color})
     return graph.mix(transmission, front, back)
 
