@@ -212,11 +212,6 @@ def level_errors(model: LeafModel, finest: float = 0.0) -> Floats:
     return errors
 
 
-def level_polygons(model: LeafModel, finest: float = 0.0) -> Floats:
-    """Polygons (levels + 1,) of a model and its finer levels; down to an error, as above."""
-    return np.array([model.polygons, *(level.model.polygons for level in _finer(model).until(finest)[0])], float)
-
-
 def chosen_level(model: LeafModel, pixels: Floats) -> Integers:
     """Level (n,) of leaves, 0 the model itself, whose lengths are so many times the tolerated error in the image.
 
@@ -229,11 +224,12 @@ def chosen_level(model: LeafModel, pixels: Floats) -> Integers:
     return np.searchsorted(-errors, -1.0 / np.maximum(pixels, 1e-300), side="left").clip(0, len(errors) - 1)
 
 
-def chosen_polygons(model: LeafModel, pixels: Floats) -> Floats:
-    """Polygons (n,) of leaves at the levels that `chosen_level` gives them."""
+def chosen_polygons(model: LeafModel, pixels: Floats) -> tuple[Floats, Floats]:
+    """Polygons (n,) of leaves at the levels that `chosen_level` gives them, and triangles (n,) of these."""
     level = chosen_level(model, pixels)
-    polygons = level_polygons(model, 1.0 / pixels.max()) if level.any() else np.array([model.polygons], float)
-    return polygons[level]
+    finer = _finer(model).until(1.0 / pixels.max())[0] if level.any() else ()
+    counts = [(one.polygons, one.triangles) for one in (model, *(level.model for level in finer))]
+    return tuple(np.array(counts, dtype=np.float64)[level].T)
 
 
 @lru_cache(maxsize=128)

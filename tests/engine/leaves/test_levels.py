@@ -21,7 +21,6 @@ from tetflora_addon.leaves.levels import (
     hidden_gloss,
     leaf_levels,
     level_errors,
-    level_polygons,
     surface_of,
 )
 from tetflora_addon.leaves.models import _COARSE, LEAF_MODELS, LeafModel, mean_silhouette
@@ -77,7 +76,8 @@ def test_needles_hide_as_much_as_the_polygons_that_stand_for_them(species: str) 
 def test_levels_are_sound(name: str) -> None:
     """Finer and finer, of faces with an area, whose edges have one or two of them, and within reach of the image."""
     model = LEAF_MODELS[name]
-    errors, polygons = level_errors(model), level_polygons(model)
+    errors = level_errors(model)
+    polygons = np.array([model.polygons, *(level.model.polygons for level in leaf_levels(model))])
     assert (np.diff(errors) < 0).all()
     assert (np.diff(polygons) > 0).all()
     assert leaf_levels(model)[-1].error <= 0.0005

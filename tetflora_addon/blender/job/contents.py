@@ -11,9 +11,10 @@ import bpy
 import numpy as np
 
 from ... import memory, parallel
+from ...arrays import Floats
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
-from ...emission.budget import BYTES_PER_POLYGON
+from ...emission.budget import BYTES_PER_TRIANGLE
 from ...emission.expansion import expanded_faces
 from ...emission.light import Sources
 from ...errors import SceneError
@@ -250,15 +251,15 @@ def use_machine(scene: bpy.types.Scene) -> None:
     pool.set_memory_limit(memory.limit(scene.tetflora.max_memory))
 
 
-def check_fits(what: str, polygons: float, left: float, remedy: str) -> None:
+def check_fits(what: str, faces: Floats, left: float, remedy: str) -> None:
     """Refuse what would make too many polygons.
 
     Parameters
     ----------
     what : str
         Begins the message.
-    polygons : float
-        At least.
+    faces : (2,) float64
+        Polygons, at least, and the triangles that they consist of.
     left : float
         Bytes, see `contents.memory_left`.
     remedy : str
@@ -269,9 +270,9 @@ def check_fits(what: str, polygons: float, left: float, remedy: str) -> None:
     SceneError
         Has the numbers, and says what to do.
     """
-    if (needed := polygons * BYTES_PER_POLYGON) > left:
+    if (needed := faces[1] * BYTES_PER_TRIANGLE) > left:
         raise SceneError(
-            f"{what} would make more than {polygons / 1e6:,.1f} million polygons, which take "
+            f"{what} would make more than {faces[0] / 1e6:,.1f} million polygons, which take "
             f"{needed / memory.GIGABYTE:,.1f} GB with rendering; Max Memory leaves {left / memory.GIGABYTE:,.1f} GB. "
             f"Raise Max Memory, {remedy}"
         )
@@ -279,6 +280,6 @@ def check_fits(what: str, polygons: float, left: float, remedy: str) -> None:
 
 def check_expanded(flora: Flora, seeds: Seeds, camera: Camera, left: float) -> None:
     """Refuse to expand plants that would not fit, near a camera as finely as it sees them; as `check_fits`."""
-    for polygons in expanded_faces(flora, seeds, camera):
+    for faces in expanded_faces(flora, seeds, camera):
         remedy = "turn Expand Everything off, use fewer plants, or move the camera away from them"
-        check_fits("Expand Everything", polygons, left, remedy)
+        check_fits("Expand Everything", faces, left, remedy)

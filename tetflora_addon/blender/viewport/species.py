@@ -18,8 +18,8 @@ from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...species.species import Range
-from ..job.contents import in_year
-from ..job.plant_mesh import expected_polygons, plant_mesh, plant_parts, single_seed
+from ..job.contents import expected_polygons, in_year
+from ..job.plant_mesh import plant_mesh, plant_parts, single_seed
 from ..materials.nodes import is_ours, tag
 from ..results.leaf_objects import resolved_species
 from ..runtime import Handlers, call_off, call_soon, redraw, with_uid
