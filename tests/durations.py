@@ -23,7 +23,8 @@ SHOWN = 15
 QUICK = 0.1
 
 
-def _cpu() -> float:
+def cpu_s() -> float:
+    """Seconds of processors so far, of this process and of those it waited for."""
     return sum(os.times()[:4])
 
 
@@ -36,7 +37,7 @@ class Durations:
     def __init__(self, folder: Path) -> None:
         self.path = folder / f"durations-{sys.version_info.major}.{sys.version_info.minor}.json"
         self.seconds: dict[str, float] = defaultdict(float)
-        self._last = _cpu()
+        self._last = cpu_s()
 
     def kept(self) -> dict[str, float]:
         """Those of earlier runs; of tests that are in no run any more as well."""
@@ -52,13 +53,13 @@ class Durations:
 
     def pytest_runtest_logstart(self) -> None:
         """Begin to count: collecting is nobody's."""
-        self._last = _cpu()
+        self._last = cpu_s()
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self) -> Generator[None, pytest.TestReport, pytest.TestReport]:
         """Mark a report with what it cost; reports travel from the processes of xdist with all they carry."""
         report = yield
-        now = _cpu()
+        now = cpu_s()
         report.cpu_seconds, self._last = now - self._last, now
         return report
 
