@@ -24,7 +24,7 @@ from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, singl
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.species.catalogue import load_species
 
-from .compare import coverage
+from .pictures import coverage
 from .report import Targets
 
 #: Trees on a hectare, their basal area on it, m², and the share of ground that they cover.

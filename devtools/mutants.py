@@ -43,9 +43,9 @@ BLENDER_TESTS = ("tests/blender", "tests/attack/blender")
 #: Tests that ask for a file, whatever stands in it.
 NO_USE = {"test_house.py"}
 #: CPU seconds of tests, by what they took in their last run, that a mutant gets in the engine and in Blender.
-BUDGET = {ENGINE_TESTS: 60.0, BLENDER_TESTS: 25.0}
+BUDGET = {ENGINE_TESTS: 40.0, BLENDER_TESTS: 12.0}
 #: A run that takes so many times as long as its tests did, and so many seconds more, hangs.
-PATIENCE, STARTING = 4, 60
+PATIENCE, STARTING = 2, 30
 
 _SWAPS = {
     ast.Add: ("+", "-"), ast.Sub: ("-", "+"), ast.Mult: ("*", "/"), ast.Div: ("/", "*"), ast.FloorDiv: ("//", "*"),

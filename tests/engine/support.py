@@ -70,7 +70,7 @@ SMALL: dict[str, Any] = {
 
 
 #: Of one plant of the shipped species in most tests.
-MOST_POLYGONS = 50_000.0
+MOST_POLYGONS = 20_000.0
 
 
 def shipped(identifier: str) -> dict[str, Any]:

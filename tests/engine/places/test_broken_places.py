@@ -8,7 +8,7 @@ import random
 
 import pytest
 
-from benchmarks import places_files as files
+from tests import places_files as files
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
 from tetflora_addon.places.grids import read_grid

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import zstandard
 
-from benchmarks import places_files as files
-from benchmarks import places_maps as maps
+from tests import places_files as files
+from tests import places_maps as maps
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
 from tetflora_addon.places import geotiff

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import places_files as files
+from tests import places_files as files
 from tetflora_addon.errors import SceneError
 from tetflora_addon.jobs import at_once
 from tetflora_addon.places import rasters

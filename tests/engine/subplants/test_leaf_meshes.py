@@ -194,7 +194,7 @@ def test_species_of_one_seed_are_plants_of_their_own() -> None:
 @pytest.mark.parametrize("species", ["maple", "cherry_blossom", "scots_pine"])
 def test_kites_in_the_place_of_leaves(species: str, share: float) -> None:
     """Each leaf is made once, as it is or as a kite of the same area; the more are kites, the same ones."""
-    flora = support.compiled(support.shipped(species))
+    flora = support.compiled({**support.shipped(species), "quality": 0.3})
     whole = support.whole_of(flora, support.grown(flora, support.plants(3, scale=0.5))[1])
 
     def made(wanted: float, kites: float) -> list[LeafMesh]:
