@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 #: Of so many tests of a run the cost is shown.
-SHOWN = 15
+SHOWN = 10
 #: CPU seconds that a test may have taken to be one of the quick ones: these are most, and take a minute together.
 QUICK = 0.1
 
@@ -40,7 +40,7 @@ class Durations:
         self._last = cpu_s()
 
     def kept(self) -> dict[str, float]:
-        """Those of earlier runs; of tests that are in no run any more as well."""
+        """Those of earlier runs; of tests that their files do not have any more as well."""
         return json.loads(self.path.read_text(encoding="utf-8")) if self.path.is_file() else {}
 
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -79,6 +79,8 @@ class Durations:
                 terminalreporter.line(f"{seconds:7.1f}  {name}")
             terminalreporter.line(f"all of them: {self.path}")
         known = self.kept() | {name: round(seconds, 3) for name, seconds in slowest}
+        root = self.path.parent.parent
+        known = {name: seconds for name, seconds in known.items() if (root / name.split("::")[0]).exists()}
         self.path.parent.mkdir(parents=True, exist_ok=True)
         new = self.path.with_suffix(f".{os.getpid()}")  # two runs may end at once
         new.write_text(json.dumps(known, indent=1), encoding="utf-8")
