@@ -19,20 +19,23 @@ from __future__ import annotations
 
 import argparse
 import ast
-import hashlib
 import json
 import os
+import queue
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from tests.durations import Durations, cpu_s
+from tests.durations import Durations
 
 from . import house, rooms
 
@@ -177,16 +180,14 @@ def draw(count: int, seed: int) -> list[Mutant]:
     return [chance.choice(lines[key]) for key in chance.sample(sorted(lines), count)]
 
 
-def copy_tree() -> Path:
-    """A copy of what is under version control, and of new files, in a folder that its contents name."""
-    contents = {path.relative_to(ROOT): path.read_bytes() for path in house.files()}
-    digest = hashlib.sha256(repr(sorted(contents.items())).encode()).hexdigest()[:12]
-    for name, content in contents.items():
-        target = FOLDER / digest / "tree" / name
+def copy_tree(folder: Path) -> Path:
+    """A copy of what is under version control, and of new files; what an earlier run has left there goes."""
+    shutil.rmtree(folder, ignore_errors=True)
+    for path in house.files():
+        target = folder / path.relative_to(ROOT)
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(content)
-        target.chmod((ROOT / name).stat().st_mode)
-    return FOLDER / digest / "tree"
+        shutil.copy(path, target)
+    return folder
 
 
 class Tests:
@@ -272,15 +273,23 @@ def tried(mutant: Mutant, tests: Tests) -> str:
         path.write_bytes(source)
 
 
-def results(mutants: list[Mutant], tree: Path) -> Iterator[dict]:
-    """What became of each mutant."""
-    tests = Tests(tree)
-    for mutant in mutants:
-        begin = cpu_s()
-        by = tried(mutant, tests)
-        seconds = cpu_s() - begin
-        print(f"{'found   ' if by else 'SURVIVES'} {seconds:4.0f} s  {mutant}   {by[:120]}", flush=True)
-        yield asdict(mutant) | {"found": bool(by), "by": by, "cpu_s": round(seconds, 1)}
+def results(mutants: list[Mutant], jobs: int) -> Iterator[dict]:
+    """What became of each mutant, so many at once, as they come."""
+    free: queue.SimpleQueue[Tests] = queue.SimpleQueue()
+    for number in range(jobs):
+        free.put(Tests(copy_tree(FOLDER / f"tree{number}")))
+
+    def one(mutant: Mutant) -> dict:
+        tests = free.get()
+        try:
+            begin, by = time.monotonic(), tried(mutant, tests)
+        finally:
+            free.put(tests)
+        return asdict(mutant) | {"found": bool(by), "by": by, "seconds": round(time.monotonic() - begin, 1)}
+
+    with ThreadPoolExecutor(jobs) as threads:
+        for done in as_completed([threads.submit(one, mutant) for mutant in mutants]):
+            yield done.result()
 
 
 def main() -> int:
@@ -289,19 +298,27 @@ def main() -> int:
     parser.add_argument("--json", type=Path, metavar="PATH", help="write the record here")
     parser.add_argument("--seed", type=int, default=43, help="which lines (default: 43)")
     parser.add_argument("--count", type=int, default=50, help="how many (default: 50)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="how many at once (default: all cores)")
     parser.add_argument("--show", action="store_true", help="only list the mutants")
     options = parser.parse_args()
     mutants = draw(options.count, options.seed)
     if options.show:
         print("\n".join(map(str, mutants)))
         return 0
-    done = list(results(mutants, copy_tree()))
-    found = sum(entry["found"] for entry in done)
-    record = {"mutants": len(done), "mutants_found": found / len(done), "seed": options.seed, "each": done}
+    done: list[dict] = []
+    for each in results(mutants, options.jobs):
+        done.append(each)
+        what = Mutant(**{field.name: each[field.name] for field in fields(Mutant)})
+        print(
+            f"{'found   ' if each['found'] else 'SURVIVES'} {each['seconds']:5.0f} s  {what}   {each['by'][:120]}",
+            flush=True,
+        )
+        found = sum(one["found"] for one in done)
+        record = {"mutants": len(done), "mutants_found": found / len(done), "seed": options.seed, "each": done}
+        if options.json:  # as it goes: all take a while
+            options.json.parent.mkdir(parents=True, exist_ok=True)
+            options.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     print(f"{found} of {len(done)} mutants found")
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     return 0
 
 

@@ -16,7 +16,7 @@ def run(folder: Path, quick: bool = False, **seconds: float) -> list[str]:
     """The tests that run, of those named, if each takes so long."""
     plugin, left_out, said = Durations(folder / "out"), [], []
     for name in seconds:
-        (folder / name).touch()
+        (folder / name.split("::")[0]).touch()
     hook = SimpleNamespace(pytest_deselected=lambda items: left_out.extend(items))
     config = SimpleNamespace(getoption={"quick": quick}.get, hook=hook)
     items = [SimpleNamespace(nodeid=name) for name in seconds]
@@ -48,6 +48,12 @@ def test_nothing_is_left_out_by_itself(tmp_path: Path) -> None:
     assert run(tmp_path, slow=0.0) == ["slow"]
     path = Durations(tmp_path / "out").path
     assert list(path.parent.iterdir()) == [path]
+
+
+def test_files_that_took_longest_begin(tmp_path: Path) -> None:
+    run(tmp_path, **{"a::one": 0.1, "b::one": 0.2, "b::two": 0.9, "c::one": 0.3})
+    again = {"new::one": 0.0, "a::one": 0.0, "b::one": 0.0, "b::two": 0.0, "c::one": 0.0}
+    assert run(tmp_path, **again) == ["b::one", "b::two", "c::one", "a::one", "new::one"]
 
 
 def test_tests_whose_file_has_gone_are_forgotten(tmp_path: Path) -> None:
