@@ -69,6 +69,11 @@ def test_colours_stay_colours_and_white_is_changed_least(colour: float, once: fl
     assert balanced_colours(given_, np.ones(1)) == pytest.approx(given_)
 
 
+def test_colours_beyond_white_are_changed_as_white_is() -> None:
+    once = np.array([0.3])
+    assert balanced_colours(np.full((1, 3), 1.2), once) == pytest.approx(1.2 * balanced_colours(np.ones((1, 3)), once))
+
+
 def test_mean_overlap_lies_between() -> None:
     a = np.geomspace(1e-2, 1e2, 30)
     assert (mean_overlap(a) >= overlap(a / np.sqrt(2.0)) - 1e-6).all()
