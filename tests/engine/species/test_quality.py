@@ -57,7 +57,7 @@ def test_expected_polygons_are_those_of_the_compiled_species() -> None:
 
 
 @given(name=KINDS, quality=QUALITIES)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_polygons_are_as_asked(name: str, quality: float) -> None:
     wanted = quality * expected_polygons(kind(name))
     assume(500 <= wanted <= 500_000)
@@ -72,7 +72,7 @@ def test_every_species_reaches_500_to_500_000_polygons(name: str, polygons: int)
 
 
 @given(name=KINDS, quality=QUALITIES)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_leaf_area_and_height_of_the_bound_are_kept(name: str, quality: float) -> None:
     before, after = kind(name), with_quality(kind(name), quality)
     assert leaf_area(after) == pytest.approx(leaf_area(before), rel=0.05)
@@ -82,7 +82,7 @@ def test_leaf_area_and_height_of_the_bound_are_kept(name: str, quality: float) -
 
 
 @given(name=KINDS, quality=st.floats(math.log(QUALITY_LIMITS[0]), math.log(30)).map(math.exp))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_the_result_is_a_species_that_the_format_allows(name: str, quality: float) -> None:
     for i, order in enumerate(with_quality(kind(name), quality).orders):
         assert isinstance(order.sides, int) and isinstance(order.segments, int)
