@@ -424,6 +424,8 @@ def table() -> str:
             sizes = {int(key.split()[1]) for key in found.rows if key.split()[0] == form and not key.endswith("b0")}
             for size in sorted(sizes):
                 at, factors = found.curve(form, size)
+                if not len(at):  # only at other zeniths than the published ones
+                    continue
                 rows = [found.get(form, size, angle, -1) for angle in at.tolist()]
                 error, beside = errors(name, at, factors), "–"
                 if len(own[0]) and form != EXPANDED:

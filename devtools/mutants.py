@@ -5,6 +5,7 @@
     python -m devtools.mutants --json PATH                    fifty lines, the same in every run with one seed
     python -m devtools.mutants --seed 7 --count 20            others
     python -m devtools.mutants --show                         only say what would be changed
+    python -m devtools.mutants --json PATH --again            only those that survived, of the record that is there
 
 A mutant is the engine with one change: an operator swapped, a comparison turned, a number changed, *and* for *or*, a
 *not* dropped. It lives in a copy of the tree in out/mutants. It gets the files of tests that import the file in which
@@ -47,8 +48,10 @@ BLENDER_TESTS = ("tests/blender", "tests/attack/blender")
 NO_USE = {"test_house.py"}
 #: CPU seconds of tests, by what they took in their last run, that a mutant gets in the engine and in Blender.
 BUDGET = {ENGINE_TESTS: 40.0, BLENDER_TESTS: 12.0}
-#: A run that takes so many times as long as its tests did, and so many seconds more, hangs.
+#: A run that takes so many times as many CPU seconds as its tests did, and so many more, hangs.
 PATIENCE, STARTING = 2, 30
+#: Seconds by the clock after which a run waits for something that does not come; long, as others may be at work beside.
+ASLEEP = 7200.0
 
 _SWAPS = {
     ast.Add: ("+", "-"), ast.Sub: ("-", "+"), ast.Mult: ("*", "/"), ast.Div: ("/", "*"), ast.FloorDiv: ("//", "*"),
@@ -241,7 +244,7 @@ class Tests:
         ) as process:  # fmt: skip
             resource.prlimit(process.pid, resource.RLIMIT_CPU, (limit, limit + 1))
             try:
-                said = process.communicate(timeout=20 * limit)[0]
+                said = process.communicate(timeout=ASLEEP)[0]
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)  # its children as well
                 return -1, "it hangs"
@@ -292,6 +295,10 @@ def results(mutants: list[Mutant], jobs: int) -> Iterator[dict]:
             yield done.result()
 
 
+def _mutant(entry: dict) -> Mutant:
+    return Mutant(**{field.name: entry[field.name] for field in fields(Mutant)})
+
+
 def main() -> int:
     """Try the mutants that the command line asks for."""
     parser = argparse.ArgumentParser(prog="python -m devtools.mutants", description=__doc__.splitlines()[0])
@@ -300,25 +307,26 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=50, help="how many (default: 50)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="how many at once (default: all cores)")
     parser.add_argument("--show", action="store_true", help="only list the mutants")
+    parser.add_argument("--again", action="store_true", help="only those that survived in the record")
     options = parser.parse_args()
     mutants = draw(options.count, options.seed)
     if options.show:
         print("\n".join(map(str, mutants)))
         return 0
     done: list[dict] = []
+    if options.again:
+        done = [one for one in json.loads(options.json.read_text(encoding="utf-8"))["each"] if one["found"]]
+        mutants = [mutant for mutant in mutants if str(mutant) not in {str(_mutant(one)) for one in done}]
     for each in results(mutants, options.jobs):
         done.append(each)
-        what = Mutant(**{field.name: each[field.name] for field in fields(Mutant)})
-        print(
-            f"{'found   ' if each['found'] else 'SURVIVES'} {each['seconds']:5.0f} s  {what}   {each['by'][:120]}",
-            flush=True,
-        )
-        found = sum(one["found"] for one in done)
-        record = {"mutants": len(done), "mutants_found": found / len(done), "seed": options.seed, "each": done}
+        word = "found   " if each["found"] else "SURVIVES"
+        print(f"{word} {each['seconds']:5.0f} s  {_mutant(each)}   {each['by'][:120]}", flush=True)
+        share = sum(one["found"] for one in done) / len(done)
+        record = {"mutants": len(done), "mutants_found": share, "seed": options.seed, "each": done}
         if options.json:  # as it goes: all take a while
             options.json.parent.mkdir(parents=True, exist_ok=True)
             options.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    print(f"{found} of {len(done)} mutants found")
+    print(f"{sum(one['found'] for one in done)} of {len(done)} mutants found")
     return 0
 
 
