@@ -28,14 +28,14 @@ from tetflora_addon.blender.results.output import result_collections
 from .pictures import flip_map, read_picture, render
 from .report import Targets, peak_mb, records_of
 
-#: Frames that are timed: five seconds of animation, in which the camera goes some seven metres.
+#: Frames that are timed: five seconds of animation, in which the camera goes some seven meters.
 FRAMES = 120
 #: Frames that are made alone, each in a process of its own, and compared with the animation's.
 ALONE, QUICK_ALONE = 20, 3
 #: Frames next to each other whose images are compared, around one at which the row is refined anew.
 AROUND, QUICK_AROUND = 4, 1
 SAMPLES, PERCENT = 16, 50
-#: A flight over the landscape, at so many metres a second, so much higher than the landscape's own camera.
+#: A flight over the landscape, at so many meters a second, so much higher than the landscape's own camera.
 FLIGHT_SPEED, FLIGHT_HIGHER = 15.0, 32.0
 
 TARGETS: Targets = {

@@ -38,7 +38,7 @@ class Order:
     number : int
         Of each branch of the order before.
     length : float
-        Relative to the parent's; of the trunk metres.
+        Relative to the parent's; of the trunk meters.
     first : float
         Where along the parent they begin, 0 to 1.
     lean : tuple of float
@@ -68,9 +68,9 @@ class Branches:
     Attributes
     ----------
     points : (n, s + 1, 3) float64
-        Metres.
+        Meters.
     radius : (n, s + 1) float64
-        Metres.
+        Meters.
     """
 
     points: Array
@@ -179,7 +179,7 @@ class Stalks:
     Attributes
     ----------
     base : (n, 3) float64
-        Metres.
+        Meters.
     along, across, up : (n, 3) float64
         Unit vectors of each: where its tip is, its width, what it turns to the sky.
     """
@@ -212,7 +212,7 @@ def stalks(twigs: Branches, number: int, rng: np.random.Generator, first: float 
 
 
 def closed_leaves(places: Stalks, size: Array, material: int = 1) -> Surface:
-    """Thin closed bodies of 16 triangles; size (n, 2): length and width, metres."""
+    """Thin closed bodies of 16 triangles; size (n, 2): length and width, meters."""
     rim = np.array([(x, y, 0.05 * abs(y) - 0.1 * x * x) for x, y in _RIM])
     ribs = np.array([(x, 0.0, 0.02 + sign * _THICK - 0.1 * x * x) for sign in (1.0, -1.0) for x in _RIBS])
     half = np.array(_HALF)
@@ -223,7 +223,7 @@ def closed_leaves(places: Stalks, size: Array, material: int = 1) -> Surface:
 
 
 def cards(places: Stalks, size: Array, tile: NDArray[np.int64], tiles: int = 2, material: int = 1) -> Surface:
-    """Quads that show a tile of a square texture of ``tiles²`` each; size (n, 2): length and width, metres."""
+    """Quads that show a tile of a square texture of ``tiles²`` each; size (n, 2): length and width, meters."""
     corners = np.array([(0.0, -0.5, 0.0), (1.0, -0.5, 0.0), (1.0, 0.5, 0.0), (0.0, 0.5, 0.0)])
     made = _placed(corners, np.array([(0, 1, 2), (0, 2, 3)]), places, size, material)
     own = np.array([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])[[[0, 1, 2], [0, 2, 3]]]
@@ -260,7 +260,7 @@ def _sprig(size: int, leaves: int, rng: np.random.Generator, dark: tuple, light:
     """A tile (size, size, 4); row 0 is where the stem begins, v grows along it."""
     v, u = np.meshgrid((np.arange(size) + 0.5) / size, (np.arange(size) + 0.5) / size - 0.5, indexing="ij")
     dark, light = np.array(dark), np.array(light)
-    colour = np.broadcast_to(0.6 * dark + [0.12, 0.06, 0.02], (size, size, 3)).copy()
+    color = np.broadcast_to(0.6 * dark + [0.12, 0.06, 0.02], (size, size, 3)).copy()
     edge = 1.5 / size
     alpha = np.clip((0.006 - np.abs(u - 0.03 * np.sin(5 * v))) / edge, 0, 1) * (v < 0.9)
     for n in range(leaves):
@@ -275,9 +275,9 @@ def _sprig(size: int, leaves: int, rng: np.random.Generator, dark: tuple, light:
         vein = 1.0 + 0.35 * np.exp(-((across / (0.01 * 1.5)) ** 2)) + 0.12 * np.cos(60 * s + 220 * np.abs(across))
         mix = np.clip(t + 0.2 * rng.uniform(-1, 1) + 0.25 * (s - 0.5), 0, 1)[..., None]
         leaf = (dark + (light - dark) * mix) * vein[..., None] * rng.uniform(0.85, 1.1)
-        colour = np.where(inside[..., None] > 0, leaf, colour)
+        color = np.where(inside[..., None] > 0, leaf, color)
         alpha = np.maximum(alpha, inside)
-    return np.concatenate([np.clip(colour, 0, 1), alpha[..., None]], axis=2)
+    return np.concatenate([np.clip(color, 0, 1), alpha[..., None]], axis=2)
 
 
 def _unit(vectors: Array) -> Array:
@@ -298,7 +298,7 @@ ORDERS = (
     Order(13, 0.4, 0.2, (35, 65), 0.25, 6, 5, 0.5),
     Order(9, 0.42, 0.12, (30, 62), 0.1, 4, 3, 0.5),
 )
-#: Length of leaves of each kind and width relative to it, metres.
+#: Length of leaves of each kind and width relative to it, meters.
 _LEAF, _CARD = (0.095, 0.62), (0.42, 0.8)
 _BARK, _GREEN = (0.17, 0.12, 0.08), (0.10, 0.24, 0.05)
 

@@ -38,12 +38,12 @@ from numpy.typing import NDArray
 from devtools.formats import set_format
 from examples import stage
 from tetflora_addon import parallel, storage
-from tetflora_addon.assets import kept
+from tetflora_addon.assets import asset_cache
 from tetflora_addon.assets.compiled import compile_asset
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.assets.parts import Target, digest_of, read_source_steps
 from tetflora_addon.blender.job import refine
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.processes import pool
 
 from . import asset_trees
@@ -57,29 +57,29 @@ LARGE = 250_000
 COUNTS, QUICK_COUNTS, ENDS, TIMED = (20, 1_000, 10_000), (20,), ("near", "far"), 16
 FOREST, MILLION = 10_000, 1_000_000
 _STATUS = Path("/proc/self/status")
-#: Metres between trees, and of the eye above the ground.
+#: Meters between trees, and of the eye above the ground.
 SPACING, EYE = 7.0, 1.7
-#: Metres from the eye to the edge of the wood.
+#: Meters from the eye to the edge of the wood.
 DISTANCES = {"near": 5.0, "middle": 50.0, "far": 250.0}
 #: Elevation of the sun and where its light goes, degrees; the camera looks to 0.
 LIGHTS = {"front": (42.0, 35.0), "back": (28.0, 160.0)}
 SIZE, PICTURE = (1920, 1080), (320, 180)
 #: Holes behind holes that rays go through; Blender's default of 8 makes crowns of cards black.
 _TRANSPARENT = 64
-#: One tree is seen from so far, in an image so wide, metres.
+#: One tree is seen from so far, in an image so wide, meters.
 _ALONE, _WIDE = 200.0, 18.0
 INSTANCES = 16
 #: By distance: what is far is small and cheap, and has many trees in a pixel.
 SAMPLES, QUICK_DIVISOR = {"near": 64, "middle": 256, "far": 256}, 8
 COVERAGE_SAMPLES = 64
 LEAST_COVERAGE = 0.05
-#: Metres of the pixels that crowns are refined for, and of those of the pictures that are compared, with samples.
+#: Meters of the pixels that crowns are refined for, and of those of the pictures that are compared, with samples.
 #: Cards of .4 m are real in smaller ones.
 COARSE, FINE, CROWN_SAMPLES = (0.8, 1.0, 1.2), 0.1, 256
 TENTHS = 10
-#: Of the renderer's passes, those that sum up to the colour of a surface.
+#: Of the renderer's passes, those that sum up to the color of a surface.
 _PASSES = "diffuse", "glossy", "transmission"
-#: Least of a crown's row that is covered where its colour counts.
+#: Least of a crown's row that is covered where its color counts.
 _LEAST_ROW = 0.02
 
 TARGETS: Targets = {
@@ -171,7 +171,7 @@ def pictures(quick: bool) -> dict[str, float]:
 
 
 def crowns(quick: bool) -> dict[str, float]:
-    """Transmittance of a crown of cards, and colour of its tenths: of its surfaces, and as they are lit."""
+    """Transmittance of a crown of cards, and color of its tenths: of its surfaces, and as they are lit."""
     found = apart("crown", "cards", quick=quick)
     for name, key in (("dT_max", "dT_"), ("tenth_max", "tenth_"), ("tenth_lit_max", "lit_")):
         values = [abs(value) for other, value in found.items() if other.startswith(key)]
@@ -231,7 +231,7 @@ def measure(words: list[str], given: argparse.Namespace) -> dict[str, float]:
     """Figures of one case, in this process."""
     name, kind, *rest = words
     if given.cache:
-        storage.use(given.cache)
+        storage.set_folder(given.cache)
     if name == "compile":
         return compiled(kind, given.quick)
     if name != "time":
@@ -399,16 +399,16 @@ def alone(scene: bpy.types.Scene, kind: str, quick: bool = False) -> bpy.types.O
 
 
 def frame(scene: bpy.types.Scene, pixel: float) -> None:
-    """Let a pixel of the view of one tree be so large, metres."""
+    """Let a pixel of the view of one tree be so large, meters."""
     scene.camera.data.ortho_scale = _WIDE
     scene.render.resolution_x = scene.render.resolution_y = round(_WIDE / pixel)
     bpy.context.view_layer.update()
 
 
-def _plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+def _plain(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
     material = bpy.data.materials.new(name)
     principled = next(node for node in compat.shader_tree(material).nodes if node.type == 'BSDF_PRINCIPLED')
-    principled.inputs["Base Color"].default_value = (*colour, 1.0)
+    principled.inputs["Base Color"].default_value = (*color, 1.0)
     principled.inputs["Roughness"].default_value = 1.0
     principled.inputs["Specular IOR Level"].default_value = 0.0
     return material
@@ -465,10 +465,10 @@ def compiled(kind: str, quick: bool) -> dict[str, float]:
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     target = Target(tree, None, None, tree.name)
-    parallel.use(1)
+    parallel.set_threads(1)
     forget_peak()
     before, begun = resident_mb("VmRSS"), cpu_s()
-    source, _ = at_once(read_source_steps(target, depsgraph))
+    source, _ = run_to_end(read_source_steps(target, depsgraph))
     read = cpu_s()
     asset = compile_asset(source)
     done = cpu_s()
@@ -481,12 +481,12 @@ def compiled(kind: str, quick: bool) -> dict[str, float]:
         "bytes_per_triangle": (resident_mb() - before) * 1e6 / triangles,
         "held_bytes_per_triangle": asset.nbytes / triangles,
     }
-    kept.keep(asset)
-    kept.forget()
+    asset_cache.keep(asset)
+    asset_cache.forget()
     begun = cpu_s()
     digest = digest_of(target, depsgraph)
     figures["digest_s"] = cpu_s() - begun
-    found = kept.find(digest)
+    found = asset_cache.find(digest)
     figures["again_s"] = cpu_s() - begun
     if found is None or len(found.clusters) != len(asset.clusters):
         raise RuntimeError("the compiled asset was not found again")
@@ -560,7 +560,7 @@ def woods(kind: str, folder: Path, quick: bool) -> dict[str, float]:
         pair = folder / f"{name}-plain.png", folder / f"{name}-refined.png"
         made = difference(*pair, masks[distance])
         key = f"{kind}_{distance}_{light}"
-        found |= {f"flip_{key}": made.flip, f"colour_{key}": made.colour}
+        found |= {f"flip_{key}": made.flip, f"color_{key}": made.color}
         found[f"polygons_{kind}_{distance}"] = statistics.polygons_meshed + statistics.polygons_proxy
     return found
 
@@ -571,8 +571,8 @@ def _samples(distance: str, quick: bool) -> int:
 
 def _views(scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
     """Names of distances and lights, which the scene has while each lasts."""
-    for distance, metres in DISTANCES.items():
-        stage.look(scene, *sight(metres))
+    for distance, meters in DISTANCES.items():
+        stage.look(scene, *sight(meters))
         for light in LIGHTS:
             set_sun(scene, light)
             bpy.context.view_layer.update()
@@ -580,7 +580,7 @@ def _views(scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
 
 
 def crown(kind: str, folder: Path, quick: bool) -> dict[str, float]:
-    """How much light a crown lets through, and the colour of its tenths from below to above, refined and plain."""
+    """How much light a crown lets through, and the color of its tenths from below to above, refined and plain."""
     scene = bpy.context.scene
     alone(scene, kind, quick)
     samples = CROWN_SAMPLES // (QUICK_DIVISOR if quick else 1)
@@ -601,7 +601,7 @@ def crown(kind: str, folder: Path, quick: bool) -> dict[str, float]:
 
 
 def _compared(plain: tuple[NDArray, NDArray], test: tuple[NDArray, NDArray]) -> dict[str, float]:
-    """How much less of the image a crown covers than a plain one, and how far the colours of its tenths are from its.
+    """How much less of the image a crown covers than a plain one, and how far the colors of its tenths are from its.
 
     Both are given as what `silhouette` and `albedo` return. ``tenth`` is of the albedo, ``lit`` under the sky, where
     the crown shades itself.
@@ -624,7 +624,7 @@ def crown_rows(silhouette: NDArray[np.float32]) -> tuple[int, int]:
 
 
 def tenths(silhouette: NDArray[np.float32], rows: tuple[int, int]) -> NDArray[np.float64]:
-    """Mean colour (10, 3) of what is covered in each tenth of a crown's rows, from below to above."""
+    """Mean color (10, 3) of what is covered in each tenth of a crown's rows, from below to above."""
     bands = np.array_split(silhouette[::-1].astype(np.float64)[slice(*rows)], TENTHS)
     return np.array([band[..., :3].sum(axis=(0, 1)) / band[..., 3].sum() for band in bands])
 
@@ -642,7 +642,7 @@ def silhouette(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0) 
 
 
 def albedo(scene: bpy.types.Scene, path: Path, seed: int = 0) -> NDArray[np.float32]:
-    """Colour of surfaces, all that they do with light, and alpha (height, width, 4), premultiplied, without ground."""
+    """Color of surfaces, all that they do with light, and alpha (height, width, 4), premultiplied, without ground."""
     bpy.utils.expose_bundled_modules()
     import OpenImageIO  # Blender's own, which it shows only now
 
@@ -669,8 +669,8 @@ def albedo(scene: bpy.types.Scene, path: Path, seed: int = 0) -> NDArray[np.floa
     for part in parts:
         pixels = part.get_pixels(OpenImageIO.FLOAT)
         named |= {name.split(".", 1)[1]: pixels[..., i] for i, name in enumerate(part.spec().channelnames)}
-    colours = [sum(named[f"{kind.title()} Color.{c}"] for kind in _PASSES) for c in "RGB"]
-    return np.stack([*colours, named["Combined.A"]], axis=2)
+    colors = [sum(named[f"{kind.title()} Color.{c}"] for kind in _PASSES) for c in "RGB"]
+    return np.stack([*colors, named["Combined.A"]], axis=2)
 
 
 def coverage(scene: bpy.types.Scene, path: Path) -> NDArray[np.float32]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from devtools import forms
 from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, single_seed
 from tetflora_addon.compiled.flora import compile_species
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 
 from .pictures import coverage
 from .report import Targets
@@ -30,7 +30,7 @@ from .report import Targets
 #: Trees on a hectare, their basal area on it, m², and the share of ground that they cover.
 STEMS, BASAL_AREA = 654.0, 23.3
 PUBLISHED = {"summer": 0.557, "winter": 0.28}
-#: Side of what is planted and of what is seen, metres; the least distance of trees.
+#: Side of what is planted and of what is seen, meters; the least distance of trees.
 LAND, SEEN, APART = 100.0, 60.0, 2.0
 #: Different birches; sizes of them vary by so much.
 VARIANTS, SPREAD = 6, 0.15

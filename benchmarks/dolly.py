@@ -29,7 +29,7 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.hashing import Draw, uniform
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.leaves.outlines import distance_to_links
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 from tetflora_addon.subplants.leaf_meshes import LevelCopies
 
 from .pictures import flip_map, read_picture, render
@@ -68,14 +68,14 @@ class Drawn:
 def run(quick: bool) -> dict[str, float]:
     """Measure; see the table in ``docs/results.md`` for what the figures mean."""
     scene = bpy.context.scene
-    target, towards = build(scene, QUICK_SIZE if quick else SIZE)
+    target, toward = build(scene, QUICK_SIZE if quick else SIZE)
     distances = np.geomspace(FAR, NEAR, QUICK_FRAMES if quick else FRAMES)
     samples = QUICK_SAMPLES if quick else SAMPLES
     pictures: dict[bool, list[NDArray]] = {False: [], True: []}
     polygons, silhouettes, peak = [], [], 0.0
     with tempfile.TemporaryDirectory() as folder:
         for distance in distances:
-            place(scene, target, towards, float(distance))
+            place(scene, target, toward, float(distance))
             refine.clear(scene)  # or what was expanded would count, and copies of it that the last render made
             bpy.context.view_layer.update()
             memory.give_back()
@@ -109,32 +109,32 @@ def run(quick: bool) -> dict[str, float]:
 
 def build(scene: bpy.types.Scene, size: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A tree before others; a leaf of it (3,), and the direction (3,) from it to the camera."""
-    towards = np.array([0.5, -0.85, 0.1]) / np.linalg.norm([0.5, -0.85, 0.1])
+    toward = np.array([0.5, -0.85, 0.1]) / np.linalg.norm([0.5, -0.85, 0.1])
     number = np.arange(1, NUMBER + 1)
     away, turn = 6.0 * np.sqrt(number + 1.0), 2.399963 * number
     places = np.stack([away * np.cos(turn), away * np.sin(turn), np.zeros(NUMBER)], axis=1)
-    places = places[places @ towards < -4.0]  # behind it, as seen from the camera
+    places = places[places @ toward < -4.0]  # behind it, as seen from the camera
     for i, (x, y, z) in enumerate([(0.0, 0.0, 0.0), *places]):
         stage.plant(scene, BEHIND[i % len(BEHIND)] if i else TREE, 1 + i, (x, y, z), turn[i] if i else 0.0)
     bpy.ops.mesh.primitive_plane_add(size=2000.0)
-    stage.camera(scene, towards, (0.0, 0.0, 0.0), size, lens=50.0, near=0.01, far=2000.0)
+    stage.camera(scene, toward, (0.0, 0.0, 0.0), size, lens=50.0, near=0.01, far=2000.0)
     stage.daylight(scene, elevation=40.0, azimuth=-60.0)
     scene.tetflora.refine_at_render = False
-    return leaf_of(TREE, towards), towards
+    return leaf_of(TREE, toward), toward
 
 
-def leaf_of(species: str, towards: NDArray[np.float64]) -> NDArray[np.float64]:
+def leaf_of(species: str, toward: NDArray[np.float64]) -> NDArray[np.float64]:
     """Where the outermost leaf (3,) of the lower half of a plant is, as seen from a direction (3,)."""
-    flora = compile_species([catalogue.load_species(species)])
+    flora = compile_species([catalog.load_species(species)])
     blocks = expanded_blocks(flora, single_seed(species, 1))
     points = np.concatenate([block.buffers.positions for block in blocks if block.kind == "leaf"]).astype(np.float64)
     low = points[points[:, 2] < np.median(points[:, 2])]
-    return low[(low @ (towards * [1.0, 1.0, 0.0])).argmax()]
+    return low[(low @ (toward * [1.0, 1.0, 0.0])).argmax()]
 
 
-def place(scene: bpy.types.Scene, target: NDArray[np.float64], towards: NDArray[np.float64], distance: float) -> None:
+def place(scene: bpy.types.Scene, target: NDArray[np.float64], toward: NDArray[np.float64], distance: float) -> None:
     """Move the camera."""
-    scene.camera.location = target + distance * towards
+    scene.camera.location = target + distance * toward
     bpy.context.view_layer.update()
 
 
@@ -201,7 +201,7 @@ def _finest(drawn: list[Drawn]) -> dict[int, object]:
     """The finest level of the leaf that each level belongs to, by the identity of the level's model."""
     found = {}
     for name in (TREE, *BEHIND):
-        for form in catalogue.load_species(name).leaf:
+        for form in catalog.load_species(name).leaf:
             levels = leaf_levels(form)
             found |= {id(level.model): levels[-1] for level in levels}
     return found

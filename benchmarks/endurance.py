@@ -25,7 +25,7 @@ import numpy as np
 
 from .report import Targets
 
-#: Frames for the way there or back, and metres of it.
+#: Frames for the way there or back, and meters of it.
 LEG, WAY = 10, 4.0
 FRAMES, QUICK_FRAMES = 20 * LEG, 8 * LEG
 #: Frames before memory counts: the first ones fill caches, compile species and load the renderer's kernels.
@@ -82,7 +82,7 @@ def _rounds(number: int) -> dict[str, float]:
     scene.render.resolution_x, scene.render.resolution_y = 480, 270
     scene.tetflora.year.enabled = True
     bpy.context.preferences.edit.undo_steps = UNDO_STEPS
-    parallel.use(2)
+    parallel.set_threads(2)
     threads, used, polygons = threading.active_count(), 0, set()
     left, handles, resident = {"processes": 0, "threads": 0}, [], []
     for round in range(number):

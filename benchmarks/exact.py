@@ -46,11 +46,11 @@ from tetflora_addon.blender.job.contents import read_scene
 from tetflora_addon.blender.materials import snow
 from tetflora_addon.blender.results.output import KIND, result_collections
 from tetflora_addon.blender.scene.fields import fields_of
-from tetflora_addon.blender.worker import at_once
+from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.growth.hashing import child_key, key_of_seed
 
 from . import forest
-from .pictures import colour_error, coverage, flip_map, read_picture, render, timed_render
+from .pictures import color_error, coverage, flip_map, read_picture, render, timed_render
 from .report import ROOT, Targets, cpu_s, forget_peak, peak_mb, records_of, setting, size_of
 
 FOLDER = ROOT / "out" / "exact"
@@ -70,7 +70,7 @@ KINDS = ("", "proxy", "leaf", "blossom", "triangle", "bark")
 _FACETS = ("proxy", "triangle")
 #: What a truth follows from, besides its numbers: folders and files of this repository.
 _SOURCES = (
-    *(f"tetflora_addon/{room}" for room in ("catalogue", "species", "growth", "leaves", "subplants", "planting")),
+    *(f"tetflora_addon/{room}" for room in ("catalog", "species", "growth", "leaves", "subplants", "planting")),
     "tetflora_addon/blender/materials",
     "benchmarks/exact.py",
     "benchmarks/forest.py",
@@ -80,14 +80,14 @@ TIMED = ("birch", "spruce", "bamboo", "mix")
 QUALITIES = ("FINAL", "PREVIEW", "DRAFT")
 #: Pixels that plants cover by less are not compared.
 COVERED, COVERAGE_SAMPLES = 0.05, 8
-#: Attributes of faces: the root of the area in metres, and which of `KINDS`.
+#: Attributes of faces: the root of the area in meters, and which of `KINDS`.
 _SIDE, _KIND = "exact_side", "exact_kind"
 _DAY = 20.0
 #: Exposure inside the wood, stops.
 _INSIDE = 3.0
-#: Height of the eye in biomes, metres.
+#: Height of the eye in biomes, meters.
 _EYE = 1.7
-#: Ground of a few plants, metres.
+#: Ground of a few plants, meters.
 _PATCH = 8.0
 _LOW_SUN = np.radians(12.0)
 
@@ -131,7 +131,7 @@ class Spec:
     seeds : int
         Different plants of each species; 0: all as Populate makes them, which have no truth.
     distance : float
-        Minimum distance between the plants of ``eye``, metres.
+        Minimum distance between the plants of ``eye``, meters.
     few : int
         Plants of a patch; 0: the whole wood.
     """
@@ -405,7 +405,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--window", type=size_of, default=(), metavar="WxH", help="compare only so much in the middle of the image")
     add("--samples", type=int, default=SAMPLES)
     add("--seeds", type=int, default=SEEDS, help="different plants of each species; 0: all, without a truth")
-    add("--distance", type=float, default=Spec.distance, help="between the plants of eye, metres")
+    add("--distance", type=float, default=Spec.distance, help="between the plants of eye, meters")
     add("--set", type=setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")
     add("--threads", type=int, default=0)
     add("--keep", action=argparse.BooleanOptionalAction, default=True, help="use truths that an earlier run has left")
@@ -488,7 +488,7 @@ def few_seeds(scene: bpy.types.Scene, number: int) -> None:
 
 
 def _few(place: NDArray, number: int) -> NDArray[np.int32]:
-    """One of so many seeds (n,) for each place (n, 3), metres; the same in fields and empties."""
+    """One of so many seeds (n,) for each place (n, 3), meters; the same in fields and empties."""
     east, north = np.round(place[:, :2].astype(np.float64) * 1e3).astype(np.int64).T
     return (child_key(key_of_seed(east), north) % np.uint64(number)).astype(np.int32)
 
@@ -543,7 +543,7 @@ def biome(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, Any]:
     chosen = files.read_biome(library.builtin_folder() / f"{spec['case']}.json")
     land = ground.make_land(scene, chosen.ground)
     bpy.context.view_layer.update()
-    at_once(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), chosen, [land]))
+    run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), chosen, [land]))
     forest.add_light(scene)
     side = land.dimensions.y
     forest.add_camera(scene, forest.Case((), eye=_EYE, side=side))
@@ -608,8 +608,8 @@ def compared(folder: Path, kept: Path, covered: NDArray[np.float32]) -> dict[str
         "flip": flip,
         "noise": flip_noise,
         "flip_over_noise": flip - flip_noise,
-        "color": colour_error(exact, found, mask),
-        "color_noise": colour_error(exact, again, mask),
+        "color": color_error(exact, found, mask),
+        "color_noise": color_error(exact, again, mask),
         "blobs": float((bright.sum() + dark.sum()) / megapixels),
         "blobs_bright": float(bright.sum() / megapixels),
         "blobs_dark": float(dark.sum() / megapixels),
@@ -631,7 +631,7 @@ def _save(path: Path, picture: NDArray[np.floating]) -> None:
 
 
 def _sides(scene: bpy.types.Scene, folder: Path) -> dict[str, float]:
-    """Sides in pixels of the faces of results that the centres of pixels see; `sums_of_sides`.
+    """Sides in pixels of the faces of results that the centers of pixels see; `sums_of_sides`.
 
     Cycles draws each face in its own root of area, with one ray through the middle of each pixel. Independent of the
     engine: nothing but the meshes counts.
@@ -663,7 +663,7 @@ def _mark(mesh: bpy.types.Mesh, kind: str) -> None:
 
 
 def _side_material() -> bpy.types.Material:
-    """Emits side, kind and depth, metres."""
+    """Emits side, kind and depth, meters."""
     material = bpy.data.materials.new("Sides")
     if not material.node_tree:  # before Blender 5.0 new materials have no nodes
         material.use_nodes = True
@@ -686,7 +686,7 @@ def _attribute(tree: bpy.types.NodeTree, name: str) -> bpy.types.NodeSocket:
 
 
 def _seen(scene: bpy.types.Scene, path: Path, material: bpy.types.Material) -> NDArray[np.float32]:
-    """What is emitted to the centre of each pixel (height, width, 3), if everything were of a material."""
+    """What is emitted to the center of each pixel (height, width, 3), if everything were of a material."""
     layer, settings = bpy.context.view_layer, scene.render
     with _changed(
         (layer, "material_override", material),

@@ -37,7 +37,7 @@ from devtools import session
 from examples import stands
 from tetflora_addon.blender import compat
 
-from .pictures import colour_error, coverage, flip_map, linear_light, read_picture, render, timed_refine
+from .pictures import color_error, coverage, flip_map, linear_light, read_picture, render, timed_refine
 from .report import ROOT, Targets
 
 #: Left by a run: images and records.
@@ -77,7 +77,7 @@ TARGETS: Targets = {
     "flip_mean": {"max": 0.05},
     "flip_max": {"max": 0.08},
     "dT_max": {"max": 0.01},
-    "colour_error_mean": {"max": 0.03},
+    "color_error_mean": {"max": 0.03},
     "engine_gap": {"max": 0.02},
     "frame_time_ratio_max": {"max": 2.0},
 }
@@ -85,7 +85,7 @@ QUICK_TARGETS: Targets = {
     "flip_mean": {"max": 0.09},
     "flip_max": {"max": 0.14},
     "dT_max": {"max": 0.03},
-    "colour_error_mean": {"max": 0.06},
+    "color_error_mean": {"max": 0.06},
 }
 
 
@@ -155,7 +155,7 @@ def line(frame: Frame) -> str:
     """A frame in a line."""
     return (
         f"{frame.pixels:4d} px {frame.light:9s}{frame.engine:7s}{frame.form:14s}{frame.species:8s}"
-        f"FLIP {frame.flip:.3f} (noise {frame.noise:.3f})  dT {frame.dT:+.4f}  colour {frame.colour:.3f} "
+        f"FLIP {frame.flip:.3f} (noise {frame.noise:.3f})  dT {frame.dT:+.4f}  color {frame.color:.3f} "
         f"({frame.brightness:+.3f})  gap {frame.gap:.3f} ({frame.gap_expanded:.3f})  "
         f"{frame.seconds:.1f} of {frame.expanded_seconds:.1f} s  {frame.memory_mb:.0f} of {frame.expanded_mb:.0f} MB"
     )
@@ -198,8 +198,8 @@ class Frame:
         no seeds).
     dT : float
         Mean difference of transmittance, form less expanded.
-    colour, brightness : float
-        Difference of the mean colours relative to the expanded plants' mean, and of luminance with its sign.
+    color, brightness : float
+        Difference of the mean colors relative to the expanded plants' mean, and of luminance with its sign.
     gap, gap_expanded : float
         FLIP between this image and that of the other engine, and between those of the expanded plants; NaN where
         the other engine has none.
@@ -218,7 +218,7 @@ class Frame:
     flip: float
     noise: float
     dT: float  # noqa: N815  (the figure's name)
-    colour: float
+    color: float
     brightness: float
     gap: float
     gap_expanded: float
@@ -230,7 +230,7 @@ class Frame:
 
 def forms() -> tuple[tuple[str, ...], str]:
     """All forms of proxies that the extension has, and the one that it takes by itself."""
-    choice = bpy.context.scene.tetflora.bl_rna.properties["proxy_form"]
+    choice = bpy.context.scene.tetflora.bl_rna.properties["proxy_kind"]
     return tuple(choice.enum_items.keys()), choice.default
 
 
@@ -301,7 +301,7 @@ class _Stand:
                 # What size spheres have depends on the engine; all other forms are the same in both.
                 if number == 0 or form == 'MICROSPHERES':
                     self.scene.render.engine = _identifier(one.engine)
-                    statistics, _ = timed_refine(self.scene, expand_everything=False, proxy_form=form)
+                    statistics, _ = timed_refine(self.scene, expand_everything=False, proxy_kind=form)
                     self.memory_mb[form] = statistics.memory_mb
                 samples = min(one.samples, COVERAGE_SAMPLES) if one.engine == "eevee" else COVERAGE_SAMPLES
                 alpha = coverage(self.scene, self.folder / "coverage.png", samples, _identifier(one.engine))
@@ -354,7 +354,7 @@ class _Stand:
                 form,
                 species,
                 dT=float(bare[mask].mean()),
-                colour=colour_error(expanded, proxies, mask),
+                color=color_error(expanded, proxies, mask),
                 brightness=float(light_of[1] / light_of[0] - 1.0),
                 seconds=self.seconds[light, engine, form],
                 expanded_seconds=self.seconds[light, engine, EXPANDED],
@@ -400,7 +400,7 @@ def _sums(frames: Sequence[Frame], suffix: str) -> dict[str, float]:
         "flip_max": max(f.flip for f in frames),
         "flip_noise": np.mean(noise) if noise else None,
         "dT_max": max(abs(f.dT) for f in frames),
-        "colour_error_mean": np.mean([f.colour for f in frames]),
+        "color_error_mean": np.mean([f.color for f in frames]),
         "brightness_mean": np.mean([f.brightness for f in frames]),
         "engine_gap": max(_gaps(frames), default=None),
         "frame_time_ratio_max": max(f.seconds / f.expanded_seconds for f in frames),

@@ -44,7 +44,7 @@ from tetflora_addon.jobs import Progress
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.refinement.statistics import Statistics
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 from .pictures import timed_render
 from .report import ROOT, Targets, forget_peak, peak_mb, records_of, setting, size_of
@@ -57,14 +57,14 @@ QUICK = ("birch", "mix")
 TIMED, SAMPLES = 4, 64
 #: Gigabytes that the process may have.
 LIMITS = (2, 4, 8)
-#: Ground: metres along each side, and faces. With these 14,891 plants have room, 2,446 at 5 m.
+#: Ground: meters along each side, and faces. With these 14,891 plants have room, 2,446 at 5 m.
 SIDE, SUBDIVISIONS = 300.0, 120
 WIDTH, HEIGHT = 1920, 1080
 MIX = ("birch", "spruce", "oak", "beech", "scots_pine")
-#: The catalogue does not say what a tree is: all that grow at least so high, metres.
+#: The catalog does not say what a tree is: all that grow at least so high, meters.
 TREE = 4.0
 MILLION_GB = 6.0
-#: The eye looks at this height above the middle of the ground, metres.
+#: The eye looks at this height above the middle of the ground, meters.
 _CROWNS = 7.0
 #: Steps of the job that are named, longest first; seconds that Blender may stand still.
 _NAMED, STILL = 5, 0.2
@@ -119,9 +119,9 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--what", choices=WHATS, default="refine", help="refine, or variants as instances")
     add("--asked", "--plants", type=int, help="plants that Populate is asked for, by default 100,000")
     add("--side", type=float, help="of the ground, by default 300 m: a smaller wood of the same density")
-    add("--distance", type=float, help="minimum distance between plants, metres")
-    add("--eye", type=float, help="height of the camera, metres")
-    add("--away", type=float, help="least distance of the camera from the middle, metres; it looks so far")
+    add("--distance", type=float, help="minimum distance between plants, meters")
+    add("--eye", type=float, help="height of the camera, meters")
+    add("--away", type=float, help="least distance of the camera from the middle, meters; it looks so far")
     add("--cover", action="store_true", help="with ground cover")
     add("--size", type=size_of, default=(WIDTH, HEIGHT), metavar="WxH")
     add("--set", type=setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")
@@ -175,7 +175,7 @@ def one(given: argparse.Namespace) -> dict:
     for name, value in given.set:
         set_named(scene.tetflora, name, value)
     figures = {"case": given.case, "what": given.what, "planted": planted}
-    figures |= build_instances(scene) if given.what == "instances" else refined(scene, given.at_once)
+    figures |= build_instances(scene) if given.what == "instances" else refined(scene, given.run_to_end)
     if not given.no_render:
         with tempfile.TemporaryDirectory() as folder:
             figures |= rendered(scene, Path(folder), given.samples)
@@ -200,15 +200,15 @@ class Case:
     asked : int
         Plants that Populate is asked for; as many come as have room.
     distance : float
-        Minimum distance between plants, metres.
+        Minimum distance between plants, meters.
     eye : float
-        Height of the camera, metres.
+        Height of the camera, meters.
     inside : bool
         The camera stands in the middle of the wood and looks ahead, not at the edge.
     side : float
-        Of the ground, metres.
+        Of the ground, meters.
     away : float
-        Least distance of the camera from the middle of the ground, metres, and how far ahead it then looks. 0: to the
+        Least distance of the camera from the middle of the ground, meters, and how far ahead it then looks. 0: to the
         middle.
     cover : bool
         The ground is covered.
@@ -234,14 +234,14 @@ def case_of(name: str) -> Case:
 
 
 def height_of(identifier: str) -> float:
-    """Height of one plant of a species, metres."""
-    flora = compile_species([catalogue.load_species(identifier)])
+    """Height of one plant of a species, meters."""
+    flora = compile_species([catalog.load_species(identifier)])
     return max(float(b.buffers.positions[:, 2].max()) for b in expanded_blocks(flora, single_seed(identifier, 1)))
 
 
 def trees() -> tuple[str, ...]:
-    """Species of the catalogue that are trees."""
-    return tuple(name for name in catalogue.list_species() if height_of(name) >= TREE)
+    """Species of the catalog that are trees."""
+    return tuple(name for name in catalog.list_species() if height_of(name) >= TREE)
 
 
 def build(scene: bpy.types.Scene, case: Case, size: tuple[int, int] = (WIDTH, HEIGHT)) -> int:
@@ -285,20 +285,20 @@ def build_million(scene: bpy.types.Scene, plants: int | None = None) -> int:
 @contextmanager
 def watching(look: Callable[[Refinement], None]) -> Iterator[None]:
     """While it lasts, jobs show what the loop left."""
-    afford = refine.afford
+    fit_to_budget = refine.fit_to_budget
 
     def watched(refinement: Refinement, *rest: object) -> Detail:
         look(refinement)
-        return afford(refinement, *rest)
+        return fit_to_budget(refinement, *rest)
 
-    refine.afford = watched
+    refine.fit_to_budget = watched
     try:
         yield
     finally:
-        refine.afford = afford
+        refine.fit_to_budget = fit_to_budget
 
 
-def refined(scene: bpy.types.Scene, at_once: bool = False) -> dict:
+def refined(scene: bpy.types.Scene, run_to_end: bool = False) -> dict:
     """Refine as the operator does; figures of the job and of what the loop left.
 
     at_once: as scripts and renders do, without a thread; steps are then those of the engine, which nobody waits for.
@@ -309,7 +309,7 @@ def refined(scene: bpy.types.Scene, at_once: bool = False) -> dict:
     with watching(kept.append):
         start, processor = time.perf_counter(), time.process_time()
         steps = _timed(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get()), taken)
-        statistics = worker.at_once(steps) if at_once else worker.run(steps)
+        statistics = worker.run_to_end(steps) if run_to_end else worker.run(steps)
         seconds, processor = time.perf_counter() - start, time.process_time() - processor
     peak = peak_mb()
     found = left_open(kept.pop()) if kept else {}

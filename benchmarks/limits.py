@@ -24,7 +24,7 @@ import numpy as np
 
 from .report import Targets, records_of
 
-#: Plants of a stand of each species on a square of so many metres, or the name of a biome.
+#: Plants of a stand of each species on a square of so many meters, or the name of a biome.
 STANDS = {"birch": 300, "spruce": 200}
 BIOME, SIDE, EYES = "beech_fern", 50.0, 1.7
 #: Gigabytes of the limits, of which the lower one is near to what plants would like to have.
@@ -118,7 +118,7 @@ def _plant(scene, name: str) -> None:
 
     from tests.blender.scenes import add_camera, add_plant
     from tetflora_addon.blender.biomes import adding, files, ground, library
-    from tetflora_addon.blender.worker import at_once
+    from tetflora_addon.blender.worker import run_to_end
 
     if name in STANDS:
         place = np.random.default_rng(1).uniform(-SIDE / 2, SIDE / 2, (STANDS[name], 2))
@@ -129,7 +129,7 @@ def _plant(scene, name: str) -> None:
     biome = files.read_biome(library.builtin_folder() / f"{name}.json")
     land = ground.make_land(scene, biome.ground)
     bpy.context.view_layer.update()
-    at_once(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
+    run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
     depsgraph = bpy.context.evaluated_depsgraph_get()
     middle = sum((np.array(land.matrix_world @ land.data.vertices[i].co) for i in (0, -1)), np.zeros(3)) / 2.0
     _, at, *_ = scene.ray_cast(depsgraph, (*middle[:2], 1e4), (0.0, 0.0, -1.0))

@@ -41,13 +41,13 @@ class Difference:
         Mean FLIP over the mask.
     flip_all : float
         Mean FLIP over the whole image.
-    colour : float
-        Difference of the masked mean colours (linear light), relative to the reference's mean.
+    color : float
+        Difference of the masked mean colors (linear light), relative to the reference's mean.
     """
 
     flip: float
     flip_all: float
-    colour: float
+    color: float
 
 
 def difference(reference: Path, test: Path, mask: NDArray[np.bool_] | None = None) -> Difference:
@@ -55,7 +55,7 @@ def difference(reference: Path, test: Path, mask: NDArray[np.bool_] | None = Non
     a, b = (read_picture(p)[:, :, :3] for p in (reference, test))
     error = flip_map(a, b)
     mask = np.ones(a.shape[:2], bool) if mask is None else mask
-    return Difference(float(error[mask].mean()), float(error.mean()), colour_error(a, b, mask))
+    return Difference(float(error[mask].mean()), float(error.mean()), color_error(a, b, mask))
 
 
 def flip_map(reference: NDArray[np.floating], test: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -69,8 +69,8 @@ def linear_light(stored: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
 
 
-def colour_error(reference: NDArray[np.floating], test: NDArray[np.floating], mask: NDArray[np.bool_]) -> float:
-    """Difference of the mean colours (linear light) where the mask is set, relative to the reference's mean."""
+def color_error(reference: NDArray[np.floating], test: NDArray[np.floating], mask: NDArray[np.bool_]) -> float:
+    """Difference of the mean colors (linear light) where the mask is set, relative to the reference's mean."""
     a, b = (linear_light(p[:, :, :3][mask]).mean(axis=0) for p in (reference, test))
     return float(np.abs(b - a).mean() / a.mean())
 

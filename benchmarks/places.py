@@ -4,8 +4,8 @@
 
 Sizes are those of fully grown meshes: height to the highest vertex, crown width the mean of the extents to east and
 north. The canopy height model is that of a mixed stand of beeches and spruces that was planted 5 to 7 m apart, with
-heights about 20 m and crown widths after Popescu and Wynne within 15 %, grown in full, rasterised at half a metre (the
-highest vertex of each cell) and averaged to cells of a metre; what is imported from it is grown and rasterised in the
+heights about 20 m and crown widths after Popescu and Wynne within 15 %, grown in full, rasterized at half a meter (the
+highest vertex of each cell) and averaged to cells of a meter; what is imported from it is grown and rasterized in the
 same way, with the right mixture but other individuals, and species by chance.
 """
 
@@ -30,15 +30,15 @@ from tests import places_inventories as inventories
 from tests import places_maps as maps
 from tetflora_addon.blender.job.contents import compile_for, read_scene
 from tetflora_addon.emission.plants import expanded_blocks
+from tetflora_addon.geodata.inventories import preview
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.places.inventories import preview
 
 from .report import Targets, records_of
 
 TREES, QUICK_TREES = 100_000, 10_000
 #: Trees that are grown in full, and those of the stand.
 SAMPLE, QUICK_SAMPLE = 120, 24
-#: Side of the stand in metres, and of the strip within its border that does not count.
+#: Side of the stand in meters, and of the strip within its border that does not count.
 STAND, QUICK_STAND, BORDER = 36, 30, 4
 MUTATED, QUICK_MUTATED = 500, 5  # of each kind
 #: Species, and how wide their crowns are over their height, from trees in a row to those by themselves.
@@ -116,8 +116,8 @@ def refined_sizes(sample: int) -> dict[str, float]:
     }
 
 
-def rasterised(points: NDArray[np.float32], side: int) -> NDArray[np.float32]:
-    """Canopy heights (side, side) of a square about the origin, cells of a metre, the northernmost row first."""
+def rasterized(points: NDArray[np.float32], side: int) -> NDArray[np.float32]:
+    """Canopy heights (side, side) of a square about the origin, cells of a meter, the northernmost row first."""
     cells = 2 * side
     column, row = np.floor(2.0 * (points[:, :2].T + side / 2.0)).astype(np.int64)
     inside = (column >= 0) & (row >= 0) & (column < cells) & (row < cells)
@@ -134,7 +134,7 @@ def averaged(values: NDArray[np.float32], step: int) -> NDArray[np.float32]:
 
 
 def stand(side: int, rng: np.random.Generator) -> str:
-    """An inventory of a closed stand in metres, around the origin."""
+    """An inventory of a closed stand in meters, around the origin."""
     places: list[NDArray[np.float64]] = []
     for place in rng.uniform(-side / 2.0, side / 2.0, (4000, 2)):
         if all(np.hypot(*(place - other)) > 5.0 for other in places):
@@ -157,14 +157,14 @@ def canopy(folder: Path, side: int) -> dict[str, float]:
     planted = len(bpy.context.view_layer.objects.active.data.vertices)
     corner = np.array([bpy.context.scene["tetflora_place"][name] for name in ("east", "north")])
     flora, seeds = grown()
-    given = rasterised(positions(flora, seeds) + np.array([*corner, 0.0], np.float32), side)
+    given = rasterized(positions(flora, seeds) + np.array([*corner, 0.0], np.float32), side)
     session.clean_file()
     path = folder / "chm.tif"
-    path.write_bytes(files.geotiff(given, 1.0, west=-side / 2.0, north=side / 2.0, code=32767))
+    path.write_bytes(files.geotiff(given, 1.0, west=-side / 2.0, north=side / 2.0, epsg=32767))
     bpy.ops.tetflora.import_canopy(filepath=str(path), species="beech:3, spruce:2")
     found = len(bpy.context.view_layer.objects.active.data.vertices)
     flora, seeds = grown()
-    made = rasterised(positions(flora, seeds), side)
+    made = rasterized(positions(flora, seeds), side)
     inner = np.s_[BORDER:-BORDER, BORDER:-BORDER]
     given, made = given[inner], made[inner]
     out = {"chm_trees_planted": float(planted), "chm_trees_found": float(found), "chm_mean_m": float(given.mean())}

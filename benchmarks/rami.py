@@ -8,7 +8,7 @@
     python -m benchmarks rami --table                                                    # what was measured
 
 Reflectance factors are measured view by view, in every way that TetFlora shows plants, and beside them how much of the
-ground RAMI-V's abstract canopies cover from above; there sizes are pixels for each metre, which is also a crown. What
+ground RAMI-V's abstract canopies cover from above; there sizes are pixels for each meter, which is also a crown. What
 was measured stays in ``out/rami`` and is not measured again without ``--again``, so that a run goes on where another
 was stopped.
 """
@@ -48,11 +48,11 @@ _WIDTH = 160
 _RINGS = 2
 #: Gigabytes that plants and renderer may take.
 _MEMORY = 3.0
-#: Pixels of a crown, and of a metre where cover is measured, with rays of each image.
+#: Pixels of a crown, and of a meter where cover is measured, with rays of each image.
 SIZES, COVER_SIZES, _COVER_RAYS = (2, 8, 32), (1, 2, 8, 32), 600_000
 #: Crowns of HET06 are so small beside its side that larger ones make images of twenty million pixels.
 LARGEST = {"HET06": 8, "HET04": 8}
-COLOURS = {
+COLORS = {
     POLYGONS: "black",
     EXPANDED: "tab:gray",
     'MICROSURFACES': "tab:blue",
@@ -297,7 +297,7 @@ def _view(scene: bpy.types.Scene, stand: Canopy, form: str, pixels: int, angle: 
     if refined:
         forget_peak()
         bpy.context.view_layer.update()
-        statistics, seconds = timed_refine(scene, expand_everything=False, proxy_form=form)
+        statistics, seconds = timed_refine(scene, expand_everything=False, proxy_kind=form)
         rami_species.make_lambertian()
         row |= {"refine_s": round(seconds, 2), "facets": statistics.polygons_proxy, "real": statistics.polygons_meshed}
     samples = ceil(_RAYS / (scene.render.resolution_x * scene.render.resolution_y))
@@ -338,7 +338,7 @@ def cover(name: str, form: str, size: int) -> float:
     form : str
         `EXPANDED` or one of `FORMS`.
     size : int
-        Pixels a metre; does not count for expanded plants.
+        Pixels a meter; does not count for expanded plants.
     """
     found = Measured(name)
     row = found.get(form, size, 0.0, 0)
@@ -359,7 +359,7 @@ def _covered(stand: Canopy, form: str, size: int) -> float:
     else:
         rami_species.add_plants(scene, stand)
         bpy.context.view_layer.update()
-        timed_refine(scene, expand_everything=False, proxy_form=form)
+        timed_refine(scene, expand_everything=False, proxy_kind=form)
     scene.render.film_transparent = True
     rami.set_bounces(scene, 0)
     rays = scene.render.resolution_x * scene.render.resolution_y
@@ -392,7 +392,7 @@ def draw(path: Path, pixels: dict[str, int]) -> None:
             at, factors = found.curve(form, pixels[name])
             if not len(at):
                 continue
-            style = {"color": COLOURS[form], "linewidth": 1.1, "marker": "." if form != POLYGONS else "", "ms": 4}
+            style = {"color": COLORS[form], "linewidth": 1.1, "marker": "." if form != POLYGONS else "", "ms": 4}
             label = LABELS.get(form, form.lower())
             above.plot(at, factors, label=label, **style)
             below.plot(at, 100 * (factors / np.interp(at, angles, known) - 1), **style)

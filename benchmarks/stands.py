@@ -22,15 +22,15 @@ from numpy.typing import NDArray
 from tetflora_addon.compiled.crowns import crown_of
 from tetflora_addon.growth.hashing import key_of_seed, uniform
 from tetflora_addon.species.ages import ages_of, with_age
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.stands.grow import StandSettings, begun
-from tetflora_addon.stands.guilds import Guild, Guilds
 from tetflora_addon.stands.site import StandSite
+from tetflora_addon.stands.traits import StandSpecies, StandTraits
 
 from .report import ROOT, Targets, forget_peak, peak_mb, records_of
 
 SPECIES = (
-    "beech", "spruce", "scots_pine", "oak", "birch", "ash", "hornbeam", "maple", "larch", "silver_fir", "lime",
+    "beech", "spruce", "scots_pine", "oak", "birch", "ash", "hornbeam", "maple", "larch", "silver_fir", "linden",
 )  # fmt: skip
 QUICK_SPECIES = ("beech", "scots_pine")
 YEARS, SIDE, DENSITY = (30, 60, 100), 141.4, 10_000.0
@@ -63,31 +63,31 @@ QUICK_TARGETS: Targets = {"thinning_slope": {"min": -1.7, "max": -1.3}}
 
 def stand(species: str) -> tuple[list[Figure], tuple[float, float]]:
     """Figures of a species at some years, and its slopes: biomass to density, and density to diameter."""
-    guild = Guild(load_species(species))
-    guilds, settings = Guilds([guild]), StandSettings(density=DENSITY, recruits=0.0, years=max(YEARS), interval=0)
+    member = StandSpecies(load_species(species))
+    traits, settings = StandTraits([member]), StandSettings(density=DENSITY, recruits=0.0, years=max(YEARS), interval=0)
     cells = round(SIDE / 5.0)
     site = StandSite(0.0, 0.0, SIDE / cells, np.zeros((cells, cells)))
-    grown, area = begun(site, [guild], settings), SIDE**2 / 1e4
+    grown, area = begun(site, [member], settings), SIDE**2 / 1e4
     found, thinned, stands = [], [], []
     for year in range(settings.years):
         grown.step(year)
         plants = grown.plants
-        diameter = 100.0 * guilds.diameters(plants.guild, plants.girth)
+        diameter = 100.0 * traits.diameters(plants.species, plants.basal)
         thinned.append(
             (
                 len(plants) / area,
-                float(guilds.masses(plants.guild, plants.girth, plants.height).mean()),
+                float(traits.masses(plants.species, plants.basal, plants.height).mean()),
                 float(np.sqrt((diameter**2).mean())),
             )
         )
-        if year + 1 in YEARS and year < _OLD * ages_of(guild.species).lifespan:
-            leaves = float(plants.leaf_area(guilds).sum())
+        if year + 1 in YEARS and year < _OLD * ages_of(member.species).lifespan:
+            leaves = float(plants.leaf_area(traits).sum())
             trees = Trees(diameter, plants.height, plants.base, 2.0 * plants.radius, area, leaves)
             found += figures(species, year + 1, trees)
             stands.append(trees)
     found += curves(species, stands)
     number, mass, mean = np.log(np.maximum(np.array(thinned), 1e-9)).T
-    counts = (number < np.log(_THINNED * DENSITY)) & (np.arange(len(number)) < _OLD * ages_of(guild.species).lifespan)
+    counts = (number < np.log(_THINNED * DENSITY)) & (np.arange(len(number)) < _OLD * ages_of(member.species).lifespan)
     slopes = (
         float(np.polyfit(number[counts], mass[counts], 1)[0]),
         float(np.polyfit(mean[counts], number[counts], 1)[0]),
@@ -97,15 +97,15 @@ def stand(species: str) -> tuple[list[Figure], tuple[float, float]]:
 
 def leaves_drawn(species: str) -> list[dict[str, float]]:
     """Leaf area of free plants of some heights: as the stand has it, and as the compiled species has it."""
-    own, guilds = load_species(species), Guilds([Guild(load_species(species))])
+    own, traits = load_species(species), StandTraits([StandSpecies(load_species(species))])
     rows = []
     for part in (0.5, 1.0, 2.0):
         years = part * ages_of(own).full
         crown = crown_of(with_age(own, years))
         zero = np.zeros(4000, np.int64)
-        girth = np.linspace(0.01, 1.0, len(zero))
-        nearest = int(np.abs(0.8 * guilds.heights(zero, girth) - crown.height).argmin())
-        width = 2.0 * float(guilds.radii(zero, girth)[nearest])
+        basal = np.linspace(0.01, 1.0, len(zero))
+        nearest = int(np.abs(0.8 * traits.heights(zero, basal) - crown.height).argmin())
+        width = 2.0 * float(traits.radii(zero, basal)[nearest])
         rows.append(
             {
                 "years": years,
@@ -113,7 +113,7 @@ def leaves_drawn(species: str) -> list[dict[str, float]]:
                 "width_drawn": 2.0 * crown.radius,
                 "width_stand": width,
                 "leaves_drawn": crown.leaves / (np.pi * crown.radius**2),
-                "leaves_stand": float(guilds.leaves[0]),
+                "leaves_stand": float(traits.leaves[0]),
             }
         )
     return [{key: round(value, 2) for key, value in row.items()} for row in rows]
@@ -127,7 +127,7 @@ def timed(plants: int) -> dict[str, float]:
     site = StandSite(0.0, 0.0, side / cells, np.zeros((cells, cells)))
     start, alive = time.perf_counter(), 0
     grown = begun(
-        site, [Guild(load_species(n)) for n in _TIMED], StandSettings(density=_PLANTED, years=_TIME, interval=20)
+        site, [StandSpecies(load_species(n)) for n in _TIMED], StandSettings(density=_PLANTED, years=_TIME, interval=20)
     )
     for year in range(_TIME):
         grown.step(year)

@@ -50,11 +50,11 @@ KINDS = ("refined", "expanded")
 PLANTS, ROOM, AGES = 32, 14.0, (6.0, 16.0)
 WOOD_SIZE, BIRCH_SIZE = (320, 180), (200, 280)
 WOOD_SAMPLES, BIRCH_SAMPLES = 16, 24
-#: Height that the birch's camera sees, metres; difference of a pixel from the empty place in which a plant is seen.
+#: Height that the birch's camera sees, meters; difference of a pixel from the empty place in which a plant is seen.
 _BIRCH, _SEEN = 24.0, 0.02
 #: Species of the wood with their relative numbers: two that turn yellow, one that turns brown, one evergreen, a shrub.
 MIX = {"birch": 0.3, "beech": 0.2, "oak": 0.2, "spruce": 0.15, "hazel": 0.15}
-#: Nearest distance to the eye and height of the eye, metres; horizontal field of view.
+#: Nearest distance to the eye and height of the eye, meters; horizontal field of view.
 _NEAREST, _EYE, _VIEW = 7.0, 1.7, radians(54.0)
 _ELEVATION, _AZIMUTH = 35.0, -60.0
 #: Plants that are refined for time, few and quick, with ground for each, m²; days, and ages in years.
@@ -342,7 +342,7 @@ def wood(
 
 
 def lone(scene: bpy.types.Scene, species: str, height: float, size: tuple[int, int], age: float) -> None:
-    """Fill an empty scene with one plant, and a camera that sees so many metres of its height."""
+    """Fill an empty scene with one plant, and a camera that sees so many meters of its height."""
     stage.plant(scene, species, 1, (0.0, 0.0, 0.0), 2.399963, age=age)
     stage.ground(60.0 * height)
     view = radians(24.0)

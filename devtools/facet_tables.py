@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import facet_weights
 from tetflora_addon.proxies.facet_weights import variants
-from tetflora_addon.species.catalogue import list_species, load_species
+from tetflora_addon.species.catalog import list_species, load_species
 
 #: Blocked rays from which weights of variants follow; those of species as described follow from all.
 _RAYS = 40_000.0
@@ -66,13 +66,13 @@ def _fitted(identifier: str, number: int) -> tuple[str, dict]:
 
 
 def _weights(flora: Flora, described: bool) -> dict[str, Any]:
-    whole, own = at_once(facet_weights.fitting(flora, 0, np.inf if described else _RAYS))
+    whole, own = run_to_end(facet_weights.fitting(flora, 0, np.inf if described else _RAYS))
     digits = 3 if described else 2
     return {"whole": whole.round(digits).tolist(), "own": own.round(digits).tolist()}
 
 
 def _write(table: dict[str, dict]) -> None:
-    """In the order of the catalogue, a line for each variant."""
+    """In the order of the catalog, a line for each variant."""
     ordered = dict(sorted(table.items(), key=lambda item: (item[1]["species"].split()[0], item[1]["species"])))
     facet_weights.TABLE.write_text(json.dumps(ordered, separators=(",", ":")).replace('},"', '},\n"') + "\n")
 

@@ -23,7 +23,7 @@ from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.growth.foliage import leaf_forms, leaf_keys, leaf_places, place_leaves, settled
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts, radius_at, trunks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.species import LEAF_KINDS
 from tetflora_addon.subplants.pieces import expand
 
@@ -153,7 +153,7 @@ def measured(identifier: str, habit: float = 0.0) -> dict[str, float]:
 
 
 def measures(flora: Flora, seed: int) -> dict[str, float]:
-    """Measures of one plant of a flora's only species, in metres but for those of `FIGURES`."""
+    """Measures of one plant of a flora's only species, in meters but for those of `FIGURES`."""
     plant = trunks(flora.rows, _alone(flora, seed))
     parts = list(expand(flora, plant))
     leaves = [group for part in parts for group in _leaves(flora, part)]
@@ -231,7 +231,7 @@ def _leaves(flora: Flora, whole: WholeBranches) -> Iterator[tuple[NDArray, NDArr
 
 
 def _across(place: NDArray[np.float64]) -> float:
-    """Mean extent in the plane of places (n, 3), metres."""
+    """Mean extent in the plane of places (n, 3), meters."""
     turn = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     return float(np.mean([np.ptp(place[:, 0] * np.cos(a) + place[:, 1] * np.sin(a)) for a in turn]))
 

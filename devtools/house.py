@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """House rules that ruff does not know: ``python -m devtools.house`` lists what breaks them.
 
-Each source file names its licence and stays short, and no file names the machine that it was written on. The check
+Each source file names its license and stays short, and no file names the machine that it was written on. The check
 runs in ``make lint``. Rules about rooms, imports and sizes are in `devtools.rooms`.
 """
 

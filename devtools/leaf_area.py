@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetflora_addon.growth.seasons import AREA, expected, leaf_table
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.year import LeafYear, Year
 
 from .house import ROOT

@@ -261,7 +261,7 @@ def _product_imports(path: Path) -> set[str]:
 
 
 def tried(mutant: Mutant, tests: Tests) -> str:
-    """The test that finds a mutant, empty where none does; the tree is as it was afterwards."""
+    """The test that finds a mutant, empty where none does; the tree is as it was afterward."""
     path = tests.tree / mutant.path
     source = path.read_bytes()
     path.write_bytes(source[: mutant.start] + mutant.text.encode() + source[mutant.end :])

@@ -5,7 +5,7 @@
     python -m devtools.result_hashes write out/hashes.json      before the change
     python -m devtools.result_hashes compare out/hashes.json    after it; lists what differs
 
-Scenes: the row of eighty, the landscape, and a small row in each proxy form and lighting, in the layouts of both
+Scenes: the row of eighty, the landscape, and a small row in each proxy kind and lighting, in the layouts of both
 engines. A hash covers all attributes of all meshes and point clouds, in no order. Hashes belong to one machine: numpy
 may add up in another order on another one, so they are kept in ``out/`` and not under version control.
 """
@@ -87,7 +87,7 @@ def scenes() -> Iterator[tuple[str, dict[str, object]]]:
         for lighting in LIGHTINGS:
             for engine in ('CYCLES', session.eevee()):
                 bpy.context.scene.render.engine = engine
-                yield f"{form} {lighting} {engine}", refined(proxy_form=form, baked_light=lighting)
+                yield f"{form} {lighting} {engine}", refined(proxy_kind=form, baked_light=lighting)
     yield "expanded", refined(expand_everything=True)
 
 

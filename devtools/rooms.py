@@ -33,7 +33,7 @@ MAX_LEVELS = 10
 _LOW = "blender blender/materials blender/species blender/scene"
 _ASSETS = "assets blender/assets"
 _HIGH = "blender/results blender/placing blender/job"
-_LAND = "blender/stands blender/places blender/biomes"
+_LAND = "blender/stands blender/geodata blender/biomes"
 #: What each room may import besides itself: folders below ``tetflora_addon`` in words separated by spaces. A dot stands
 #: for the files beside these folders, and ``blender`` alone for the files at the top of that folder.
 _TABLE = {
@@ -51,7 +51,7 @@ _TABLE = {
     "preview": ". growth compiled subplants tetrahedra camera refinement",
     "planting": ". growth",
     "stands": ". species growth",
-    "places": ".",
+    "geodata": ".",
     "proxies": ". species growth assets compiled subplants camera refinement",
     "light": ". compiled tetrahedra camera refinement proxies",
     "emission": ". processes leaves species growth compiled subplants tetrahedra camera refinement proxies light",
@@ -64,13 +64,13 @@ _TABLE = {
     "blender/results": f". leaves species refinement emission {_LOW}",
     "blender/placing": f". species growth compiled planting {_LOW} blender/assets",
     "blender/stands": ". species planting stands blender blender/species blender/scene blender/placing",
-    "blender/places": f". species growth compiled planting places {_LOW} blender/placing",
+    "blender/geodata": f". species growth compiled planting geodata {_LOW} blender/placing",
     "blender/biomes": f". species growth planting {_LOW} blender/placing blender/stands",
     "blender/job": f". processes species growth compiled camera refinement proxies emission {_LOW} {_ASSETS} "
     "blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
     "blender/cli": ". blender blender/scene blender/job",
-    "operators": ". species assets camera refinement preview planting places blender blender/species blender/scene "
+    "operators": ". species assets camera refinement preview planting geodata blender blender/species blender/scene "
     f"blender/assets {_HIGH} {_LAND} blender/viewport",
     "panels": f". species blender blender/species blender/scene blender/assets {_HIGH} {_LAND} blender/viewport "
     "operators",

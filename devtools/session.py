@@ -75,7 +75,7 @@ def start() -> ModuleType:
     from tetflora_addon import storage
 
     # Inside a full Blender it would be the user's own.
-    storage.use(home / "cache")
+    storage.set_folder(home / "cache")
     # Blender 4.5's wheel hangs at exit while a callback of an add-on is registered.
     atexit.register(stop)
     return sys.modules[PACKAGE]

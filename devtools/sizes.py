@@ -20,7 +20,7 @@ from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.growth import children, radius_at, trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.ages import with_age
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.skeletons import MAX_ORDERS
 
 from .forms import BREAST_HEIGHT
@@ -29,7 +29,7 @@ from .house import ROOT
 DATA = ROOT / "tests" / "data" / "sizes_by_age.json"
 SEEDS = 20
 QUANTITIES = ("height", "diameter")
-"""Metres, and centimetres at 1.3 m above the ground."""
+"""Meters, and centimeters at 1.3 m above the ground."""
 
 
 class Size(NamedTuple):
@@ -61,7 +61,7 @@ def compared(identifier: str) -> Iterator[Size]:
 
 @cache
 def measured(identifier: str, years: float) -> tuple[float, float]:
-    """Mean height, metres, and diameter of the trunk, centimetres, of `SEEDS` plants of a shipped species."""
+    """Mean height, meters, and diameter of the trunk, centimeters, of `SEEDS` plants of a shipped species."""
     flora = compile_species([with_age(load_species(identifier), years)])
     zero, one = np.zeros(SEEDS), np.ones(SEEDS)
     upright = np.tile(np.eye(3), (SEEDS, 1, 1))

@@ -15,9 +15,9 @@ import re
 from tetflora_addon.leaves.models import LEAF_MODELS, Spines
 from tetflora_addon.leaves.schema import OUTLINES
 from tetflora_addon.parameters import Key, keys_of
-from tetflora_addon.species.catalogue import builtin_folder, load_species
+from tetflora_addon.species.catalog import builtin_folder, load_species
 from tetflora_addon.species.schema import LENGTH_HIGH, ORDER_KEYS
-from tetflora_addon.species.species import CROWN_SHAPES, LEAF_KINDS
+from tetflora_addon.species.species import CROWN_PROFILES, LEAF_KINDS
 from tetflora_addon.species.year import DAYS
 
 from . import forms
@@ -31,12 +31,12 @@ _WRITTEN = {
     "integer": "whole number",
     "choice": "name",
     "rgb": "`[r, g, b]`",
-    "colour": "`[[r, g, b], [variation of each]]`",
+    "color": "`[[r, g, b], [variation of each]]`",
 }
 
 
 def _limits(key: Key) -> str:
-    if key.choices == CROWN_SHAPES:
+    if key.choices == CROWN_PROFILES:
         return "see below"
     if key.choices:
         return ", ".join(f"`{name}`" for name in key.choices)
@@ -63,7 +63,7 @@ def key_table() -> str:
 
 def crown_list() -> str:
     """Names of the crown shapes in one line."""
-    return ", ".join(f"`{name}`" for name in CROWN_SHAPES)
+    return ", ".join(f"`{name}`" for name in CROWN_PROFILES)
 
 
 def leaf_table() -> str:

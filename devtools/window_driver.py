@@ -57,7 +57,7 @@ class Ui:
         found = [a for a in self.window.screen.areas if a.type == kind]
         return max(found, key=lambda a: a.width * a.height)
 
-    def centre(self, region: str = 'WINDOW', kind: str = 'VIEW_3D') -> tuple[int, int]:
+    def center(self, region: str = 'WINDOW', kind: str = 'VIEW_3D') -> tuple[int, int]:
         """The middle of an editor's region."""
         found = next(r for r in self.area(kind).regions if r.type == region)
         return found.x + found.width // 2, found.y + found.height // 2
@@ -91,7 +91,7 @@ class Ui:
         """Open the 3D view's sidebar, at the given tab; the mouse goes to the middle of the view."""
         area = self.area()
         area.spaces.active.show_region_ui = True
-        self.move(*self.centre())
+        self.move(*self.center())
         yield MOMENT  # the region gets its size, and its tabs, when it is drawn
         yield MOMENT
         if tab is not None:
@@ -145,7 +145,7 @@ def main(script: Path, out_dir: Path) -> None:
         try:
             if steps is None:
                 spec.loader.exec_module(module)
-                ui.move(*ui.centre())
+                ui.move(*ui.center())
                 steps = module.steps(ui)
             pause = next(steps)
         except StopIteration:

@@ -30,12 +30,12 @@ ROOT = Path(__file__).resolve().parent.parent
 SPECIES, SEED = "oak", 1
 AGES = (8.0, 18.0, 35.0, 80.0, 300.0, 545.0)
 SIZE, SAMPLES = (1600, 540), 96
-#: Room between crowns, and before the first and behind the last, metres; sides of the meadow and of its nearer part.
+#: Room between crowns, and before the first and behind the last, meters; sides of the meadow and of its nearer part.
 _BETWEEN, _BESIDE = 1.2, 1.6
 _SIDE, _VIEW, _EYE = 560.0, radians(26.0), 2.2
 #: Trees that close the view: species, how far away, and how many.
 _BEHIND, _AWAY, _MANY = ("beech", "birch", "hornbeam", "spruce", "maple"), (270.0, 330.0), 240
-_GREY = 0.47
+_GRAY = 0.47
 _FIGURE = 1.7
 #: Joints of the figure, in its heights: x, y, z and radius, of the spine, and of a leg and an arm; and what it wears.
 _SPINE = (
@@ -62,11 +62,11 @@ _CLOTHES = (
 def build(scene: bpy.types.Scene, size: tuple[int, int]) -> list[tuple[float, str]]:
     """Fill an empty scene; where in the image trees stand, 0 to 1, and what to write under each."""
     from tetflora_addon.compiled.crowns import crown_of
-    from tetflora_addon.species import ages, catalogue
+    from tetflora_addon.species import ages, catalog
 
     from .haze import add_haze
 
-    species = catalogue.load_species(SPECIES)
+    species = catalog.load_species(SPECIES)
     crowns = [crown_of(ages.with_age(species, age)) for age in AGES]
     radius = np.array([max(crown.radius, 1.3) for crown in crowns])
     middle = np.cumsum(np.concatenate([[_BESIDE + radius[0] + 2.6], radius[:-1] + radius[1:] + _BETWEEN]))
@@ -106,14 +106,14 @@ def _close_view(scene: bpy.types.Scene) -> None:
 
 def _meadow(scene: bpy.types.Scene, distance: float) -> None:
     from tetflora_addon.blender.placing.cover import cover_steps
-    from tetflora_addon.blender.worker import at_once
+    from tetflora_addon.blender.worker import run_to_end
 
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=90, y_subdivisions=90, size=1.2 * _SIDE)
     ground = bpy.context.object
     ground.location.y = 0.6 * _SIDE - distance + 30.0
     bpy.context.view_layer.update()
     steps = cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[ground])
-    at_once(steps)
+    run_to_end(steps)
 
 
 def _figure(place: tuple[float, float]) -> bpy.types.Object:
@@ -139,15 +139,15 @@ def _figure(place: tuple[float, float]) -> bpy.types.Object:
 
 
 def _pole(place: tuple[float, float]) -> None:
-    """A ranging pole of 4 m, red and white by the metre."""
-    for metre in range(4):
-        bpy.ops.mesh.primitive_cylinder_add(radius=0.045, depth=1.0, location=(*place, metre + 0.5))
-        colour = (0.60, 0.02, 0.02) if metre % 2 == 0 else (0.8, 0.8, 0.8)
-        bpy.context.object.data.materials.append(_bands("Pole", ((0.0, colour),)))
+    """A ranging pole of 4 m, red and white by the meter."""
+    for meter in range(4):
+        bpy.ops.mesh.primitive_cylinder_add(radius=0.045, depth=1.0, location=(*place, meter + 0.5))
+        color = (0.60, 0.02, 0.02) if meter % 2 == 0 else (0.8, 0.8, 0.8)
+        bpy.context.object.data.materials.append(_bands("Pole", ((0.0, color),)))
 
 
 def _bands(name: str, stops: tuple[tuple[float, tuple[float, float, float]], ...]) -> bpy.types.Material:
-    """Colours by the height in the object, without steps between."""
+    """Colors by the height in the object, without steps between."""
     from tetflora_addon.blender.compat import shader_tree
 
     material = bpy.data.materials.new(name)
@@ -159,8 +159,8 @@ def _bands(name: str, stops: tuple[tuple[float, tuple[float, float, float]], ...
     elements = ramp.color_ramp.elements
     elements.remove(elements[1])
     elements[0].position, elements[0].color = stops[0][0], (*stops[0][1], 1.0)
-    for position, colour in stops[1:]:
-        elements.new(position).color = (*colour, 1.0)
+    for position, color in stops[1:]:
+        elements.new(position).color = (*color, 1.0)
     surface, output = new("ShaderNodeBsdfDiffuse"), new("ShaderNodeOutputMaterial")
     link(place.outputs["Generated"], split.inputs[0])
     link(split.outputs["Z"], ramp.inputs[0])
@@ -169,7 +169,7 @@ def _bands(name: str, stops: tuple[tuple[float, tuple[float, float, float]], ...
     return material
 
 
-def labelled(picture: Image.Image, labels: list[tuple[float, str]]) -> Image.Image:
+def labeled(picture: Image.Image, labels: list[tuple[float, str]]) -> Image.Image:
     """The picture with words at its lower edge."""
     picture = picture.convert("RGB")
     font = ImageFont.load_default(max(11.0, picture.width / 72))
@@ -188,8 +188,8 @@ def render_ages(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES
 
     labels = build(bpy.context.scene, size)
     with tempfile.TemporaryDirectory() as folder:
-        render(Path(folder) / "ages.png", size, samples, grey=_GREY)
-        save_jpeg(labelled(Image.open(Path(folder) / "ages.png"), labels), path)
+        render(Path(folder) / "ages.png", size, samples, gray=_GRAY)
+        save_jpeg(labeled(Image.open(Path(folder) / "ages.png"), labels), path)
 
 
 def main() -> int:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The catalogue as an asset library for Blender's asset browser: ``python -m examples.asset_library --out FOLDER``."""
+"""The catalog as an asset library for Blender's asset browser: ``python -m examples.asset_library --out FOLDER``."""
 
 from __future__ import annotations
 

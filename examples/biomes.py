@@ -51,7 +51,7 @@ class View:
         x, y and height over the ground, of the camera and of what is in the middle of the picture; meters.
     sun : tuple of float
         Height over the horizon and azimuth where the light comes from, from north to the east; degrees.
-    grey : float
+    gray : float
         Mean that the exposure aims at.
     haze : tuple
         As of `seasons.Look`.
@@ -70,7 +70,7 @@ class View:
     lens: float = 28.0
     sun: tuple[float, float] = (48.0, 236.0)
     tint: Rgb = (1.0, 0.94, 0.84)
-    grey: float = 0.34
+    gray: float = 0.34
     haze: tuple[float, Rgb] = (0.0004, (0.5, 0.62, 0.8))
     clouds: float = 0.5
     light: float = 1.0
@@ -82,23 +82,23 @@ class View:
 _COOL, _GOLD = (1.0, 0.95, 0.88), (1.0, 0.86, 0.66)
 _CLEAR = (0.0002, (0.4, 0.5, 0.5))
 VIEWS = {
-    "alpine_treeline": View((-34.0, -26.0, 1.8), (18.0, 2.0, 3.0), 24.0, (38.0, 215.0), grey=0.42, clouds=0.6),
-    "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (56.0, 215.0), grey=0.34, haze=_CLEAR, light=2.2),
-    "birch_pine": View((0.0, -42.0, 1.6), (4.0, 0.0, 4.6), 26.0, (36.0, 240.0), _GOLD, grey=0.38),
-    "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), grey=0.38, clouds=0.8),
-    "hedgerow": View((-45.0, -12.0, 1.75), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, grey=0.42, beside="meadow"),
-    "meadow": View((0.0, -44.0, 1.5), (4.0, 0.0, 1.7), 34.0, (42.0, 245.0), grey=0.44),
-    "mediterranean_scrub": View((0.0, -44.0, 1.7), (2.0, 0.0, 2.2), 28.0, (46.0, 240.0), _COOL, grey=0.44, clouds=0.3),
-    "oak_savanna": View((0.0, -46.0, 1.9), (2.0, 0.0, 3.0), 34.0, (24.0, 245.0), _GOLD, grey=0.42),
-    "park": View((0.0, -46.0, 1.65), (0.0, 0.0, 4.0), 28.0, (40.0, 240.0), grey=0.42),
+    "alpine_treeline": View((-34.0, -26.0, 1.8), (18.0, 2.0, 3.0), 24.0, (38.0, 215.0), gray=0.42, clouds=0.6),
+    "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (56.0, 215.0), gray=0.34, haze=_CLEAR, light=2.2),
+    "birch_pine": View((0.0, -42.0, 1.6), (4.0, 0.0, 4.6), 26.0, (36.0, 240.0), _GOLD, gray=0.38),
+    "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), gray=0.38, clouds=0.8),
+    "hedgerow": View((-45.0, -12.0, 1.75), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, gray=0.42, beside="meadow"),
+    "meadow": View((0.0, -44.0, 1.5), (4.0, 0.0, 1.7), 34.0, (42.0, 245.0), gray=0.44),
+    "mediterranean_scrub": View((0.0, -44.0, 1.7), (2.0, 0.0, 2.2), 28.0, (46.0, 240.0), _COOL, gray=0.44, clouds=0.3),
+    "oak_savanna": View((0.0, -46.0, 1.9), (2.0, 0.0, 3.0), 34.0, (24.0, 245.0), _GOLD, gray=0.42),
+    "park": View((0.0, -46.0, 1.65), (0.0, 0.0, 4.0), 28.0, (40.0, 240.0), gray=0.42),
     "riparian_willow": View(
-        (44.0, -12.0, 2.2), (8.0, 4.0, 3.2), 24.0, (44.0, 200.0), grey=0.42, free=7.0, beside="meadow", water=0.3
+        (44.0, -12.0, 2.2), (8.0, 4.0, 3.2), 24.0, (44.0, 200.0), gray=0.42, free=7.0, beside="meadow", water=0.3
     ),
     "spruce_forest": View(
-        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), grey=0.3, haze=_CLEAR, light=1.0, free=5.0
+        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.3, haze=_CLEAR, light=1.0, free=5.0
     ),
-    "tropical_understorey": View(
-        (0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), grey=0.34, haze=_CLEAR, light=1.3, free=4.5
+    "tropical_understory": View(
+        (0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), gray=0.34, haze=_CLEAR, light=1.3, free=4.5
     ),
 }
 
@@ -106,25 +106,25 @@ VIEWS = {
 def build(identifier: str, view: View) -> None:
     """Fill an empty scene with a biome, its land, sun and sky."""
     from tetflora_addon.blender.biomes import adding, files, ground
-    from tetflora_addon.blender.worker import at_once
+    from tetflora_addon.blender.worker import run_to_end
 
     scene = bpy.context.scene
     biome = files.read_biome(SHIPPED / f"{identifier}.json")
     land = ground.make_land(scene, biome.ground)
     if view.beside:
         other = files.read_biome(SHIPPED / f"{view.beside}.json")
-        _add(at_once, adding, scene, replace(other, layers=[o for o in other.layers if o["kind"] == "cover"]), land)
-    added = _add(at_once, adding, scene, biome, land)
+        _add(run_to_end, adding, scene, replace(other, layers=[o for o in other.layers if o["kind"] == "cover"]), land)
+    added = _add(run_to_end, adding, scene, biome, land)
     around = _around(biome, ground)
     scene.collection.objects.link(around)
     tall = [layer for layer in biome.layers if layer["kind"] != "cover"]
     if tall:
         far = replace(biome, layers=tall, ground={**biome.ground, "earth": _mean(land)}, species=biome.species)
-        _add(at_once, adding, scene, far, around)
+        _add(run_to_end, adding, scene, far, around)
     else:
         around.data.materials.append(land.data.materials[0])
     if view.beside:
-        at_once(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.biomes[0]))
+        run_to_end(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.biomes[0]))
     if view.water:
         _brook(scene, ground, biome, view.water)
     print(identifier, ", ".join(f"{name} {number:,}" for name, number in added.layers), *added.bare, flush=True)
@@ -173,9 +173,9 @@ def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
     return float(x), float(y), view.eye[2]
 
 
-def _add(at_once, adding, scene, biome, land):
+def _add(run_to_end, adding, scene, biome, land):
     bpy.context.view_layer.update()
-    return at_once(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
+    return run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
 
 
 def _around(biome: object, ground: object) -> bpy.types.Object:
@@ -234,7 +234,7 @@ def render_biome(
     build(identifier, view)
     if keep is not None:
         bpy.ops.wm.save_as_mainfile(filepath=str(keep))
-    render(path, size, samples, grey=view.grey, beyond=0.1)
+    render(path, size, samples, gray=view.gray, beyond=0.1)
 
 
 def save_small(source: Path, identifier: str) -> Path:

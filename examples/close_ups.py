@@ -35,23 +35,23 @@ SPECIES = ("oak", "scots_pine", "birch", "willow", "ash", "aspen", "beech", "spr
 SIZE, SAMPLES = (400, 300), 24
 #: Where the sun stands, degrees: above the horizon, and from north to the east; cameras look north.
 ELEVATION, AZIMUTH = 42.0, 222.0
-#: Other plants around the first one, and the side of the ground, metres.
+#: Other plants around the first one, and the side of the ground, meters.
 _AROUND, _SIDE = 14, 50.0
 #: Direction from leaves to the camera: from the south, where the sun is, and from above, as leaves face up.
-_TOWARDS = np.array([-0.25, -0.86, 0.44]) / np.linalg.norm([0.25, 0.86, 0.44])
+_TOWARD = np.array([-0.25, -0.86, 0.44]) / np.linalg.norm([0.25, 0.86, 0.44])
 #: Pixels to which shadows of hidden crowns are refined where trunks are seen.
 _SHADOWS = 10.0
 #: Mean of a picture that is well exposed, of its display values.
-_GREY = 0.34
+_GRAY = 0.34
 #: Pixels of a sheet at most: what fits into the size of a picture of the documentation.
 _LARGEST_SHEET = (1500, 1800)
 #: Strength of the sky: bright haze, which opens the shade under crowns.
 _SKY = 0.9
-#: Height of the breast, metres, where foresters measure girth.
+#: Height of the breast, meters, where foresters measure girth.
 _BREAST = 1.3
 #: Species that stand among others, and how much so: the boughs of a spruce that stands free hide its foot.
 _AMONG_OTHERS = {"spruce": 0.7}
-#: Weight of how much a leaf faces the camera and the sky, in metres that it stands out.
+#: Weight of how much a leaf faces the camera and the sky, in meters that it stands out.
 _FACING = 1.2
 
 
@@ -71,11 +71,11 @@ class Subject:
         from tetflora_addon.growth.axes import axes
         from tetflora_addon.growth.growth import WholeBranches, trunks
         from tetflora_addon.leaves.needles import Needles
-        from tetflora_addon.species import catalogue
+        from tetflora_addon.species import catalog
         from tetflora_addon.species.habit import with_habit
 
         habit = _AMONG_OTHERS.get(identifier, 0.0)
-        species = replace(catalogue.load_species(identifier), habit=habit)
+        species = replace(catalog.load_species(identifier), habit=habit)
         self.planted = among_others(bpy.context.scene, identifier, habit) if habit else identifier
         self.identifier, self.crown = identifier, crown_of(with_habit(species, habit))
         flora = compile_species([species])
@@ -84,17 +84,17 @@ class Subject:
         # Of a shoot full of needles, some of these are looked at.
         part = 0.5 if isinstance(flora.forms[0][0][0].shape, Needles) else 1.0
         self.size = part * max(o.leaf_size.mean for o in species.orders if o.leaves.mean > 0)
-        self.leaf = face_on_leaf(flora, identifier, _TOWARDS, highest=0.35)
+        self.leaf = face_on_leaf(flora, identifier, _TOWARD, highest=0.35)
         self._plant()
 
     def leaf_view(self) -> None:
         """A leaf that fills a third of the picture."""
-        self._aim(self.leaf, self.leaf + _TOWARDS * max(4.6 * self.size, 0.2), 55.0, blur=11.0)
+        self._aim(self.leaf, self.leaf + _TOWARD * max(4.6 * self.size, 0.2), 55.0, blur=11.0)
 
     def twig_view(self) -> None:
         """A twig with its leaves."""
         away = float(np.clip(11.0 * self.size, 0.7, 1.6))
-        self._aim(self.leaf - 0.1 * away * _TOWARDS, self.leaf + _TOWARDS * away, 50.0, blur=8.0)
+        self._aim(self.leaf - 0.1 * away * _TOWARD, self.leaf + _TOWARD * away, 50.0, blur=8.0)
 
     def bark_view(self) -> None:
         """The trunk at the height of the breast; its bark fills most of the picture."""
@@ -122,7 +122,7 @@ class Subject:
         return {name: getattr(self, f"{name}_view") for name in ("leaf", "twig", "bark", "foot", "crown")}
 
     def _trunk(self, height: float) -> tuple[NDArray[np.float64], float]:
-        """Middle (3,) and radius of the trunk at a height, metres."""
+        """Middle (3,) and radius of the trunk at a height, meters."""
         from tetflora_addon.growth.growth import radius_at
 
         whole, flora = self.stem
@@ -134,7 +134,7 @@ class Subject:
     def _plant(self) -> None:
         from tetflora_addon.blender.placing import first_forest
         from tetflora_addon.blender.placing.cover import cover_steps
-        from tetflora_addon.blender.worker import at_once
+        from tetflora_addon.blender.worker import run_to_end
 
         scene = bpy.context.scene
         number = np.arange(_AROUND + 1)
@@ -153,7 +153,7 @@ class Subject:
         background.inputs["Strength"].default_value = _SKY
         bpy.context.view_layer.update()
         steps = cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[ground])
-        at_once(steps)
+        run_to_end(steps)
 
     def _aim(
         self, target: NDArray[np.float64], eye: NDArray[np.float64], lens: float, blur: float | None = None
@@ -170,7 +170,7 @@ class Subject:
 
 
 def face_on_leaf(
-    flora: Flora, identifier: str, towards: NDArray[np.float64], lowest: float = 0.0, highest: float = 0.4
+    flora: Flora, identifier: str, toward: NDArray[np.float64], lowest: float = 0.0, highest: float = 0.4
 ) -> NDArray[np.float64]:
     """Middle (3,) of a leaf of the plant of seed 1 that stands out toward the camera and faces it and the sky.
 
@@ -179,10 +179,10 @@ def face_on_leaf(
     flora : Flora
         Of that species alone.
     identifier : str
-    towards : (3,) float64
+    toward : (3,) float64
         Direction from the leaf to the camera.
     lowest : float
-        Metres above the ground at least.
+        Meters above the ground at least.
     highest : float
         Fraction of all leaves among which it is, from below.
     """
@@ -200,9 +200,9 @@ def face_on_leaf(
             normal = np.linalg.eigh(np.einsum("nci,ncj->nij", off, off))[1][:, :, 0]
             normal *= np.sign(normal[:, 2:])
             middles.append(middle)
-            facings.append(normal @ (towards + [0.0, 0.0, 0.35]))
+            facings.append(normal @ (toward + [0.0, 0.0, 0.35]))
     middle, facing = np.concatenate(middles), np.concatenate(facings)
-    out = middle @ (towards * [1.0, 1.0, 0.0])
+    out = middle @ (toward * [1.0, 1.0, 0.0])
     low = (middle[:, 2] > lowest) & (middle[:, 2] < np.quantile(middle[:, 2], highest))
     return middle[np.where(low, out + _FACING * facing, -np.inf).argmax()]
 
@@ -219,9 +219,9 @@ def among_others(scene: bpy.types.Scene, species: str, habit: float) -> str:
 
 
 def render(
-    path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, grey: float = _GREY, beyond: float = 0.0
+    path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, gray: float = _GRAY, beyond: float = 0.0
 ) -> None:
-    """Refine for the camera and render; ``grey`` is the mean that the exposure aims at.
+    """Refine for the camera and render; ``gray`` is the mean that the exposure aims at.
 
     What is beyond the border by a fraction of the picture is as fine as the rest, where plants stand close to the eye.
     """
@@ -242,16 +242,16 @@ def render(
     set_format(scene.render.image_settings, 'PNG')
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    scene.view_settings.exposure += _metered(path, grey)
+    scene.view_settings.exposure += _metered(path, gray)
     bpy.data.images["Render Result"].save_render(str(path), scene=scene)
 
 
-def _metered(path: Path, grey: float) -> float:
+def _metered(path: Path, gray: float) -> float:
     """Stops by which a picture is too dark, as a camera meters: views in shade are longer exposed than in the sun."""
     from PIL import Image
 
     mean = np.asarray(Image.open(path).convert("L")).mean() / 255.0
-    return float(np.clip(2.0 * np.log2(grey / max(mean, 1e-3)), -0.7, 2.0))
+    return float(np.clip(2.0 * np.log2(gray / max(mean, 1e-3)), -0.7, 2.0))
 
 
 def render_views(

@@ -17,12 +17,12 @@ from tetflora_addon.blender.scene.plants import read_plants
 from . import landscape, row80
 
 FRAMES, RATE = 96, 24
-#: Metres a second that somebody walks.
+#: Meters a second that somebody walks.
 SPEED = 1.4
 SCENES = ("row80", "landscape")
-#: Height of the eye over the ground in the landscape, and how far ahead it looks, metres.
+#: Height of the eye over the ground in the landscape, and how far ahead it looks, meters.
 _EYE, _AHEAD = 1.7, 60.0
-#: In the landscape the walk begins so many metres from its near border, at most so many aside of its middle.
+#: In the landscape the walk begins so many meters from its near border, at most so many aside of its middle.
 _BEGIN, _ASIDE = 60.0, 60.0
 
 
@@ -63,7 +63,7 @@ def build(scene: bpy.types.Scene, frames: int = FRAMES, of: str = "row80") -> No
 
 
 def _ground(scene: bpy.types.Scene, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Heights (n,) of the scene's ground at places (n, 2), metres; it lies where its mesh does."""
+    """Heights (n,) of the scene's ground at places (n, 2), meters; it lies where its mesh does."""
     ground = next(o for o in scene.objects if o.tetflora.is_occluder)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     down = Vector((0.0, 0.0, -1.0))

@@ -41,7 +41,7 @@ SEEDS = {
     "beech": 2.0,
     "hazel": 1.0,
 }
-#: Sides of the stand and of the land, and how high the land rolls, metres.
+#: Sides of the stand and of the land, and how high the land rolls, meters.
 _SIDE, _LAND, _ROLL = 100.0, 340.0, 1.4
 _EYE, _AHEAD, _LENS = (-22.0, -112.0, 15.0), (0.0, 0.0, 9.0), 34.0
 _SUN = (36.0, 238.0)
@@ -53,7 +53,7 @@ def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
     """Fill an empty scene; the stand."""
     from tetflora_addon.blender.placing.cover import cover_steps
     from tetflora_addon.blender.stands.growing import new_stand_steps
-    from tetflora_addon.blender.worker import at_once
+    from tetflora_addon.blender.worker import run_to_end
 
     from .haze import add_haze
 
@@ -65,11 +65,11 @@ def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
     stand.years, stand.density, stand.recruits, stand.seed = years, 0.0, 500.0, 3
     for species, share in SEEDS.items():
         entry = stand.species.add()
-        entry.species, entry.planted, entry.rain = species, 0.0, share
+        entry.species, entry.planted, entry.incoming_seeds = species, 0.0, share
     bpy.context.view_layer.update()
-    grown = at_once(new_stand_steps(scene, bpy.context.evaluated_depsgraph_get(), [plot]))
+    grown = run_to_end(new_stand_steps(scene, bpy.context.evaluated_depsgraph_get(), [plot]))
     print(f"{grown.plants:,} plants after {grown.years} years, {grown.records:,} records", flush=True)
-    at_once(cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[land]))
+    run_to_end(cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[land]))
     stage.camera(scene, _EYE, _AHEAD, lens=_LENS, far=2000.0)
     scene.tetflora.hidden = _HIDDEN
     stage.sun(scene, _SUN[0], _SUN[1] - 180.0)

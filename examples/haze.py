@@ -13,7 +13,7 @@ import numpy as np
 
 from tetflora_addon.blender import compat
 
-#: How far the box reaches beyond the land to all sides, and above it, metres.
+#: How far the box reaches beyond the land to all sides, and above it, meters.
 _BESIDE, _ABOVE = 300.0, 90.0
 
 

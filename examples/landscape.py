@@ -36,7 +36,7 @@ SPECIES = {
     "rowan": 0.003,
 }
 _SCALE = 0.1
-_ACROSS = 420.0  # metres that the paper's number of plants takes along each side
+_ACROSS = 420.0  # meters that the paper's number of plants takes along each side
 _ROW, _COLUMN = 96, 120  # of the elevation model, where the land begins that the camera sees first
 
 

@@ -33,7 +33,7 @@ PLANTS = 1_000_000
 #: Relative numbers of species in the valleys and on the heights.
 VALLEYS = {"broadleaf_tree": 0.3, "oak": 0.1, "maple": 0.15, "birch": 0.1, "aspen": 0.1, "bush": 0.25}
 HEIGHTS = {"spruce": 0.45, "conifer": 0.3, "birch": 0.1, "bush": 0.15}
-#: Square metres for each plant.
+#: Square meters for each plant.
 _ROOM = 22.0
 _CORNER, _SCALE = (80, 100), 0.5
 EXTINCTION, AIRLIGHT = 0.00012, (0.50, 0.60, 0.75)

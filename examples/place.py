@@ -26,7 +26,7 @@ from . import stage
 from .close_ups import render
 from .seasons import LOOKS, sky
 
-#: South-western corner in UTM zone 32, and side of the land, metres.
+#: South-western corner in UTM zone 32, and side of the land, meters.
 EAST, NORTH, SIDE = 500_000.0, 5_316_000.0, 400.0
 _STEP = 4.0
 _LAKE, _WOOD = (255.0, 190.0), (110.0, 275.0)
@@ -34,7 +34,7 @@ _SUN = (34.0, 245.0)
 
 
 def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Altitude at places from the corner, metres: a valley that rises to the north, with a hollow for the lake."""
+    """Altitude at places from the corner, meters: a valley that rises to the north, with a hollow for the lake."""
     valley = 430.0 + 26.0 * (y / SIDE) ** 2 + 9.0 * np.cos(x / 70.0) + 3.0 * np.sin(x / 31.0 + y / 43.0)
     away = np.hypot(x - _LAKE[0], (y - _LAKE[1]) * 1.3)
     return valley - 7.0 * np.exp(-((away / 45.0) ** 2))
@@ -91,7 +91,7 @@ def _canopy(x: NDArray, y: NDArray, rng: np.random.Generator) -> NDArray[np.floa
 
 def _map() -> str:
     """Lake, wood, road and houses, as longitude and latitude."""
-    from tetflora_addon.places.projection import System, to_degrees
+    from tetflora_addon.geodata.projection import System, to_degrees
 
     def degrees(points: NDArray[np.float64]) -> list[list[float]]:
         return to_degrees(System(25832), points + [EAST, NORTH]).round(9).tolist()

@@ -114,13 +114,13 @@ def displayed(light: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def compare(image: Path, reference: Path, mask: Path) -> dict[str, float]:
-    """FLIP where plants are and of the whole image, and the difference of the mean colour where plants are."""
+    """FLIP where plants are and of the whole image, and the difference of the mean color where plants are."""
     seen = images.read_picture(mask)[:, :, 0] > LEAST_COVERAGE
     a, b = stored(reference), stored(image)
     if a.shape != b.shape:
         raise SystemExit(f"{image} has {b.shape[1]} × {b.shape[0]} pixels, its reference {a.shape[1]} × {a.shape[0]}")
     error = images.flip_map(a, b)
-    found = {"flip": error[seen].mean(), "flip_all": error.mean(), "colour": images.colour_error(a, b, seen)}
+    found = {"flip": error[seen].mean(), "flip_all": error.mean(), "color": images.color_error(a, b, seen)}
     return {key: round(float(value), 5) for key, value in found.items()}
 
 
@@ -128,9 +128,9 @@ def _write_mask(path: Path, cover: NDArray[np.float32]) -> None:
     height, width = cover.shape
     image = bpy.data.images.new("mask", width, height)
     image.colorspace_settings.name = "Non-Color"
-    grey = np.repeat(cover[::-1, :, None], 4, axis=2).clip(0.0, 1.0)
-    grey[..., 3] = 1.0
-    image.pixels.foreach_set(grey.ravel())
+    gray = np.repeat(cover[::-1, :, None], 4, axis=2).clip(0.0, 1.0)
+    gray[..., 3] = 1.0
+    image.pixels.foreach_set(gray.ravel())
     image.filepath_raw, image.file_format = str(path), 'PNG'
     image.save()
     bpy.data.images.remove(image)

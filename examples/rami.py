@@ -143,7 +143,7 @@ def _fill(mesh: bpy.types.Mesh, corners: NDArray[np.float32], faces: NDArray[np.
 
 
 def lambertian(name: str, reflectance: float, transmittance: float = 0.0) -> bpy.types.Material:
-    """A grey surface that scatters so much evenly to the side of the light and so much to the other."""
+    """A gray surface that scatters so much evenly to the side of the light and so much to the other."""
     made = bpy.data.materials.get(name) or bpy.data.materials.new(name)
     tree = shader_tree(made)
     tree.nodes.clear()
@@ -197,11 +197,11 @@ def set_view(scene: bpy.types.Scene, stand: Canopy, zenith: float, pixels: int) 
     """
     camera, render = scene.camera, scene.render
     angle = radians(zenith)
-    towards = Vector((-sin(angle), 0.0, cos(angle)))
-    camera.location = Vector((0.0, 0.0, stand.top)) + _FAR * towards
+    toward = Vector((-sin(angle), 0.0, cos(angle)))
+    camera.location = Vector((0.0, 0.0, stand.top)) + _FAR * toward
     # The image's horizontal is y, so that its vertical lies in the principal plane.
     across = Vector((0.0, 1.0, 0.0))
-    camera.rotation_euler = Matrix((across, towards.cross(across), towards)).transposed().to_euler()
+    camera.rotation_euler = Matrix((across, toward.cross(across), toward)).transposed().to_euler()
     camera.data.type, camera.data.sensor_fit = 'ORTHO', 'HORIZONTAL'
     camera.data.ortho_scale = stand.side
     camera.data.clip_start, camera.data.clip_end = 1.0, 2 * _FAR

@@ -23,9 +23,9 @@ DATA = Path(__file__).resolve().parent / "data" / "rami.json"
 CURVES = ("HET01", "HET04", "HET06")
 COVERS = ("HOM23", "HOM33", "HOM26", "HET10", "HET20")
 CORNERS = 8
-#: Side of HET06, metres: the data gives the size of one tree under this name, the definition says 500.
+#: Side of HET06, meters: the data gives the size of one tree under this name, the definition says 500.
 _HET06_SIDE = 500.0
-#: Side of the scenes that are seen from above only, and radius of the discs of layers, metres.
+#: Side of the scenes that are seen from above only, and radius of the discs of layers, meters.
 _LAYER_SIDE = 10.0
 _LAYER_DISC = 0.05
 #: Places that are tried for a crown.
@@ -41,15 +41,15 @@ class Solid:
     shape : str
         ``sphere`` (around the origin), ``cylinder``, ``cone`` or ``box``; these stand on z = 0.
     radius, height : float
-        Metres; half of the side of a box.
+        Meters; half of the side of a box.
     discs : int
     disc_radius : float
-        Metres.
+        Meters.
     reflectance, transmittance : float
     inclination : str
         ``spherical``, ``planophile`` or ``erectophile``.
     trunk : tuple of float
-        Height, radius (metres) and reflectance of a cylinder below; empty without.
+        Height, radius (meters) and reflectance of a cylinder below; empty without.
     apart : bool
         No disc cuts another: so in RAMI's own files. What Eradiate draws itself, HET06, is independent.
     """
@@ -67,12 +67,12 @@ class Solid:
 
     @property
     def leaf_area(self) -> float:
-        """One side of all discs, square metres."""
+        """One side of all discs, square meters."""
         return self.discs * pi * self.disc_radius**2
 
     @property
     def across(self) -> float:
-        """Width, metres."""
+        """Width, meters."""
         return 2 * self.radius
 
 
@@ -84,7 +84,7 @@ class Canopy:
     ----------
     name : str
     side, top : float
-        Of the square target around the origin, and the height that it is at, metres.
+        Of the square target around the origin, and the height that it is at, meters.
     ground : float
         Reflectance.
     sun_zenith : float
@@ -93,7 +93,7 @@ class Canopy:
         Copies on each side that a view at 75 degrees and a few scatterings reach; 0 for open borders.
     solids : dict of str to Solid
     places : dict of str to (n, 3)
-        Origins of the crowns of each kind, metres.
+        Origins of the crowns of each kind, meters.
     """
 
     name: str
@@ -168,14 +168,14 @@ def canopy(name: str, seed: int = 0) -> Canopy:
     if name == "HET01":
         crown = given["crown"]
         solid = _solid("sphere", crown, radius=crown["radius_m"])
-        return Canopy(name, 100.0, 30.0, ground, sun, 4, {"crown": solid}, {"crown": np.array(given["centres_m"])})
+        return Canopy(name, 100.0, 30.0, ground, sun, 4, {"crown": solid}, {"crown": np.array(given["centers_m"])})
     if name == "HET04":
         spheres, cylinders = given["spheres"], given["cylinders"]
         solids = {
             "sphere": _solid("sphere", spheres, radius=spheres["radius_m"]),
             "cylinder": _solid("cylinder", cylinders, cylinders["radius_m"], cylinders["height_m"]),
         }
-        heights = {"sphere": spheres["centre_z_m"], "cylinder": cylinders["base_z_m"]}
+        heights = {"sphere": spheres["center_z_m"], "cylinder": cylinders["base_z_m"]}
         numbers = {"sphere": spheres["count"], "cylinder": cylinders["count"]}
         places = _scattered(solids, numbers, heights, given["x_y_range_m"], seed)
         return Canopy(name, 270.0, 15.0, ground, sun, 1, solids, places)
@@ -240,27 +240,27 @@ def _scattered(
 
 
 def discs(solid: Solid, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres (n, 3), metres, evenly in the solid, and unit normals (n, 3) of its discs.
+    """Centers (n, 3), meters, evenly in the solid, and unit normals (n, 3) of its discs.
 
     Where they do not cut each other they hide less of each other: a crown of HET01 covers .877 instead of .874.
     """
     random = np.random.default_rng(seed)
-    centres, normals = _drawn(random, solid, solid.discs)
+    centers, normals = _drawn(random, solid, solid.discs)
     while solid.apart:
-        again = np.unique(intersecting(centres, normals, solid.disc_radius)[1])
+        again = np.unique(intersecting(centers, normals, solid.disc_radius)[1])
         if not len(again):
             break
-        centres[again], normals[again] = _drawn(random, solid, len(again))
-    return centres, normals
+        centers[again], normals[again] = _drawn(random, solid, len(again))
+    return centers, normals
 
 
 def _drawn(random: np.random.Generator, solid: Solid, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Independent ones."""
     normals = _directions(random, n, solid.inclination)
     if solid.shape == "sphere":
-        centres = _directions(random, n, "spherical") * (solid.radius * np.cbrt(random.random(n)))[:, None]
-        centres[:, 2] *= random.choice((-1.0, 1.0), n)
-        return centres, normals
+        centers = _directions(random, n, "spherical") * (solid.radius * np.cbrt(random.random(n)))[:, None]
+        centers[:, 2] *= random.choice((-1.0, 1.0), n)
+        return centers, normals
     if solid.shape == "box":
         plane = random.uniform(-solid.radius, solid.radius, (n, 2))
         return np.column_stack([plane, random.random(n) * solid.height]), normals
@@ -273,13 +273,13 @@ def _drawn(random: np.random.Generator, solid: Solid, n: int) -> tuple[NDArray[n
 
 
 def intersecting(
-    centres: NDArray[np.float64], normals: NDArray[np.float64], radius: float
+    centers: NDArray[np.float64], normals: NDArray[np.float64], radius: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs (p,), (p,) of discs of one radius that cut each other.
 
     Two discs do if they reach over the line in which their planes meet, and the chords of that line overlap.
     """
-    cells = np.floor((centres - centres.min(axis=0)) / (2 * radius)).astype(np.int64) + 1
+    cells = np.floor((centers - centers.min(axis=0)) / (2 * radius)).astype(np.int64) + 1
     size = cells.max(axis=0) + 2
     weights = np.array([size[1] * size[2], size[2], 1])
     key = cells @ weights
@@ -296,14 +296,14 @@ def intersecting(
         firsts.append(first[kept])
         seconds.append(second[kept])
     a, b = np.concatenate(firsts), np.concatenate(seconds)
-    between = centres[b] - centres[a]
+    between = centers[b] - centers[a]
     near = (between**2).sum(axis=1) < 4 * radius**2
     a, b, between = a[near], b[near], between[near]
     line = np.cross(normals[a], normals[b])
     squared = (line**2).sum(axis=1)
     cosine = (normals[a] * normals[b]).sum(axis=1)
     sine = np.sqrt(np.maximum(squared, 1e-12))
-    # Distance from each centre to the line, in its own plane, and where along the line it is nearest.
+    # Distance from each center to the line, in its own plane, and where along the line it is nearest.
     away_a = np.abs((between * normals[b]).sum(axis=1)) / sine
     away_b = np.abs((between * normals[a]).sum(axis=1)) / sine
     apart = np.abs((between * line).sum(axis=1)) / sine
@@ -325,7 +325,7 @@ def _directions(random: np.random.Generator, n: int, inclination: str) -> NDArra
     return np.column_stack([sine * np.cos(turn), sine * np.sin(turn), cosine])
 
 
-def polygons(centres: NDArray[np.float64], normals: NDArray[np.float64], radius: float) -> NDArray[np.float32]:
+def polygons(centers: NDArray[np.float64], normals: NDArray[np.float64], radius: float) -> NDArray[np.float32]:
     """Corners (n, `CORNERS`, 3) of regular polygons that have the area of the discs."""
     helper = np.where(np.abs(normals[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
     first = np.cross(normals, helper)
@@ -334,7 +334,7 @@ def polygons(centres: NDArray[np.float64], normals: NDArray[np.float64], radius:
     reach = radius * sqrt(2 * pi / (CORNERS * sin(2 * pi / CORNERS)))
     turn = np.arange(CORNERS) * (2 * pi / CORNERS)
     around = np.cos(turn)[:, None] * first[:, None] + np.sin(turn)[:, None] * second[:, None]
-    return (centres[:, None] + reach * around).astype(np.float32)
+    return (centers[:, None] + reach * around).astype(np.float32)
 
 
 def extinction(inclination: str) -> float:

@@ -41,14 +41,14 @@ def species_data(name: str, solid: Solid) -> dict:
         "leaf_inclination": solid.inclination,
         "leaf_light": 0,
         "leaf_start": 0,
-        "leaf_colour": [[albedo] * 3, [0, 0, 0]],
-        "branch_colour": [[_BARK] * 3, [0, 0, 0]],
+        "leaf_color": [[albedo] * 3, [0, 0, 0]],
+        "branch_color": [[_BARK] * 3, [0, 0, 0]],
     }
     orders = [order]
     if solid.trunk:
         height, radius, reflectance = solid.trunk
-        colour = [[reflectance] * 3, [0, 0, 0]]
-        trunk = {"length": height, "thickness": radius / height, "taper": 1, "sides": 16, "branch_colour": colour}
+        color = [[reflectance] * 3, [0, 0, 0]]
+        trunk = {"length": height, "thickness": radius / height, "taper": 1, "sides": 16, "branch_color": color}
         trunk |= {"branches": 1, "branch_start": 0.99}
         orders = [trunk, order | {"length": solid.height / height, "azimuth": [0, 0]}]
     return {
@@ -115,7 +115,7 @@ def make_lambertian() -> None:
     for material in bpy.data.materials:
         if material.name.startswith("TetFlora ") and material.name.endswith((" leaf", " bark")):
             graph = Graph(shader_tree(material))
-            looks = {"Colour": graph.attribute("tf_colour", "Color")}
+            looks = {"Color": graph.attribute("tf_color", "Color")}
             if material.name.endswith(" leaf"):
                 looks["Transmission"] = graph.attribute("tf_transmission", "Fac")
             looks["Normal"] = graph.node("ShaderNodeNewGeometry").outputs["Normal"]

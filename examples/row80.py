@@ -27,7 +27,7 @@ def build(scene: bpy.types.Scene, count: int = COUNT, species: str = "broadleaf_
     count : int
         Number of plants.
     species : str
-        Identifier in the catalogue.
+        Identifier in the catalog.
     """
     ground = Terrain(corner=CORNER, shape=(72, 18), scale=0.1)
     ground.add_object(scene, "Ground", spacing=5.0)

@@ -52,7 +52,7 @@ class Look:
         Fraction of the sky.
     haze : tuple of float and Rgb
         Extinction, 1/m, and airlight.
-    grey : float
+    gray : float
         Mean that the exposure aims at.
     """
 
@@ -65,7 +65,7 @@ class Look:
     strength: float
     clouds: float
     haze: tuple[float, Rgb]
-    grey: float
+    gray: float
 
 
 LOOKS = {
@@ -86,7 +86,7 @@ LOOKS = {
         ((0.88, 0.86, 0.84), (0.36, 0.53, 0.82), (0.08, 0.22, 0.50)), 0.8, 0.5, (0.0009, (0.66, 0.68, 0.72)), 0.44,
     ),
 }  # fmt: skip
-#: Sides of the land, metres, and of its part around the eye, of which every blade is planted.
+#: Sides of the land, meters, and of its part around the eye, of which every blade is planted.
 _LAND, _NEAR = 640.0, 130.0
 _EYE, _AHEAD, _LENS = (-9.0, -33.0, 2.0), (2.5, 12.0, 5.6), 31.0
 #: Trees of the hill and along its edge, with relative numbers; trees by themselves: species, seed, place, size, age.
@@ -107,21 +107,21 @@ _CHERRY_LEAVES = {
     "leaves": [9, 2],
     "leaf_size": [0.1, 0.02],
     "leaf_start": 0.15,
-    "leaf_colour": [[0.07, 0.115, 0.025], [0.015, 0.02, 0.006]],
-    "leaf_colour_tip": [0.085, 0.135, 0.03],
+    "leaf_color": [[0.07, 0.115, 0.025], [0.015, 0.02, 0.006]],
+    "leaf_color_tip": [0.085, 0.135, 0.03],
 }
 _WOOD, _MARGIN = "wood", "edge"
 
 
 def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of the land, metres: a meadow in a shallow dip, and a hill behind it."""
+    """Of the land, meters: a meadow in a shallow dip, and a hill behind it."""
     waves = 0.8 * np.sin(0.024 * x + 0.5) * np.cos(0.03 * y) + 0.12 * np.sin(0.14 * x - 0.11 * y)
     far = np.clip((y - 35.0 + 0.12 * x) / 300.0, 0.0, 1.0)
     return waves + 58.0 * far**1.35 * (1.0 + 0.28 * np.sin(0.011 * x + 0.6)) + 0.0008 * np.maximum(-y, 0.0) ** 2
 
 
 def wooded(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Metres behind the edge of the wood, which waves."""
+    """Meters behind the edge of the wood, which waves."""
     return y - (44.0 + 9.0 * np.sin(0.035 * x + 2.2) + 4.0 * np.sin(0.1 * x) - 0.10 * x)
 
 
@@ -151,7 +151,7 @@ def dress(scene: bpy.types.Scene, look: Look) -> None:
 
 
 def _add_cherry(scene: bpy.types.Scene) -> None:
-    """Give the file a cherry with the leaves of summer: those of the catalogue's are as few as when it blossoms."""
+    """Give the file a cherry with the leaves of summer: those of the catalog's are as few as when it blossoms."""
     from tetflora_addon.blender.species.edits import species_data, store_species
 
     page = species_data(scene, "cherry_blossom")
@@ -174,7 +174,7 @@ def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Objec
 def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     """Plant the hill and its edge on a ground, and cover all of it."""
     from tetflora_addon.blender.placing import cover, populations
-    from tetflora_addon.blender.worker import at_once
+    from tetflora_addon.blender.worker import run_to_end
 
     for mask, mix, apart, density, sizes, habit in (
         (_WOOD, _HILL, 3.2, 480.0, (0.6, 1.15), 0.35),
@@ -187,10 +187,10 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
         some.vertex_group, some.min_distance = mask, apart
         some.by_density, some.density = True, density
         some.scale_min, some.scale_max, some.seed = *sizes, 3
-        at_once(populations.make_plants_steps(scene, bpy.context.evaluated_depsgraph_get(), some))
+        run_to_end(populations.make_plants_steps(scene, bpy.context.evaluated_depsgraph_get(), some))
         bpy.context.view_layer.update()
     steps = cover.cover_steps(scene, bpy.context.evaluated_depsgraph_get(), some, masks={"vertex_group": ""})
-    at_once(steps)
+    run_to_end(steps)
 
 
 def _air(scene: bpy.types.Scene, look: Look) -> None:
@@ -206,7 +206,7 @@ def _air(scene: bpy.types.Scene, look: Look) -> None:
 
 
 def sky(look: Look) -> bpy.types.World:
-    """Three colours from the horizon to the zenith, with clouds; seen less bright than its light, as on film."""
+    """Three colors from the horizon to the zenith, with clouds; seen less bright than its light, as on film."""
     from tetflora_addon.blender.compat import shader_tree
 
     world = bpy.data.worlds.new("Sky")
@@ -216,8 +216,8 @@ def sky(look: Look) -> bpy.types.World:
     place, split, ramp = new("ShaderNodeTexCoord"), new("ShaderNodeSeparateXYZ"), new("ShaderNodeValToRGB")
     stops = ramp.color_ramp.elements
     stops.new(0.5)
-    for element, position, colour in zip(stops, (0.0, 0.16, 0.75), look.sky, strict=True):
-        element.position, element.color = position, (*colour, 1.0)
+    for element, position, color in zip(stops, (0.0, 0.16, 0.75), look.sky, strict=True):
+        element.position, element.color = position, (*color, 1.0)
     link(place.outputs["Generated"], split.inputs[0])
     link(split.outputs["Z"], ramp.inputs[0])
     background, output = new("ShaderNodeBackground"), new("ShaderNodeOutputWorld")
@@ -271,7 +271,7 @@ def render_seasons(
     for name in only:
         dress(bpy.context.scene, LOOKS[name])
         made.append(folder / f"{name}.png")
-        render(made[-1], size, samples, grey=LOOKS[name].grey)
+        render(made[-1], size, samples, gray=LOOKS[name].gray)
     return made
 
 

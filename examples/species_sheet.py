@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images of the catalogue (the paper's figure 4), and of one plant of which order after order is opened."""
+"""Images of the catalog (the paper's figure 4), and of one plant of which order after order is opened."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from tetflora_addon.blender.job import contents, plant_mesh
 from tetflora_addon.blender.materials import materials
 from tetflora_addon.blender.results import leaf_objects, meshes
 from tetflora_addon.growth import growth
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import microsurfaces
-from tetflora_addon.proxies.drawn import facet_mesh
-from tetflora_addon.species import catalogue
+from tetflora_addon.proxies.primitives import facet_mesh
+from tetflora_addon.species import catalog
 from tetflora_addon.subplants import leaf_meshes, tubes
 from tetflora_addon.subplants.pieces import open_branches
 
@@ -26,7 +26,7 @@ from .studio import render_cells, save_sheet
 
 COLUMNS, WIDTH, HEIGHT = 8, 240, 290
 SEED = 11
-#: The plant that is opened, and how wide one facet of its deferred parts is, metres.
+#: The plant that is opened, and how wide one facet of its deferred parts is, meters.
 OPENED, FACET = "beech", 0.3
 
 
@@ -46,7 +46,7 @@ def species_cell(
         empty = stage.plant(scene, identifier, seed, (0.0, 0.0, 0.0))
         bpy.context.view_layer.update()
         steps = plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty])
-        (plant,) = at_once(steps)
+        (plant,) = run_to_end(steps)
         polygons[identifier] = len(plant.data.polygons)
         return _points(plant.data), f"{name}\n{polygons[identifier]:,} polygons"
 
@@ -84,7 +84,7 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
 
 
 def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | None = None) -> dict[str, int]:
-    """Render one plant of each species of the catalogue, as a JPEG.
+    """Render one plant of each species of the catalog, as a JPEG.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | Non
     dict of str to int
         Polygons of each plant.
     """
-    known = catalogue.list_species()
+    known = catalog.list_species()
     polygons: dict[str, int] = {}
     cells = [species_cell(one, known[one].name, polygons) for one in (identifiers or known)]
     save_sheet(render_cells(cells, WIDTH, HEIGHT, samples), COLUMNS, path)
@@ -107,6 +107,6 @@ def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | Non
 
 def render_opening(path: Path, samples: int = 32) -> None:
     """Render one plant with none of its orders opened, one, and so on to all, as a JPEG."""
-    orders = len(catalogue.load_species(OPENED).orders)
+    orders = len(catalog.load_species(OPENED).orders)
     cells = [opened_cell(OPENED, number) for number in range(orders + 1)]
     save_sheet(render_cells(cells, 380, 400, samples), len(cells), path)

@@ -17,7 +17,7 @@ from tetflora_addon.blender import compat
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission import plants
 from tetflora_addon.growth import seeds
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 from . import stage
 
@@ -25,7 +25,7 @@ SPECIES = ("oak", "birch", "spruce", "aspen")
 #: Directions of the sun's light as its azimuth over the direction of view, degrees: 0 shines over the viewer's
 #: shoulder. None: nothing but an even sky.
 LIGHTS: dict[str, float | None] = {"front": 25.0, "side": 95.0, "back": 170.0, "overcast": None}
-#: Height that every plant is scaled to, metres.
+#: Height that every plant is scaled to, meters.
 HEIGHT = 12.0
 _ELEVATION = 40.0
 _FIELD_OF_VIEW = radians(30.0)
@@ -76,8 +76,8 @@ def build(scene: bpy.types.Scene, pixels: int, light: str, each: int, species: t
 
 
 def _height(identifier: str) -> float:
-    """Height of a plant of a species, metres."""
-    flora = compile_species([catalogue.load_species(identifier)])
+    """Height of a plant of a species, meters."""
+    flora = compile_species([catalog.load_species(identifier)])
     one = seeds.Seeds(
         (identifier,), np.zeros(1, np.int32), np.zeros(1, np.int64), np.zeros((1, 3)), np.eye(3)[None], np.ones(1)
     )

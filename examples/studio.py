@@ -30,7 +30,7 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
     Parameters
     ----------
     points : (n, 3) float
-        Of the plant that stands at the origin, metres.
+        Of the plant that stands at the origin, meters.
     title : str
     aspect : float
         Width of the image over its height.
@@ -84,7 +84,7 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
     text.materials.append(ink)
     scene.collection.objects.link(label)
     stage.daylight(scene, elevation=48.0, azimuth=180.0 - _SUN)
-    # The light of a clouded sky around the sun: coloured shadows would colour the plants.
+    # The light of a clouded sky around the sun: colored shadows would color the plants.
     background = next(n for n in scene.world.node_tree.nodes if n.type == 'BACKGROUND')
     for link in list(background.inputs["Color"].links):
         scene.world.node_tree.links.remove(link)

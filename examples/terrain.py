@@ -9,14 +9,14 @@ import numpy as np
 from matplotlib import cbook
 from numpy.typing import NDArray
 
-METRES_PER_DEGREE = 111_320.0
+METERS_PER_DEGREE = 111_320.0
 
 
 def elevation() -> tuple[NDArray[np.float64], float]:
-    """Heights in metres, north to south by west to east, and metres from one sample to the next (north to south)."""
+    """Heights in meters, north to south by west to east, and meters from one sample to the next (north to south)."""
     with cbook.get_sample_data("jacksboro_fault_dem.npz") as data:
         heights, spacing = data["elevation"], float(data["dy"])
-    return np.asarray(heights, dtype=np.float64), spacing * METRES_PER_DEGREE
+    return np.asarray(heights, dtype=np.float64), spacing * METERS_PER_DEGREE
 
 
 class Terrain:
@@ -40,7 +40,7 @@ class Terrain:
         self.step = spacing * scale
 
     def height(self, x: NDArray, y: NDArray) -> NDArray[np.float64]:
-        """Height at points, by cubic (Catmull-Rom) interpolation; x and y from 0, metres."""
+        """Height at points, by cubic (Catmull-Rom) interpolation; x and y from 0, meters."""
         rows, columns = self.heights.shape
         v, u = np.asarray(y) / self.step, np.asarray(x) / self.step
         j, i = np.floor(v).astype(int), np.floor(u).astype(int)
@@ -52,12 +52,12 @@ class Terrain:
 
     @property
     def size(self) -> tuple[float, float]:
-        """Extent along x and y, metres."""
+        """Extent along x and y, meters."""
         rows, columns = self.heights.shape
         return (columns - 1) * self.step, (rows - 1) * self.step
 
     def add_object(self, scene: bpy.types.Scene, name: str, spacing: float) -> bpy.types.Object:
-        """Add the ground as a grid mesh that hides what is behind it, with vertices about ``spacing`` metres apart."""
+        """Add the ground as a grid mesh that hides what is behind it, with vertices about ``spacing`` meters apart."""
         width, length = self.size
         nx, ny = int(width / spacing) + 1, int(length / spacing) + 1
         x, y = np.meshgrid(np.linspace(0, width, nx), np.linspace(0, length, ny))

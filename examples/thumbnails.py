@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images of the catalogue's species for menus: ``python -m examples.thumbnails [--seasons] [IDENTIFIER ...]``.
+"""Images of the catalog's species for menus: ``python -m examples.thumbnails [--seasons] [IDENTIFIER ...]``.
 
-One plant of each species in daylight, rendered by Cycles in front of a light grey, 128 × 128 pixels, into
-``tetflora_addon/catalogue/thumbnails``. Images are stored with palettes, because all of them are in the extension. With
+One plant of each species in daylight, rendered by Cycles in front of a light gray, 128 × 128 pixels, into
+``tetflora_addon/catalog/thumbnails``. Images are stored with palettes, because all of them are in the extension. With
 ``--seasons``, those of the four seasons instead, of species that look different then.
 """
 
@@ -17,14 +17,14 @@ from pathlib import Path
 from devtools import session
 from devtools.formats import set_format
 
-FOLDER = session.ROOT / "tetflora_addon" / "catalogue" / "thumbnails"
+FOLDER = session.ROOT / "tetflora_addon" / "catalog" / "thumbnails"
 SIDE, SAMPLES, SEED = 128, 96, 11
-COLOURS = 128  # of a palette
+COLORS = 128  # of a palette
 LARGEST = 12_000  # bytes
 #: Days of the seasons that have images of their own, and the least change of a plant's pixels, display values of 255.
 DAYS = {"spring": 125.0, "summer": 196.0, "autumn": 293.0, "winter": 20.0}
 CHANGED = 6.0
-BACKDROP = (199, 209, 214)  # display values of 255; conifers would not be seen on the dark grey of menus
+BACKDROP = (199, 209, 214)  # display values of 255; conifers would not be seen on the dark gray of menus
 
 
 def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> None:
@@ -33,7 +33,7 @@ def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> N
     import numpy as np
 
     from tetflora_addon.blender.job import plant_mesh
-    from tetflora_addon.jobs import at_once
+    from tetflora_addon.jobs import run_to_end
 
     from . import stage
 
@@ -42,7 +42,7 @@ def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> N
     empty = stage.plant(scene, identifier, SEED, (0.0, 0.0, 0.0))
     bpy.context.view_layer.update()
     graph = bpy.context.evaluated_depsgraph_get()
-    (plant,) = at_once(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))
+    (plant,) = run_to_end(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))
     points = np.zeros((len(plant.data.vertices), 3), np.float32)
     plant.data.vertices.foreach_get("co", points.reshape(-1))
     # A few twigs that reach far out must not make the rest small.
@@ -51,7 +51,7 @@ def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> N
     if day is not None:  # in the same frame
         bpy.data.objects.remove(plant)
         scene.tetflora.year.enabled, scene.tetflora.year.day = True, day
-        at_once(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))
+        run_to_end(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))
     middle, side = (low + high) / 2, max(float((high - low).max()), math.hypot(*(high - low)[:2])) * 1.06
     camera = stage.camera(scene, middle + side * np.array([1.2, -2.4, 0.55]), middle, (SIDE, SIDE), far=10.0 * side)
     camera.data.type, camera.data.ortho_scale = 'ORTHO', side
@@ -74,7 +74,7 @@ def _shrink(source: Path, target: Path) -> None:
     rendered = Image.open(source).convert("RGBA")
     whole = Image.new("RGBA", rendered.size, BACKDROP)
     whole.alpha_composite(rendered)
-    few = whole.convert("RGB").quantize(COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    few = whole.convert("RGB").quantize(COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     few.save(target, "PNG", optimize=True)
 
 
@@ -91,12 +91,12 @@ def _change(first: Path, second: Path) -> float:
 def main(arguments: list[str]) -> int:
     """Make the images that are asked for, or all; exit code 1 if one is too large."""
     session.start()
-    from tetflora_addon.species import catalogue
+    from tetflora_addon.species import catalog
 
-    known = catalogue.list_species()
+    known = catalog.list_species()
     wanted = [one for one in arguments if one != "--seasons"] or list(known)
     if "--seasons" in arguments:
-        years = {one: year for one in wanted if (year := catalogue.load_species(one).year) is not None}
+        years = {one: year for one in wanted if (year := catalog.load_species(one).year) is not None}
         images = [
             (one, day, f"{one}.{season}.png")
             for one, year in years.items()

@@ -15,7 +15,7 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.refinement import decisions
 
-#: Colours of the lines by decision, linear RGB, and the height at which they lie, so that the rarer are on top.
+#: Colors of the lines by decision, linear RGB, and the height at which they lie, so that the rarer are on top.
 STYLES = {
     "PROXY": ((0.95, 0.45, 0.05), 2.0, 0.3),
     "HIDDEN": ((0.35, 0.38, 0.45), 1.0, 0.25),
@@ -44,20 +44,20 @@ def render_top_view(scene: bpy.types.Scene, path: Path, width: int = 1600, sampl
     try:
         plants = read_plants(scene, depsgraph, depsgraph.view_layer)[0]
         far = np.linalg.norm(plants.position[:, :2] - camera.position[:2], axis=1).max() + 20
-        centre_line = plants.position[:, :2].mean(axis=0) - camera.position[:2]
-        centre_line /= np.linalg.norm(centre_line)
+        center_line = plants.position[:, :2].mean(axis=0) - camera.position[:2]
+        center_line /= np.linalg.norm(center_line)
         top = 500.0
-        for name, (colour, layer, thickness) in STYLES.items():
+        for name, (color, layer, thickness) in STYLES.items():
             if name == "PYRAMID":
                 lines = _pyramid(camera, far)
             else:
                 nodes = result.nodes[(result.decision == decision[name]) & result.tree.inside[result.nodes]]
                 lines = result.tree.vertices(nodes)[:, _EDGES].reshape(-1, 2, 3)[:, :, :2]
-            _add_lines(drawing, name, lines, top + layer, thickness, colour)
+            _add_lines(drawing, name, lines, top + layer, thickness, color)
         for shown in scene.objects:
             if "tetflora_kind" in shown:
                 drawing.collection.objects.link(shown)
-        _add_camera(drawing, camera.position[:2], centre_line, far, width)
+        _add_camera(drawing, camera.position[:2], center_line, far, width)
         _settings(drawing, path, samples)
         bpy.ops.render.render(write_still=True, scene=drawing.name)
     finally:
@@ -72,7 +72,7 @@ def _pyramid(camera: object, far: float) -> NDArray[np.float64]:
 
 
 def _add_lines(
-    scene: bpy.types.Scene, name: str, lines: NDArray, z: float, thickness: float, colour: tuple[float, float, float]
+    scene: bpy.types.Scene, name: str, lines: NDArray, z: float, thickness: float, color: tuple[float, float, float]
 ) -> None:
     """Lines (n, 2, 2) as flat, glowing rectangles."""
     along = lines[:, 1] - lines[:, 0]
@@ -90,7 +90,7 @@ def _add_lines(
     nodes = material.node_tree.nodes
     nodes.clear()
     glow, out = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
-    glow.inputs["Color"].default_value = (*colour, 1.0)
+    glow.inputs["Color"].default_value = (*color, 1.0)
     material.node_tree.links.new(glow.outputs[0], out.inputs["Surface"])
     mesh.materials.append(material)
     scene.collection.objects.link(bpy.data.objects.new(name, mesh))

@@ -28,21 +28,21 @@ from . import stage
 from .close_ups import among_others, face_on_leaf, render, store_sheet
 
 ROOT = Path(__file__).resolve().parent.parent
-#: Distances of the eight pictures from the leaf, metres.
+#: Distances of the eight pictures from the leaf, meters.
 DISTANCES = tuple(np.geomspace(400.0, 0.15, 8).tolist())
-#: Relative numbers of the species; how far from each other they stand at least, metres, and how many on a hectare.
+#: Relative numbers of the species; how far from each other they stand at least, meters, and how many on a hectare.
 TREES = {"beech": 0.32, "oak": 0.2, "birch": 0.14, "hornbeam": 0.12, "hazel": 0.12, "spruce": 0.06, "rowan": 0.04}
 _APART, _DENSITY = 3.4, 520.0
 #: How much the trees have grown as between others.
 _HABIT = 0.6
 #: Brightness of the sky to the camera over that of its light: on film it is not as bright as its light on leaves.
 _SEEN = 0.62
-#: Side of the land, and of the part around the oak and the eye of which every blade is planted, metres.
+#: Side of the land, and of the part around the oak and the eye of which every blade is planted, meters.
 LAND, NEAR = 800.0, 150.0
 #: Where the camera stands in the wood, and where it looks.
 _EYE, _AHEAD = (24.0, 22.0, 1.65), (38.0, 52.0, 3.6)
 #: Direction from the leaf to the camera.
-_TOWARDS = np.array([0.16, -0.98, 0.12]) / np.linalg.norm([0.16, 0.98, 0.12])
+_TOWARD = np.array([0.16, -0.98, 0.12]) / np.linalg.norm([0.16, 0.98, 0.12])
 _ELEVATION, _AZIMUTH = 38.0, 236.0
 _SKY = 0.9
 #: Mean of the picture from inside, where sunlit boles would else be white.
@@ -53,7 +53,7 @@ _MASK = "wood"
 
 
 def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of the land, metres: a meadow that waves a little, and a hill behind the wood."""
+    """Of the land, meters: a meadow that waves a little, and a hill behind the wood."""
     waves = 0.9 * np.sin(0.021 * x + 0.4) * np.cos(0.027 * y + 0.3) + 0.16 * np.sin(0.11 * x - 0.09 * y)
     hill = 46.0 * np.clip((y - 40.0) / 340.0, 0.0, 1.0) ** 1.5 * (1.0 + 0.3 * np.sin(0.012 * x + 1.2))
     return waves * np.clip(np.hypot(x, y) / 30.0, 0.15, 1.0) + hill
@@ -95,7 +95,7 @@ def grid(
     height: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
     nearest: float = -np.inf,
 ) -> tuple[bpy.types.Mesh, NDArray[np.float64], NDArray[np.float64]]:
-    """A mesh of squares with a square hole in its middle, of sides in metres, and the places x, y (n,) of its vertices.
+    """A mesh of squares with a square hole in its middle, of sides in meters, and the places x, y (n,) of its vertices.
 
     Faces in front of a ``nearest`` y are left out.
     """
@@ -123,7 +123,7 @@ def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Objec
 def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     """Plant the wood on a ground, and cover all of it."""
     from tetflora_addon.blender.placing import cover, populations
-    from tetflora_addon.blender.worker import at_once
+    from tetflora_addon.blender.worker import run_to_end
 
     depsgraph = bpy.context.evaluated_depsgraph_get()
     wood = populations.add_population(scene, [ground], name=f"{ground.name} wood")
@@ -133,10 +133,10 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     wood.vertex_group, wood.min_distance = _MASK, _APART
     wood.by_density, wood.density = True, _DENSITY
     wood.scale_min, wood.scale_max, wood.seed = 0.6, 1.15, 3
-    at_once(populations.make_plants_steps(scene, depsgraph, wood))
+    run_to_end(populations.make_plants_steps(scene, depsgraph, wood))
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    at_once(cover.cover_steps(scene, depsgraph, wood, masks={"vertex_group": ""}))
+    run_to_end(cover.cover_steps(scene, depsgraph, wood, masks={"vertex_group": ""}))
 
 
 def aim(scene: bpy.types.Scene, target: Vector, eye: Vector, lens: float) -> None:
@@ -149,10 +149,10 @@ def aim(scene: bpy.types.Scene, target: Vector, eye: Vector, lens: float) -> Non
 def leaf_of_the_oak(scene: bpy.types.Scene) -> Vector:
     """Middle of a leaf of the oak that stands out toward the camera and faces it and the sun."""
     from tetflora_addon.compiled.flora import compile_species
-    from tetflora_addon.species import catalogue
+    from tetflora_addon.species import catalog
 
-    flora = compile_species([catalogue.load_species("oak")])
-    return Vector(face_on_leaf(flora, "oak", _TOWARDS, lowest=1.2)) + scene.objects["The oak"].location
+    flora = compile_species([catalog.load_species("oak")])
+    return Vector(face_on_leaf(flora, "oak", _TOWARD, lowest=1.2)) + scene.objects["The oak"].location
 
 
 def render_dolly(path: Path, size: tuple[int, int] = (480, 270), samples: int = 32) -> None:
@@ -163,9 +163,9 @@ def render_dolly(path: Path, size: tuple[int, int] = (480, 270), samples: int = 
         made = []
         for number, distance in enumerate(DISTANCES):
             # A lens that shows the whole oak at 16 m, and a leaf at a hand's width.
-            aim(scene, leaf, leaf + Vector(_TOWARDS * distance), 40.0)
+            aim(scene, leaf, leaf + Vector(_TOWARD * distance), 40.0)
             made.append(Path(folder) / f"{number}.png")
-            render(made[-1], size, samples, grey=_WIDE if distance > NEAR else _CLOSER)
+            render(made[-1], size, samples, gray=_WIDE if distance > NEAR else _CLOSER)
         store_sheet([made[:4], made[4:]], path)
 
 
@@ -179,7 +179,7 @@ def render_interior(path: Path, size: tuple[int, int] = (1280, 720), samples: in
     )
     aim(scene, ahead, eye, 28.0)
     with tempfile.TemporaryDirectory() as folder:
-        render(Path(folder) / "interior.png", size, samples, grey=_SHADE)
+        render(Path(folder) / "interior.png", size, samples, gray=_SHADE)
         save_jpeg(Image.open(Path(folder) / "interior.png").convert("RGB"), path)
 
 

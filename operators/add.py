@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Add plants: a single one, one grown on a drawn form, a first forest, or a population on a terrain."""
+"""Add plants: a single one, one grown on a drawn skeleton, a first forest, or a population on a terrain."""
 
 from collections.abc import Generator
 
@@ -11,14 +11,19 @@ from ..tetflora_addon.blender.attributes import world_matrix
 from ..tetflora_addon.blender.placing.distances import distance_of, follows_species
 from ..tetflora_addon.blender.placing.first_forest import build
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
-from ..tetflora_addon.blender.placing.populations import Made, add_population, forget_population, make_plants_steps
+from ..tetflora_addon.blender.placing.populations import (
+    PlacedPlants,
+    add_population,
+    forget_population,
+    make_plants_steps,
+)
 from ..tetflora_addon.blender.placing.properties import CREATE_AS, MOST_EMPTIES
 from ..tetflora_addon.blender.placing.rules import copy_entry
-from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES, read_skeleton, upright_turn
+from ..tetflora_addon.blender.scene.skeletons import SKELETON_TYPES, read_skeleton, upright_turn
 from ..tetflora_addon.blender.settings import properties_of
-from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, operator_items
+from ..tetflora_addon.blender.species.catalog import NO_SPECIES, default_species, operator_items
 from ..tetflora_addon.blender.species.editor import present_species
-from ..tetflora_addon.blender.species.edits import catalogue, unknown_text
+from ..tetflora_addon.blender.species.edits import catalog, unknown_text
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.planting.rules import Rules
@@ -72,18 +77,18 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
+class TETFLORA_OT_use_as_skeleton(Reporting, bpy.types.Operator):
     """Use the active curve, hair curves or mesh of edges as trunk and limbs of the selected plants or, if none is
     selected, of a new plant in its place; the species grows the rest.
 
-    The form is no longer rendered.
+    The skeleton is no longer rendered.
     """
 
-    bl_label = "Make Plant from Form"
+    bl_label = "Make Plant from Skeleton"
     needs = (
         in_object_mode,
         need(
-            lambda context: context.active_object is not None and context.active_object.type in FORM_TYPES,
+            lambda context: context.active_object is not None and context.active_object.type in SKELETON_TYPES,
             "The active object must be a curve, hair curves or a mesh of edges; select it last",
         ),
     )
@@ -97,19 +102,19 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
             plants = add_plant(scene, matrix[:3, 3], upright_turn(matrix), 1.0, next_seed(scene), _species(scene))
         height = float(skeleton.points[:, 2].max())
         for plant in plants:
-            plant.tetflora.form = form
+            plant.tetflora.skeleton = form
             if plant.type == 'EMPTY' and height > 0.0:
                 plant.empty_display_size = height  # the arrow was as tall as the species grows by itself
         form.hide_render = True
         select_only(context, plants)
         made = f"{counted(len(skeleton.points), 'point')} drawn"
-        return self.done(f'"{form.name}" is now the form of {counted(len(plants), "plant")}: {made}')
+        return self.done(f'"{form.name}" is now the skeleton of {counted(len(plants), "plant")}: {made}')
 
 
 def _species(scene: bpy.types.Scene) -> str:
     """The species that the editor shows."""
     present = present_species(scene.tetflora.species_editor)
-    return present if present in catalogue() else default_species()
+    return present if present in catalog() else default_species()
 
 
 class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
@@ -183,7 +188,7 @@ class TETFLORA_OT_populate(Placing, bpy.types.Operator):
         options={'SKIP_SAVE', 'HIDDEN'},
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Made]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, PlacedPlants]:
         scene = context.scene
         yield Progress(0.0, "Reading the ground")
         self._complete_from(scene)
@@ -202,7 +207,7 @@ class TETFLORA_OT_populate(Placing, bpy.types.Operator):
             forget_population(scene, uid, active)
             raise
 
-    def finish(self, context: bpy.types.Context, result: Made) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: PlacedPlants) -> set[str]:
         grounds = selected_grounds(context)
         select_only(context, [*result.objects, *grounds])
         # The terrain stays selected and active, so that Populate can follow Populate.
@@ -253,7 +258,7 @@ def mix_in(settings: bpy.types.PropertyGroup) -> str:
 
 def parse_weights(text: str) -> dict[str, float]:
     """``oak:3, spruce`` to weights by identifier; the weights of a species named twice add up."""
-    known = catalogue()
+    known = catalog()
     weights: dict[str, float] = {}
     for part in filter(None, (p.strip() for p in text.split(","))):
         identifier, _, weight = (p.strip() for p in part.partition(":"))

@@ -12,7 +12,7 @@ from bpy.props import StringProperty
 from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.plant_objects import plants_of
 from ..tetflora_addon.blender.runtime import remember
-from ..tetflora_addon.blender.worker import at_once
+from ..tetflora_addon.blender.worker import run_to_end
 from ..tetflora_addon.errors import TetFloraError, readable
 from ..tetflora_addon.jobs import Pace, Progress
 
@@ -179,7 +179,7 @@ class ModalJob(Reporting):
         raise NotImplementedError
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        return self.finish(context, at_once(self.steps(context)))
+        return self.finish(context, run_to_end(self.steps(context)))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ..tetflora_addon.blender.biomes.adding import (
-    Added,
+    BiomeResult,
     add_biome_steps,
     plant_biome_steps,
     remove_biome,
@@ -31,7 +31,7 @@ _biome_exists = need(lambda context: active_biome(context.scene), "Add a biome f
 class _Planting(ModalJob):
     """Mix-in for operators that plant a biome."""
 
-    def finish(self, context: bpy.types.Context, result: Added) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: BiomeResult) -> set[str]:
         points.schedule()
         show_shapes(context.scene)
         number = sum(number for _, number in result.layers)
@@ -67,7 +67,7 @@ class TETFLORA_OT_add_biome(_Planting, bpy.types.Operator):
         options={'SKIP_SAVE'},
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Added]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, BiomeResult]:
         yield Progress(0.0, "Reading the biome")
         scene = context.scene
         if not self.properties.is_property_set("biome"):
@@ -121,7 +121,7 @@ class TETFLORA_OT_update_biome(_Planting, bpy.types.Operator):
                 bpy.ops.ed.undo_push(message=self.bl_label)
         return result
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Added]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, BiomeResult]:
         return plant_biome_steps(context.scene, context.evaluated_depsgraph_get(), active_biome(context.scene))
 
     def next_step(self, _context: bpy.types.Context) -> str:

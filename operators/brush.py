@@ -23,7 +23,7 @@ _SPACING = 0.25  # radii from dab to dab
 _PATIENCE = 4.0  # multiple of the time that showing the plants took last, before it happens again
 _FINER = 1.1  # factor of the radius for a key or a notch of the wheel
 _PIXELS = 0.01  # fraction of the radius that a pixel of the mouse adds after F
-_COLOURS = {'PAINT': (0.35, 0.95, 0.3, 1.0), 'ERASE': (1.0, 0.3, 0.2, 1.0), 'THIN': (1.0, 0.8, 0.2, 1.0)}
+_COLORS = {'PAINT': (0.35, 0.95, 0.3, 1.0), 'ERASE': (1.0, 0.3, 0.2, 1.0), 'THIN': (1.0, 0.8, 0.2, 1.0)}
 _MODE_KEYS = {'P': 'PAINT', 'E': 'ERASE', 'T': 'THIN'}
 _KEYS = (
     "TetFlora {mode}   |   Drag: {does}   |   Shift: Erase   |   P, E, T: Paint, Erase, Thin   |   F or [ ]: Radius "
@@ -186,8 +186,8 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
             way = [tuple(place)]
         else:
             way = dabs_along(self._last, place, _SPACING * context.scene.tetflora.brush.radius).tolist()
-        for centre in way:
-            self._stroke.dab(centre, pressure)
+        for center in way:
+            self._stroke.dab(center, pressure)
         self._last = tuple(place)
 
     def _flush(self) -> None:
@@ -212,9 +212,9 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
         self._cursor.lines = []
         if self._hit is not None:
             place, normal = self._hit
-            self._cursor.lines = [(draped_circle(self._ground, place, normal, settings.radius), _COLOURS[mode])]
+            self._cursor.lines = [(draped_circle(self._ground, place, normal, settings.radius), _COLORS[mode])]
             stalk = np.array([place, place + normal * 0.2 * settings.radius])
-            self._cursor.lines.append((stalk, _COLOURS[mode]))
+            self._cursor.lines.append((stalk, _COLORS[mode]))
         done = f"   |   {self._done}" if self._done else ""
         text = _KEYS.format(mode=mode.capitalize(), does=_DOES[mode], radius=settings.radius, done=done)
         context.workspace.status_text_set(text)

@@ -14,8 +14,8 @@ from bpy_extras import view3d_utils
 from ..tetflora_addon.blender.placing.ground import Ground, Hit
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.runtime import GoneError, JobData, redraw
-from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, operator_items
-from ..tetflora_addon.blender.species.edits import catalogue, display_height
+from ..tetflora_addon.blender.species.catalog import NO_SPECIES, default_species, operator_items
+from ..tetflora_addon.blender.species.edits import catalog, display_height
 from ..tetflora_addon.blender.viewport.points import GroundCursor, circle
 from ..tetflora_addon.errors import TetFloraError
 from .base import NO_VIEWPORT, Tool, in_object_mode, select_only
@@ -156,7 +156,7 @@ def _in(part: bpy.types.Area | bpy.types.Region, x: int, y: int) -> bool:
 
 _NOTCH = radians(15.0)
 _LARGER = 1.1
-_COLOUR = (0.35, 0.95, 0.3, 1.0)
+_COLOR = (0.35, 0.95, 0.3, 1.0)
 _KEYS = (
     "TetFlora {name}   |   Click: Add Plant   |   Wheel: Rotation {turn:.0f}°   |   Ctrl Wheel: Scale {scale:.2f}   "
     "|   Ctrl Z: Undo Plant   |   Esc or Right Click: Finish"
@@ -234,11 +234,11 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
             forward = np.array([np.cos(self._turn), np.sin(self._turn), 0.0])
             width = max(0.12 * height, 0.15)
             self._cursor.lines = [
-                (circle(foot, width), _COLOUR),
-                (np.array([foot, foot + [0.0, 0.0, height]]), _COLOUR),
-                (np.array([foot, foot + 1.6 * width * forward]), _COLOUR),
+                (circle(foot, width), _COLOR),
+                (np.array([foot, foot + [0.0, 0.0, height]]), _COLOR),
+                (np.array([foot, foot + 1.6 * width * forward]), _COLOR),
             ]
-        known = catalogue()
+        known = catalog()
         name = known[self._chosen].name if self._chosen in known else self._chosen
         turn = np.degrees(self._turn)
         context.workspace.status_text_set(_KEYS.format(name=name, turn=turn, scale=self._scale))

@@ -17,8 +17,8 @@ from ..tetflora_addon.blender.placing.populations import adopt, collection_of, o
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
 from ..tetflora_addon.blender.scene.objects import SURFACE_TYPES, may_instance
-from ..tetflora_addon.blender.species.catalogue import default_species
-from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.blender.species.catalog import default_species
+from ..tetflora_addon.blender.species.edits import catalog
 from .base import Reporting, counted, in_object_mode, need, plants_selected, select_only, selected_plants
 
 
@@ -230,7 +230,7 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
             return self.failed(f'There is no list "{self.entries}" of "{self.owner}"; click the buttons beside a list')
         if self.action == 'ADD':
             present = {entry.species for entry in entries}
-            species = next((s for s in catalogue() if s not in present), None) or default_species()
+            species = next((s for s in catalog() if s not in present), None) or default_species()
             entries.add().species = species
             setattr(owner, index, len(entries) - 1)
             return {'FINISHED'}

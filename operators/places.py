@@ -10,22 +10,22 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ..tetflora_addon.blender.places.columns import (
+from ..tetflora_addon.blender.geodata.columns import (
     TetFloraInventoryColumn,
     chosen_columns,
     columns_in,
     show_columns,
 )
-from ..tetflora_addon.blender.places.origin import EXISTING, MIDDLE, WHOLE, Import, Imported, Steps
-from ..tetflora_addon.blender.places.outlines import outline_steps
-from ..tetflora_addon.blender.places.terrain import PATTERN, terrain_steps
-from ..tetflora_addon.blender.places.trees import GENERIC, LEFT_OUT, canopy_steps, inventory_steps
-from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
+from ..tetflora_addon.blender.geodata.origin import EXISTING, MIDDLE, WHOLE, Import, Imported, Steps
+from ..tetflora_addon.blender.geodata.outlines import outline_steps
+from ..tetflora_addon.blender.geodata.terrain import PATTERN, terrain_steps
+from ..tetflora_addon.blender.geodata.trees import GENERIC, LEFT_OUT, canopy_steps, inventory_steps
+from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
 from ..tetflora_addon.errors import TetFloraError, readable
-from ..tetflora_addon.places.inventories import IMPERIAL, METRIC
-from ..tetflora_addon.places.layers import ENDINGS
-from ..tetflora_addon.places.outlines import KINDS
-from ..tetflora_addon.places.projection import PLAIN
+from ..tetflora_addon.geodata.inventories import IMPERIAL, METRIC
+from ..tetflora_addon.geodata.layers import ENDINGS
+from ..tetflora_addon.geodata.outlines import KINDS
+from ..tetflora_addon.geodata.projection import PLAIN
 from .add import mix_in, parse_weights
 from .base import ModalJob, in_object_mode, select_only
 from .populations import selected_grounds
@@ -57,7 +57,7 @@ class _Importing(ModalJob, ImportHelper):
 
     needs = (in_object_mode,)
 
-    code: _Int(
+    epsg: _Int(
         name="Coordinate System",
         description=(
             "EPSG code of the coordinates in the file, such as 4326 for longitude and latitude, or 25832 for a zone of "
@@ -128,10 +128,10 @@ class _Importing(ModalJob, ImportHelper):
 
     def order(self, context: bpy.types.Context, **others: Any) -> Import:
         """What is to be imported."""
-        code = PLAIN if self.plain else self.code
+        epsg = PLAIN if self.plain else self.epsg
         selected, graph = tuple(selected_grounds(context)), context.evaluated_depsgraph_get()
         crop = {"crop": self.crop, "side": self.crop_size}
-        return Import(context.scene, graph, self.path, code, self.new_origin, selected, **crop, **others)
+        return Import(context.scene, graph, self.path, epsg, self.new_origin, selected, **crop, **others)
 
     def finish(self, context: bpy.types.Context, result: Imported) -> set[str]:
         if result.object is not None:
@@ -146,7 +146,7 @@ class _Raster(_Importing):
     filter_glob: StringProperty(default=PATTERN, options={'HIDDEN'})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
-    factor: _Float(
+    scale: _Float(
         name="Meters per Value",
         description="Factor on the values of the file: 0.3048 for feet, 0.1 for decimeters",
         default=1.0,
@@ -155,8 +155,8 @@ class _Raster(_Importing):
         max=1e6,
         precision=4,
     )
-    shift: _Float(
-        name="Height of 0",
+    offset: _Float(
+        name="Height Offset",
         description="What is added to all values, meters",
         default=0.0,
         min=-20_000.0,
@@ -169,7 +169,7 @@ class _Raster(_Importing):
         folder = Path(bpy.path.abspath(self.directory)) if self.directory else self.path.parent
         tiles = (folder / file.name for file in self.files if file.name)
         tiles = tuple(tile for tile in tiles if tile != self.path)
-        return super().order(context, factor=self.factor, shift=self.shift, tiles=tiles, **others)
+        return super().order(context, scale=self.scale, offset=self.offset, tiles=tiles, **others)
 
     def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
         """Settings of another call, with files by their names."""
@@ -182,8 +182,8 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
 
     bl_label = "Import Terrain"
 
-    most: _Int(
-        name="Most Faces",
+    max_faces: _Int(
+        name="Max Faces",
         description="Number of faces at most; a finer raster is averaged in blocks",
         default=500_000,
         min=100,
@@ -199,7 +199,7 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
     )
 
     def steps(self, context: bpy.types.Context) -> Steps:
-        return terrain_steps(self.order(context), self.most, _file(self.image))
+        return terrain_steps(self.order(context), self.max_faces, _file(self.image))
 
 
 class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
@@ -271,7 +271,7 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
                 "TETFLORA_UL_inventory_columns", "", self, "table", self, "active", rows=rows, maxrows=rows
             )
         layout.use_property_split = True
-        for name in ("units", "unknown", "species", "skip", "code", "plain", "new_origin", "crop", "crop_size"):
+        for name in ("units", "unknown", "species", "skip", "epsg", "plain", "new_origin", "crop", "crop_size"):
             if (name != "species" or self.unknown == 'SPECIES') and (name != "crop_size" or self.crop == MIDDLE):
                 layout.prop(self, name)
 
@@ -295,8 +295,8 @@ class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
             "Populate"
         ),
     )
-    least: _Float(
-        name="Smallest Tree",
+    min_height: _Float(
+        name="Min Height",
         description="Lower canopy is left out",
         default=3.0,
         min=0.5,
@@ -312,7 +312,7 @@ class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps:
         self.species = self.species or mix_in(context.scene.tetflora.populate)
-        return canopy_steps(self.order(context), parse_weights(self.species), self.least, _file(self.below))
+        return canopy_steps(self.order(context), parse_weights(self.species), self.min_height, _file(self.below))
 
 
 class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):

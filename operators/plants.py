@@ -7,7 +7,7 @@ from collections.abc import Generator
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from ..tetflora_addon.blender.placing.dropping import Dropped, drop_steps
+from ..tetflora_addon.blender.placing.dropping import DropResult, drop_steps
 from ..tetflora_addon.blender.placing.field_edits import assign_field_species, editable, reseed_field
 from ..tetflora_addon.blender.placing.plant_objects import (
     assign_species,
@@ -18,7 +18,7 @@ from ..tetflora_addon.blender.placing.plant_objects import (
 )
 from ..tetflora_addon.blender.placing.populations import recount
 from ..tetflora_addon.blender.scene.fields import fields_of, stored_size
-from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
+from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
 from ..tetflora_addon.jobs import Progress
 from .base import LINKED, ModalJob, Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
 
@@ -144,11 +144,11 @@ class TETFLORA_OT_drop_to_ground(ModalJob, bpy.types.Operator):
     bl_label = "Drop Plants to Ground"
     needs = (in_object_mode, plants_or_fields_selected)
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Dropped]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, DropResult]:
         fields = [field for field in fields_of(context.selected_objects) if editable(field)]
         return drop_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context), fields)
 
-    def finish(self, context: bpy.types.Context, result: Dropped) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: DropResult) -> set[str]:
         left = [field.name for field in fields_of(context.selected_objects) if not editable(field)]
         notes = [f"{counted(result.missed, 'plant')} had no ground below or above"] if result.missed else []
         if left:

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..tetflora_addon.blender.placing.cover import (
-    Covered,
+    CoverResult,
     cover_steps,
     cover_with_snow,
     covered_population,
@@ -17,7 +17,7 @@ from ..tetflora_addon.blender.placing.cover import (
 )
 from ..tetflora_addon.blender.placing.population_files import read_populations, write_populations
 from ..tetflora_addon.blender.placing.populations import (
-    Made,
+    PlacedPlants,
     add_population,
     make_plants_steps,
     own_objects,
@@ -49,7 +49,7 @@ _REPLACING = (*_ACTIVE, _not_frozen)
 class Placing(ModalJob):
     """Mix-in for operators that place the plants of a population."""
 
-    def finish(self, _context: bpy.types.Context, result: Made) -> set[str]:
+    def finish(self, _context: bpy.types.Context, result: PlacedPlants) -> set[str]:
         where = ""
         if result.objects and result.objects[0].tetflora.is_field:
             where = f' in the field "{result.objects[0].name}"'
@@ -92,7 +92,7 @@ class TETFLORA_OT_update_population(Placing, bpy.types.Operator):
     bl_label = "Update Population"
     needs = _REPLACING
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Made]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, PlacedPlants]:
         depsgraph = context.evaluated_depsgraph_get()
         return make_plants_steps(context.scene, depsgraph, active_population(context.scene))
 
@@ -103,7 +103,7 @@ class TETFLORA_OT_reroll_population(Placing, bpy.types.Operator):
     bl_label = "Re-roll Population"
     needs = _REPLACING
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Made]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, PlacedPlants]:
         depsgraph = context.evaluated_depsgraph_get()
         return reroll_steps(context.scene, depsgraph, active_population(context.scene))
 
@@ -270,14 +270,14 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
         default=True,
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Covered]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, CoverResult]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
         made = yield from cover_steps(scene, depsgraph, covered_population(scene), self.soil)
         if self.fallen and scene.tetflora.year.enabled:
             yield from strew_steps(scene, depsgraph, covered_population(scene))
         return made
 
-    def finish(self, context: bpy.types.Context, result: Covered) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: CoverResult) -> set[str]:
         points.schedule()
         show_shapes(context.scene)
         kept = f'; "{result.bare[0]}" keeps its own material' if result.bare else ""

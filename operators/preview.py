@@ -14,7 +14,7 @@ from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.preview.levels import Levels
 from .base import NO_CAMERA, ModalJob, Reporting, counted, need
 
-#: Extent of a viewport's longer side at distance 1, times its focal length in millimetres.
+#: Extent of a viewport's longer side at distance 1, times its focal length in millimeters.
 _VIEWPORT = 72.0
 
 

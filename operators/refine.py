@@ -7,7 +7,7 @@ from collections.abc import Generator
 import bpy
 
 from ..tetflora_addon import storage
-from ..tetflora_addon.assets import kept
+from ..tetflora_addon.assets import asset_cache
 from ..tetflora_addon.blender.job import refine
 from ..tetflora_addon.blender.job.assets import asset_warnings
 from ..tetflora_addon.blender.job.forecast import forecast, learn
@@ -16,8 +16,8 @@ from ..tetflora_addon.blender.job.render import forget_render_errors
 from ..tetflora_addon.blender.placing.plant_objects import plants_of, prepare_scene
 from ..tetflora_addon.blender.results import hiding
 from ..tetflora_addon.blender.results.collection import has_results, result_collections
-from ..tetflora_addon.blender.results.forms import few_bounces
 from ..tetflora_addon.blender.results.hiding import keep_results
+from ..tetflora_addon.blender.results.proxy_kinds import few_bounces
 from ..tetflora_addon.blender.runtime import is_there, redraw, stop_jobs
 from ..tetflora_addon.blender.scene.lights import read_world
 from ..tetflora_addon.blender.viewport import auto
@@ -223,8 +223,8 @@ class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
     """Delete all cached species analysis, and nothing else in the folder. It is computed again when needed."""
 
     bl_label = "Clear Cache"
-    needs = (need(lambda _: storage.used() is not None, "The cache folder does not exist"),)
+    needs = (need(lambda _: storage.current_folder() is not None, "The cache folder does not exist"),)
     bl_options = {'REGISTER'}
 
     def run(self, _context: bpy.types.Context) -> set[str]:
-        return self.done(f"{counted(storage.clear() + kept.clear(), 'file')} deleted from {storage.used()}")
+        return self.done(f"{counted(storage.clear() + kept.clear(), 'file')} deleted from {storage.current_folder()}")

@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
 from ..tetflora_addon.blender.placing.plant_objects import assign_species
-from ..tetflora_addon.blender.species.catalogue import (
+from ..tetflora_addon.blender.species.catalog import (
     OWN_FILES,
     load_species_file,
     own_file,
@@ -20,7 +20,7 @@ from ..tetflora_addon.blender.species.catalogue import (
 )
 from ..tetflora_addon.blender.species.editor import orders_of, present_species
 from ..tetflora_addon.blender.species.edits import (
-    catalogue,
+    catalog,
     change_species,
     find_edit,
     new_identifier,
@@ -39,7 +39,7 @@ def shown(context: bpy.types.Context) -> str:
     return present_species(context.scene.tetflora.species_editor)
 
 
-species_shown = need(lambda context: shown(context) in catalogue(), "Choose a species from the catalog first")
+species_shown = need(lambda context: shown(context) in catalog(), "Choose a species from the catalog first")
 
 
 class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
@@ -69,7 +69,7 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
         editor = scene.tetflora.species_editor
         data = copy.deepcopy(species_data(scene, present_species(editor)))
         data["name"] = self.name.strip() or self._suggestion(context)
-        known = catalogue()
+        known = catalog()
         identifier = new_identifier(data["name"], known.__contains__)
         store_species(scene, identifier, data)
         editor.species = identifier
@@ -79,7 +79,7 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
 
     @staticmethod
     def _suggestion(context: bpy.types.Context) -> str:
-        known = catalogue()
+        known = catalog()
         old = known[shown(context)].name
         names = {info.name for info in known.values()}
         return next(name for n in range(2, len(names) + 3) if (name := f"{old} {n}") not in names)
@@ -98,7 +98,7 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
         editor = context.scene.tetflora.species_editor
         identifier = present_species(editor)
         revert_species(identifier)
-        if identifier in catalogue():
+        if identifier in catalog():
             return self.done(f'"{identifier}" reverted to the catalog')
         editor.species = ""
         return self.done(f'Species "{identifier}" removed from this file')
@@ -194,7 +194,7 @@ class TETFLORA_OT_load_species(FileTool, bpy.types.Operator, ImportHelper):
     def run(self, context: bpy.types.Context) -> set[str]:
         identifier = load_species_file(self.path, self.replace)
         context.scene.tetflora.species_editor.species = identifier
-        return self.done(f'Species "{catalogue()[identifier].name}" loaded')
+        return self.done(f'Species "{catalog()[identifier].name}" loaded')
 
 
 class TETFLORA_OT_export_species(FileTool, bpy.types.Operator, ExportHelper):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import bpy
 from bpy.utils import units
 
-from ..tetflora_addon.blender.species.catalogue import FALLBACK_ICON, icon_of
+from ..tetflora_addon.blender.species.catalog import FALLBACK_ICON, icon_of
 
 
 class SidebarPanel:
@@ -62,10 +62,10 @@ def draw_below(layout: bpy.types.UILayout, text: str) -> None:
     row.label(text=text)
 
 
-def shown_length(metres: float) -> str:
+def shown_length(meters: float) -> str:
     """A length in the scene's units, as its fields show it."""
     unit = bpy.context.scene.unit_settings
-    return units.to_string(unit.system, 'LENGTH', metres * unit.scale_length, precision=2)
+    return units.to_string(unit.system, 'LENGTH', meters * unit.scale_length, precision=2)
 
 
 def draw_properties(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:

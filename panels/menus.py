@@ -5,8 +5,8 @@
 import bpy
 
 from ..tetflora_addon.blender.runtime import open_menu
-from ..tetflora_addon.blender.species.edits import catalogue
-from ..tetflora_addon.species.catalogue import FIRST
+from ..tetflora_addon.blender.species.edits import catalog
+from ..tetflora_addon.species.catalog import FIRST
 from .base import Button, draw_buttons, thumbnail
 from .biomes import FALLBACK_ICON, TETFLORA_MT_add_biome
 from .places import IMPORTS
@@ -21,7 +21,7 @@ class _SpeciesMenu:
     def draw(self, _context: bpy.types.Context) -> None:
         # Menus execute operators by default; tools need the mouse, and the others have nothing to ask.
         self.layout.operator_context = 'INVOKE_DEFAULT'
-        known = catalogue()
+        known = catalog()
         for info in known.values():
             icon = thumbnail(info.identifier)
             self.layout.operator(f"tetflora.{self.operator}", text=info.name, **icon).species = info.identifier
@@ -93,7 +93,7 @@ class TETFLORA_MT_object(bpy.types.Menu):
             Button("use_as_species", 'ASSET_MANAGER'),
             Button("stop_using_as_species", 'X'),
             Button("refine_scatter", 'OUTLINER_OB_POINTCLOUD', "Refine Scatter or Keep It Plain"),
-            Button("use_as_form", 'CURVE_DATA'),
+            Button("use_as_skeleton", 'CURVE_DATA'),
             Button("mark_field", 'POINTCLOUD_DATA', "Use or Stop Using as Field of Plants"),
             Button("make_field", 'POINTCLOUD_DATA'),
             Button("split_field", 'OUTLINER_OB_EMPTY'),

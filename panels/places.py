@@ -5,7 +5,7 @@
 import bpy
 
 from ..operators.places import column_row
-from ..tetflora_addon.blender.places.origin import origin_of
+from ..tetflora_addon.blender.geodata.origin import origin_of
 from ..tetflora_addon.errors import TetFloraError
 from .base import Button, SidebarPanel, draw_buttons, draw_message
 

@@ -9,10 +9,10 @@ from ..tetflora_addon.blender.scene.ages import stage_text
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.scene.objects import has_nodes
 from ..tetflora_addon.blender.scene.own_ages import has_ages
-from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES
+from ..tetflora_addon.blender.scene.skeletons import SKELETON_TYPES
 from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.species.asset_species import name_of
-from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.blender.species.edits import catalog
 from .base import Button, SidebarPanel, TETFLORA_UL_field_species, draw_below, draw_properties, split_layout
 from .menus import TETFLORA_MT_add_plant
 
@@ -29,9 +29,9 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
         if active is not None and active.tetflora.is_plant:
             plant = active.tetflora
             column.prop(plant, "species_choice")
-            if plant.species not in catalogue():
+            if plant.species not in catalog():
                 column.label(text=f'"{name_of(plant.species)}" is not in the catalog', icon='ERROR')
-            draw_properties(column, plant, "seed", "enabled", "form", "age")
+            draw_properties(column, plant, "seed", "enabled", "skeleton", "age")
             stage = stage_text(context.scene, plant.species, plant.age)
             if stage:
                 draw_below(column, stage)
@@ -45,8 +45,8 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
         _draw_asset(layout, active)
         # A mesh with faces is ground or something else, as a rule; the Object menu offers these for it too.
         faces = active.type == 'MESH' and len(active.data.polygons) > 0
-        if active.type in FORM_TYPES and not faces:
-            layout.operator("tetflora.use_as_form", icon='CURVE_DATA')
+        if active.type in SKELETON_TYPES and not faces:
+            layout.operator("tetflora.use_as_skeleton", icon='CURVE_DATA')
         field = active.tetflora.is_field
         if field or (active.type in FIELD_TYPES and (not faces or has_nodes(active))):
             text = "Field of Plants" if field else "Use as Field of Plants"
@@ -72,9 +72,9 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     if not kinds:
         column.prop(field, "species_choice")
     elif entry := active_in(field, "field_species"):
-        column.prop(entry, "form")
+        column.prop(entry, "skeleton")
     for species in {entry.species for entry in kinds} or {field.species}:
-        if species not in catalogue():
+        if species not in catalog():
             column.label(text=f'"{name_of(species)}" is not in the catalog', icon='ERROR')
     draw_properties(column, field, "seed", "enabled")
     if has_ages(obj):

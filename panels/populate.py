@@ -8,7 +8,7 @@ from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows
 from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
 from ..tetflora_addon.blender.settings import active_in
-from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.blender.species.edits import catalog
 from ..tetflora_addon.blender.viewport import points
 from .base import (
     Button,
@@ -102,7 +102,7 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
 def _draw_species(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     TETFLORA_UL_mix.draw_in(layout, settings)
     if not settings.mix:
-        known = catalogue()
+        known = catalog()
         text = f"Default: {next(iter(known.values())).name}" if known else "The catalog has no species"
         layout.label(text=text, icon='INFO')
     elif entry := active_in(settings, "mix"):

@@ -96,8 +96,8 @@ def _draw_cache(column: bpy.types.UILayout, own: TetFloraPreferences) -> None:
     row.active = own.use_cache
     row.prop(own, "cache_folder")
     column.operator("tetflora.clear_cache")
-    if storage.trouble():
-        column.label(text=storage.trouble(), icon='ERROR')
+    if storage.last_problem():
+        column.label(text=storage.last_problem(), icon='ERROR')
 
 
 def _draw_keys(column: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -10,8 +10,8 @@ from ..operators.marks import can_be_explicit
 from ..tetflora_addon.blender.job.forecast import forecast_text, memory_text
 from ..tetflora_addon.blender.job.render import render_errors
 from ..tetflora_addon.blender.placing.first_forest import is_first_forest
-from ..tetflora_addon.blender.results.forms import few_bounces, form_of
 from ..tetflora_addon.blender.results.output import KIND
+from ..tetflora_addon.blender.results.proxy_kinds import few_bounces, proxy_kind_of
 from ..tetflora_addon.blender.scene.objects import has_contents, has_plants, is_drop, is_scatter, may_scatter
 from ..tetflora_addon.blender.viewport import auto
 from .base import (
@@ -68,7 +68,7 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         layout = split_layout(self)
         column = layout.column()
         column.active = not settings.expand_everything
-        names = ("quality", "cutoff", "shadow_cutoff", "proxy_form", "baked_light", "max_polygons")
+        names = ("quality", "cutoff", "shadow_cutoff", "proxy_kind", "baked_light", "max_polygons")
         draw_properties(column, settings, *names)
         _draw_memory(column, context.scene)
         active = context.view_layer.objects.active  # and not the context's, which is None while results hide it
@@ -130,7 +130,7 @@ def hint(scene: bpy.types.Scene) -> str:
 
 
 def _draw_proxies(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    settings, form, cycles = scene.tetflora, form_of(scene), getattr(scene, "cycles", None)
+    settings, form, cycles = scene.tetflora, proxy_kind_of(scene), getattr(scene, "cycles", None)
     draw_properties(layout, settings, "leaf_limit", "facet")
     if form.bounces and cycles is not None:
         layout.prop(cycles, "transparent_max_bounces", text="Transparent")

@@ -137,7 +137,7 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "wires")
         row = column.row()
         row.active = settings.wires
-        row.prop(settings, "colour")
+        row.prop(settings, "color")
         column.prop(settings, "projected")
         column.column(align=True).prop(settings, "forms")
         column.prop(settings, "statistics")

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..tetflora_addon.blender.species.catalogue import own_file
+from ..tetflora_addon.blender.species.catalog import own_file
 from ..tetflora_addon.blender.species.editor import (
     NO_LEAF,
     OBJECT_LEAF,
@@ -131,5 +131,5 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
         row.prop(editor, name)
         if name + VARIATION in editor.bl_rna.properties:
             row.prop(editor, name + VARIATION, text="")
-        if key.kind == "colour":
+        if key.kind == "color":
             column.separator()

@@ -44,12 +44,12 @@ class TETFLORA_PT_stand(SidebarPanel, bpy.types.Panel):
         draw_properties(layout.column(), stand, "years", "density", "recruits", "outside", "seed")
         TETFLORA_UL_stand_species.draw_in(layout, stand)
         if not stand.species:
-            layout.label(text="Default: a mixed wood of central Europe", icon='INFO')
+            layout.label(text="Default: a mixed forest of central Europe", icon='INFO')
         elif entry := active_in(stand, "species"):
-            draw_properties(layout.column(align=True), entry, "planted", "rain")
+            draw_properties(layout.column(align=True), entry, "planted", "incoming_seeds")
         if body := section(layout, "Site"):
-            draw_properties(body.column(align=True), stand, "warmth", "winter")
+            draw_properties(body.column(align=True), stand, "degree_days", "coldest_month")
             draw_properties(body.column(align=True), stand, "moisture", "relief", "fertility")
             draw_where(body, stand)
         if body := section(layout, "Detail"):
-            draw_properties(body, stand, "interval", "least_height", "cell", "open_edges")
+            draw_properties(body, stand, "interval", "min_height", "cell", "open_edges")

@@ -262,7 +262,7 @@ def binary_area(*rings: Any) -> bytes:
     return out + b"".join(struct.pack(f"<I{2 * len(r)}d", len(r), *(v for p in r for v in p)) for r in rings)
 
 
-def _in_metres(size: float, east: float = 0.0) -> list[list[float]]:
+def _in_meters(size: float, east: float = 0.0) -> list[list[float]]:
     """A square, clockwise."""
     ring = [[0.0, 0.0], [0.0, size], [size, size], [size, 0.0], [0.0, 0.0]]
     return [[EAST + east + x, NORTH + y] for x, y in ring]
@@ -321,15 +321,15 @@ FILES: dict[str, tuple[str, str, bytes]] = {
     "csv": ("import_inventory", "trees.csv", INVENTORY.encode()),
     "points": ("import_inventory", "trees.geojson", collection(*TREES).encode()),
     "lines": ("import_outlines", "map.geojsonl", b"\n".join(json.dumps(f).encode() for f in OUTLINES)),
-    "shape": ("import_outlines", "shape.shp", shapefile([_in_metres(50.0)], [_in_metres(9.0, 80.0)])),
+    "shape": ("import_outlines", "shape.shp", shapefile([_in_meters(50.0)], [_in_meters(9.0, 80.0)])),
     "dbase": ("import_outlines", "dbase.dbf", dbase(fclass=["forest", "building"], height=["", "9.5"])),
     "geopackage": (
         "import_outlines",
         "map.gpkg",
         geopackage(
             "areas",
-            (binary_area(_in_metres(50.0)), {"kind": "Wald"}),
-            (binary_area(_in_metres(9.0, 80.0)), {"kind": "Haus"}),
+            (binary_area(_in_meters(50.0)), {"kind": "Wald"}),
+            (binary_area(_in_meters(9.0, 80.0)), {"kind": "Haus"}),
         ),
     ),
     "outlines": ("import_outlines", "map.geojson", collection(*OUTLINES).encode()),

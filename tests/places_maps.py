@@ -12,16 +12,16 @@ import numpy as np
 import zstandard
 
 from tetflora_addon.errors import SceneError
-from tetflora_addon.jobs import at_once
-from tetflora_addon.places.canopy import checked_canopy
-from tetflora_addon.places.geotiff import use_zstandard
-from tetflora_addon.places.grids import read_grid
-from tetflora_addon.places.outlines import read_outlines
-from tetflora_addon.places.projection import between, chosen_system, place_about
-from tetflora_addon.places.rasters import in_degrees
+from tetflora_addon.geodata.canopy import checked_canopy
+from tetflora_addon.geodata.geotiff import use_zstandard
+from tetflora_addon.geodata.grids import read_grid
+from tetflora_addon.geodata.outlines import read_outlines
+from tetflora_addon.geodata.projection import between, chosen_system, place_about
+from tetflora_addon.geodata.rasters import in_degrees
+from tetflora_addon.jobs import run_to_end
 
 use_zstandard(zstandard)
-FOLDER = Path(__file__).parent.parent / "tests" / "data" / "places"
+FOLDER = Path(__file__).parent.parent / "tests" / "data" / "geodata"
 
 
 def cases() -> dict[str, dict[str, Any]]:
@@ -56,7 +56,7 @@ def problems(name: str) -> list[str]:
 
 def _raster(path: Path, canopy: bool) -> dict[str, Any]:
     what = f"{path.name}: "
-    raster = at_once(read_grid(path))
+    raster = run_to_end(read_grid(path))
     raster = in_degrees(raster, what)
     system = chosen_system(0, raster.system, what)
     outline = raster.outline

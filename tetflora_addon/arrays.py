@@ -34,7 +34,7 @@ GOLDEN_TURN, GOLDEN_ANGLE = np.pi * (1.0 + np.sqrt(5.0)), np.pi * (3.0 - np.sqrt
 #: Room to spare where columns of `Growing` are made larger: one part in so many of what is there.
 _SPARE = 3
 #: Indices that are looked at at a time: numpy makes 64 bit of each, which stays in the cache. Threads gain nothing.
-_AT_ONCE = 1 << 16
+_BATCH = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -188,13 +188,13 @@ def top(up: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def rows_within(chosen: NDArray[np.bool_], index: NDArray[np.int32]) -> NDArray[np.intp]:
     """Rows (k,), ascending, of which an index (n,) is among those of a mask."""
-    found = [np.flatnonzero(np.take(chosen, index[block])) + block.start for block in blocks(len(index), _AT_ONCE)]
+    found = [np.flatnonzero(np.take(chosen, index[block])) + block.start for block in blocks(len(index), _BATCH)]
     return np.concatenate([np.zeros(0, np.intp), *found])
 
 
 def renumber(index: NDArray[np.int32], number: NDArray[np.int32]) -> None:
     """Replace an index (n,), in place, by the new numbers (m,) of what it points to."""
-    for block in blocks(len(index), _AT_ONCE):
+    for block in blocks(len(index), _BATCH):
         index[block] = np.take(number, index[block])
 
 

@@ -21,7 +21,7 @@ class MeshBuffers:
     Attributes
     ----------
     positions : (v, 3) float32
-        Vertices, metres, world space.
+        Vertices, meters, world space.
     edge_verts : (e, 2) int32
         The two vertices of each edge.
     corner_verts, corner_edges : (c,) int32
@@ -68,9 +68,9 @@ class PointBuffers:
     Attributes
     ----------
     positions : (n, 3) float32
-        Centres, metres, world space.
+        Centers, meters, world space.
     radius : (n,) float32
-        Metres.
+        Meters.
     attributes : mapping of str to ndarray
         Name to values of the points: ``(n,)`` or ``(n, 3)`` float32.
     species, look : int or None, str

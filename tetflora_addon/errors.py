@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Errors that a user can cause; their message names the thing and says what to do next.
 
-What they name comes from files of anybody, so that texts are made `readable`, and values `shown`, before they are told.
+What they name comes from files of anybody, so that texts are made `readable`, and values `quoted`, before they are
+told.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def readable(text: str, most: int = MESSAGE) -> str:
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
-def shown(value: Any) -> str:
+def quoted(value: Any) -> str:
     """A value of a file, as messages quote it."""
     try:
         text = repr(value[: 2 * VALUE] if isinstance(value, str) else value)

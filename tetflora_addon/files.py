@@ -43,7 +43,7 @@ def is_identifier(text: str) -> bool:
     return bool(_IDENTIFIER.fullmatch(text)) and not _RESERVED.fullmatch(text)
 
 
-def inside(folder: Path, name: str) -> Path:
+def path_in(folder: Path, name: str) -> Path:
     """The path of a file right in a folder.
 
     Raises
@@ -138,7 +138,7 @@ def replace(part: Path, path: Path) -> None:
             time.sleep(wait)
 
 
-def json_of(content: bytes | str, constant: Callable[[str], float] = float) -> Any:
+def parse_json(content: bytes | str, constant: Callable[[str], float] = float) -> Any:
     """Decode JSON of which every part is a Python value that texts and floats can hold.
 
     Integers beyond floats become infinite, so that whoever checks a number refuses it by the name of its key.

@@ -28,24 +28,24 @@ class Progress:
         For the status bar.
     waiting : bool
         Whether nothing is new: the next step waits as well.
-    amid : bool
+    partial : bool
         Whether something small is half done: whoever looks after the job may do that later.
     """
 
     fraction: float
     message: str
     waiting: bool = False
-    amid: bool = False
+    partial: bool = False
 
     @property
-    def again(self) -> Progress:
+    def repeated(self) -> Progress:
         """The same, while nothing is new."""
         return replace(self, waiting=True)
 
     def during(self, steps: Generator[object, None, _Result]) -> Generator[Progress, object, _Result]:
         """The same after each of some small steps; returns what these return."""
-        amid = replace(self, amid=True)
-        return mapped(steps, lambda _: amid)
+        partial = replace(self, partial=True)
+        return mapped(steps, lambda _: partial)
 
 
 def mapped(steps: Generator[_Item, Any, _Result], change: Callable[[_Item], _Step]) -> Generator[_Step, Any, _Result]:
@@ -101,7 +101,7 @@ class Pace:
         return False
 
 
-def at_once(steps: Generator[object, object, _Result]) -> _Result:
+def run_to_end(steps: Generator[object, object, _Result]) -> _Result:
     """Run a job to its end; returns what the job returns."""
     while True:
         try:

@@ -27,7 +27,7 @@ VARIABLE = "TETFLORA_THREADS"
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
-_wanted = 0  # threads, see `use`
+_wanted = 0  # threads, see `set_threads`
 _pools: dict[int, ThreadPoolExecutor] = {}  # by their numbers of threads
 _lock = threading.Lock()
 _here = threading.local()  # "at_work" in threads of the pool, which must not wait for each other
@@ -41,12 +41,12 @@ def cores() -> int:
 
 
 def threads() -> int:
-    """Threads that work at the same time: as many as `use` or `VARIABLE` says, or all cores; up to `MOST_THREADS`."""
+    """Threads that work at the same time: what `set_threads` or `VARIABLE` says, or all cores; up to `MOST_THREADS`."""
     told = os.environ.get(VARIABLE, "")
     return min(_wanted or (int(told) if told.isdecimal() else 0) or cores(), MOST_THREADS)
 
 
-def use(number: int) -> None:
+def set_threads(number: int) -> None:
     """Work with so many threads from now on; 0 is all cores."""
     global _wanted
     _wanted = number

@@ -13,13 +13,13 @@ from difflib import get_close_matches
 from functools import cache
 from typing import Any, NamedTuple, TypeVar
 
-from .errors import NAME, SpeciesError, readable, shown
+from .errors import NAME, SpeciesError, quoted, readable
 
 Rgb = tuple[float, float, float]
 Declared = TypeVar("Declared")
 #: How fields are written, by their annotations.
 KINDS = {
-    "Range": "range", "float": "number", "int": "integer", "str": "text", "bool": "truth", "Colour": "colour",
+    "Range": "range", "float": "number", "int": "integer", "str": "text", "bool": "truth", "Color": "color",
     "Rgb": "rgb", "Rgb | None": "rgb", "tuple[float, float]": "pair",
 }  # fmt: skip
 
@@ -55,8 +55,8 @@ class Range(NamedTuple):
         return factor
 
 
-class Colour(NamedTuple):
-    """A linear colour that differs from leaf to leaf: mean ± variation, all channels together."""
+class Color(NamedTuple):
+    """A linear color that differs from leaf to leaf: mean ± variation, all channels together."""
 
     mean: Rgb
     variation: Rgb
@@ -117,7 +117,7 @@ def named(default: str, names: Iterable[str], meaning: str) -> Any:
 
 
 def described(default: Any, meaning: str, unit: str = "", **options: str) -> Any:
-    """A field without limits of its own: a text, true or false, or a colour."""
+    """A field without limits of its own: a text, true or false, or a color."""
     return limited(default, 0, 1, meaning, unit, **options)
 
 
@@ -161,20 +161,20 @@ class FileReader:
             )
         return Range(mean, variation)
 
-    def colour(self, value: Any, key: str) -> Colour:
-        """A colour with the variation of each channel."""
+    def color(self, value: Any, key: str) -> Color:
+        """A color with the variation of each channel."""
         form = "[[r, g, b], [variation of each]]"
         if not (
-            isinstance(value, list | Colour)
+            isinstance(value, list | Color)
             and len(value) == 2
             and all(isinstance(v, list | tuple) and len(v) == 3 for v in value)
         ):
             raise self.fail(key, f"must be {form} with numbers from 0 to 1, not {shown(value)}")
         channels = [self.range([m, v], f"{key}.{c}", 0, 1) for m, v, c in zip(*value, "rgb", strict=True)]
-        return Colour(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
+        return Color(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
 
     def rgb(self, value: Any, key: str) -> tuple[float, float, float]:
-        """A colour."""
+        """A color."""
         if not isinstance(value, list | tuple) or len(value) != 3:
             raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, not {shown(value)}")
         return tuple(self.number(v, f"{key}.{c}", 0, 1) for v, c in zip(value, "rgb", strict=True))

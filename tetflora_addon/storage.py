@@ -6,7 +6,7 @@ The cache folder has one file for each result, named after its kind and a digest
 may become unused but never wrong. Processes and users may share the folder: files are written whole or not at all, even
 on a full disk, never through links, and each user clears away what is his own. Damaged, foreign or unreadable files
 count as absent, and none is taken for larger than the result that is looked for. Trouble with the folder is reported
-once on stderr and stops nothing. `keeping` does the same in memory for functions of arrays.
+once on stderr and stops nothing. `memoized` does the same in memory for functions of arrays.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import TetFloraError
-from .files import PART, inside, read_whole, write_whole
+from .files import PART, path_in, read_whole, write_whole
 
 #: Raise it when files are written in another way.
 _FORMAT = 1
@@ -47,28 +47,28 @@ _OURS = re.compile(r"tetflora-[a-z_]+-\d+-[0-9a-f]+\.npz")
 _BEGUN = re.compile("[0-9a-f]+".join(map(re.escape, PART)))
 
 _folder: Path | None = None
-_trouble = ""
+_problem = ""
 
 
-def use(folder: Path | None) -> None:
+def set_folder(folder: Path | None) -> None:
     """Keep results in a folder from now on, which is made when there is a first one; None for nowhere."""
-    global _folder, _trouble
+    global _folder, _problem
     if folder != _folder:
-        _folder, _trouble = folder, ""
+        _folder, _problem = folder, ""
 
 
-def used() -> Path | None:
+def current_folder() -> Path | None:
     """The folder that results are kept in."""
     return _folder
 
 
-def trouble() -> str:
+def last_problem() -> str:
     """What went wrong with the folder since it is used; empty if nothing did."""
-    return _trouble
+    return _problem
 
 
-def remembered(
-    kind: str, content: str, shape: tuple[int, ...], find_out: Callable[[], NDArray[np.float64]]
+def cached(
+    kind: str, content: str, shape: tuple[int, ...], compute: Callable[[], NDArray[np.float64]]
 ) -> NDArray[np.float64]:
     """A result from the cache folder, or computed now and stored there.
 
@@ -80,17 +80,17 @@ def remembered(
         Hash, in hexadecimal, of everything that the result follows from, the method included.
     shape : tuple of int
         Of the result; a file with another one does not count.
-    find_out : callable
+    compute : callable
         Returns the result: finite numbers, always the same ones to the last bit.
     """
     if _folder is None:
-        return find_out()
+        return compute()
     path = _folder / f"tetflora-{kind}-{_FORMAT}-{content}.npz"
     if not _OURS.fullmatch(path.name):
         raise ValueError(f"{path.name} is no name of a result")
     values = _read(path, shape)
     if values is None:
-        values = find_out()
+        values = compute()
         _write(path, values)
     return values
 
@@ -169,7 +169,7 @@ def _write(path: Path, values: NDArray[np.float64]) -> None:
     np.savez(content, values=values, name=np.array(path.name))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(inside(path.parent, path.name), content.getvalue())
+        write_whole(path_in(path.parent, path.name), content.getvalue())
         make_room(_folder, _OURS, MOST_BYTES)
     except OSError as error:
         warn(f"cannot write to the cache folder {path.parent}: {error.strerror}")
@@ -215,16 +215,16 @@ def _entries(pattern: re.Pattern[str], folder: Path | None) -> Iterator[os.DirEn
 
 def warn(text: str) -> None:
     """Report trouble with the folder, once."""
-    global _trouble
-    if not _trouble:
+    global _problem
+    if not _problem:
         print(f"TetFlora: warning: {text}", file=sys.stderr, flush=True)
-        _trouble = text
+        _problem = text
 
 
 Arrays = tuple[NDArray, ...]
 
 
-def keeping(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[..., Arrays]]:
+def memoized(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[..., Arrays]]:
     """Decorator for functions that take arrays alone, and give arrays that follow from these alone.
 
     Results are read only, for all who ask for the same get the same arrays. What nobody has asked for longest goes
@@ -240,7 +240,7 @@ def keeping(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[..., 
         kept: dict[bytes, Arrays] = {}  # least recently asked for first
 
         @wraps(function)
-        def remembering(*given: NDArray) -> Arrays:
+        def memo(*given: NDArray) -> Arrays:
             key = _digest(given)
             found = kept.pop(key, None)
             if found is None:
@@ -254,7 +254,7 @@ def keeping(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[..., 
                 del kept[next(iter(kept))]
             return found
 
-        return remembering
+        return memo
 
     return decorated
 

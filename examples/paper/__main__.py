@@ -24,7 +24,7 @@ OUT, IMAGES, PAGE = ROOT / "out" / "paper", ROOT / "docs" / "images", ROOT / "do
 
 #: Modules by the name that the command line knows them by, and what they make.
 FIGURES = {
-    "figure4": "the catalogue of plants",
+    "figure4": "the catalog of plants",
     "figure5": "the partition of the row of eighty from above",
     "figure6": "the row of eighty, its polygons stored (figure 6) and deferred to the render (figure 7)",
     "figure8": "the states of refinement, pass by pass",

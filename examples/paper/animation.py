@@ -122,12 +122,12 @@ def divided_anew(small: bool) -> tuple[list[int], int]:
 
 
 def _divided(scene: bpy.types.Scene) -> set[tuple[int, ...]]:
-    """Tetrahedra that a frame divides, by centre (tenths of a millimetre) and level."""
+    """Tetrahedra that a frame divides, by center (tenths of a millimeter) and level."""
     tree = refine.partition(scene, bpy.context.evaluated_depsgraph_get())[1].tree
     nodes = np.flatnonzero(tree.children[:, 0] >= 0)
-    centres = tree.vertices(nodes).mean(axis=1)
-    whole = np.isfinite(centres).all(axis=1)
-    keys = np.column_stack([np.round(centres[whole] * 1e4).astype(np.int64), tree.level[nodes[whole]]])
+    centers = tree.vertices(nodes).mean(axis=1)
+    whole = np.isfinite(centers).all(axis=1)
+    keys = np.column_stack([np.round(centers[whole] * 1e4).astype(np.int64), tree.level[nodes[whole]]])
     return set(map(tuple, keys.tolist()))
 
 

@@ -27,7 +27,7 @@ _THROUGH = 128
 def make(out: Path, images: Path, small: bool) -> dict[str, float]:
     """Make ``paper-figure8.jpg``; returns tetrahedra and polygons after each pass that is shown."""
     scene = row(small, (480, 270))
-    scene.tetflora.proxy_form = 'SHELLS'
+    scene.tetflora.proxy_kind = 'SHELLS'
     scene.cycles.transparent_max_bounces = _THROUGH
     steps = refined(scene).steps
     cells, figures = [], {"passes": len(steps)}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edges of tetrahedra over an image, by what was decided about them, in the colours of the top view."""
+"""Edges of tetrahedra over an image, by what was decided about them, in the colors of the top view."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from PIL import Image, ImageDraw
 
 from tetflora_addon.refinement import decisions
 
-#: Display colours, opacity included; what is rarer comes later, and on top.
-COLOURS = {"HIDDEN": (110, 115, 130, 110), "PROXY": (245, 140, 25, 150), "EXPLICIT": (20, 80, 215, 70)}
+#: Display colors, opacity included; what is rarer comes later, and on top.
+COLORS = {"HIDDEN": (110, 115, 130, 110), "PROXY": (245, 140, 25, 150), "EXPLICIT": (20, 80, 215, 70)}
 #: Tetrahedra that are smaller, in pixels, would hide the image under their lines.
 LEAST = 10.0
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
@@ -35,10 +35,10 @@ def draw_wires(picture: Path, camera: object, refinement: object) -> None:
     lines = Image.new("RGBA", (shown.width * _FINER, shown.height * _FINER))
     draw = ImageDraw.Draw(lines)
     tree, nodes = refinement.tree, refinement.nodes
-    for name, colour in COLOURS.items():
+    for name, color in COLORS.items():
         chosen = nodes[(refinement.decision == decision[name]) & tree.inside[nodes]]
         for line in (projected_edges(tree.vertices(chosen), camera) * lines.size).reshape(-1, 4).tolist():
-            draw.line(line, fill=colour, width=_FINER)
+            draw.line(line, fill=color, width=_FINER)
     lines = lines.resize(shown.size, Image.Resampling.BOX)
     Image.alpha_composite(shown, lines).convert("RGB").save(picture)
 
@@ -66,7 +66,7 @@ def projected_edges(vertices: NDArray[np.float64], camera: object) -> NDArray[np
 
 
 def _cut(point: NDArray[np.float64], other: NDArray[np.float64], near: float) -> NDArray[np.float64]:
-    """Points (m, 3), moved towards the other ends of their edges as far as they are nearer than ``near``."""
+    """Points (m, 3), moved toward the other ends of their edges as far as they are nearer than ``near``."""
     missing = np.maximum(near - point[:, 2], 0.0)
     fraction = np.divide(missing, other[:, 2] - point[:, 2], out=np.zeros(len(point)), where=missing > 0.0)
     return point + fraction[:, None] * (other - point)

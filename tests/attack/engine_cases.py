@@ -28,7 +28,7 @@ from tetflora_addon.parameters import Key
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.species.catalogue import list_species, load_species, odd_files
+from tetflora_addon.species.catalog import list_species, load_species, odd_files
 from tetflora_addon.species.schema import ORDER_KEYS, read_species, species_from_dict
 
 _SETTINGS = RefinementSettings(visibility_resolution=64, max_tetrahedra=4_000)
@@ -67,7 +67,7 @@ def _allowed(rng: random.Random, key: Key) -> Any:
     """A value that a key may have: often one of its limits."""
     if key.choices:
         return rng.choice(key.choices)
-    if key.kind == "colour":
+    if key.kind == "color":
         return [[rng.choice([0, 0.5, 1]) for _ in range(3)], [0, 0, 0]]
     if key.kind == "rgb":
         return [rng.choice([0, 0.5, 1]) for _ in range(3)]
@@ -133,7 +133,7 @@ def identifiers(rng: random.Random, jail: Jail) -> None:
     with suppress(TetFloraError):
         load_species(name, [folder])
     if files.is_identifier(name):
-        path = files.inside(folder, name + ".json")
+        path = files.path_in(folder, name + ".json")
         files.write_whole(path, "{}")
         assert os.listdir(folder) == [path.name]
         path.unlink()
@@ -166,7 +166,7 @@ def paths(rng: random.Random, jail: Jail) -> None:
     except OSError:
         pass
     try:
-        path = files.inside(folder, material.identifier(rng, jail.outside) if way == 5 else "file")
+        path = files.path_in(folder, material.identifier(rng, jail.outside) if way == 5 else "file")
         files.write_whole(path, b"content")
     except OSError as error:
         raise TetFloraError(str(error)) from None
@@ -190,15 +190,15 @@ def cache(rng: random.Random, jail: Jail) -> None:
         os.mkfifo(path)
     else:
         path.write_bytes(material.cache_entry(rng, path.name, _VALUES))
-    before = storage.used()
+    before = storage.current_folder()
     try:
-        storage.use(folder)
+        storage.set_folder(folder)
         for _ in range(2):
-            found = storage.remembered("attack", content, _VALUES.shape, lambda: _VALUES)
+            found = storage.cached("attack", content, _VALUES.shape, lambda: _VALUES)
             assert found.shape == _VALUES.shape
         storage.clear()
     finally:
-        storage.use(before)
+        storage.set_folder(before)
         if path.is_dir() and not path.is_symlink():
             path.rmdir()
         path.unlink(missing_ok=True)
@@ -239,7 +239,7 @@ def polygons(rng: random.Random, _jail: Jail) -> None:
     result = _last(refine(support.small_flora(), support.plants([]), camera, _SETTINGS, None, whole))
     drawn = support.refined(support.small_flora(), result, camera, 1.2, 0.6)
     assert not list(drawn.mesh_blocks())
-    assert all(np.isfinite(facets.centre).all() for parts in drawn.facet_parts() for facets, _ in parts)
+    assert all(np.isfinite(facets.center).all() for parts in drawn.facet_parts() for facets, _ in parts)
     for block in (*drawn.polygon_blocks(), *polygon_blocks(kept_polygons(result))):
         assert np.isfinite(block.buffers.positions).all()
 

@@ -26,7 +26,7 @@ from tetflora_addon.blender import preferences
 from tetflora_addon.blender.cli import command
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import population_files
-from tetflora_addon.blender.species import catalogue, edits
+from tetflora_addon.blender.species import catalog, edits
 from tetflora_addon.errors import TetFloraError
 
 _NUMBERS = (0.0, 1.0, -1.0, 1e-30, 1e-6, 0.5, 3.0, 1e3, 1e6, 1e20, 1e38, math.nan, math.inf, -math.inf)
@@ -87,7 +87,7 @@ def brought(rng: random.Random, jail: Jail) -> None:
         editor.species = identifier
         for prop in editor.bl_rna.properties:
             getattr(editor, prop.identifier)
-        catalogue.items_for(identifier)
+        catalog.items_for(identifier)
         edits.problem_of(scene, identifier)
         buttons = bpy.ops.tetflora
         for button in rng.sample(["save_species", "delete_species", "revert_species", "duplicate_species"], 3):
@@ -95,7 +95,7 @@ def brought(rng: random.Random, jail: Jail) -> None:
         _said(buttons.edit_orders, action=rng.choice(['ADD', 'REMOVE', 'SPUR']))
         _said(buttons.export_species, filepath=str(jail.inside / f"{rng.randrange(9)}.json"))
         with suppress(TetFloraError):
-            catalogue.OWN_FILES.delete(identifier)
+            catalog.OWN_FILES.delete(identifier)
         edits.species_for(scene, identifier)
     finally:
         scene.tetflora.species_edits.clear()

@@ -42,7 +42,7 @@ PASSING = frozenset(
         # reading it then gives None or ends in a crash (5.2 and 4.5).
         "all_objects",
         "particle_edit",  # its object follows the mouse
-        # The same as `species`, for panels. Blender lists the whole catalogue, with pictures, each time it is read.
+        # The same as `species`, for panels. Blender lists the whole catalog, with pictures, each time it is read.
         "species_choice",
     }
 )

@@ -20,7 +20,7 @@ EEVEE_SAMPLES = 4
 def small_scene(
     sky: float, samples: int, sun: float | None = None, size: int = 16, engine: str = "CYCLES", width: float = 2.0
 ) -> None:
-    """Look down from z = 50 on `width` metres, under a grey sky and a sun of π W/m² so many degrees off the zenith."""
+    """Look down from z = 50 on `width` meters, under a gray sky and a sun of π W/m² so many degrees off the zenith."""
     scene = bpy.context.scene
     render = scene.render
     render.engine = engine

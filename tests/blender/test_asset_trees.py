@@ -28,7 +28,7 @@ def _positions(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", asset_trees.KINDS)
-def test_tree_is_valid_and_about_twelve_metres_high(kind: str) -> None:
+def test_tree_is_valid_and_about_twelve_meters_high(kind: str) -> None:
     mesh = asset_trees.make(kind, quick=True).data
     assert not mesh.validate()
     low, high = _positions(mesh).min(axis=0), _positions(mesh).max(axis=0)
@@ -57,7 +57,7 @@ def test_closed_leaves_are_closed() -> None:
     assert (np.cross(a, b) * c).sum() / 6 > 0  # the volume: outward
 
 
-def test_cards_are_quads_with_holes_in_a_texture_whose_colour_varies() -> None:
+def test_cards_are_quads_with_holes_in_a_texture_whose_color_varies() -> None:
     tree = asset_trees.make("cards")
     mesh = tree.data
     sides = np.zeros(len(mesh.polygons), np.int32)

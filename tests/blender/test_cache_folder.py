@@ -18,12 +18,12 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 
 @pytest.fixture
 def cache():
-    """The engine's module; afterwards it uses the folder that it used before."""
-    before = storage.used()
+    """The engine's module; afterward it uses the folder that it used before."""
+    before = storage.current_folder()
     yield storage
     own = preferences.preferences()
     own.use_cache, own.cache_folder = True, ""
-    storage.use(before)
+    storage.set_folder(before)
 
 
 def test_it_lies_where_blender_keeps_what_belongs_to_the_extension(cache, monkeypatch):

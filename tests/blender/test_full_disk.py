@@ -18,7 +18,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, se
 from tests.limits import full_disk
 from tetflora_addon.blender import preferences
 from tetflora_addon.blender.cli import command
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -46,7 +46,7 @@ def _own_species_to(path: Path) -> None:
 
 
 def _loaded_species_to(path: Path) -> None:
-    shipped = catalogue.list_species()["bush"].path
+    shipped = catalog.list_species()["bush"].path
     bpy.ops.tetflora.load_species(filepath=str(shipped), replace=True)
 
 

@@ -18,7 +18,7 @@ from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraPopulation
 from tetflora_addon.blender.results import leaf_objects
 from tetflora_addon.blender.settings import TetFloraWind, TetFloraYear
-from tetflora_addon.blender.species import catalogue, edits
+from tetflora_addon.blender.species import catalog, edits
 from tetflora_addon.growth import seasons, wind
 from tetflora_addon.planting import rules, strokes
 from tetflora_addon.refinement import settings
@@ -69,7 +69,7 @@ def test_properties_are_made_from_the_fields_of_the_engine(engine, group, engine
             assert made.type == {"bool": 'BOOLEAN'}.get(field.type, field.type.upper())
 
 
-def test_qualities_set_what_they_say_and_are_recognised():
+def test_qualities_set_what_they_say_and_are_recognized():
     qualities = settings.QUALITIES
     own = bpy.context.scene.tetflora
     assert own.quality == 'FINAL'
@@ -136,37 +136,37 @@ def test_labels_and_tooltips_follow_blenders_guidelines():
 
 
 def test_an_unknown_species_survives_the_panel_and_the_file(tmp_path):
-    plant = add_plant(species="not_in_the_catalogue", seed=-7)
-    assert plant.tetflora.species_choice == "not_in_the_catalogue"
+    plant = add_plant(species="not_in_the_catalog", seed=-7)
+    assert plant.tetflora.species_choice == "not_in_the_catalog"
     _reopen(tmp_path / "a.blend")
     plant = bpy.data.objects["plant"].tetflora
-    assert (plant.species, plant.seed, plant.is_plant, plant.enabled) == ("not_in_the_catalogue", -7, True, True)
+    assert (plant.species, plant.seed, plant.is_plant, plant.enabled) == ("not_in_the_catalog", -7, True, True)
     plant.species_choice = "bush"
     assert plant.species == "bush"
     assert plant.species_choice == "bush"
 
 
-def test_items_keep_their_numbers_when_the_catalogue_grows(tmp_path):
-    items = catalogue.items_for("gone")
+def test_items_keep_their_numbers_when_the_catalog_grows(tmp_path):
+    items = catalog.items_for("gone")
     numbers = {item[0]: item[4] for item in items}
     assert len(set(numbers.values())) == len(numbers)
-    assert numbers["gone"] == catalogue.number_of("gone")
-    assert {i[0]: i[4] for i in catalogue.items_for()} == {k: v for k, v in numbers.items() if k != "gone"}
+    assert numbers["gone"] == catalog.number_of("gone")
+    assert {i[0]: i[4] for i in catalog.items_for()} == {k: v for k, v in numbers.items() if k != "gone"}
 
 
 def test_numbers_of_items_survive_popups_which_keep_floats():
-    numbers = [item[4] for item in (*catalogue.items_for(), *library.items())]
+    numbers = [item[4] for item in (*catalog.items_for(), *library.items())]
     assert np.array(numbers, np.float32).astype(int).tolist() == numbers
 
 
 def test_species_of_the_users_own_folder(tmp_path):
-    shipped = edits.catalogue()
+    shipped = edits.catalog()
     own = bpy.context.preferences.addons[preferences.ROOT_PACKAGE].preferences
     (tmp_path / "mine.json").write_text(shipped["bush"].path.read_text(encoding="utf-8"), encoding="utf-8")
     try:
         own.species_folder = str(tmp_path)
         assert preferences.species_folders() == (tmp_path,)
-        assert set(edits.catalogue()) == {*shipped, "mine"}
+        assert set(edits.catalog()) == {*shipped, "mine"}
         own.species_folder = str(tmp_path / "missing")
         assert preferences.species_folders() == ()
     finally:

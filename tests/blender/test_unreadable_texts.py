@@ -11,7 +11,7 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, select
 from tetflora_addon.blender.placing import populations
-from tetflora_addon.blender.species import catalogue, edits
+from tetflora_addon.blender.species import catalog, edits
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -49,8 +49,8 @@ def test_texts_that_are_no_text_are_emptied_and_told(tmp_path, capfd):
     assert (population.name, population.uv_layer, population.erased, population.mix[0].companion) == ("",) * 4
     assert group.wind.loop == 7
     assert len(population.uid) == 32
-    assert "oak" in edits.catalogue()
-    assert catalogue.items_for(bpy.data.objects["plant"].tetflora.species)
+    assert "oak" in edits.catalog()
+    assert catalog.items_for(bpy.data.objects["plant"].tetflora.species)
     bpy.ops.tetflora.export_populations(filepath=str(tmp_path / "p.json"))
     with pytest.raises(RuntimeError, match='"plant", "field": unknown species ""'):
         bpy.ops.tetflora.refine()

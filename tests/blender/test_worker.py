@@ -76,8 +76,8 @@ def test_at_once_there_is_no_other_thread():
     def job():
         return (yield from worker.in_thread(counting(3)))
 
-    assert worker.at_once(job()) == threading.current_thread().name
-    assert items_of(worker.in_thread(counting(3)))[1] == "TetFlora"  # afterwards as before
+    assert worker.run_to_end(job()) == threading.current_thread().name
+    assert items_of(worker.in_thread(counting(3)))[1] == "TetFlora"  # afterward as before
 
 
 def test_a_failed_job_at_once_leaves_threads_on():
@@ -86,7 +86,7 @@ def test_a_failed_job_at_once_leaves_threads_on():
         raise ValueError
 
     with pytest.raises(ValueError):
-        worker.at_once(job())
+        worker.run_to_end(job())
     assert items_of(worker.in_thread(counting(3)))[1] == "TetFlora"
 
 

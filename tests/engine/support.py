@@ -17,18 +17,18 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.drawing import drawing
-from tetflora_addon.emission.forms import Refined
+from tetflora_addon.emission.emitters import EmissionInput
 from tetflora_addon.emission.plants import Block, Transition
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts, trunks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.drawn import joined
 from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights, facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets
+from tetflora_addon.proxies.primitives import joined
 from tetflora_addon.refinement.loop import Refinement
-from tetflora_addon.species.catalogue import builtin_folder, load_species
+from tetflora_addon.species.catalog import builtin_folder, load_species
 from tetflora_addon.species.members import expected_polygons
 from tetflora_addon.species.quality import with_quality
 from tetflora_addon.species.schema import species_from_dict
@@ -97,18 +97,18 @@ RICH: dict[str, Any] = small(
     },
     order1={
         "pipe": 2.4, "attraction": [60, 20], "spray": 0.8, "azimuth": [180, 10], "leaf_start": [0.3, 0.2],
-        "leaf_whorl": 3, "leaf_spray": 0.7, "leaf_size_tip": 0.6, "leaf_colour_tip": [0.3, 0.4, 0.1],
+        "leaf_whorl": 3, "leaf_spray": 0.7, "leaf_size_tip": 0.6, "leaf_color_tip": [0.3, 0.4, 0.1],
         "thickness": [0.6, 0.1], "segments": 4,
     },
     order2={
         "spurs": [2, 1], "leaf_droop": 0.6, "leaf_light": [0.4, 0.3], "leaf_size_tip": 1.7, "attraction": [-40, 10],
-        "leaf_colour_tip": [0.3, 0.4, 0.1], "count_by_length": 0.7,
+        "leaf_color_tip": [0.3, 0.4, 0.1], "count_by_length": 0.7,
     },
     leaf=[{"model": "kite"}, {"model": "ovate"}, {"model": "round"}],
     blossom={"model": "lanceolate"},
     spur={
         "length": [0.12, 0.04], "thickness": [0.05, 0.01], "sides": 3, "angle": [40, 20], "leaf_kind": "blossom",
-        "leaves": [4, 0], "leaf_whorl": 4, "leaf_size": [0.06, 0.01], "leaf_colour": [[0.8, 0.5, 0.5], [0.1, 0.1, 0.1]],
+        "leaves": [4, 0], "leaf_whorl": 4, "leaf_size": [0.06, 0.01], "leaf_color": [[0.8, 0.5, 0.5], [0.1, 0.1, 0.1]],
     },
     bud={"length": 0.008, "lateral": 0.5},
     dead={"number": [5, 2], "into": 0.5, "on_limbs": [2, 1]},
@@ -165,7 +165,7 @@ def grove(count: int, spacing: float, species: ArrayLike = 0) -> Seeds:
 def camera(
     eye: ArrayLike, target: ArrayLike, pixels: int = 128, view: float = 0.8, kind: str = "PERSP", near: float = 0.1
 ) -> Camera:
-    """A square picture; ``view`` is its side at depth 1 (perspective) or in metres (orthographic)."""
+    """A square picture; ``view`` is its side at depth 1 (perspective) or in meters (orthographic)."""
     eye, target = np.asarray(eye, float), np.asarray(target, float)
     back = (eye - target) / np.linalg.norm(eye - target)
     right = np.cross([0.0, 0.02, 1.0], back)
@@ -247,8 +247,8 @@ def face_areas(mesh: MeshBuffers) -> NDArray[np.float64]:
     return np.linalg.norm(face_vectors(mesh), axis=1)
 
 
-def face_centres(mesh: MeshBuffers) -> NDArray[np.float64]:
-    """Means (f, 3) of the corners of faces, metres."""
+def face_centers(mesh: MeshBuffers) -> NDArray[np.float64]:
+    """Means (f, 3) of the corners of faces, meters."""
     points = mesh.positions[mesh.corner_verts].astype(np.float64)
     return np.add.reduceat(points, mesh.face_offsets[:-1], axis=0) / np.diff(mesh.face_offsets)[:, None]
 
@@ -269,7 +269,7 @@ def refined(
     limit: float = 1e9,
     weighted: bool = True,
     **options: Any,
-) -> Refined:
+) -> EmissionInput:
     """A scene to be drawn with facets of so many pixels, and leaves as facets up to a width of so many.
 
     weighted: facets have the area that leaves of a cluster show; else all of the area that they stand for.
@@ -278,7 +278,7 @@ def refined(
     there = np.unique(flora.species_of(result.plants.parts.branches.row)).tolist()
     weights = facet_weights(flora, there) if weighted else FacetWeights(ones, ones)
     given = drawing(flora, result, camera, Transition(flora, camera, limit, np.inf), facet, weights, **options)
-    return Refined(flora, result, camera, given)
+    return EmissionInput(flora, result, camera, given)
 
 
 def drawn(
@@ -298,7 +298,7 @@ def face_planes(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Positively oriented tetrahedra, metres.
+        Positively oriented tetrahedra, meters.
 
     Returns
     -------

@@ -92,7 +92,7 @@ def test_chunks_hold_what_is_not_taken_out(steps: list, first: int, seed: int) -
         assert each.there.all()
 
 
-@given(st.integers(0, 3 * arrays._AT_ONCE), st.integers(1, 50), st.integers(0, 2**31))
+@given(st.integers(0, 3 * arrays._BATCH), st.integers(1, 50), st.integers(0, 2**31))
 def test_indices_are_looked_up_as_if_all_at_once(size: int, number: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     index, chosen = rng.integers(0, number, size).astype(np.int32), rng.random(number) < 0.3

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from tests.attack import material
 from tetflora_addon import files
-from tetflora_addon.errors import MESSAGE, NAME, VALUE, TetFloraError, readable, shown
+from tetflora_addon.errors import MESSAGE, NAME, VALUE, TetFloraError, quoted, readable
 
 needs_links = pytest.mark.skipif(os.name == "nt", reason="links need rights on Windows")
 
@@ -37,14 +37,14 @@ def test_an_identifier_is_a_name_right_in_its_folder(text: str) -> None:
     if files.is_identifier(text):
         assert set(text) <= set(string.ascii_letters + string.digits + "_-")
         assert 0 < len(text) <= 64
-        assert files.inside(Path("folder"), text + ".json") == Path("folder") / f"{text}.json"
+        assert files.path_in(Path("folder"), text + ".json") == Path("folder") / f"{text}.json"
 
 
 @given(st.text(st.characters(), max_size=20) | st.sampled_from(material.IDENTIFIERS))
 def test_a_path_lies_right_in_its_folder_or_is_refused(tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
     folder = tmp_path_factory.getbasetemp()
     try:
-        path = files.inside(folder, name)
+        path = files.path_in(folder, name)
     except OSError as error:
         assert readable(error.strerror) == error.strerror
         return
@@ -70,7 +70,7 @@ def test_what_a_link_leads_to_is_neither_read_nor_written(tmp_path: Path) -> Non
 def test_folders_above_may_be_links(tmp_path: Path) -> None:
     (tmp_path / "real").mkdir()
     (tmp_path / "other").symlink_to(tmp_path / "real", target_is_directory=True)
-    files.write_whole(files.inside(tmp_path / "other", "a.json"), b"here")
+    files.write_whole(files.path_in(tmp_path / "other", "a.json"), b"here")
     assert files.read_whole(tmp_path / "other" / "a.json", 10) == (tmp_path / "real" / "a.json").read_bytes() == b"here"
 
 
@@ -124,7 +124,7 @@ def test_a_file_has_a_limit_of_size_whatever_it_says(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a\0b", "\ud800", "a\0b.json"])
 def test_names_that_no_system_takes_are_errors_of_the_system(tmp_path: Path, name: str) -> None:
-    for do in (lambda p: files.read_whole(p, 10), lambda p: files.write_whole(p, ""), lambda p: files.inside(p, "a")):
+    for do in (lambda p: files.read_whole(p, 10), lambda p: files.write_whole(p, ""), lambda p: files.path_in(p, "a")):
         with pytest.raises(OSError, match="no file can have such a name"):
             do(tmp_path / name)
     assert not files.is_regular(tmp_path / name)
@@ -146,21 +146,21 @@ def test_names_that_no_system_takes_are_errors_of_the_system(tmp_path: Path, nam
 )
 def test_what_is_no_json_is_said(text: bytes | str, says: str) -> None:
     with pytest.raises(ValueError, match=says) as caught:
-        files.json_of(text)
+        files.parse_json(text)
     assert readable(str(caught.value)) == str(caught.value)
 
 
 def test_keys_that_come_twice_are_found_at_once() -> None:
     keys = [f'"{n}": 0' for n in range(200_000)]
     with pytest.raises(ValueError, match=r"^199999: duplicate"):
-        files.json_of("{" + ",".join([*keys, keys[-1]]) + "}")
+        files.parse_json("{" + ",".join([*keys, keys[-1]]) + "}")
 
 
 def test_json_has_numbers_that_floats_can_hold() -> None:
-    read = files.json_of("[1, -7, 1" + "0" * 400 + ", -1" + "0" * 5000 + ", 1e999, NaN]")
+    read = files.parse_json("[1, -7, 1" + "0" * 400 + ", -1" + "0" * 5000 + ", 1e999, NaN]")
     assert read[:5] == [1, -7, float("inf"), float("-inf"), float("inf")]
     assert all(float(n) == n for n in read[:5])
-    assert files.json_of('"\\ud83c\\udf33"') == "\N{DECIDUOUS TREE}"
+    assert files.parse_json('"\\ud83c\\udf33"') == "\N{DECIDUOUS TREE}"
 
 
 @given(st.text(st.characters()))
@@ -183,16 +183,16 @@ def test_what_people_write_stays() -> None:
     )
 )
 def test_values_in_messages_are_short(value: object) -> None:
-    assert len(shown(value)) <= VALUE
-    shown(value).encode()
+    assert len(quoted(value)) <= VALUE
+    quoted(value).encode()
 
 
 def test_values_too_large_for_a_message() -> None:
     deep: list = []
     for _ in range(200_000):
         deep = [deep]
-    assert "too large" in shown(deep)
-    assert "too large" in shown(10**5000)
+    assert "too large" in quoted(deep)
+    assert "too large" in quoted(10**5000)
     while deep:  # or Python itself falls over it
         deep = deep.pop()
 
@@ -207,7 +207,7 @@ def test_attack_on_names_and_paths(tmp_path: Path) -> None:
     for _ in range(1000):
         name = material.identifier(rng, tmp_path)
         try:
-            path = files.inside(folder, name + ".json")
+            path = files.path_in(folder, name + ".json")
             files.write_whole(path, "x")
         except OSError:
             continue
@@ -227,7 +227,7 @@ def test_attack_on_json(tmp_path: Path) -> None:
     for _ in range(2000):
         text = material.json_text(rng)
         try:
-            data = files.json_of(text)
+            data = files.parse_json(text)
         except ValueError as error:
             assert readable(str(error)) == str(error)
             continue

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tetflora_addon.storage import keeping
+from tetflora_addon.storage import memoized
 
 
 @pytest.fixture
@@ -15,7 +15,7 @@ def double():
     """A function that doubles arrays and says what it was asked for."""
     asked = []
 
-    @keeping(most_bytes=8 * 10)
+    @memoized(most_bytes=8 * 10)
     def function(*arrays):
         asked.append(arrays)
         return tuple(2 * array for array in arrays)

@@ -65,7 +65,7 @@ def test_few_more_are_made_ahead_than_there_are_threads(threads: int) -> None:
 
 
 def test_a_thread_has_work_while_another_is_at_a_longer_item() -> None:
-    parallel.use(2)
+    parallel.set_threads(2)
     others = threading.Event()
 
     def work(x: int) -> int:
@@ -77,7 +77,7 @@ def test_a_thread_has_work_while_another_is_at_a_longer_item() -> None:
     try:
         assert list(on_all_cores(work, range(4))) == [0, 1, 2, 3]
     finally:
-        parallel.use(0)
+        parallel.set_threads(0)
 
 
 def test_the_environment_says_how_many_where_nobody_else_does(monkeypatch: pytest.MonkeyPatch) -> None:

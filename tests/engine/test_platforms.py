@@ -39,12 +39,12 @@ for module in pkgutil.walk_packages(tetflora_addon.__path__, "tetflora_addon."):
         importlib.import_module(module.name)
 from tetflora_addon import files, memory, parallel, storage
 from tetflora_addon.processes import pool
-from tetflora_addon.species.catalogue import list_species, load_species
+from tetflora_addon.species.catalog import list_species, load_species
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     assert len([load_species(name) for name in sorted(list_species())]) > 20
     files.write_whole(folder / "species.json", '{"name": "Wei\\u00dfdorn"}')
-    assert files.json_of(files.read_whole(folder / "species.json", 1000)) == {"name": "Wei\\u00dfdorn"}
+    assert files.parse_json(files.read_whole(folder / "species.json", 1000)) == {"name": "Wei\\u00dfdorn"}
     assert memory.limit(0.0) > 0 and memory.allowance(0.0) > 0
     parallel.threads = lambda: 2
     assert list(pool.in_processes(operator.add, 1, range(4))) == [1, 2, 3, 4]

@@ -50,7 +50,7 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_tests_run_on_the_code_before_theirs(repository: Path) -> None:
-    """New tests alone, of commits with code; a parameter that fails is enough; the worktree is gone afterwards."""
+    """New tests alone, of commits with code; a parameter that fails is enough; the worktree is gone afterward."""
     found = {name: outcome for _, name, outcome in proofs.proofs(repository, "HEAD~2")}
     assert found == {
         "tests/engine/test_a.py::TestTwo::test_b": "fails",

@@ -27,15 +27,15 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="links, pipes and owners
 def folder(tmp_path: Path) -> Iterator[Path]:
     made = tmp_path / "cache"
     made.mkdir()
-    storage.use(made)
+    storage.set_folder(made)
     yield made
-    storage.use(None)
+    storage.set_folder(None)
 
 
 def asked(content: str = "ab") -> bool:
     """Whether the result had to be found out; it is the right one."""
     found = []
-    result = storage.remembered("test", content, VALUES.shape, lambda: found.append(1) or VALUES)
+    result = storage.cached("test", content, VALUES.shape, lambda: found.append(1) or VALUES)
     assert result.tobytes() == VALUES.tobytes()
     return bool(found)
 
@@ -133,7 +133,7 @@ def test_a_file_that_cannot_be_deleted_does_not_stop_the_others(folder: Path, mo
     monkeypatch.setattr(storage, "MOST_BYTES", 1)
     asked("a3")
     assert [p.name for p in folder.iterdir()] == ["tetflora-test-1-a0.npz"]
-    assert storage.trouble() == ""
+    assert storage.last_problem() == ""
 
 
 def test_no_more_than_so_many_entries_are_looked_at(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,4 +150,4 @@ def test_no_more_than_so_many_entries_are_looked_at(folder: Path, monkeypatch: p
 @pytest.mark.parametrize("content", ["../x", "", "a/b", "AB", "a\0", "a.npz"])
 def test_names_of_results_are_names_of_files(folder: Path, content: str) -> None:
     with pytest.raises(ValueError, match="is no name of a result"):
-        storage.remembered("test", content, VALUES.shape, lambda: VALUES)
+        storage.cached("test", content, VALUES.shape, lambda: VALUES)

@@ -22,7 +22,7 @@ from tetflora_addon import storage
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.proxies import facet_weights
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 
 ROOT = Path(__file__).resolve().parents[2]
 TRUTH = np.linspace(0.0, 1.0, 24).reshape(2, 3, 4)
@@ -31,15 +31,15 @@ TRUTH = np.linspace(0.0, 1.0, 24).reshape(2, 3, 4)
 @pytest.fixture
 def folder(tmp_path: Path) -> Iterator[Path]:
     """A folder that is used and not there yet."""
-    storage.use(tmp_path / "cache")
+    storage.set_folder(tmp_path / "cache")
     yield tmp_path / "cache"
-    storage.use(None)
+    storage.set_folder(None)
 
 
 def asked(content: str, values: np.ndarray = TRUTH) -> bool:
     """Whether a result had to be found out; it is the right one to the last bit."""
     found = []
-    result = storage.remembered("test", content, values.shape, lambda: found.append(1) or values)
+    result = storage.cached("test", content, values.shape, lambda: found.append(1) or values)
     assert result.dtype == np.float64
     assert result.tobytes() == values.tobytes()
     return bool(found)
@@ -54,11 +54,11 @@ def test_what_was_found_out_is_not_found_out_again(folder: Path, capsys: pytest.
     assert len(files(folder)) == len(list(folder.iterdir())) == 2
     assert storage.clear() == 2
     assert asked("ab")
-    assert capsys.readouterr().err == storage.trouble() == ""
+    assert capsys.readouterr().err == storage.last_problem() == ""
 
 
 def test_without_a_folder_nothing_is_kept(tmp_path: Path) -> None:
-    assert storage.used() is None
+    assert storage.current_folder() is None
     assert asked("ab")
     assert asked("ab")
     assert storage.clear() == 0
@@ -115,7 +115,7 @@ def test_what_is_wrong_is_said_once(folder: Path, capsys: pytest.CaptureFixture)
     said = capsys.readouterr().err
     assert said.count("warning") == 1
     assert str(files(folder)[0]) in said
-    assert storage.trouble() in said
+    assert storage.last_problem() in said
 
 
 @pytest.mark.parametrize("what", ["file", "folder of that name", "below a file"])
@@ -128,7 +128,7 @@ def test_a_place_that_cannot_be_used_stops_nobody(
         (folder / "tetflora-test-1-ab.npz").mkdir(parents=True)
     else:
         (tmp_path / "mine").write_text("mine")
-        storage.use(tmp_path / "mine" / "cache")
+        storage.set_folder(tmp_path / "mine" / "cache")
     assert asked("ab")
     assert asked("ab")
     assert capsys.readouterr().err.count("warning") == 1
@@ -192,16 +192,16 @@ from pathlib import Path
 import numpy as np
 from tetflora_addon import storage
 folder, seed, rounds, most = sys.argv[1], *map(int, sys.argv[2:])
-storage.use(Path(folder))
+storage.set_folder(Path(folder))
 storage.MOST_BYTES = most
 found = 0
-def find_out(number):
+def compute(number):
     global found
     found += 1
     return np.full((50, 40), float(number))
 print("ready", flush=True)
 for number in np.random.default_rng(seed).integers(0, 40, rounds):
-    values = storage.remembered("test", f"{number:x}", (50, 40), lambda: find_out(number))
+    values = storage.cached("test", f"{number:x}", (50, 40), lambda: compute(number))
     assert (values == number).all(), number
 print("found", found)
 """

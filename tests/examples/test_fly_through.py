@@ -68,8 +68,8 @@ def test_walk_through_the_landscape_is_clear_of_plants(clean_file):
     for number, place in enumerate(plants.tolist()):
         tree.insert((*place[:2], 0.0), number)
     tree.balance()
-    neighbours = [tree.find_n((*place[:2], 0.0), 2)[1][2] for place in plants[::50].tolist()]
-    assert away > np.median(neighbours), "half of all plants have a neighbour that is closer"
+    neighbors = [tree.find_n((*place[:2], 0.0), 2)[1][2] for place in plants[::50].tolist()]
+    assert away > np.median(neighbors), "half of all plants have a neighbor that is closer"
 
 
 def test_unknown_scene_is_named(clean_file):

@@ -27,7 +27,7 @@ def test_the_scene_is_seeds_of_four_species_for_an_image_of_the_size_of_its_refe
 @pytest.mark.parametrize("distance", public_scene.DISTANCES)
 def test_a_reference_is_no_different_from_itself_and_plants_are_where_its_mask_says(distance, clean_file):
     reference, mask = (public_scene.FOLDER / f"{distance}{end}" for end in (".exr", "-mask.png"))
-    assert public_scene.compare(reference, reference, mask) == {"flip": 0.0, "flip_all": 0.0, "colour": 0.0}
+    assert public_scene.compare(reference, reference, mask) == {"flip": 0.0, "flip_all": 0.0, "color": 0.0}
     light, seen = images.read_picture(reference)[:, :, :3].mean(axis=2), images.read_picture(mask)[:, :, 0]
     # Foliage is darker than the sky that it is seen before, and than the ground.
     assert light[seen > 0.9].mean() < 0.6 * light[seen == 0.0].mean()

@@ -40,7 +40,7 @@ def test_crowns_stand_apart_and_within_the_border(name):
     stand = rami_discs.canopy(name)
     places = np.concatenate(list(stand.places.values()))
     radii = np.concatenate([np.full(len(p), stand.solids[kind].radius) for kind, p in stand.places.items()])
-    # Published centres have no slack.
+    # Published centers have no slack.
     assert np.all(np.abs(places[:, :2]) + radii[:, None] <= stand.side / 2 + 1e-3)
     some = slice(None, 1000)
     apart = np.linalg.norm(places[some, None, :2] - places[None, :, :2], axis=-1) - radii[some, None] - radii[None]
@@ -63,18 +63,18 @@ def test_copies_around_repeat_the_scene():
 @pytest.mark.parametrize("shape", ("sphere", "cylinder", "cone", "box"))
 def test_discs_fill_their_solid_evenly(shape):
     solid = rami_discs.Solid(shape, 1.0, 2.0, 20_000, 0.001, apart=False)
-    centres, _ = rami_discs.discs(solid, 3)
-    x, y, z = centres.T
+    centers, _ = rami_discs.discs(solid, 3)
+    x, y, z = centers.T
     width = np.hypot(x, y)
     inside, middle = {
-        "sphere": (np.linalg.norm(centres, axis=1) <= 1.0, 0.0),
+        "sphere": (np.linalg.norm(centers, axis=1) <= 1.0, 0.0),
         "cylinder": ((width <= 1.0) & (z >= 0.0) & (z <= 2.0), 1.0),
         # The centroid of a cone lies a quarter of its height above its base.
         "cone": ((width <= 1.0 - z / 2.0 + 1e-12) & (z >= 0.0), 0.5),
         "box": ((np.abs(x) <= 1.0) & (np.abs(y) <= 1.0) & (z >= 0.0) & (z <= 2.0), 1.0),
     }[shape]
     assert inside.all()
-    assert np.allclose(centres.mean(axis=0), (0.0, 0.0, middle), atol=0.02)
+    assert np.allclose(centers.mean(axis=0), (0.0, 0.0, middle), atol=0.02)
 
 
 @pytest.mark.parametrize("inclination", ("spherical", "planophile", "erectophile"))
@@ -86,8 +86,8 @@ def test_normals_show_the_expected_area_from_above(inclination):
 
 
 def test_discs_do_not_cut_each_other():
-    centres, normals = rami_discs.discs(SOLID, 1)
-    assert len(rami_discs.intersecting(centres, normals, SOLID.disc_radius)[0]) == 0
+    centers, normals = rami_discs.discs(SOLID, 1)
+    assert len(rami_discs.intersecting(centers, normals, SOLID.disc_radius)[0]) == 0
     # Two crossed discs do, beside each other they do not.
     upright, flat = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
     for shift, number in ((0.5, 1), (1.5, 0)):
@@ -108,7 +108,7 @@ def test_species_have_the_discs_of_the_solid():
             species = species_from_dict(rami_species.species_data(kind, solid), "test", "test")
             order = species.orders[-1]
             assert order.leaves[0] == solid.discs
-            assert species.leaf_transmission * order.leaf_colour[0][0] == pytest.approx(solid.transmittance)
+            assert species.leaf_transmission * order.leaf_color[0][0] == pytest.approx(solid.transmittance)
 
 
 def test_bare_ground_reflects_the_same_everywhere(clean_file, tmp_path):

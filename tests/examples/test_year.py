@@ -18,9 +18,9 @@ TIMES = {f"{kind}_{what}": 1 for kind in year.KINDS for what in ("s", "render_s"
 
 
 def frames(folder, refined, expanded):
-    """Pictures of flat greys, and their record."""
-    for grey, kind in ((refined, "refined"), (expanded, "expanded")):
-        for state, value in zip(STATES, grey, strict=True):
+    """Pictures of flat grays, and their record."""
+    for gray, kind in ((refined, "refined"), (expanded, "expanded")):
+        for state, value in zip(STATES, gray, strict=True):
             picture = Image.fromarray(np.full((16, 16, 3), value, np.uint8))
             picture.save(year._path(folder, state, kind))
     Image.fromarray(np.full((16, 16, 3), 255, np.uint8)).save(folder / "nothing.png")

@@ -97,9 +97,9 @@ def test_the_zip_of_the_job_is_that_of_the_build(
     run: Run, scene_file: Path, extension_zip: Path, tmp_path: Path
 ) -> None:
     bundle = written(run, scene_file, tmp_path / "job")
-    (travelling,) = (bundle / "tetflora").glob("*.zip")
-    assert travelling.name == extension_zip.name
-    with zipfile.ZipFile(travelling) as ours, zipfile.ZipFile(extension_zip) as built:
+    (traveling,) = (bundle / "tetflora").glob("*.zip")
+    assert traveling.name == extension_zip.name
+    with zipfile.ZipFile(traveling) as ours, zipfile.ZipFile(extension_zip) as built:
         contents = [{name: z.read(name) for name in z.namelist() if not name.endswith("/")} for z in (ours, built)]
     assert contents[0] == contents[1]
 

@@ -45,7 +45,7 @@ def forest(request: pytest.FixtureRequest, blender: object, tmp_path_factory: py
     scene.camera.location.x = 1.0
     scene.camera.keyframe_insert("location", frame=9)
     scene.frame_start, scene.frame_end = 1, 9
-    scene.tetflora.proxy_form = 'SHELLS'
+    scene.tetflora.proxy_kind = 'SHELLS'
     scene.tetflora.output.save_results = request.param
     scene.cycles.transparent_max_bounces = scene.cycles.min_transparent_bounces = BOUNCES
     assert bpy.ops.tetflora.refine() == {'FINISHED'}

@@ -45,7 +45,7 @@ def steps(ui):
 
 def dragged(ui, x, y):
     """Drag what is there to the middle of the viewport."""
-    to_x, to_y = ui.centre()
+    to_x, to_y = ui.center()
     ui.move(x, y)
     yield 0.5
     ui.window.event_simulate(type='LEFTMOUSE', value='PRESS', x=x, y=y)

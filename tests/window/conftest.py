@@ -42,8 +42,8 @@ def seen(request: pytest.FixtureRequest, full_blender: str, resources: Path, pic
 
 
 @pytest.fixture(scope="session")
-def colours() -> Callable[[Path], int]:
-    """Counts the different colours of a picture; a window that was never drawn has one or two."""
+def colors() -> Callable[[Path], int]:
+    """Counts the different colors of a picture; a window that was never drawn has one or two."""
 
     def count(picture: Path) -> int:
         command = ["identify", "-format", "%k", str(picture)]

@@ -60,7 +60,7 @@ def steps(ui):
 
 
 def look(space, tilt, distance):
-    """Turn the viewport towards the middle of the plants."""
+    """Turn the viewport toward the middle of the plants."""
     view = space.region_3d
     view.view_perspective = 'PERSP'
     view.view_location = Vector((0.0, 0.0, 5.0))

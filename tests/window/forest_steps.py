@@ -116,7 +116,7 @@ def build_ground(scene):
 
 def look(ui):
     """Look through the camera, by the key that artists press."""
-    ui.move(*ui.centre())
+    ui.move(*ui.center())
     ui.press('NUMPAD_0')
     yield from ui.until(
         lambda: ui.area().spaces.active.region_3d.view_perspective == 'CAMERA', 10, "view through the camera"
@@ -145,13 +145,13 @@ def press_button(ui, operator):
         raise LookupError(f"the sidebar shows no button for {operator}")
     ui.press('LEFTMOUSE')
     yield 0.1
-    ui.move(*ui.centre())
+    ui.move(*ui.center())
     yield 0.1
 
 
 def press_key(ui, key, **modifiers):
     """Press a key over the 3D view and wait until Blender has acted on it."""
-    ui.move(*ui.centre())
+    ui.move(*ui.center())
     yield 0.2
     ui.press(key, **modifiers)
     yield 1.5

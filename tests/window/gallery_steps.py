@@ -43,5 +43,5 @@ def steps(ui):
             ui.press('LEFTMOUSE')
             yield 0.5
             chosen.append([getattr(group, stored), getattr(group, choice)])
-            ui.move(*ui.centre())
+            ui.move(*ui.center())
             yield 0.5

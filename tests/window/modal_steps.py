@@ -29,7 +29,7 @@ def steps(ui):
     scene.camera.location, scene.camera.rotation_euler = (0.0, -60.0, 2.0), (1.5708, 0.0, 0.0)
     for i in range(2):
         add_plant(f"p{i}", seed=i, location=(3.0 * i, 3.0 * i, 0.0))
-    ui.move(*ui.centre())
+    ui.move(*ui.center())
     yield 0.5
     bare = datablocks()
 
@@ -49,7 +49,7 @@ def steps(ui):
     begin(ui)
     yield from ui.until(lambda: datablocks() != bare, 60, "first objects")
     ui.values["running_before_esc"] = running(ui)
-    ui.move(*ui.centre())
+    ui.move(*ui.center())
     ui.press('ESC')
     yield from ui.until(lambda: not running(ui), 30, "end after Esc")
     ui.values["left_by_esc"] = changes(bare)

@@ -45,7 +45,7 @@ def steps(ui):
         bpy.ops.tetflora.paint_plants('INVOKE_DEFAULT', mode='PAINT')
     yield 0.3
     ui.values["painting"] = painting(ui)
-    x, y = ui.centre()
+    x, y = ui.center()
     yield from drag(ui, (x - 200, y), (x + 100, y))
     ui.values["painted"] = places()
     yield from ui.picture("painted")

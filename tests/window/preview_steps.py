@@ -104,9 +104,9 @@ def steps(ui):
     last = settings.level
     ui.values["last"] = last
     for mode in ("FORM", "LEVEL", "VISIBILITY", "CONTRIBUTION"):
-        settings.colour = mode
+        settings.color = mode
         yield from ui.picture(f"wires_{mode.lower()}")
-    settings.colour = 'FORM'
+    settings.color = 'FORM'
     for number in (0, last // 2):
         settings.level = number
         yield from ui.picture(f"level_{number}")
@@ -196,7 +196,7 @@ def press_button(ui, operator):
             if manager.clipboard.startswith(f"bpy.ops.{operator}("):
                 ui.press('LEFTMOUSE')
                 yield 0.2
-                ui.move(*ui.centre())
+                ui.move(*ui.center())
                 yield 0.1
                 return
     raise LookupError(f"the sidebar shows no button for {operator}")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The catalogue as an asset library, in the real window: a plant is dragged from the asset browser into the scene."""
+"""The catalog as an asset library, in the real window: a plant is dragged from the asset browser into the scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def test_the_library_is_known_to_blender(seen: dict) -> None:
 
 
 def test_a_plant_that_is_dropped_is_a_plant(seen: dict) -> None:
-    """One object of this file, of a species of the catalogue, in a scene that is ready for it."""
+    """One object of this file, of a species of the catalog, in a scene that is ready for it."""
     assert len(seen["plants"]) == 1
     _, is_plant, species, own = seen["plants"][0]
     assert is_plant

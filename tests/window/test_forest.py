@@ -75,5 +75,5 @@ def test_populate_can_be_adjusted_afterwards(seen: dict) -> None:
 @pytest.mark.parametrize(
     "name", ["populated", "progress", "refined", "escaped", "rendered", "nothing_refined", "search"]
 )
-def test_the_window_was_drawn(seen: dict, pictures: Path, colours: Callable[[Path], int], name: str) -> None:
-    assert colours(pictures / "forest" / f"{name}.png") > 200
+def test_the_window_was_drawn(seen: dict, pictures: Path, colors: Callable[[Path], int], name: str) -> None:
+    assert colors(pictures / "forest" / f"{name}.png") > 200

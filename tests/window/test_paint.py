@@ -55,5 +55,5 @@ def test_a_click_places_a_plant(seen: dict) -> None:
 
 
 @pytest.mark.parametrize("name", ["begin", "first_forest", "refined", "painted", "erased", "thinned", "placing", "pie"])
-def test_the_window_was_drawn(seen: dict, pictures: Path, colours: Callable[[Path], int], name: str) -> None:
-    assert colours(pictures / "paint" / f"{name}.png") > 200
+def test_the_window_was_drawn(seen: dict, pictures: Path, colors: Callable[[Path], int], name: str) -> None:
+    assert colors(pictures / "paint" / f"{name}.png") > 200

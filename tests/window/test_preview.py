@@ -37,9 +37,9 @@ def changed(a: np.ndarray, b: np.ndarray) -> float:
     return float((np.abs(a - b).max(axis=2) > 0.05).mean())
 
 
-def share(picture: np.ndarray, colour: tuple[float, float, float]) -> float:
-    """Share of the pixels that have the hue of a colour and are as saturated."""
-    wanted, got = np.array(colour) - min(colour), picture - picture.min(axis=2, keepdims=True)
+def share(picture: np.ndarray, color: tuple[float, float, float]) -> float:
+    """Share of the pixels that have the hue of a color and are as saturated."""
+    wanted, got = np.array(color) - min(color), picture - picture.min(axis=2, keepdims=True)
     size = np.linalg.norm(got, axis=2) + 1e-6
     return float(((got @ wanted > 0.98 * size * np.linalg.norm(wanted)) & (size > 0.25)).mean())
 
@@ -84,11 +84,11 @@ def test_each_level_looks_different(seen: dict, views: Pictures) -> None:
 
 
 @pytest.mark.parametrize("one", WIRES)
-def test_each_colouring_tells_something_else(views: Pictures, one: str) -> None:
+def test_each_coloring_tells_something_else(views: Pictures, one: str) -> None:
     for other in WIRES:
         if other != one:
             assert changed(views[one], views[other]) > 0.01, other
-    # Colours change, places do not.
+    # Colors change, places do not.
     places = [np.abs(views[name] - views["bare"]).max(axis=2) > 0.1 for name in (one, "wires_form")]
     assert (places[0] == places[1]).mean() > 0.9
 
@@ -96,13 +96,13 @@ def test_each_colouring_tells_something_else(views: Pictures, one: str) -> None:
 def test_forms_are_told_apart_and_chosen(seen: dict, views: Pictures) -> None:
     _, proxies, hidden, explicit, _ = seen["forms"]
     assert min(proxies, hidden, explicit) > 0
-    for colour in (GREEN, ORANGE):
-        assert share(views["wires_form"], colour) > 0.003
-        assert share(views["hidden"], colour) < 1e-4
+    for color in (GREEN, ORANGE):
+        assert share(views["wires_form"], color) > 0.003
+        assert share(views["hidden"], color) < 1e-4
     assert share(views["hidden"], BLUE) > 0.002
 
 
-def test_translucent_tetrahedra_have_the_plants_colour(views: Pictures) -> None:
+def test_translucent_tetrahedra_have_the_plants_color(views: Pictures) -> None:
     cloud = np.abs(views["translucent"] - views["bare"]).max(axis=2) > 0.05
     assert cloud.mean() > 0.1
     red, green, blue = views["translucent"][cloud].mean(axis=0)

@@ -16,7 +16,7 @@ def test_programs_for_a_window_are_there() -> None:
     assert window.missing_tools() == []
 
 
-def test_sidebar(full_blender: str, resources: Path, pictures: Path, colours: Callable[[Path], int]) -> None:
+def test_sidebar(full_blender: str, resources: Path, pictures: Path, colors: Callable[[Path], int]) -> None:
     result = window.run_in_window(full_blender, HERE / "sidebar_steps.py", pictures / "sidebar", 180, resources)
     assert result["ok"], result["error"]
     assert result["values"]["enabled"]
@@ -26,7 +26,7 @@ def test_sidebar(full_blender: str, resources: Path, pictures: Path, colours: Ca
     assert result["values"]["preferences_drawn"] > 0
     assert "Traceback" not in (pictures / "sidebar" / "blender.log").read_text(encoding="utf-8", errors="replace")
     assert "sidebar.png" in result["pictures"]
-    assert colours(pictures / "sidebar" / "sidebar.png") > 200
+    assert colors(pictures / "sidebar" / "sidebar.png") > 200
 
 
 def test_an_error_in_the_script_is_reported(full_blender: str, tmp_path: Path) -> None:

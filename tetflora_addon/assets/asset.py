@@ -31,20 +31,20 @@ class Clusters(Arrays):
     parent, child, children : (c,) int32
         Parent or −1, first child, and number of children.
     low, high : (c, 3) float64
-        Bounds of all vertices, metres.
+        Bounds of all vertices, meters.
     leaf_area, wood_area : (c,) float64
         One-sided area of sheets, and surface of solids, m², without what is transparent.
-    body_area : (c,) float64
+    closed_leaf_area : (c,) float64
         The part of that of solids which are as many as leaves: closed leaves, berries, twigs. Facets stand for them as
         for leaves.
     faces : (c,) int32
     first_face : (c,) int64
         First of its faces in the asset's order.
     width : (c,) float64
-        Mean width of its leaves and wood, by area, metres.
+        Mean width of its leaves and wood, by area, meters.
     one_leaf : (c,) float64
         Mean optical area of its leaves, m²; 0 where there are none.
-    colour : (c, 3) float64
+    color : (c, 3) float64
     transmission : (c,) float64
     moment : (c, 6) float64
         Mean of n nᵀ by optical area: xx, yy, zz, xy, xz, yz.
@@ -65,12 +65,12 @@ class Clusters(Arrays):
     high: NDArray[np.float64] = field(metadata=column(3))
     leaf_area: NDArray[np.float64]
     wood_area: NDArray[np.float64]
-    body_area: NDArray[np.float64]
+    closed_leaf_area: NDArray[np.float64]
     faces: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     first_face: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
     width: NDArray[np.float64]
     one_leaf: NDArray[np.float64]
-    colour: NDArray[np.float64] = field(metadata=column(3))
+    color: NDArray[np.float64] = field(metadata=column(3))
     transmission: NDArray[np.float64]
     moment: NDArray[np.float64] = field(metadata=column(6))
     first_leaf: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
@@ -89,7 +89,7 @@ class Clusters(Arrays):
     @property
     def leaf_optical(self) -> NDArray[np.float64]:
         """The part (c,) of the optical area that facets stand for as for leaves, m²."""
-        return self.leaf_area + self.body_area / 2
+        return self.leaf_area + self.closed_leaf_area / 2
 
     @property
     def leaf_faces(self) -> NDArray[np.float64]:
@@ -116,15 +116,15 @@ class SurfaceSamples(Arrays):
     Attributes
     ----------
     position : (s, 3) float32
-        Metres.
+        Meters.
     normal : (s, 3) float16
-    colour : (s, 3) float16
+    color : (s, 3) float16
     transmission, roughness : (s,) float16
     """
 
     position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
     normal: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
-    colour: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
+    color: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
     transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
     roughness: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
 
@@ -138,18 +138,18 @@ class AssetKites(Arrays):
 
     Attributes
     ----------
-    centre : (l, 3) float32
-        Metres.
+    center : (l, 3) float32
+        Meters.
     along, across : (l, 3) float32
-        Halves of its diagonals, metres.
-    colour : (l, 3) float16
+        Halves of its diagonals, meters.
+    color : (l, 3) float16
     transmission, roughness : (l,) float16
     """
 
-    centre: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    center: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
     along: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
     across: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    colour: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
+    color: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
     transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
     roughness: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
 
@@ -288,7 +288,7 @@ class Instances(Arrays):
     linear : (n, 3, 3) float64
         From the space of the asset to the world, without the translation: turned, stretched or mirrored.
     position : (n, 3) float64
-        Of the asset's origin, metres.
+        Of the asset's origin, meters.
     key : (n,) uint64
         Tells individuals apart.
     """
@@ -325,13 +325,13 @@ class AssetSurface:
     ----------
     name : str
     positions : (v, 3) float32
-        In the space of the mesh, metres.
+        In the space of the mesh, meters.
     triangles : (t, 3) int32
         Vertices of each.
     face : (t,) int32
         The mesh's face that each is a part of; ascending.
-    colour : (f, 3) float16
-        Mean linear colour of what is not transparent of each face.
+    color : (f, 3) float16
+        Mean linear color of what is not transparent of each face.
     transmission : (f,) float16
         Fraction of light that is scattered through; NaN where nobody knows.
     coverage : (f,) float16
@@ -344,7 +344,7 @@ class AssetSurface:
     positions: NDArray[np.float32]
     triangles: NDArray[np.int32]
     face: NDArray[np.int32]
-    colour: NDArray[np.float16]
+    color: NDArray[np.float16]
     transmission: NDArray[np.float16]
     coverage: NDArray[np.float16]
     roughness: NDArray[np.float16] | None = None

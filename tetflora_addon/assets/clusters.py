@@ -43,17 +43,17 @@ class Hierarchy:
     children: NDArray[np.int32]
 
 
-def hierarchy_of(centre: NDArray[np.floating], triangles: NDArray[np.integer], kind: NDArray[np.integer]) -> Hierarchy:
+def hierarchy_of(center: NDArray[np.floating], triangles: NDArray[np.integer], kind: NDArray[np.integer]) -> Hierarchy:
     """Clusters of patches with middles (p, 3) and so many triangles (p,) each, at least one patch.
 
     Kinds (p,) are divided before anything else: a trunk among leaves would be as small as these for all that asks.
     """
     order = np.argsort(kind, kind="stable")
-    first, last, parent = [np.zeros(1, np.int64)], [np.array([len(centre)])], [np.array([-1])]
+    first, last, parent = [np.zeros(1, np.int64)], [np.array([len(center)])], [np.array([-1])]
     start, stop, number, known = first[0], last[0], np.zeros(1, np.int64), 1
     begin = np.flatnonzero(np.diff(kind[order], prepend=-1))
     if len(begin) > 1:
-        start, stop = begin.astype(np.int64), np.append(begin[1:], len(centre))
+        start, stop = begin.astype(np.int64), np.append(begin[1:], len(center))
         first.append(start)
         last.append(stop)
         parent.append(np.zeros(len(begin), np.int64))
@@ -64,7 +64,7 @@ def hierarchy_of(centre: NDArray[np.floating], triangles: NDArray[np.integer], k
     while len(number):
         inner, low, high = number, start, stop
         for _ in range(generations):
-            order, low, high, inner = _divided(order, low, high, inner, centre, triangles)
+            order, low, high, inner = _divided(order, low, high, inner, center, triangles)
         # A cluster that is not divided any more has itself as its only child.
         real = np.bincount(inner, minlength=known)[inner] > 1
         start, stop, of = low[real], high[real], inner[real]
@@ -83,7 +83,7 @@ def _divided(
     low: NDArray[np.int64],
     high: NDArray[np.int64],
     number: NDArray[np.int64],
-    centre: NDArray[np.floating],
+    center: NDArray[np.floating],
     triangles: NDArray[np.integer],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Divide runs (r,) of the order in two where they are large; new order, runs, and where each comes from."""
@@ -97,7 +97,7 @@ def _divided(
     dividing = (load > SMALL) & (size > 1)
     if not dividing.any():
         return order, low, high, number
-    points = centre[patch]
+    points = center[patch]
     least, most = np.minimum.reduceat(points, begin, axis=0), np.maximum.reduceat(points, begin, axis=0)
     axis = (most - least).argmax(axis=1)
     along = np.take_along_axis(points, axis[owner][:, None], axis=1)[:, 0].astype(np.float64)

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From an asset's faces to its clusters: bounds, areas, colours, orientation, samples and weights (paper, section 5).
+"""From an asset's faces to its clusters: bounds, areas, colors, orientation, samples and weights (paper, section 5).
 
-The paper compiles a species before any plant is modelled. Here the model is there, and compiled in the same spirit:
+The paper compiles a species before any plant is modeled. Here the model is there, and compiled in the same spirit:
 what refinement asks of a cluster is known without looking at its polygons again.
 """
 
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
-from ..jobs import at_once
+from ..jobs import run_to_end
 from .asset import COUNTS, Asset, AssetKites, AssetSource, Clusters, SurfaceSamples
-from .clumping import facet_weights_of
 from .clusters import Hierarchy, hierarchy_of
-from .measures import ALONG, Measured, measured, pool_of, runs_of, shared_out, well_spread
+from .facet_weights import facet_weights_of
+from .measures import ALONG, Measured, measured, patch_table_of, runs_of, shared_out, well_spread
 from .patches import patches_of
 
 #: Samples of a cluster with children.
@@ -28,7 +28,7 @@ SAMPLES_ABOVE = 64
 
 def compile_asset(source: AssetSource) -> Asset:
     """Compile an asset at once; errors as `compile_steps`."""
-    return at_once(compile_steps(source))
+    return run_to_end(compile_steps(source))
 
 
 def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
@@ -45,8 +45,8 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
     for number, surface in enumerate(source.surfaces):
         patches.append(patches_of(surface) if len(surface.triangles) else None)
         yield 0.5 * (number + 1) / len(source.surfaces)
-    pool = pool_of(source, tuple(patches))
-    hierarchy = hierarchy_of(pool.centre, pool.triangles, pool.kind)
+    pool = patch_table_of(source, tuple(patches))
+    hierarchy = hierarchy_of(pool.center, pool.triangles, pool.kind)
     parts: list[Measured] = []
     number = int((hierarchy.children == 0).sum())
     for run in runs_of(source, pool, hierarchy):
@@ -96,7 +96,7 @@ def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Su
     begin = np.zeros(len(first), np.int64)
     begin[small] = np.cumsum(number[small]) - number[small]
     begin[inner] = len(samples) + np.cumsum(number[inner]) - number[inner]
-    leaf, wood, optical, faces, leaves, bodies = every[:, :6].T
+    leaf, wood, optical, faces, leaves, closed_leaves = every[:, :6].T
     mean = every[:, 6:] / np.maximum(optical, 1e-300)[:, None]
     before, leaves_before = (np.cumsum(np.append(0, sums[:, k])) for k in (3, 4))
     clusters = Clusters(
@@ -107,11 +107,11 @@ def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Su
         bounds[:, 1],
         leaf,
         wood,
-        np.minimum(bodies, wood),
+        np.minimum(closed_leaves, wood),
         faces.astype(np.int32),
         before[first].astype(np.int64),
         mean[:, 0],
-        (leaf + bodies / 2) / np.maximum(leaves, 1.0),
+        (leaf + closed_leaves / 2) / np.maximum(leaves, 1.0),
         mean[:, 1:4],
         mean[:, 4],
         mean[:, 5:],

@@ -22,7 +22,7 @@ def kites_of(
     corners: NDArray[np.float64],
     optical: NDArray[np.float64],
     normal: NDArray[np.float64],
-    colour: NDArray[np.floating],
+    color: NDArray[np.floating],
     transmission: NDArray[np.floating],
     roughness: NDArray[np.floating],
     first: NDArray[np.integer],
@@ -37,7 +37,7 @@ def kites_of(
         Area that each blocks, m².
     normal : (t, 3) float64
         Unit vectors.
-    colour, transmission, roughness : (t, 3), (t,), (t,) float
+    color, transmission, roughness : (t, 3), (t,), (t,) float
     first : (l,) int
         First triangle of each leaf, ascending from 0 on.
     number : (l,) int
@@ -47,12 +47,12 @@ def kites_of(
     whole = np.maximum(area, 1e-300)[:, None]
     middle = corners.mean(axis=1)
     counted = np.maximum(optical, 1e-200)[:, None]  # leaves of no area are somewhere, too
-    centre = np.add.reduceat(counted * middle, first, axis=0) / np.add.reduceat(counted, first, axis=0)
+    center = np.add.reduceat(counted * middle, first, axis=0) / np.add.reduceat(counted, first, axis=0)
     leaf = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(optical))))
     # Second moments of triangles: a twelfth of the sum over corners, and nine twelfths of the middle.
     away = np.concatenate([corners, np.sqrt(9.0) * middle[:, None]], axis=1)
-    away[:, :3] -= centre[leaf][:, None]
-    away[:, 3] -= 3.0 * centre[leaf]
+    away[:, :3] -= center[leaf][:, None]
+    away[:, 3] -= 3.0 * center[leaf]
     spread = np.zeros((len(first), 3, 3))
     for i in range(3):
         for j in range(i, 3):
@@ -72,10 +72,10 @@ def kites_of(
     side = np.sqrt(area)
     length = np.clip(length, side * np.sqrt(2.0 / _WIDE), side * np.sqrt(2.0 / _NARROW))
     width = 2.0 * area / np.maximum(length, 1e-300)
-    mean = np.add.reduceat(optical[:, None] * colour, first, axis=0) / whole
+    mean = np.add.reduceat(optical[:, None] * color, first, axis=0) / whole
     through, rough = (np.add.reduceat(optical * own, first) / whole[:, 0] for own in (transmission, roughness))
     return AssetKites(
-        centre.astype(np.float32),
+        center.astype(np.float32),
         (length[:, None] / 2 * along).astype(np.float32),
         (width[:, None] / 2 * np.cross(plane, along)).astype(np.float32),
         mean.astype(np.float16),
@@ -87,8 +87,8 @@ def kites_of(
 def kite_mesh(leaves: AssetKites) -> MeshBuffers:
     """Kites (l,) as a mesh with the attributes that the material of proxies reads."""
     count = len(leaves)
-    points = [leaves.centre - leaves.along, leaves.centre - leaves.across]
-    points += [leaves.centre + leaves.along, leaves.centre + leaves.across]
+    points = [leaves.center - leaves.along, leaves.center - leaves.across]
+    points += [leaves.center + leaves.along, leaves.center + leaves.across]
     every = np.arange(4 * count, dtype=np.int32).reshape(count, 4)
     return MeshBuffers(
         positions=np.stack(points, axis=1).reshape(-1, 3),
@@ -97,7 +97,7 @@ def kite_mesh(leaves: AssetKites) -> MeshBuffers:
         corner_edges=every.ravel().copy(),
         face_offsets=np.arange(count + 1, dtype=np.int32) * np.int32(4),
         attributes={
-            "tf_colour": ("FACE", leaves.colour.astype(np.float32)),
+            "tf_color": ("FACE", leaves.color.astype(np.float32)),
             "tf_transmission": ("FACE", leaves.transmission.astype(np.float32)),
             "tf_roughness": ("FACE", leaves.roughness.astype(np.float32)),
         },

@@ -21,7 +21,7 @@ from .kites import kites_of
 from .patches import Patches
 
 #: Triangles of which all is looked at at a time.
-AT_ONCE = 60_000
+BATCH = 60_000
 #: Samples of a cluster without children, and how many either kind of surface has at least.
 SAMPLES, FEWEST = 32, 4
 #: Transmission of sheets where the material leaves it open.
@@ -41,7 +41,7 @@ _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 @dataclass(frozen=True)
-class Pool:
+class PatchTable:
     """Patches (p) of all parts of a source.
 
     Attributes
@@ -50,7 +50,7 @@ class Pool:
         By surface.
     part, patch : (p,) int32
         Part of the source, and patch of its surface.
-    centre : (p, 3) float32
+    center : (p, 3) float32
         In the space of the asset.
     triangles : (p,) int32
     woody : (p,) bool
@@ -62,24 +62,24 @@ class Pool:
     patches: tuple[Patches | None, ...]
     part: NDArray[np.int32]
     patch: NDArray[np.int32]
-    centre: NDArray[np.float32]
+    center: NDArray[np.float32]
     triangles: NDArray[np.int32]
     woody: NDArray[np.bool_]
     kind: NDArray[np.int8]
 
 
-def pool_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> Pool:
+def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> PatchTable:
     """All patches of the parts of a source, from those of its surfaces."""
     number = np.array([0 if p is None else len(p) for p in patches])
     part, patch = spread(number[source.surface])
-    centre, triangles = np.zeros((len(part), 3), np.float32), np.zeros(len(part), np.int32)
+    center, triangles = np.zeros((len(part), 3), np.float32), np.zeros(len(part), np.int32)
     solid, (island, share, width) = np.zeros(len(part), bool), np.zeros((3, len(part)))
     for s, own in enumerate(patches):
         at = np.flatnonzero(source.surface[part] == s)
         if own is not None and len(at):
             matrix = source.matrices[part[at]].astype(np.float32)
-            local = own.centre[patch[at]]
-            centre[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], local) + matrix[:, :3, 3]
+            local = own.center[patch[at]]
+            center[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], local) + matrix[:, :3, 3]
             triangles[at] = np.diff(own.first)[patch[at]]
             solid[at] = own.solid[patch[at]]
             scale = np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
@@ -89,7 +89,7 @@ def pool_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> Pool:
     woody = solid & (island > _WOOD * share.sum())
     thick = woody & (width > _THICK * width.max(initial=0.0, where=woody))
     kind = (woody.astype(np.int8) + thick).astype(np.int8)
-    return Pool(patches, part.astype(np.int32), patch.astype(np.int32), centre, triangles, woody, kind)
+    return PatchTable(patches, part.astype(np.int32), patch.astype(np.int32), center, triangles, woody, kind)
 
 
 @dataclass(frozen=True)
@@ -101,15 +101,15 @@ class Run:
     cluster : (t,) int64
         Among those without children, in their order; ascending.
     corners : (t, 3, 3) float64
-        In the space of the asset, metres.
+        In the space of the asset, meters.
     part, face : (t,) int32
     new_face, new_patch : (t,) bool
         The first triangle of a face, and of a patch.
-    colour : (t, 3) float32
+    color : (t, 3) float32
     transmission, coverage, roughness : (t,) float32
     solid, woody : (t,) bool
     width : (t,) float32
-        Metres.
+        Meters.
     """
 
     cluster: NDArray[np.int64]
@@ -118,7 +118,7 @@ class Run:
     face: NDArray[np.int32]
     new_face: NDArray[np.bool_]
     new_patch: NDArray[np.bool_]
-    colour: NDArray[np.float32]
+    color: NDArray[np.float32]
     transmission: NDArray[np.float32]
     coverage: NDArray[np.float32]
     roughness: NDArray[np.float32]
@@ -128,26 +128,26 @@ class Run:
 
 
 def runs_of(
-    source: AssetSource, pool: Pool, hierarchy: Hierarchy, first: int = 0, last: int | None = None
+    source: AssetSource, pool: PatchTable, hierarchy: Hierarchy, first: int = 0, last: int | None = None
 ) -> Iterator[Run]:
     """Triangles of the smallest clusters from one to before another, some clusters at a time."""
     small = np.flatnonzero(hierarchy.children == 0)
     small = small[np.argsort(hierarchy.first[small], kind="stable")][first:last]
     done = np.concatenate([[0], np.cumsum(pool.triangles[hierarchy.order], dtype=np.int64)])
     load = done[hierarchy.last[small]] - done[hierarchy.first[small]]
-    for block in np.split(np.arange(len(small)), np.flatnonzero(np.diff(np.cumsum(load) // AT_ONCE)) + 1):
+    for block in np.split(np.arange(len(small)), np.flatnonzero(np.diff(np.cumsum(load) // BATCH)) + 1):
         own = small[block]
         of, index = spread(hierarchy.last[own] - hierarchy.first[own])
         yield _run(source, pool, hierarchy.order[hierarchy.first[own][of] + index], first + block[of])
 
 
-def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDArray[np.int64]) -> Run:
+def _run(source: AssetSource, pool: PatchTable, some: NDArray[np.int64], cluster: NDArray[np.int64]) -> Run:
     """Triangles of some patches (k,), each of a cluster (k,)."""
     of, index = spread(pool.triangles[some])
     count = len(of)
     corners = np.zeros((count, 3, 3))
     part, face = pool.part[some][of], np.zeros(count, np.int32)
-    colour, solid = np.zeros((count, 3), np.float32), np.zeros(count, bool)
+    color, solid = np.zeros((count, 3), np.float32), np.zeros(count, bool)
     transmission, coverage, width, roughness = np.zeros((4, count), np.float32)
     surface, woody = source.surface[part], pool.woody[some][of]
     for s in np.unique(surface):
@@ -162,14 +162,14 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
             along = sum(matrix[:, i, k, None] * local[:, :, k] for k in range(3))
             corners[at, :, i] = along + matrix[:, i, 3, None]
         face[at] = of_face = shown.face[triangle]
-        colour[at], coverage[at] = shown.colour[of_face], shown.coverage[of_face]
+        color[at], coverage[at] = shown.color[of_face], shown.coverage[of_face]
         roughness[at] = _ROUGHNESS if shown.roughness is None else shown.roughness[of_face]
         solid[at] = own.solid[patch]
         through = shown.transmission[of_face].astype(np.float32)
         unknown = np.where(solid[at], np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
         transmission[at] = np.where(np.isnan(through), unknown, through)
         both = at[solid[at] & ~woody[at]]  # a facet or a kite is one sheet in place of the two sides of a closed leaf
-        colour[both], transmission[both] = through_both_sides(colour[both], transmission[both])
+        color[both], transmission[both] = through_both_sides(color[both], transmission[both])
         width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
     new_face = (np.diff(face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0)
     return Run(
@@ -179,7 +179,7 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
         face,
         new_face,
         index == 0,
-        colour,
+        color,
         transmission,
         coverage,
         roughness,
@@ -198,7 +198,7 @@ class Measured:
     low, high : (c, 3) float64
     sums : (c, 17) float64
         Areas of sheets and solids, optical area; faces; patches that are not wood; area of solids that are not;
-        optical area times width, colour (3), transmission, and n nᵀ (6).
+        optical area times width, color (3), transmission, and n nᵀ (6).
     samples : SurfaceSamples of s
     counts : (c, 2) int64
         Samples on leaves and on wood of each.
@@ -230,7 +230,7 @@ def measured(run: Run) -> Measured:
     columns = [np.where(run.solid, 0.0, shown), np.where(run.solid, shown, 0.0), optical]
     columns += [run.new_face, run.new_patch & ~run.woody, np.where(run.solid & ~run.woody, shown, 0.0)]
     columns += [optical * run.width]
-    columns += [optical * run.colour[:, k] for k in range(3)] + [optical * run.transmission]
+    columns += [optical * run.color[:, k] for k in range(3)] + [optical * run.transmission]
     columns += [optical * normal[:, i] * normal[:, j] for i, j in _PAIRS]
     sums = np.stack([np.add.reduceat(column.astype(np.float64), start) for column in columns], axis=1)
     samples, counts = _samples(run, owner, start, optical, normal)
@@ -258,7 +258,7 @@ def _leaves(run: Run, optical: NDArray[np.float64], normal: NDArray[np.float64])
         + np.arange(len(first))
         - np.searchsorted(run.cluster[some][first], run.cluster[some][first])
     )
-    seen = run.corners[some], optical[some], normal[some], run.colour[some], run.transmission[some], run.roughness[some]
+    seen = run.corners[some], optical[some], normal[some], run.color[some], run.transmission[some], run.roughness[some]
     return kites_of(*seen, first, number)
 
 
@@ -295,7 +295,7 @@ def _samples(
         before = (done - kind)[start]
         at = before[cluster] + area[cluster] * (rank + uniform(key, ALONG)) / np.maximum(count, 1)[cluster]
         pick = np.minimum(np.searchsorted(done, at, side="right"), len(kind) - 1)
-        # Rounding may lead to a neighbour of another cluster or kind.
+        # Rounding may lead to a neighbor of another cluster or kind.
         pick = np.clip(pick, start[cluster], np.append(start[1:], len(kind))[cluster] - 1)
         root, v = np.sqrt(uniform(key, _U)), uniform(key, _V)
         weight = np.stack([1 - root, root * (1 - v), root * v], axis=1)
@@ -304,7 +304,7 @@ def _samples(
             SurfaceSamples(
                 place.astype(np.float32),
                 normal[pick].astype(np.float16),
-                run.colour[pick].astype(np.float16),
+                run.color[pick].astype(np.float16),
                 run.transmission[pick].astype(np.float16),
                 run.roughness[pick].astype(np.float16),
             )
@@ -315,15 +315,15 @@ def _samples(
 
 
 def through_both_sides(
-    colour: NDArray[np.floating], transmission: NDArray[np.floating]
+    color: NDArray[np.floating], transmission: NDArray[np.floating]
 ) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    """Colours (n, 3) and transmissions (n,) of closed leaves as one sheet, from those of their sides.
+    """Colors (n, 3) and transmissions (n,) of closed leaves as one sheet, from those of their sides.
 
     Light that passes the first side meets the second from within, again and again: with r and t of a side, the whole
     reflects r + t² r / (1 − r²), and t² / (1 − r²) goes through (Stokes 1862).
     """
-    through = colour * transmission[:, None]
-    back = colour - through
+    through = color * transmission[:, None]
+    back = color - through
     again = 1.0 / np.maximum(1.0 - back**2, 1e-6)
     passed = through**2 * again
     whole = back + through**2 * back * again + passed

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..storage import keeping
+from ..storage import memoized
 
 #: Bytes of cached features, ten a face.
 MOST_BYTES = 128 << 20
@@ -21,7 +21,7 @@ _SHEET = 2 * np.pi
 _LEAF_FRACTION = 1 / 16
 #: Leaves are many: none is larger than this fraction of the area of all in the mesh. A wall of one face is no leaf.
 _ONE_OF_MANY = 1 / 64
-#: How often curvature is averaged over neighbours: some faces around a branch.
+#: How often curvature is averaged over neighbors: some faces around a branch.
 _ROUNDS = 6
 
 
@@ -49,7 +49,7 @@ def classified(
     -----
     Components are connected faces. The width of a sheet is its area over its extent. That of a solid is 1 / H, with
     Steiner's mean curvature H of polyhedra (half the sum of edge length × signed angle, over the area) averaged over
-    neighbours: 2 r for a long tube, r for a ball, no less for rough ground, where bumps and hollows cancel. Edges of
+    neighbors: 2 r for a long tube, r for a ball, no less for rough ground, where bumps and hollows cancel. Edges of
     no, one or many faces, faces of no area and faces that touch themselves are all allowed.
     """
     faces = len(face_offsets) - 1
@@ -62,7 +62,7 @@ def classified(
     following[face_offsets[1:] - 1] = face_offsets[:-1]
     label = connected(int(welded.max()) + 1, welded, welded[following])
     component = np.unique(label[welded[face_offsets[:-1]]], return_inverse=True)[1].reshape(-1)
-    vector, centre = _measures(positions, corner_verts, face_offsets, following, sizes)
+    vector, center = _measures(positions, corner_verts, face_offsets, following, sizes)
     area = np.linalg.norm(vector, axis=1)
     number = int(component.max()) + 1
     total = np.bincount(component, area, number)
@@ -86,7 +86,7 @@ def classified(
     solid = closed[component]
     mean_width = np.where(closed, 0.5, 1.0) * total / np.where(extent > 0, extent, 1.0)
     width = mean_width[component]
-    curved = 2.0 * _mean_curvature(vector, area, centre, a, b, length[order[pairs]], faces)
+    curved = 2.0 * _mean_curvature(vector, area, center, a, b, length[order[pairs]], faces)
     with np.errstate(divide="ignore"):
         local = np.where(curved > 0, 2.0 / np.maximum(curved, 1e-300), np.inf)
     width = np.where(solid, np.minimum(width, local), width)
@@ -129,9 +129,9 @@ def _measures(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Area vectors and mean corners (f, 3) of faces."""
     points = positions[corner_verts]
-    centre = np.add.reduceat(points, face_offsets[:-1], axis=0) / sizes[:, None]
-    points = points - np.repeat(centre, sizes, axis=0)
-    return 0.5 * np.add.reduceat(np.cross(points, points[following]), face_offsets[:-1], axis=0), centre
+    center = np.add.reduceat(points, face_offsets[:-1], axis=0) / sizes[:, None]
+    points = points - np.repeat(center, sizes, axis=0)
+    return 0.5 * np.add.reduceat(np.cross(points, points[following]), face_offsets[:-1], axis=0), center
 
 
 def _extents(points: NDArray[np.float64], component: NDArray, number: int) -> NDArray[np.float64]:
@@ -143,9 +143,9 @@ def _extents(points: NDArray[np.float64], component: NDArray, number: int) -> ND
 
 
 def _mean_curvature(
-    vector: NDArray, area: NDArray, centre: NDArray, a: NDArray, b: NDArray, length: NDArray, faces: int
+    vector: NDArray, area: NDArray, center: NDArray, a: NDArray, b: NDArray, length: NDArray, faces: int
 ) -> NDArray[np.float64]:
-    """Mean curvature H (f,), averaged over neighbours; positive where the surface bulges to the side of its normals.
+    """Mean curvature H (f,), averaged over neighbors; positive where the surface bulges to the side of its normals.
 
     Faces that are turned inside out would make it negative; what counts is its amount.
     """
@@ -153,7 +153,7 @@ def _mean_curvature(
     angle = np.arctan2(
         np.linalg.norm(np.cross(normal[a], normal[b]), axis=1), np.einsum("ni,ni->n", normal[a], normal[b])
     )
-    bulge = np.einsum("ni,ni->n", normal[a] - normal[b], centre[a] - centre[b])
+    bulge = np.einsum("ni,ni->n", normal[a] - normal[b], center[a] - center[b])
     own = 0.25 * length * angle * np.sign(bulge)  # half of ½ l θ to either face
     own[(area[a] <= 0) | (area[b] <= 0)] = 0.0
     integral = np.bincount(a, own, faces) + np.bincount(b, own, faces)
@@ -166,4 +166,4 @@ def _mean_curvature(
 
 
 #: `classified`, its results kept for as long as there is room: each frame of an animation needs the same again.
-mesh_features = keeping(MOST_BYTES)(classified)
+mesh_features = memoized(MOST_BYTES)(classified)

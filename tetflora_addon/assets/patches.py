@@ -22,7 +22,7 @@ from .mesh_features import classified, connected
 #: Faces of a patch at most; an island with more is cut into pieces of about so many that lie together.
 MOST_FACES = 48
 #: Triangles whose features are found at a time; bounds what that takes to some thirty megabytes.
-AT_ONCE = 100_000
+BATCH = 100_000
 #: Bits of a coordinate of the curve along which large islands are cut.
 _BITS = 10
 
@@ -43,7 +43,7 @@ class Patches:
         Of a closed surface, or a tube with open ends: half of it is never seen.
     width : (p,) float32
         Of the leaf, or the local thickness of the solid, in the unit of the positions.
-    centre : (p, 3) float32
+    center : (p, 3) float32
         Mean of its corners.
     island : (p,) float32
         Area of the island that each is or is cut from, in that unit squared.
@@ -56,7 +56,7 @@ class Patches:
     faces: NDArray[np.int32]
     solid: NDArray[np.bool_]
     width: NDArray[np.float32]
-    centre: NDArray[np.float32]
+    center: NDArray[np.float32]
     island: NDArray[np.float32]
     pieces: NDArray[np.int32]
 
@@ -87,14 +87,14 @@ def patches_of(surface: AssetSurface) -> Patches:
     first = np.append(np.flatnonzero(new), len(triangle))
     owner = np.cumsum(new) - 1
     size = np.maximum(np.diff(first), 1)
-    centre, area = np.zeros((len(size), 3), np.float32), np.zeros(len(triangle), np.float32)
-    for run in blocks(len(triangle), AT_ONCE):
+    center, area = np.zeros((len(size), 3), np.float32), np.zeros(len(triangle), np.float32)
+    for run in blocks(len(triangle), BATCH):
         corners = surface.positions[surface.triangles[triangle[run]]]
         sides = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         area[run] = 0.5 * np.linalg.norm(np.cross(*sides), axis=1)
         for axis in range(3):
-            centre[:, axis] += np.bincount(owner[run], corners[:, :, axis].mean(axis=1), len(size))
-    centre /= size[:, None]
+            center[:, axis] += np.bincount(owner[run], corners[:, :, axis].mean(axis=1), len(size))
+    center /= size[:, None]
     of = np.cumsum(new_island)[first[:-1]] - 1
     whole = np.add.reduceat(area, start)[of]
     return Patches(
@@ -103,7 +103,7 @@ def patches_of(surface: AssetSurface) -> Patches:
         np.bincount(owner, new_face).astype(np.int32),
         solid[first[:-1]],
         (np.add.reduceat(width, first[:-1]) / size).astype(np.float32),
-        centre,
+        center,
         whole.astype(np.float32),
         np.bincount(of)[of].astype(np.int32),
     )
@@ -149,9 +149,9 @@ def _features(
 
 
 def _whole_runs(island: NDArray[np.int32]) -> Iterator[slice]:
-    """Slices of triangles, sorted by island (t,), with whole islands and about `AT_ONCE` triangles."""
+    """Slices of triangles, sorted by island (t,), with whole islands and about `BATCH` triangles."""
     first = np.flatnonzero(np.diff(island, prepend=-1))
-    block = first // AT_ONCE
+    block = first // BATCH
     starts = first[np.flatnonzero(np.diff(block, prepend=-1))]
     for start, stop in zip(starts, [*starts[1:], len(island)], strict=True):
         yield slice(int(start), int(stop))

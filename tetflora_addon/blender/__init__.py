@@ -7,7 +7,7 @@ from .biomes import library
 from .cli import command
 from .job import forecast, render
 from .placing import assets
-from .species import catalogue, edits
+from .species import catalog, edits
 from .viewport import auto, levels, overlay, points
 from .viewport import species as species_preview  # or the room of that name could not be read as an attribute
 
@@ -17,7 +17,7 @@ _PARTS = (
     worker,
     runtime,
     preferences,
-    catalogue,
+    catalog,
     library.pictures,
     properties,
     render,

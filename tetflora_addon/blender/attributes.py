@@ -187,7 +187,7 @@ def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
 
 
 def image_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
-    """Pixels (height, width, channels) of an image that has some, row 0 lowest, in its own colour space.
+    """Pixels (height, width, channels) of an image that has some, row 0 lowest, in its own color space.
 
     Pixels with a channel that is not finite, such as the sun in an EXR, are black and transparent, as in Cycles.
     """
@@ -202,10 +202,10 @@ def image_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
 
 def linear_rgb(image: bpy.types.Image, pixels: NDArray[np.floating]) -> NDArray[np.floating]:
     """Linear RGB (..., 3) of some pixels (..., channels) of an image."""
-    colour = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
+    color = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     if image.colorspace_settings.name == "sRGB" and not image.is_float:
-        colour = linear_of(colour)
-    return colour
+        color = linear_of(color)
+    return color
 
 
 def face_offsets(mesh: bpy.types.Mesh) -> NDArray[np.int32]:

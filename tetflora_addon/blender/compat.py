@@ -89,7 +89,7 @@ def drawn_disc(engine: str) -> float:
 
 
 def dot_shader() -> str:
-    """Built-in shader for coloured points; before 5.0 the one for all flat colours draws them."""
+    """Built-in shader for colored points; before 5.0 the one for all flat colors draws them."""
     try:
         gpu.shader.from_builtin('POINT_FLAT_COLOR')
     except ValueError:

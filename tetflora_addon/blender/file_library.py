@@ -13,8 +13,8 @@ from typing import Any
 
 from bpy.utils import previews
 
-from ..errors import NAME, TetFloraError, readable, shown
-from ..files import IDENTIFIER_RULE, inside, is_identifier, is_regular, read_whole, write_whole
+from ..errors import NAME, TetFloraError, quoted, readable
+from ..files import IDENTIFIER_RULE, is_identifier, is_regular, path_in, read_whole, write_whole
 
 ENDING = ".json"
 MAX_FILE_BYTES = 4_000_000
@@ -88,7 +88,7 @@ class OwnFiles:
         if not is_identifier(identifier):
             raise self.error(f"{shown(identifier)} cannot name a {self.noun}. Use only {IDENTIFIER_RULE}")
         try:
-            return inside(self.folder(), identifier + ENDING)
+            return path_in(self.folder(), identifier + ENDING)
         except OSError as error:
             raise self.error(f"Your {self.noun} folder: {error.strerror}") from None
 

@@ -24,7 +24,7 @@ QUALITY_ITEMS = (
 
 
 def _use_cache(_preferences: object = None, _context: object = None) -> None:
-    storage.use(_cache_folder())
+    storage.set_folder(_cache_folder())
 
 
 class TetFloraPreferences(bpy.types.AddonPreferences):
@@ -98,7 +98,7 @@ def preferences() -> TetFloraPreferences | None:
 
 
 def species_folders() -> tuple[Path, ...]:
-    """Existing folders of the user's own species, for the catalogue's functions; none outside of an extension."""
+    """Existing folders of the user's own species, for the catalog's functions; none outside of an extension."""
     folder = _folder("species")
     return (folder,) if folder is not None and folder.is_dir() else ()
 
@@ -160,5 +160,5 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregister the preferences."""
-    storage.use(None)
+    storage.set_folder(None)
     bpy.utils.unregister_class(TetFloraPreferences)

@@ -16,34 +16,34 @@ from bpy.props import (
 from . import settings
 from .biomes import library
 from .biomes import properties as biome_properties
-from .places import columns
+from .geodata import columns
 from .placing import properties
 from .placing.plant_objects import show_age
 from .results import collection
-from .results.forms import form_property
+from .results.proxy_kinds import proxy_kind_property
 from .runtime import Listeners
 from .scene import objects
 from .scene.explicit import EXPLICIT_PROPERTY
 from .scene.field_sizes import STAND_SMOOTH, STAND_YEAR
 from .scene.own_ages import AGE_PROPERTY
-from .scene.skeletons import FORM_TYPES
+from .scene.skeletons import SKELETON_TYPES
 from .settings import AnimationProperties, RefinementProperties
 from .species import asset_species, editor, edits
-from .species.catalogue import SpeciesChoice
+from .species.catalog import SpeciesChoice
 from .stands import properties as stand_properties
 from .viewport import state
 
 #: Notified with a scene when Refine Automatically is switched on or off there.
 auto_refine_switched = Listeners()
 
-_FORM = {
-    "name": "Form",
+_SKELETON = {
+    "name": "Skeleton",
     "description": (
         "Curve, hair curves or edge mesh that defines this plant's trunk, and optionally its limbs; the species grows "
         "the rest on them. Without one, the species grows the whole plant"
     ),
     "type": bpy.types.Object,
-    "poll": lambda _group, candidate: candidate.type in FORM_TYPES,
+    "poll": lambda _group, candidate: candidate.type in SKELETON_TYPES,
 }
 
 #: What overrides of linked objects may change; otherwise Blender forgets the change when the file is opened again.
@@ -66,7 +66,7 @@ def _on_year(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
 class TetFloraFieldEntry(bpy.types.PropertyGroup, SpeciesChoice):
     """One kind of plant of a field; the attribute ``species`` of its points is an index into these."""
 
-    form: PointerProperty(**_FORM)
+    skeleton: PointerProperty(**_SKELETON)
 
 
 class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
@@ -92,7 +92,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         default=True,
         override=_OVERRIDES,
     )
-    form: PointerProperty(**_FORM, override=_OVERRIDES)
+    skeleton: PointerProperty(**_SKELETON, override=_OVERRIDES)
     age: FloatProperty(**AGE_PROPERTY, override=_OVERRIDES, update=_on_age)
     is_field: BoolProperty(
         name="Field of Plants",
@@ -155,7 +155,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
 
     version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
 
-    proxy_form: form_property()
+    proxy_kind: proxy_kind_property()
     baked_light: EnumProperty(
         name="Lighting",
         description=(
@@ -186,7 +186,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
         name="Refine at Render",
         description=(
             "Refine for the camera of every rendered frame, also in background renders, and remove the result "
-            "afterwards. Meshes made by Refine are left out of these renders. Blender's interface is locked while "
+            "afterward. Meshes made by Refine are left out of these renders. Blender's interface is locked while "
             "rendering (Render > Lock Interface), which TetFlora enables when plants are added"
         ),
         default=True,
@@ -301,7 +301,9 @@ _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 def register() -> None:
     """Register the property groups and add them to Blender's types."""
-    TetFloraScene.__annotations__["proxy_form"] = form_property()  # forms may have come while it was not registered
+    TetFloraScene.__annotations__["proxy_kind"] = (
+        proxy_kind_property()
+    )  # forms may have come while it was not registered
     _register()
     bpy.types.Object.tetflora = PointerProperty(type=TetFloraObject, override=_OVERRIDES)
     bpy.types.Scene.tetflora = PointerProperty(type=TetFloraScene)

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import bpy
 
-from ..errors import SceneError, shown
+from ..errors import SceneError, quoted
 from ..files import IDENTIFIER_RULE, PART, is_identifier, replace
 from .runtime import Handlers, complain
 

@@ -19,7 +19,7 @@ from bpy.app.translations import pgettext_iface as iface
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..camera.view_cells import ViewCells
-from ..errors import SceneError, readable, shown
+from ..errors import SceneError, quoted, readable
 from ..growth.seasons import DAYS, Season
 from ..growth.wind import Wind
 from ..refinement.settings import QUALITIES, RefinementSettings
@@ -90,7 +90,7 @@ def limits_of(prop: bpy.types.Property) -> str:
 
 
 #: Choices that other extensions add; while those are absent, the default takes their place.
-_OPEN = {"proxy_form"}
+_OPEN = {"proxy_kind"}
 
 
 def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
@@ -296,7 +296,7 @@ def years_of(scene: bpy.types.Scene) -> float:
 
 def date_text(day: float) -> str:
     """A day of the year as ``14 October``; days of other years are those of one year."""
-    shown = date(2001, 1, 1) + timedelta(days=int((day - 1.0) % DAYS))  # no leap year
+    quoted = date(2001, 1, 1) + timedelta(days=int((day - 1.0) % DAYS))  # no leap year
     return f"{shown.day} {iface(MONTHS[shown.month - 1])}"
 
 

@@ -5,7 +5,7 @@
 One pass or one block of a forest may take seconds. Meanwhile the window looks for Esc and draws, and meshes of earlier
 blocks are written. What runs here must be the engine's: it never touches bpy. Nothing depends on when what is done.
 
-Where nobody looks, `at_once` runs all in the caller's thread: a second one would save no time, but take more memory.
+Where nobody looks, `run_to_end` runs all in the caller's thread: a second one would save no time, but take more memory.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from weakref import WeakSet
 
 from .. import parallel
 from ..jobs import Progress, mapped
-from ..jobs import at_once as run
+from ..jobs import run_to_end as run
 from ..processes import pool
 
 #: Seconds after which a step ends at the latest although there is nothing new.
@@ -29,24 +29,24 @@ LOOK = 0.02
 #: Seconds that Blender waits for work under way when it quits.
 _PARTING = 1.0
 
-_here = threading.local()  # "at_once" while jobs are not to use other threads
+_here = threading.local()  # "run_to_end" while jobs are not to use other threads
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 
 
-def at_once(steps: Generator[object, object, _Result]) -> _Result:
+def run_to_end(steps: Generator[object, object, _Result]) -> _Result:
     """Run a job to its end in this thread; returns what the job returns."""
-    before, _here.at_once = getattr(_here, "at_once", False), True
+    before, _here.run_to_end = getattr(_here, "run_to_end", False), True
     try:
         return run(steps)
     finally:
-        _here.at_once = before
+        _here.run_to_end = before
 
 
 def nobody_waits() -> bool:
     """Whether what runs here is run to its end at once, so that nobody sees anything before."""
-    return getattr(_here, "at_once", False)
+    return getattr(_here, "run_to_end", False)
 
 
 def in_thread(work: Generator[_Item, Any, _Result], ahead: int = 0) -> Generator[_Item | None, object, _Result]:
@@ -97,7 +97,7 @@ def steps_in_thread(work: Generator[Progress, Any, _Result], progress: Progress)
     def shown(item: Progress | None) -> Progress:
         nonlocal progress
         progress = item or progress
-        return progress.again if item is None else progress
+        return progress.repeated if item is None else progress
 
     with closing(in_thread(work)) as items:
         return (yield from mapped(items, shown))

@@ -9,7 +9,7 @@ image generation", Computer Graphics 15 (3), 1981). What lies beside the view by
 Coordinates begin near the camera, wherever in the world that is. Blender stores vertices in single precision: 1,000 km
 from the world's origin they are 6 cm apart, wider than a leaf. A job therefore counts from a corner of a wide grid
 (`Camera.local`), with everything that it reads; the objects that it makes carry the way back to the world. Corners are
-exact in single precision up to billions of metres.
+exact in single precision up to billions of meters.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: Side of the grid, metres. Up to half of it from the world's origin, coordinates are those of the world.
+#: Side of the grid, meters. Up to half of it from the world's origin, coordinates are those of the world.
 GRID = 1024.0
-#: Cosine of the latitude from which on panoramas count as if no pixels were added towards the poles: 84 degrees.
+#: Cosine of the latitude from which on panoramas count as if no pixels were added toward the poles: 84 degrees.
 LEAST_COSINE = 0.1
 #: How far from several eyes things are at least to hide others from all of them, in cell radii.
 _OPEN = 2.0
 
 
 def origin_near(points: ArrayLike) -> NDArray[np.float64]:
-    """The corner (3,) of the grid that is nearest to most points (n, 3), or to one (3,); metres, world space."""
+    """The corner (3,) of the grid that is nearest to most points (n, 3), or to one (3,); meters, world space."""
     points = np.asarray(points, np.float64).reshape(-1, 3)
     if not len(points):
         return np.zeros(3)
@@ -52,25 +52,25 @@ class Camera:
     frame : (3, 3) float64
         Rotation; columns are the camera's x, y and z axes in world space.
     window : tuple of float
-        ``(left, right, bottom, top)`` of the image at depth 1 (``'PERSP'``), at any depth in metres (``'ORTHO'``), or
+        ``(left, right, bottom, top)`` of the image at depth 1 (``'PERSP'``), at any depth in meters (``'ORTHO'``), or
         in radians (``'PANO'``): longitude from the viewing direction to the right, latitude from its plane upwards.
         Lens shift, sensor fit and pixel aspect are in it; it need not be symmetric.
     near, far : float
-        Clipping depths, metres, ``0 < near < far``.
+        Clipping depths, meters, ``0 < near < far``.
     width, height : int
         Size of the final image in pixels.
     lens_radius : float
-        Radius of the lens, metres; 0 where all is sharp.
+        Radius of the lens, meters; 0 where all is sharp.
     focus : float
-        Depth that is sharp, metres.
+        Depth that is sharp, meters.
     shutter : tuple of Camera
         The camera at other times while the shutter is open, and the other eyes of a stereoscopic image; often empty.
     setback : float
-        How far, in depth, the position lies behind the eye, metres: not 0 where the camera stands for several.
+        How far, in depth, the position lies behind the eye, meters: not 0 where the camera stands for several.
     cell_radius : float
-        Largest distance from that eye to the others that the camera stands for, metres; see `view_cells`.
+        Largest distance from that eye to the others that the camera stands for, meters; see `view_cells`.
     origin : (3,) float64
-        Where in the world coordinates begin, metres: those of the camera, and of all that is refined for it.
+        Where in the world coordinates begin, meters: those of the camera, and of all that is refined for it.
     """
 
     kind: Literal["PERSP", "ORTHO", "PANO"]
@@ -109,7 +109,7 @@ class Camera:
 
     @property
     def eye(self) -> NDArray[np.float64]:
-        """Where the image is seen from (3,), metres: before the position where the camera stands for several."""
+        """Where the image is seen from (3,), meters: before the position where the camera stands for several."""
         left, right, bottom, top = self.window
         ahead = np.array([(left + right) / 2.0, (bottom + top) / 2.0, -1.0])
         return self.position + self.setback * (self.frame @ ahead)
@@ -121,16 +121,16 @@ class Camera:
 
     @property
     def pixel_size(self) -> float:
-        """Side of a pixel at depth 1 (perspective), at any depth (orthographic) or 1 m away (panorama), metres."""
+        """Side of a pixel at depth 1 (perspective), at any depth (orthographic) or 1 m away (panorama), meters."""
         left, right, bottom, top = self.window
         return float(np.sqrt((right - left) * (top - bottom) / (self.width * self.height)))
 
     def to_camera_space(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """World points ``(..., 3)`` to (x right, y up, depth) ``(..., 3)``, metres."""
+        """World points ``(..., 3)`` to (x right, y up, depth) ``(..., 3)``, meters."""
         return ((points - self.position) @ self.frame) * np.array([1.0, 1.0, -1.0])
 
-    def clearance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of world points (n, 3) from the space that the image shows, metres; negative within it."""
+    def distance_to_view(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of world points (n, 3) from the space that the image shows, meters; negative within it."""
         x, y, depth = self.to_camera_space(points).T
         left, right, bottom, top = self.window
         if self.kind == "PANO":
@@ -187,21 +187,21 @@ class Camera:
         longitude, latitude = self.longitude_latitude(local)
         far, across = np.linalg.norm(local, axis=-1), np.hypot(local[..., 0], local[..., 2])
 
-        def beyond(angle: NDArray[np.float64], metres: NDArray[np.float64]) -> NDArray[np.float64]:
-            return metres * np.sin(np.clip(angle, -np.pi / 2.0, np.pi / 2.0))
+        def beyond(angle: NDArray[np.float64], meters: NDArray[np.float64]) -> NDArray[np.float64]:
+            return meters * np.sin(np.clip(angle, -np.pi / 2.0, np.pi / 2.0))
 
         # What goes all the way round or to a pole has no walls there.
-        beside = np.full(far.shape, -np.inf)
+        outside = np.full(far.shape, -np.inf)
         if right - left < 2.0 * np.pi - 1e-9:
-            beside = np.maximum(beside, beyond(np.maximum(longitude - right, left - longitude), across))
+            outside = np.maximum(outside, beyond(np.maximum(longitude - right, left - longitude), across))
         if top < np.pi / 2.0 - 1e-9:
-            beside = np.maximum(beside, beyond(latitude - top, far))
+            outside = np.maximum(outside, beyond(latitude - top, far))
         if bottom > -np.pi / 2.0 + 1e-9:
-            beside = np.maximum(beside, beyond(bottom - latitude, far))
-        return beside
+            outside = np.maximum(outside, beyond(bottom - latitude, far))
+        return outside
 
     def pixel_extent(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Metres that one pixel spans at each of the world points ``(..., 3)``; result ``(...)``.
+        """Meters that one pixel spans at each of the world points ``(..., 3)``; result ``(...)``.
 
         Points nearer than the near plane count as lying on it.
         """
@@ -210,7 +210,7 @@ class Camera:
         if self.kind == "PANO":
             local = self.to_camera_space(points)
             distance = np.maximum(np.linalg.norm(local, axis=-1), self.near)
-            # Towards the poles an image has more pixels for each solid angle.
+            # Toward the poles an image has more pixels for each solid angle.
             cosine = np.hypot(local[..., 0], local[..., 2]) / distance
             return self.pixel_size * self._nearest(distance) * np.sqrt(np.clip(cosine, LEAST_COSINE, 1.0))
         depth = self.to_camera_space(points)[..., 2]
@@ -218,12 +218,12 @@ class Camera:
 
     @property
     def closest(self) -> float:
-        """Least distance from an eye at which things count, metres; see `_nearest`."""
+        """Least distance from an eye at which things count, meters; see `_nearest`."""
         return max(self.cell_radius / 2.0, self.near if self.setback == 0.0 else 0.0)
 
     @property
-    def hides_from(self) -> float:
-        """Depth from which on things hide what is behind them, metres: nearer ones not from all eyes; 0 for one eye."""
+    def min_occluding_depth(self) -> float:
+        """Depth from which on things hide what is behind them, meters: nearer ones not from all eyes; 0 for one eye."""
         return self.setback + _OPEN * self.cell_radius
 
     def pixel_gain(self, points: NDArray[np.float64]) -> NDArray[np.float64] | float:
@@ -237,14 +237,14 @@ class Camera:
         return (self.pixel_size * depth / self.pixel_extent(points)) ** 2
 
     def _nearest(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distances from the nearest of the eyes, given those from the one in the middle, metres.
+        """Distances from the nearest of the eyes, given those from the one in the middle, meters.
 
         Within the cell nobody knows: half of its radius is as near as it comes to what is not grazed.
         """
         return np.maximum(distance - self.cell_radius, self.closest)
 
     def extent_around(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Metres (n,) that one pixel spans at points (n, 3), in view or not.
+        """Meters (n,) that one pixel spans at points (n, 3), in view or not.
 
         Beside and behind the camera depth says nothing, but distance does.
         """
@@ -268,33 +268,33 @@ def to_eye(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
     return away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
 
 
-def blur_margins(camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.float64]) -> tuple[float, float]:
+def blur_margins(camera: Camera, center: NDArray[np.float64], reach: NDArray[np.float64]) -> tuple[float, float]:
     """Fractions of the image's width and height by which blur reaches beyond it.
 
     Parameters
     ----------
     camera : Camera
         With its lens and shutter.
-    centre : (n, 3) float64
-        Middles of the plants, metres, world space.
+    center : (n, 3) float64
+        Middles of the plants, meters, world space.
     reach : (n,) float64
-        Radii of spheres around them that hold the plants, metres.
+        Radii of spheres around them that hold the plants, meters.
 
     Returns
     -------
     across, up : float
         For each side of the image, 0 to `MOST`. Where nothing is blurred, 0.
     """
-    if not len(centre) or not (camera.lens_radius > 0.0 or camera.shutter):
+    if not len(center) or not (camera.lens_radius > 0.0 or camera.shutter):
         return 0.0, 0.0
-    depth = _depths(camera, centre)
+    depth = _depths(camera, center)
     near, far = camera.near - camera.setback, camera.far - camera.setback
     nearest = np.maximum(depth - reach - camera.cell_radius, camera.closest)
     farthest = np.maximum(np.minimum(depth + reach + camera.cell_radius, far), camera.closest)
     ahead = (depth + reach > near) & (depth - reach < far)
     radius = np.maximum(circle_of_confusion(camera, nearest), circle_of_confusion(camera, farthest))
-    metres = radius if camera.kind == "ORTHO" else radius * farthest
-    seen = ahead & (camera.clearance(centre) - reach < metres)
+    meters = radius if camera.kind == "ORTHO" else radius * farthest
+    seen = ahead & (camera.distance_to_view(center) - reach < meters)
     left, right, bottom, top = camera.window
     size = np.array([right - left, top - bottom])
     margins = np.max(radius[seen], initial=0.0) / size
@@ -307,7 +307,7 @@ def blur_margins(camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.
 
 
 def circle_of_confusion(camera: Camera, depth: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Radius (n,) on the window of the discs that points at depths (n,), metres, are drawn as; see the module."""
+    """Radius (n,) on the window of the discs that points at depths (n,), meters, are drawn as; see the module."""
     if camera.lens_radius <= 0.0:
         return np.zeros(len(depth))
     if camera.kind == "ORTHO":
@@ -316,7 +316,7 @@ def circle_of_confusion(camera: Camera, depth: NDArray[np.float64]) -> NDArray[n
 
 
 def _depths(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Depths (n,) from the eye, metres, or distances where an image is all around it."""
+    """Depths (n,) from the eye, meters, or distances where an image is all around it."""
     local = camera.to_camera_space(points)
     return np.linalg.norm(local, axis=-1) if camera.kind == "PANO" else local[..., 2] - camera.setback
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Projection to the camera's window: boxes and silhouettes of tetrahedra and triangles, without pixels.
 
-Names: ``local`` is camera space (x right, y up, depth), metres; the *window* is the image at depth 1
-(``'PERSP'``) or in metres (``'ORTHO'``).
+Names: ``local`` is camera space (x right, y up, depth), meters; the *window* is the image at depth 1
+(``'PERSP'``) or in meters (``'ORTHO'``).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def silhouette_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[ND
     Parameters
     ----------
     vertices : (n, 4, 3) float64
-        World space, metres.
+        World space, meters.
     camera : Camera
         Its ``width`` and ``height`` are the image's.
 
@@ -67,13 +67,13 @@ def expected_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDAr
 
 def _on_the_sphere(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     middle = vertices.mean(axis=1)
-    towards = middle - camera.position
-    distance = np.linalg.norm(towards, axis=1)
-    area = projected_area(vertices, towards / np.maximum(distance, 1e-300)[:, None])
+    toward = middle - camera.position
+    distance = np.linalg.norm(toward, axis=1)
+    area = projected_area(vertices, toward / np.maximum(distance, 1e-300)[:, None])
     # Nothing covers more than the whole sphere; what is around the eye covers much of it.
     pixels = np.minimum(area, 4.0 * np.pi * np.maximum(distance, camera.near) ** 2) / camera.pixel_extent(middle) ** 2
-    beside = camera.clearance(vertices.reshape(-1, 3)).reshape(-1, 4)
-    return np.where((beside > 0.0).all(axis=1), 0.0, pixels), (beside <= 0.0).all(axis=1)
+    outside = camera.distance_to_view(vertices.reshape(-1, 3)).reshape(-1, 4)
+    return np.where((outside > 0.0).all(axis=1), 0.0, pixels), (outside <= 0.0).all(axis=1)
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@
 The space of cameras (place, direction, focal length) is divided into cells. Which cell a camera is in follows from that
 camera alone, never from the frames before it: a frame of an animation and the same frame alone are refined alike, on
 any machine. What is seen from a cell of space instead of from a point goes back to J. M. Airey, J. H. Rohlf and F. P.
-Brooks, "Towards image realism with interactive update rates in complex virtual building environments" (I3D 1990).
+Brooks, "Toward image realism with interactive update rates in complex virtual building environments" (I3D 1990).
 
 All cameras of a cell are replaced by one that sees whatever any of them sees: it stands further back, its window is
 wider, and it takes everything to be as near as it is to the nearest of them.
@@ -34,7 +34,7 @@ ACROSS = 2.0
 CLEAR = 4.0
 #: Minimum fraction of the view's direction that corners of the window must have when the camera has turned: 84 degrees.
 _AHEAD = 0.1
-#: Where lattices begin, in cells, and a turn that comes before them: what artists type in (0, 90 degrees, whole metres)
+#: Where lattices begin, in cells, and a turn that comes before them: what artists type in (0, 90 degrees, whole meters)
 #: then lies on no border, where rounding errors would decide.
 _BEGIN = 0.381966
 _BEFORE = np.array([0.8446, 0.2397, 0.3581, 0.3173])
@@ -75,20 +75,20 @@ class ViewCells:
 
 @dataclass(frozen=True)
 class Around:
-    """Spheres about all that is refined: centres (n, 3) and radii (n,), metres. Roughly will do."""
+    """Spheres about all that is refined: centers (n, 3) and radii (n,), meters. Roughly will do."""
 
-    centres: NDArray[np.float64]
+    centers: NDArray[np.float64]
     radii: NDArray[np.float64]
 
     def leaves_clear(self, place: NDArray[np.float64], distance: float) -> bool:
-        """Whether all of them are at least so far from a place (3,), metres."""
-        away = np.linalg.norm(self.centres - place, axis=1) - self.radii
+        """Whether all of them are at least so far from a place (3,), meters."""
+        away = np.linalg.norm(self.centers - place, axis=1) - self.radii
         return bool((away >= distance).all())
 
 
 @dataclass(frozen=True)
 class _Turns:
-    """A cell of rotations: in the projection of unit quaternions from their centre, coordinates of its middle (3,)."""
+    """A cell of rotations: in the projection of unit quaternions from their center, coordinates of its middle (3,)."""
 
     largest: int
     middle: NDArray[np.float64]

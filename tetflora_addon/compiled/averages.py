@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Expected totals of sub-plants in closed form, from the highest order down to the trunk (paper, section 5).
 
-Every total is kept by the row that contributes it, so that colours and fractions follow by a product. What depends on
+Every total is kept by the row that contributes it, so that colors and fractions follow by a product. What depends on
 how far outside in the crown a sub-plant sits is known at three places, `NODES`, and quadratic between them.
 """
 
@@ -21,7 +21,7 @@ from ..growth.grown_rows import NOW, fullness_of, lengths, spread_children
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..leaves.models import LeafModel
 from ..species.growing import EVEN
-from ..species.members import dead_vigour, expected_forks
+from ..species.members import dead_vigor, expected_forks
 from ..species.species import Range
 
 NODES = np.array([0.0, 0.5, 1.0])
@@ -59,7 +59,7 @@ class Averages:
         Number of leaves.
     leaf_area : (r, 3, r) float64
         One-sided area at `NODES`, m² at plant scale 1.
-    leaf_colour : (r, 3, 3) float64
+    leaf_color : (r, 3, 3) float64
         Area times linear RGB at `NODES`.
     fixed_wood, full_wood : (r, r) float64
         Surface over length × radius of the own branch: what every sub-plant has, and what follows its fullness.
@@ -68,12 +68,12 @@ class Averages:
     fixed_faces, full_faces : (r, r) float64
         Faces of branches, likewise.
     length, radius : (r,) float64
-        Typical size of a branch of the row at plant scale 1, metres.
+        Typical size of a branch of the row at plant scale 1, meters.
     """
 
     leaves: Floats
     leaf_area: Floats
-    leaf_colour: Floats
+    leaf_color: Floats
     fixed_wood: Floats
     full_wood: Floats
     spur_wood: Floats
@@ -166,7 +166,7 @@ def average(rows: Table, leaf: RowLeaves) -> Averages:
     eye = np.eye(r)
     number, size = rows["leaves"][:, 0], rows["leaf_size"]
     one_area = number * (size[:, 0] ** 2 + size[:, 1] ** 2 / 3) * leaf.area  # E[s²] of a uniform range
-    leaves, leaf_area, leaf_colour = eye * number, np.zeros((r, 3, r)), np.zeros((r, 3, 3))
+    leaves, leaf_area, leaf_color = eye * number, np.zeros((r, 3, r)), np.zeros((r, 3, 3))
     start, (first, last) = rows["leaf_start"][:, 0], rows["part"].T
     for n, place in enumerate(NODES):
         low = np.where(rows["outward"], first + (last - first) * start, place)
@@ -174,8 +174,8 @@ def average(rows: Table, leaf: RowLeaves) -> Averages:
         sizes = rows["leaf_size_tip"], rows["leaf_size_young"]
         area, area_outward, area_young = own_leaf_integrals(*sizes, (low, high), (first + (last - first) * start, last))
         leaf_area[every, n, every] = one_area * area
-        inside, tip, young = rows["leaf_colour"][:, 0], rows["leaf_colour_tip"], rows["leaf_colour_young"]
-        leaf_colour[:, n] = one_area[:, None] * (
+        inside, tip, young = rows["leaf_color"][:, 0], rows["leaf_color_tip"], rows["leaf_color_young"]
+        leaf_color[:, n] = one_area[:, None] * (
             area[:, None] * inside + area_outward[:, None] * (tip - inside) + area_young[:, None] * (young - inside)
         )
     whole = profile_integral(exact, every, no_key, np.ones(r))
@@ -203,7 +203,7 @@ def average(rows: Table, leaf: RowLeaves) -> Averages:
             one, j = sums[i, sort], rows["next"][i, sort]
             leaves[i] += one.full * leaves[j]
             leaf_area[i] += np.tensordot(one.nodes, leaf_area[j], 1)
-            leaf_colour[i] += one.nodes @ leaf_colour[j]
+            leaf_color[i] += one.nodes @ leaf_color[j]
             if sort == FORK:
                 fixed_wood[i] += one.wood * fixed_wood[j]
                 full_wood[i] += one.wood * full_wood[j]
@@ -219,24 +219,24 @@ def average(rows: Table, leaf: RowLeaves) -> Averages:
             spur_wood[i] += one.full * spur_wood[j]
         for j in range(*rows["drawn_rows"][i]):
             # Each drawn branch is there once, of a known size and fullness.
-            vigour, outward = rows["size"][j, 2:]
-            full = 1 - rows["count_by_length"][j] * (1 - vigour)
+            vigor, outward = rows["size"][j, 2:]
+            full = 1 - rows["count_by_length"][j] * (1 - vigor)
             node = quadratic(np.array(outward))
             relative = length[j] * radius[j] / (length[i] * radius[i])
             leaves[i] += full * leaves[j]
             leaf_area[i] += full * (node @ leaf_area[j].reshape(3, -1))
-            leaf_colour[i] += full * (node @ leaf_colour[j])
+            leaf_color[i] += full * (node @ leaf_color[j])
             fixed_wood[i] += relative * (fixed_wood[j] + full * full_wood[j])
             fixed_faces[i] += fixed_faces[j] + full * full_faces[j]
             spur_wood[i] += full * spur_wood[j]
     return Averages(
-        leaves, leaf_area, leaf_colour, fixed_wood, full_wood, spur_wood, fixed_faces, full_faces, length, radius
+        leaves, leaf_area, leaf_color, fixed_wood, full_wood, spur_wood, fixed_faces, full_faces, length, radius
     )
 
 
 @dataclass(frozen=True)
 class _Sums:
-    """Expected sums over the children of one sort of a branch of vigour 1.
+    """Expected sums over the children of one sort of a branch of vigor 1.
 
     ``number`` of them; ``full``, the sum of the factors on their own numbers (`growth.fullness`); ``wood`` and
     ``full_wood``, the sums of length × radius relative to the parent's (of short shoots in m²), without and with that
@@ -267,16 +267,16 @@ def children_sums(rows: Table, i: int, sort: int) -> _Sums:
         t, fraction, weight, fading = spread_children(row, sort)
     if sort == SPUR:
         mean, variation = child["length"]
-        vigour, size, radius = np.ones_like(t), np.full(t.shape, (mean**2 + variation**2 / 3) * thickness), thickness
+        vigor, size, radius = np.ones_like(t), np.full(t.shape, (mean**2 + variation**2 / 3) * thickness), thickness
     else:
-        vigour, thick, size = side_branches(rows, i, sort, t, fraction, fading)
+        vigor, thick, size = side_branches(rows, i, sort, t, fraction, fading)
         radius = float((weight * thick).mean() * thickness)
-    full = weight * fullness_of(rows, np.full(t.shape, row["next"][sort]), vigour)
+    full = weight * fullness_of(rows, np.full(t.shape, row["next"][sort]), vigor)
     nodes = number * full.mean() * np.eye(3)
     if row["order"] == 1:
         outward = row["part"][0] + (row["part"][1] - row["part"][0]) * t
         nodes = np.tile(number * (full[:, None] * quadratic(outward)).mean(axis=0), (3, 1))
-    length = float(row["nominal"] * child["length"][0] * (weight * vigour).mean())
+    length = float(row["nominal"] * child["length"][0] * (weight * vigor).mean())
     means = (float(number * m.mean()) for m in (full, weight * size, size * full))
     return _Sums(number, *means, nodes, length, radius)
 
@@ -284,17 +284,17 @@ def children_sums(rows: Table, i: int, sort: int) -> _Sums:
 def side_branches(
     rows: Table, i: int, sort: int, t: NDArray, fraction: NDArray, fading: NDArray | float
 ) -> tuple[Floats, Floats, Floats]:
-    """Laterals or dead branches (k,) of a row: vigours, what radii are in proportion to, and lengths × radii.
+    """Laterals or dead branches (k,) of a row: vigors, what radii are in proportion to, and lengths × radii.
 
     All relative to their parent's. They are at fractions t (k,) of it and (k,) of its children; laterals are shorter by
     factors ``fading`` (k,).
     """
     row, here = rows[i], np.full(t.shape, i)
     child = rows[row["next"][sort]]
-    vigour = lengths(rows, here, fraction) * fading if sort == LATERAL else dead_vigour(fraction)
+    vigor = lengths(rows, here, fraction) * fading if sort == LATERAL else dead_vigor(fraction)
     piped = sort == LATERAL and row["pipe"] > 0
-    thick = row["pipe_radius"] * vigour if piped else profile(rows, here, np.zeros(len(t), np.uint64), t)
-    return vigour, thick, vigour * row["nominal"] * child["length"][0] * thick * child["thickness"][0]
+    thick = row["pipe_radius"] * vigor if piped else profile(rows, here, np.zeros(len(t), np.uint64), t)
+    return vigor, thick, vigor * row["nominal"] * child["length"][0] * thick * child["thickness"][0]
 
 
 def _fork_sums(rows: Table, i: int) -> _Sums:

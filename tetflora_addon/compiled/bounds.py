@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Table
-from ..growth.envelopes import reaches
+from ..growth.envelopes import envelope_reach
 from ..growth.grown_rows import NOW
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..growth.wind import widest_sway
@@ -79,7 +79,7 @@ def widest_radii(rows: Table) -> Floats:
 
 
 def own_leaf_reaches(rows: Table, model_reach: Floats) -> Floats:
-    """How far leaves stick out beyond the axes that bear them (r,), at plant scale 1, metres; see `leaf_reaches`."""
+    """How far leaves stick out beyond the axes that bear them (r,), at plant scale 1, meters; see `leaf_reaches`."""
     factor = np.maximum(rows["leaf_size_tip"], 1) * np.maximum(rows["leaf_size_young"], 1)
     largest = rows["leaf_size"].sum(axis=1) * factor
     beyond = model_reach + np.where(rows["envelope"] > 0, 0.5, 0.0)  # solids hold the middles of leaves
@@ -111,7 +111,8 @@ def unit_bounds(rows: Table, raised: bool = False) -> Floats:
     ----------
     rows : (r,) table of `rows.build_rows`
     raised : bool
-        Also if plants have crown bases (see `growth.formed`), so that any limb may be anywhere above where they begin.
+        Also if plants have crown bases (see `growth.crown_effects`), so that any limb may be anywhere above where they
+        begin.
 
     Returns
     -------
@@ -138,7 +139,7 @@ def limb_reaches(rows: Table, bounds: Floats) -> Floats:
 
 
 def leaf_reaches(rows: Table, bounds: Floats, model_reach: Floats) -> Floats:
-    """How far leaves and short shoots stick out beyond the axes of sub-plants at plant scale 1, metres.
+    """How far leaves and short shoots stick out beyond the axes of sub-plants at plant scale 1, meters.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def leaf_reaches(rows: Table, bounds: Floats, model_reach: Floats) -> Floats:
 def _unit_bound(rows: Table, index: int, bounds: Floats, raised: bool) -> Floats:
     row = rows[index]
     radius, low, high, turn = _axis_envelope(row)
-    solid = float(reaches(row))
+    solid = float(envelope_reach(row))
     rises = solid * np.sin(min(turn.max(), np.pi / 2))
     bound = np.array([radius.max() + solid, min(low.min(), 0.0) - rises, max(high.max(), 0.0) + rises])
     knot_t = np.linspace(0, 1, len(radius))

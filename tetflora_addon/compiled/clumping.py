@@ -30,8 +30,8 @@ from ..growth.growth import trunks
 from ..growth.hashing import key_of_seed, mix, uniform
 from ..growth.seeds import Seeds
 from ..leaves.models import LeafModel
-from ..storage import remembered
-from .rays import WIDEST, Things, basis, cell_numbers, opened, path_lengths, things_of
+from ..storage import cached
+from .rays import WIDEST, PlantElements, basis, cell_numbers, elements_of, opened, path_lengths
 
 #: Raise it when factors are found in another way.
 _METHOD = 1
@@ -67,7 +67,7 @@ class Clumping:
         √m, at plant scale 1.
     density : (r,) float64
     length : (r,) float64
-        Usual length of the branch at plant scale 1, metres.
+        Usual length of the branch at plant scale 1, meters.
     """
 
     whole: Floats
@@ -107,7 +107,7 @@ def fit_clumping(
     area : (r, r) float64
         Expected optical area of a sub-plant by the row that contributes it.
     polygons, width, length : (r,) float64
-        Expected faces of a sub-plant, width of its leaves (0 without) and length of its branch, metres at plant
+        Expected faces of a sub-plant, width of its leaves (0 without) and length of its branch, meters at plant
         scale 1.
     """
     root, density, own = np.zeros((3, len(rows)))
@@ -117,7 +117,7 @@ def fit_clumping(
         every, leaves = slice(int(first), int(end)), forms[rows["species"][first]]
         fit = partial(_fitted, rows, leaves, every, polygons, width[first], usual)
         name = fingerprint(rows[every], leaves, _METHOD)
-        root[every], density[every], own[every] = remembered("clumping", name, (3, int(end - first)), fit)
+        root[every], density[every], own[every] = cached("clumping", name, (3, int(end - first)), fit)
     total = area.sum(axis=1)
     return Clumping(np.where(total > 0, area @ own / np.where(total > 0, total, 1), own), own, root, density, usual)
 
@@ -128,7 +128,7 @@ def _fitted(
     """Roots, densities and own offsets (3, r) of the rows of one species."""
     orders, group = np.unique(rows["order"][every], return_inverse=True)
     group = group.reshape(-1)
-    things = [things_of(rows, forms, one, group, every.start, usual) for one in _plants(rows, every.start, polygons)]
+    things = [elements_of(rows, forms, one, group, every.start, usual) for one in _plants(rows, every.start, polygons)]
     finest = _FINEST * max(width, 0.0)
     parts = [seen for n, one in enumerate(things) for seen in _rays(one, len(orders), finest, n, len(things))]
     unit = np.sqrt(finest / _FINEST) if finest > 0 else np.sqrt(usual[every.start] / 100)
@@ -164,7 +164,7 @@ def _directions(plant: int, plants: int) -> Floats:
 
 
 def _rays(
-    things: Things, groups: int, finest: float, plant: int, plants: int
+    things: PlantElements, groups: int, finest: float, plant: int, plants: int
 ) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
     """Whether rays through a sub-plant meet anything (k,), their optical depths (k, 3 + groups) and weights (k,).
 
@@ -187,7 +187,7 @@ def _rays(
     directions = _directions(plant, plants)
     segments = _SEGMENTS / (plants * len(directions))
     for d, direction in enumerate(directions):
-        origin, met = _looked_at(things, direction, uniform(key, _AT + 8 * d)[0])
+        origin, met = _seen_along(things, direction, uniform(key, _AT + 8 * d)[0])
         shown = np.concatenate([p.shown(direction) for p in things.parts])
         pick = np.argsort(mix(key ^ np.arange(len(origin)).astype(np.uint64)), kind="stable")
         for h, side, corner, shape, cells, within in grids:
@@ -208,7 +208,7 @@ def _rays(
             yield met[some][use], depth, np.full(len(use), 1 / max(len(use), 1))
 
 
-def _looked_at(things: Things, direction: Floats, offset: float) -> tuple[Floats, Mask]:
+def _seen_along(things: PlantElements, direction: Floats, offset: float) -> tuple[Floats, Mask]:
     """Origins (k, 3) of parallel rays on a grid over a sub-plant, and whether each meets anything (k,)."""
     u, v = basis(direction)
     flat = np.stack([sum(axis[k] * things.middle[k] for k in range(3)) for axis in (u, v)])
@@ -257,7 +257,7 @@ _PLACES = {"species", "next", "drawn_rows", "sunlit", "dead"}
 _LATER: dict[str, Callable[[Table], Floats | float]] = {
     "leaf_light_tip": lambda rows: rows["leaf_light"][:, 0],
     "leaf_size_young": lambda _: 1.0,
-    "leaf_colour_young": lambda rows: rows["leaf_colour"][:, 0],
+    "leaf_color_young": lambda rows: rows["leaf_color"][:, 0],
     "envelope": lambda _: 0.0,
     "envelope_radius": lambda _: 0.0,
     "inclination": lambda _: 0.0,

@@ -42,7 +42,7 @@ class Crown:
         Meters below which there are next to no leaves.
     leaves, wood : float
         Expected one-sided area of the leaves and surface of the branches, m².
-    colour : tuple of float
+    color : tuple of float
         Mean linear RGB of both, weighted by how much of them is seen from above.
     leaf : float
         Mean width of a leaf, or of a trunk without leaves, meters.
@@ -56,7 +56,7 @@ class Crown:
     base: float = 0.0
     leaves: float = 0.0
     wood: float = 0.0
-    colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    color: tuple[float, float, float] = (0.0, 0.0, 0.0)
     leaf: float = 0.02
     form: LeafModel | None = None
 
@@ -104,9 +104,9 @@ def _crown_of(species: Species) -> Crown:
     base = max(float(np.quantile(place[:, 2], _LOWEST)), 0.0) if flora.leaf_count[row] > 0 else 0.0
     leaves, wood = flora.leaf_areas(trunk), flora.wood_areas(trunk)
     areas = np.array([LEVEL * leaves.mean(), wood.mean() / np.pi])
-    colours = np.stack([flora.leaf_colours(trunk).mean(axis=0), flora.wood_colour[row]])
-    colour = tuple((areas @ colours / areas.sum()).tolist())
+    colors = np.stack([flora.leaf_colors(trunk).mean(axis=0), flora.wood_color[row]])
+    color = tuple((areas @ colors / areas.sum()).tolist())
     polygons = expected_polygons(flora.species[0])
     leaf = float(flora.leaf_width[row]) if flora.leaf_count[row] > 0 else 2.0 * float(trunk.radius.mean())
     form = next((form for forms in flora.forms[0] for form in forms), None) if flora.leaf_count[row] > 0 else None
-    return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), colour, leaf, form)
+    return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), color, leaf, form)

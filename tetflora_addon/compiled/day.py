@@ -38,12 +38,12 @@ class DayTotals:
         Days on which these begin.
     area : (r, 3, k) float64
         Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
-    colour : (r, 3, k, 3) float64
-        Area times mean colour in summer at the same places.
+    color : (r, 3, k, 3) float64
+        Area times mean color in summer at the same places.
     count, faces : (r, k) float64
         Expected numbers of leaves and of their faces.
     twig : (r,) float64
-        Mean width of what bears the leaves of sub-plants, metres at plant scale 1; without leaves that of the branch.
+        Mean width of what bears the leaves of sub-plants, meters at plant scale 1; without leaves that of the branch.
     """
 
     years: Table
@@ -51,7 +51,7 @@ class DayTotals:
     tables: Floats
     origin: Floats
     area: Floats
-    colour: Floats
+    color: Floats
     count: Floats
     faces: Floats
     twig: Floats
@@ -70,27 +70,27 @@ class DayTotals:
         """Sum (n,) over kinds of leaves of what they have in summer (n, k) and the day leaves."""
         return sum(each[:, kind] * self.left(subplants, kind, column)[0] for kind in self.kinds)
 
-    def leaf_areas(self, subplants: Branches, formed: Floats | float = 1.0) -> Floats:
+    def leaf_areas(self, subplants: Branches, shaped: Floats | float = 1.0) -> Floats:
         """Area (n,) of leaves at plant scale 1, without the fullness of sub-plants.
 
-        ``formed`` (n, k) are factors by kind of leaf, because of crown forms.
+        ``shaped`` (n, k) are factors by kind of leaf, because of crown shapes.
         """
         area = np.einsum("nj,njk->nk", quadratic(subplants.outward), self.area[subplants.row])
-        return self._summed(subplants, area * formed, seasons.AREA)
+        return self._summed(subplants, area * shaped, seasons.AREA)
 
     def leaf_counts(self, subplants: Branches) -> Floats:
         """Number (n,) of leaves, likewise."""
         return self._summed(subplants, self.count[subplants.row], seasons.PRESENT)
 
-    def leaf_faces(self, subplants: Branches, formed: Floats | float = 1.0) -> Floats:
+    def leaf_faces(self, subplants: Branches, shaped: Floats | float = 1.0) -> Floats:
         """Number (n,) of faces of leaves, likewise."""
-        return self._summed(subplants, self.faces[subplants.row] * formed, seasons.PRESENT)
+        return self._summed(subplants, self.faces[subplants.row] * shaped, seasons.PRESENT)
 
-    def leaf_colours(self, subplants: Branches) -> Floats:
-        """Mean colours (n, 3) of leaves, weighted by area; black where there are none."""
+    def leaf_colors(self, subplants: Branches) -> Floats:
+        """Mean colors (n, 3) of leaves, weighted by area; black where there are none."""
         weights = quadratic(subplants.outward)
         area = np.einsum("nj,njk->nk", weights, self.area[subplants.row])
-        summer = np.einsum("nj,njkc->nkc", weights, self.colour[subplants.row])
+        summer = np.einsum("nj,njkc->nkc", weights, self.color[subplants.row])
         total, out = np.zeros(len(subplants)), np.zeros((len(subplants), 3))
         for kind in self.kinds:
             year, left = self.years[subplants.row, kind], self.left(subplants, kind, *_SEEN)
@@ -98,8 +98,8 @@ class DayTotals:
             total += area[:, kind] * left[0]
         return out / np.maximum(total, 1e-300)[:, None]
 
-    def own_colours(self, branches: Branches, kind: Integers, summer: Floats, owner: Integers | None = None) -> Floats:
-        """Mean colours (n, 3) of leaves of one kind (n,), of which those in summer are known (n, 3).
+    def own_colors(self, branches: Branches, kind: Integers, summer: Floats, owner: Integers | None = None) -> Floats:
+        """Mean colors (n, 3) of leaves of one kind (n,), of which those in summer are known (n, 3).
 
         ``owner`` (n,) are their branches, if not one for each.
         """
@@ -114,7 +114,7 @@ class DayTotals:
         return out
 
     def _mixture(self, branches: Branches, kind: int) -> tuple[Floats, Floats]:
-        """Factor (n,) on the mean colour of leaves in summer on the day of branches, and what is added to it (n, 3)."""
+        """Factor (n,) on the mean color of leaves in summer on the day of branches, and what is added to it (n, 3)."""
         left = self.left(branches, kind, *_SEEN)
         one, none = np.ones(len(branches)), np.zeros((len(branches), 3))
         added = _mixed(none, one, left, self.years[branches.row, kind], branches.year[:, 1])
@@ -149,11 +149,11 @@ class DayTotals:
 
 
 def _mixed(summer: Floats, area: Floats, left: list[Floats], year: Table, hue: Floats) -> Floats:
-    """Area times colour (n, 3) of leaves on a day, from those in summer (n, 3) of areas (n,), by columns of `_SEEN`."""
+    """Area times color (n, 3) of leaves on a day, from those in summer (n, 3) of areas (n,), by columns of `_SEEN`."""
     every, *others = left
     out = (every - sum(others))[:, None] * summer
-    for part, colour in zip(others, (year["fresh"], seasons.mean_autumn_colours(year, hue), year["dry"]), strict=True):
-        out += (area * part)[:, None] * colour
+    for part, color in zip(others, (year["fresh"], seasons.mean_autumn_colors(year, hue), year["dry"]), strict=True):
+        out += (area * part)[:, None] * color
     return out
 
 
@@ -195,18 +195,18 @@ def totals_of_day(
 
 
 def _by_kind(rows: Table, totals: Averages, leaf: RowLeaves) -> tuple[Floats, ...]:
-    """``area``, ``colour``, ``count`` and ``faces`` of `DayTotals`."""
+    """``area``, ``color``, ``count`` and ``faces`` of `DayTotals`."""
     kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]  # (r, k), which kind each contributing row bears
     area = totals.leaf_area @ kinds
-    colour = np.zeros((*area.shape, 3))
+    color = np.zeros((*area.shape, 3))
     used = [kind for kind in range(KINDS) if area[..., kind].any()]
     for kind in used[:-1]:
         some = rows.copy()
         some["leaves"] *= kinds[:, kind, None]
-        colour[:, :, kind] = average(some, leaf).leaf_colour
+        color[:, :, kind] = average(some, leaf).leaf_color
     if used:  # the last has what is left
-        colour[:, :, used[-1]] = np.maximum(totals.leaf_colour - colour.sum(axis=2), 0.0)
-    return area, colour, totals.leaves @ kinds, (totals.leaves * leaf.polygons) @ kinds
+        color[:, :, used[-1]] = np.maximum(totals.leaf_color - color.sum(axis=2), 0.0)
+    return area, color, totals.leaves @ kinds, (totals.leaves * leaf.polygons) @ kinds
 
 
 def _days_of_plants(trunk: np.void) -> Floats:

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of sub-plants before any is grown: bounds, mean areas, colours and orientation (paper, section 5).
+"""What is known of sub-plants before any is grown: bounds, mean areas, colors and orientation (paper, section 5).
 
-Areas, counts and colours are expectations in closed form. Orientation and the places of leaves and wood within a
+Areas, counts and colors are expectations in closed form. Orientation and the places of leaves and wood within a
 sub-plant are kept as a few hundred sample points, drawn by following random paths from the branch outwards.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Floats, Integers, Table
 from ..errors import SpeciesError
 from ..growth.branches import Branches
-from ..growth.envelopes import reaches
+from ..growth.envelopes import envelope_reach
 from ..growth.foliage import YOUTH
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
@@ -32,25 +32,25 @@ from .averages import Averages, RowLeaves, average, quadratic, row_leaves
 from .bounds import leaf_reaches, limb_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
 from .day import DayTotals, totals_of_day
-from .formed_totals import FormedTotals, formed_totals
 from .orientation import Orientation, orientation_of
 from .samples import Samples, draw_samples
+from .shaped_totals import ShapedTotals, shaped_totals
 
 
-def _in_summer(find_out: Callable[[Flora], Any]) -> Any:
+def _in_summer(compute: Callable[[Flora], Any]) -> Any:
     """A property that is found out once when first asked for, of the flora in summer without wind.
 
-    Only proxies need what takes rays or samples to know, and few scenes have crown forms.
+    Only proxies need what takes rays or samples to know, and few scenes have crown shapes.
     """
-    name = find_out.__name__
-    return cached_property(lambda flora: find_out(flora) if flora.in_leaf is flora else getattr(flora.in_leaf, name))
+    name = compute.__name__
+    return cached_property(lambda flora: compute(flora) if flora.in_leaf is flora else getattr(flora.in_leaf, name))
 
 
 @dataclass(frozen=True, eq=False)
 class Flora:
     """The compiled species of a scene; arrays have one entry for each row (species and order).
 
-    Totals are those of a sub-plant where the crown's branches are longest (vigour 1); of what follows the length, a
+    Totals are those of a sub-plant where the crown's branches are longest (vigor 1); of what follows the length, a
     shorter one has the fraction that `growth.fullness` gives.
 
     Attributes
@@ -69,9 +69,9 @@ class Flora:
     widest : (r,) float64
         Greatest distance of the sub-plant's wood from its axes, in radii of its base, see `bounds.widest_radii`.
     leaf_reach : (r,) float64
-        How far leaves and short shoots of the sub-plant stick out beyond its axes at plant scale 1, metres.
+        How far leaves and short shoots of the sub-plant stick out beyond its axes at plant scale 1, meters.
     leaf_width : (r,) float64
-        Mean width of its leaves at plant scale 1, metres; 0 without leaves.
+        Mean width of its leaves at plant scale 1, meters; 0 without leaves.
     leaf_count : (r,) float64
         Expected number of the leaves of the sub-plant.
     fixed_wood, full_wood : (r,) float64
@@ -82,7 +82,7 @@ class Flora:
     polygons, leaf_faces, fixed_faces : (r,) float64
         Expected number of faces of the sub-plant, leaves and branches; those of the leaves; and those of the tubes that
         every one has.
-    wood_colour : (r, 3) float64
+    wood_color : (r, 3) float64
         Area-weighted mean.
     transmission : (r,) float64
         Fraction of scattered light that goes through the leaves of the sub-plant.
@@ -90,8 +90,8 @@ class Flora:
         All expected totals by the row that contributes them.
     area_nodes : (r, 3) float64
         Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
-    colour_nodes : (r, 3, 3) float64
-        Area times mean colour at the same places.
+    color_nodes : (r, 3, 3) float64
+        Area times mean color at the same places.
     calm : Flora or None
         The same without the wind that this one is in.
     summer : Flora or None
@@ -119,11 +119,11 @@ class Flora:
     polygons: Floats
     leaf_faces: Floats
     fixed_faces: Floats
-    wood_colour: Floats
+    wood_color: Floats
     transmission: Floats
     averages: Averages
     area_nodes: Floats
-    colour_nodes: Floats
+    color_nodes: Floats
     calm: Flora | None = None
     summer: Flora | None = None
     day: DayTotals | None = None
@@ -154,8 +154,8 @@ class Flora:
     @cached_property
     def has_young(self) -> bool:
         """Whether any leaves at the ends of branches differ from others."""
-        coloured = (self.rows["leaf_colour_young"] != self.rows["leaf_colour"][:, 0]).any()
-        return bool(coloured or (self.rows["leaf_size_young"] != 1).any())
+        colored = (self.rows["leaf_color_young"] != self.rows["leaf_color"][:, 0]).any()
+        return bool(colored or (self.rows["leaf_size_young"] != 1).any())
 
     @_in_summer
     def samples(self) -> Samples:
@@ -199,25 +199,25 @@ class Flora:
     def leaf_areas(self, subplants: Branches) -> Floats:
         """Expected one-sided area (n,) of the leaves of sub-plants, m²."""
         if subplants.year is None:
-            area = self._at_place(self.area_nodes, subplants) * self._formed_leaves(subplants)
+            area = self._at_place(self.area_nodes, subplants) * self._shaped_leaves(subplants)
         else:
-            area = self.day.leaf_areas(subplants, self._formed_leaves(subplants, kinds=True))
+            area = self.day.leaf_areas(subplants, self._shaped_leaves(subplants, kinds=True))
         return fullness(self.rows, subplants) * area * subplants.scale**2
 
-    def leaf_colours(self, subplants: Branches) -> Floats:
+    def leaf_colors(self, subplants: Branches) -> Floats:
         """Mean linear RGB (n, 3) of the leaves of sub-plants, weighted by area; black where they have none."""
         if subplants.year is not None:
-            return self.day.leaf_colours(subplants)
+            return self.day.leaf_colors(subplants)
         area = self._at_place(self.area_nodes, subplants)
-        return self._at_place(self.colour_nodes, subplants) / np.maximum(area, 1e-300)[:, None]
+        return self._at_place(self.color_nodes, subplants) / np.maximum(area, 1e-300)[:, None]
 
     def wood_areas(self, subplants: Branches) -> Floats:
         """Expected surface (n,) of the branches of sub-plants, m²."""
         row, full = subplants.row, fullness(self.rows, subplants)
         relative, spurs = self.fixed_wood[row] + full * self.full_wood[row], full * self.spur_wood[row]
-        some = self._formed(subplants)
+        some = self._shaped(subplants)
         if len(some):
-            wood, short = self.formed_totals.wood(subplants.take(some))
+            wood, short = self.shaped_totals.wood(subplants.take(some))
             relative[some] *= wood
             spurs[some] *= short
         return relative * subplants.length * subplants.radius + spurs * subplants.scale**2
@@ -229,10 +229,10 @@ class Flora:
         if subplants.year is not None:
             faces = faces - self.leaf_faces[row] + self.day.leaf_faces(subplants)
         counts = fixed + fullness(self.rows, subplants) * (faces - fixed)
-        some = self._formed(subplants)
+        some = self._shaped(subplants)
         if len(some):
             own = subplants.take(some)
-            wood = (self.formed_totals.faces(own) - 1.0) * (self.polygons - self.leaf_faces)[own.row]
+            wood = (self.shaped_totals.faces(own) - 1.0) * (self.polygons - self.leaf_faces)[own.row]
             counts[some] += wood + (self._leaf_faces(own) - self._leaf_faces(replace(own, crown=None)))
         return counts
 
@@ -243,27 +243,27 @@ class Flora:
     def _leaf_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the leaves of sub-plants, without their fullness."""
         if subplants.year is not None:
-            return self.day.leaf_faces(subplants, self._formed_leaves(subplants, faces=True, kinds=True))
-        return self.leaf_faces[subplants.row] * self._formed_leaves(subplants, faces=True)
+            return self.day.leaf_faces(subplants, self._shaped_leaves(subplants, faces=True, kinds=True))
+        return self.leaf_faces[subplants.row] * self._shaped_leaves(subplants, faces=True)
 
     @_in_summer
-    def formed_totals(self) -> FormedTotals:
-        """What crown forms change."""
-        return formed_totals(self.rows, self.averages, self.leaf.polygons)
+    def shaped_totals(self) -> ShapedTotals:
+        """What crown shapes change."""
+        return shaped_totals(self.rows, self.averages, self.leaf.polygons)
 
-    def _formed(self, subplants: Branches) -> Integers:
-        """Sub-plants (k,) of (n,) whose totals crown forms change."""
+    def _shaped(self, subplants: Branches) -> Integers:
+        """Sub-plants (k,) of (n,) whose totals crown shapes change."""
         if subplants.crown is None or not (self.rows["order"] == 0)[subplants.row].any():
             return np.zeros(0, np.intp)
-        return np.flatnonzero(self.formed_totals.formed[subplants.row])
+        return np.flatnonzero(self.shaped_totals.shaped[subplants.row])
 
-    def _formed_leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats | float:
-        """`FormedTotals.leaves` (n,) or (n, k) of sub-plants, 1 where nothing is formed."""
-        some = self._formed(subplants)
+    def _shaped_leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats | float:
+        """`ShapedTotals.leaves` (n,) or (n, k) of sub-plants, 1 where nothing is formed."""
+        some = self._shaped(subplants)
         if not len(some):
             return 1.0
         out = np.ones((len(subplants), len(LEAF_KINDS)) if kinds else len(subplants))
-        out[some] = self.formed_totals.leaves(subplants.take(some), faces, kinds)
+        out[some] = self.shaped_totals.leaves(subplants.take(some), faces, kinds)
         return out
 
     def one_leaf_area(self, branches: Branches) -> Floats:
@@ -328,11 +328,11 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         polygons=polygons,
         leaf_faces=leaves @ leaf.polygons,
         fixed_faces=fixed,
-        wood_colour=wood @ rows["branch_colour"][:, 0] / wood.sum(axis=1, keepdims=True),
+        wood_color=wood @ rows["branch_color"][:, 0] / wood.sum(axis=1, keepdims=True),
         transmission=area @ leaf.transmission / np.maximum(leaf_area, 1e-300),
         averages=totals,
         area_nodes=totals.leaf_area.sum(axis=2),
-        colour_nodes=totals.leaf_colour,
+        color_nodes=totals.leaf_color,
     )
 
 
@@ -367,7 +367,7 @@ def _with_drawn(rows: Table, bound: Floats) -> Floats:
         child = own["next"][:, LATERAL]
         farthest = np.hypot(bound[child, 0], np.maximum(bound[child, 2], -bound[child, 1]))
         reach = np.where(child >= 0, own["size"][:, 0] * rows["length"][child].sum(axis=1) * farthest, 0.0)
-        reach = np.maximum(reach, own["size"][:, 0] * reaches(own))
+        reach = np.maximum(reach, own["size"][:, 0] * envelope_reach(own))
         across, height = np.hypot(own["knots"][..., 0], own["knots"][..., 1]), own["knots"][..., 2]
         if is_windy(rows):  # no point moves farther than an arc that turns as its height does
             above = np.maximum(height.max(), 0.0)

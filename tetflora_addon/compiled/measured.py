@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heights and crown widths of single plants as one would measure them, and crown forms of plants that were measured.
+"""Heights and crown widths of single plants as one would measure them, and crown shapes of plants that were measured.
 
 Of the limbs of a plant the few that are likely to end outermost or on top are grown. How far what grows on these
 reaches beyond them is known from a few whole limbs of their kind.
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Integers, Mask, Table, spread
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
-from ..growth.crown_forms import BASE, LEAST, MOST, PLAIN, WIDTH
+from ..growth.crown_effects import MOST_LEANING, are_stools, bare_part, child_factors, lateral_fractions, length_factors
+from ..growth.crown_shapes import BASE, LEAST, MOST, PLAIN, WIDTH
 from ..growth.foliage import leaf_keys, leaf_places, place_leaves, settled
-from ..growth.formed import MOST_LEANING, along, are_stools, bare_part, fractions, reaches
 from ..growth.grown_rows import FADES, lengths
 from ..growth.growth import (
     branch_counts,
@@ -38,11 +38,11 @@ from ..parallel import each_on_all_cores
 from ..species.growing import faded
 from .flora import Flora
 
-_AT_ONCE = 2_000
+_BATCH = 2_000
 _BISECTIONS = 11
 #: Factors that would change by less are found.
 _CLOSE = 0.015
-_known: WeakKeyDictionary[Flora, dict[int, Beyond]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[Flora, dict[int, TwigReach]] = WeakKeyDictionary()
 
 
 def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
@@ -51,7 +51,7 @@ def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
     Returns
     -------
     height, width : (n,) float64
-        Metres, about as plants are when all of them has grown.
+        Meters, about as plants are when all of them has grown.
     """
     height, width = np.zeros((2, len(seeds)))
 
@@ -70,14 +70,14 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
     flora : Flora
     seeds : Seeds of n
     height, width : (n,) float64
-        Metres.
+        Meters.
     times : int
         How often plants are measured at most.
 
     Returns
     -------
     (n, 2) float64
-        Factors on the scale, and on the lengths of limbs (the first column of crown forms), which stay within their
+        Factors on the scale, and on the lengths of limbs (the first column of crown shapes), which stay within their
         limits; heights are met even then.
     """
     out = np.ones((len(seeds), 2))
@@ -89,12 +89,12 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
         most = np.where(are_stools(flora.rows, row), MOST_LEANING, MOST[WIDTH])
         tall, left = np.ones(len(own)), np.arange(len(own))
         for _ in range(times):
-            formed = crown[left]
-            formed[:, WIDTH] *= factor[left]
-            tall[left], _, found = _sizes(flora.in_leaf, replace(own.take(left), crown=formed))
+            shaped = crown[left]
+            shaped[:, WIDTH] *= factor[left]
+            tall[left], _, found = _sizes(flora.in_leaf, replace(own.take(left), crown=shaped))
             if found is None:
                 break
-            more = _solved(found, wanted[left], LEAST[WIDTH] / formed[:, WIDTH], most[left] / formed[:, WIDTH])
+            more = _solved(found, wanted[left], LEAST[WIDTH] / shaped[:, WIDTH], most[left] / shaped[:, WIDTH])
             far = np.abs(more - 1) > _CLOSE  # plants that are close are left alone, whatever others need
             tall[left] = np.where(far, found.sizes(more)[0], tall[left])
             factor[left] *= np.where(far, more, 1.0)
@@ -115,27 +115,31 @@ def _by_kind(flora: Flora, seeds: Seeds, work: Callable[[Integers], None]) -> No
     for some in kinds:
         if len(some):
             _beyond(flora.in_leaf, int(seeds.species[some[0]]))
-    each_on_all_cores(work, [some[i : i + _AT_ONCE] for some in kinds for i in range(0, len(some), _AT_ONCE)])
+    each_on_all_cores(work, [some[i : i + _BATCH] for some in kinds for i in range(0, len(some), _BATCH)])
 
 
-def _beyond(flora: Flora, species: int) -> Beyond:
+def _beyond(flora: Flora, species: int) -> TwigReach:
     known = _known.setdefault(flora, {})
     if species not in known:
         known[species] = beyond_limbs(flora.rows, int(flora.first_row[species]), species)
     return known[species]
 
 
-def _sizes(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats, Outermost | None]:
+def _sizes(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats, OuterLimbs | None]:
     """Heights and crown widths (n,), (n,) of plants of one species, and what reaches farthest, if they have limbs."""
     plants, beyond = trunks(flora.rows, seeds), _beyond(flora, int(seeds.species[0]))
     if beyond.whole[0] > 0:
-        length = plants.length if plants.crown is None else plants.length / along(flora.rows, plants.row, plants.crown)
+        length = (
+            plants.length
+            if plants.crown is None
+            else plants.length / length_factors(flora.rows, plants.row, plants.crown)
+        )
         return beyond.whole[0] * length, beyond.whole[1] * length, None
     found = outermost(flora.rows, plants, beyond)
     return *found.sizes(), found
 
 
-def _solved(found: Outermost, wanted: Floats, least: Floats, most: Floats) -> Floats:
+def _solved(found: OuterLimbs, wanted: Floats, least: Floats, most: Floats) -> Floats:
     """Factors (n,) on limbs, between limits (n,), by which crown widths over heights become what is wanted (n,)."""
     low, high = least, np.maximum(most, least)
     for _ in range(_BISECTIONS):
@@ -147,7 +151,7 @@ def _solved(found: Outermost, wanted: Floats, least: Floats, most: Floats) -> Fl
 
 
 #: East, west, north, south and up.
-WAYS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
+DIRECTIONS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
 UP = 4
 #: Limbs that are grown for each of these.
 _LIKELY = (6, 6, 6, 6, 8)
@@ -160,15 +164,15 @@ _ASIDE = 0.4
 
 
 @dataclass(frozen=True)
-class Beyond:
+class TwigReach:
     """How far twigs and leaves of a species reach beyond its limbs.
 
     Attributes
     ----------
     side, up : pair of float
-        Metres at plant scale 1, and fraction of the limb's length.
+        Meters at plant scale 1, and fraction of the limb's length.
     top : float
-        How far leaves of trunks and stems reach beyond these, metres at plant scale 1.
+        How far leaves of trunks and stems reach beyond these, meters at plant scale 1.
     whole : pair of float
         Height and crown width of plants without limbs, in lengths of their trunks; 0 where there are limbs.
     """
@@ -180,7 +184,7 @@ class Beyond:
 
 
 @dataclass(frozen=True)
-class Outermost:
+class OuterLimbs:
     """What reaches farthest on plants (n).
 
     Attributes
@@ -188,7 +192,7 @@ class Outermost:
     plant : (m,) int32
         Whose limb it is; in order.
     root, limb : (5, m) float64
-        How far limbs begin in each of `WAYS`, and how much farther they lead; metres.
+        How far limbs begin in each of `DIRECTIONS`, and how much farther they lead; meters.
     stem : (m,) bool
         Whether they begin on stems beyond a fork, which lean more or less.
     width : (n,) float64
@@ -202,7 +206,7 @@ class Outermost:
     width: Floats
 
     def sizes(self, factor: Floats | None = None) -> tuple[Floats, Floats]:
-        """Heights and crown widths (n,), (n,) if limbs were so many times (n,) as long, about; metres."""
+        """Heights and crown widths (n,), (n,) if limbs were so many times (n,) as long, about; meters."""
         if factor is None:
             reach = self.root + self.limb
         else:
@@ -214,7 +218,7 @@ class Outermost:
         return far[UP], far[:UP].sum(axis=0) / 2
 
 
-def outermost(rows: Table, plants: Branches, beyond: Beyond) -> Outermost:
+def outermost(rows: Table, plants: Branches, beyond: TwigReach) -> OuterLimbs:
     """What reaches farthest on plants (n) of one species, trunks of which are given."""
     stems = _stems(rows, plants)
     chosen = _likely(rows, stems, len(plants))
@@ -225,7 +229,7 @@ def outermost(rows: Table, plants: Branches, beyond: Beyond) -> Outermost:
         own = _farthest(lines, origin)
         own[:, UP] += beyond.top * grown.scale
         root.append(own)
-        limb.append(np.zeros((len(grown), len(WAYS))))
+        limb.append(np.zeros((len(grown), len(DIRECTIONS))))
         stem.append(rows["continues"][grown.row])
         limbs = chosen_children(rows, grown, lines, which, index, counts)
         if not len(limbs):
@@ -236,7 +240,7 @@ def outermost(rows: Table, plants: Branches, beyond: Beyond) -> Outermost:
         end = axis.knot(np.arange(len(limbs)), axis.segments) - limbs.position
         level = end[:, :2] / np.maximum(np.hypot(end[:, 0], end[:, 1]), 1e-9)[:, None]
         side, up = (a * limbs.scale + b * limbs.length for a, b in (beyond.side, beyond.up))
-        leads[:, :UP] += np.maximum(level @ WAYS[:UP, :2].T, 0.0) * side[:, None]
+        leads[:, :UP] += np.maximum(level @ DIRECTIONS[:UP, :2].T, 0.0) * side[:, None]
         leads[:, UP] += up
         # Wider crowns of shrubs are stems that lean more, which bear as much to the sides as before.
         lean, part = are_stools(rows, grown.row[which]), np.array([_ASIDE] * UP + [1.0])
@@ -249,7 +253,7 @@ def outermost(rows: Table, plants: Branches, beyond: Beyond) -> Outermost:
     plant, root, limb, stem = (np.concatenate(some) for some in (owner, root, limb, stem))
     order = np.argsort(plant, kind="stable")
     root, limb = (np.ascontiguousarray(some[order].T) for some in (root, limb))
-    return Outermost(plant[order], root, limb, stem[order], width)
+    return OuterLimbs(plant[order], root, limb, stem[order], width)
 
 
 def _stems(rows: Table, plants: Branches) -> list[tuple[Branches, Axes]]:
@@ -265,12 +269,12 @@ def _stems(rows: Table, plants: Branches) -> list[tuple[Branches, Axes]]:
 
 
 def _farthest(lines: Axes, origin: Floats) -> Floats:
-    """How far axes (n,) reach in each of `WAYS` (n, 5) from places (n, 3)."""
+    """How far axes (n,) reach in each of `DIRECTIONS` (n, 5) from places (n, 3)."""
     return np.maximum(_in_ways(lines.knots.max(axis=1) - origin), _in_ways(lines.knots.min(axis=1) - origin))
 
 
 def _in_ways(place: Floats) -> Floats:
-    """Places (n, 3) along each of `WAYS` (n, 5)."""
+    """Places (n, 3) along each of `DIRECTIONS` (n, 5)."""
     x, y, z = place.T
     return np.stack([x, -x, y, -y, z]).T
 
@@ -304,7 +308,7 @@ def _likely(rows: Table, stems: list[tuple[Branches, Axes]], n: int) -> list[tup
 
 
 def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Integers, Integers, NDArray[np.float32]]:
-    """Counts of limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `WAYS`.
+    """Limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `DIRECTIONS`.
 
     As `growth.chosen_children` has it, but for what differs at random from limb to limb.
     """
@@ -327,7 +331,7 @@ def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Int
         first, last = rows["fraction"][row, LATERAL].T
         described = first[owner] + (last - first)[owner] * described
         fading = faded(described, rows["growing"][row, LATERAL, FADES][owner], extra)
-    low, high = fractions(rows, row, base).T
+    low, high = lateral_fractions(rows, row, base).T
     fraction = low[owner] + (high - low)[owner] * part
     angle = rows["angle"][child, 0][owner]
     angle = angle + (rows["angle_tip"][child][owner] - angle) * fraction
@@ -336,9 +340,9 @@ def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Int
     length = (stems.length * rows["nominal"][row] * rows["length"][child, 0])[owner]
     length = length * lengths(rows, row[owner], fraction) * fading
     if crown is not None:
-        length /= along(rows, row, crown)[owner]
+        length /= length_factors(rows, row, crown)[owner]
         few = replace(Branches.empty(), row=row[owner], crown=crown[owner])
-        lean, reach = reaches(rows, few, azimuth, LATERAL)
+        lean, reach = child_factors(rows, few, azimuth, LATERAL)
         length, angle = length * reach, angle * lean
     sine, cosine = length * np.sin(angle), length * np.cos(angle)
     rise = lines.knot(np.arange(len(stems)), lines.segments) - stems.position
@@ -352,7 +356,7 @@ def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Int
     return counts, owner, index, tips
 
 
-def beyond_limbs(rows: Table, first: int, species: int) -> Beyond:
+def beyond_limbs(rows: Table, first: int, species: int) -> TwigReach:
     """How far twigs and leaves of a species reach, whose trunk is row ``first``."""
     n, plants = _KNOWN_PLANTS, trunks(rows, Seeds.upright(_KNOWN_PLANTS, species))
     limbs, over = [], 0.0
@@ -368,30 +372,30 @@ def beyond_limbs(rows: Table, first: int, species: int) -> Beyond:
             limbs.append(chosen_children(rows, grown, lines, owner, index, counts))
     limbs = Branches.concatenate(limbs)
     if not len(limbs):
-        far = _all_extremes(rows, plants, np.broadcast_to(WAYS, (n, *WAYS.shape))) / plants.length[:, None]
-        return Beyond(whole=(float(far[:, UP].mean()), float(far[:, :UP].sum(axis=1).mean() / 2)))
+        far = _all_extremes(rows, plants, np.broadcast_to(DIRECTIONS, (n, *DIRECTIONS.shape))) / plants.length[:, None]
+        return TwigReach(whole=(float(far[:, UP].mean()), float(far[:, :UP].sum(axis=1).mean() / 2)))
     order = np.argsort(limbs.length, kind="stable")
     longest = np.flatnonzero(limbs.length[order] > 0.5 * limbs.length.max())
     side = order[longest[np.linspace(0, len(longest) - 1, _LONG).astype(np.int64)]]
     top = np.argsort(limbs.position[:, 2] + limbs.length * limbs.frame[:, 2, 2], kind="stable")
     high = top[np.linspace(len(top) - 1 - min(4 * n, len(top) - 1), len(top) - 1, _HIGH).astype(np.int64)]
-    return Beyond(_fitted(rows, limbs.take(side), False), _fitted(rows, limbs.take(high), True), over)
+    return TwigReach(_fitted(rows, limbs.take(side), False), _fitted(rows, limbs.take(high), True), over)
 
 
 def _fitted(rows: Table, limbs: Branches, up: bool) -> tuple[float, float]:
-    """How far what grows on limbs reaches beyond them, in the way that they lead or up: metres, and of their length."""
+    """How far what grows on limbs reaches beyond them, in the way that they lead or up: meters, and of their length."""
     factor = np.resize(_FACTORS, len(limbs))
-    limbs = replace(limbs, length=limbs.length * factor, vigour=limbs.vigour * factor)
+    limbs = replace(limbs, length=limbs.length * factor, vigor=limbs.vigor * factor)
     lines, every = axes(rows, limbs), np.arange(len(limbs))
     end = lines.knot(every, lines.segments) - limbs.position
-    way = end * [1.0, 1.0, 0.0] if not up else np.broadcast_to(WAYS[UP], end.shape)
+    way = end * [1.0, 1.0, 0.0] if not up else np.broadcast_to(DIRECTIONS[UP], end.shape)
     way = way / np.maximum(np.linalg.norm(way, axis=1), 1e-9)[:, None]
     own = np.einsum("nsi,ni->ns", lines.knots - limbs.position[:, None], way).max(axis=1)
     over = _all_extremes(rows, limbs, way[:, None])[:, 0] - own
     terms = np.stack([np.ones(len(limbs)), limbs.length], axis=1)
-    (metres, part), *_ = np.linalg.lstsq(terms, over, rcond=None)
-    luck = _LUCK * (over - terms @ [metres, part]).std() / limbs.length.mean()
-    return float(metres), float(part + luck)
+    (meters, part), *_ = np.linalg.lstsq(terms, over, rcond=None)
+    luck = _LUCK * (over - terms @ [meters, part]).std() / limbs.length.mean()
+    return float(meters), float(part + luck)
 
 
 def _leaf_tips(rows: Table, branches: Branches, lines: Axes) -> tuple[Integers, Floats]:

@@ -159,7 +159,7 @@ def orientation_of(
     wood : (r, r) float64
         Expected surface of branches by row, over length × radius of the sub-plant's own branch.
     length : (r,) float64
-        Typical length of a branch at plant scale 1, metres.
+        Typical length of a branch at plant scale 1, meters.
     """
     nodes = NODES if rows["sunlit"].any() else NODES[:1]
     out = Orientation(*np.zeros((2, len(rows), len(nodes), _TERMS, 6)), np.zeros((len(rows), 1, _TERMS, 6)))
@@ -167,7 +167,9 @@ def orientation_of(
     leaf_area, wood_area = leaf.sum(axis=1), wood.sum(axis=1)
     skies = _skies_met(rows, length)
     for i in range(len(rows) - 1, -1, -1):
-        branches = _looked_at(i, float(length[i]), _skies_around(_BRANCHES, bool(rows["order"][i] == 0), skies[i]))
+        branches = _sample_branches(
+            i, float(length[i]), _skies_around(_BRANCHES, bool(rows["order"][i] == 0), skies[i])
+        )
         lines = axes(rows, branches)
         children, owner, stands = _some_children(rows, branches, lines)
         row, scale = children.row, branches.scale[0]
@@ -243,7 +245,7 @@ def _skies_met(rows: Table, length: Floats) -> list[Floats]:
             sky = np.stack([-np.sin(tilt), np.zeros(_MET), np.cos(tilt)], axis=1)
         out.append(sky)
         if (rows["next"][i] >= 0).any() or rows["phantom"][i]:
-            branches = _looked_at(i, float(length[i]), sky)
+            branches = _sample_branches(i, float(length[i]), sky)
             children, *_ = _some_children(rows, branches, axes(rows, branches))
             for row in np.unique(children.row):
                 met[row].append(children.frame[children.row == row, 2])
@@ -260,7 +262,7 @@ def _skies_around(n: int, upright: bool, met: Floats) -> Floats:
     return sky
 
 
-def _looked_at(row: int, length: float, sky: Floats) -> Branches:
+def _sample_branches(row: int, length: float, sky: Floats) -> Branches:
     """Branches of a row, of length 1, with the sky in given directions (n, 3) of their axes."""
     key = mix(key_of_seed(np.arange(len(sky))) ^ np.uint64(0x0E1E))
     return Branches.apart(row, key, _frames_along(sky).transpose(0, 2, 1), 1.0, 1 / max(length, 1e-9))
@@ -290,7 +292,7 @@ def _some_children(rows: Table, branches: Branches, lines: Axes) -> tuple[Branch
 
 
 def _straight(branches: Branches) -> Axes:
-    """Centre lines of branches that do not bend."""
+    """Center lines of branches that do not bend."""
     knots = np.stack([branches.position, branches.position + branches.frame[:, :, 2]], axis=1)
     return Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
 

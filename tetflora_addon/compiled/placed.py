@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the samples of given sub-plants are, how far these reach, and within which bounds they stay.
 
-Without crown forms that is what is known of their rows. A form moves the place where a limb leaves the trunk up, and
+Without crown shapes that is what is known of their rows. A form moves the place where a limb leaves the trunk up, and
 what is on the limb away from there, as it does when plants grow. Where limbs are longer, more is on each: samples there
 stand for more, but all together for as much as is expected.
 """
@@ -14,16 +14,24 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask, Table, gathered
 from ..growth.branches import Branches
-from ..growth.crown_forms import BASE, WIDTH
-from ..growth.formed import LIGHT, MOST_LEANING, along, are_stools, bare_part, first_forks, raised
+from ..growth.crown_effects import (
+    LIGHT,
+    MOST_LEANING,
+    are_stools,
+    bare_part,
+    first_forks,
+    length_factors,
+    trunk_length_factors,
+)
+from ..growth.crown_shapes import BASE, WIDTH
 from ..growth.grown_rows import lengths
 from ..growth.rows import FORK, LATERAL
 from .flora import Flora
 from .samples import LIMB, STEM, STEM_LIMB, Limbs, Points, Shares
 
 
-def formed_subplants(rows: Table, subplants: Branches) -> Integers:
-    """Sub-plants (k,) of (n,) that are trunks, or stems of these, with a crown form other than the plain one."""
+def shaped_subplants(rows: Table, subplants: Branches) -> Integers:
+    """Sub-plants (k,) of (n,) that are trunks, or stems of these, with a crown shape other than the plain one."""
     crown = subplants.crown
     if crown is None:
         return np.zeros(0, np.intp)
@@ -54,7 +62,7 @@ def placed_samples(
         Area over that of other samples of the same sub-plant, 1 on the mean; None where all stand for as much.
     """
     place, rows = gathered(points.position, pick), flora.rows
-    some = formed_subplants(rows, subplants)
+    some = shaped_subplants(rows, subplants)
     if not len(some):
         return place, None
     place, share = place.astype(np.float64), np.ones(len(owner))
@@ -67,7 +75,7 @@ def placed_samples(
         c, s = np.cos(turn[mine]), np.sin(turn[mine])
         light = np.stack([c * light[:, 0] + s * light[:, 1], c * light[:, 1] - s * light[:, 0]], axis=1)
     at, reach, sparse = _moved(rows, own, points.limbs.take(pick[mine]), place[mine], which, light)
-    place[mine] = at / along(rows, own.row, own.crown)[which, None]
+    place[mine] = at / length_factors(rows, own.row, own.crown)[which, None]
     leafy = points is flora.samples.leaves
     share[mine] = _shares(flora, own, points.shares, points.limbs.take(pick[mine]), which, reach, sparse, leafy)
     return place, share
@@ -87,7 +95,7 @@ def _moved(
     start = rows["start"][row, LATERAL, 0]
     bare = np.maximum(start, bare_part(rows, row, crown[:, BASE]))
     left = (1 - bare) / np.maximum(1 - start, 1e-9)
-    below, above = raised(crown[:, BASE], first_forks(rows, row))
+    below, above = trunk_length_factors(crown[:, BASE], first_forks(rows, row))
     stretch = np.where(rows["continues"][row], above, below)
     stool, limb, stem = are_stools(rows, row)[which], on.kind >= LIMB, (on.kind == STEM) | (on.kind == STEM_LIMB)
 
@@ -150,15 +158,15 @@ def _shares(
     flora: Flora, own: Branches, shares: Shares, on: Limbs, which: Integers, reach: Floats, sparse: Floats, leafy: bool
 ) -> Floats:
     """What samples (m,) stand for, 1 on the mean; see `_moved`."""
-    totals, crown = flora.formed_totals, own.crown.astype(np.float64)
-    ratio = np.where(totals.formed[own.row], totals.leaves(own) if leafy else totals.wood(own)[0], 1.0)
+    totals, crown = flora.shaped_totals, own.crown.astype(np.float64)
+    ratio = np.where(totals.shaped[own.row], totals.leaves(own) if leafy else totals.wood(own)[0], 1.0)
     follows, width = shares.follows[own.row], crown[:, WIDTH]
     bears = 1 - follows + follows * width
     if leafy:
         sparse = sparse.copy()
         sparse[:, :LIMB] = 1.0
     else:
-        ratio = ratio * along(flora.rows, own.row, own.crown)
+        ratio = ratio * length_factors(flora.rows, own.row, own.crown)
         square = 1 + (crown[:, LIGHT][:, :2] ** 2).sum(axis=1) / 2
         bears = width * (1 - follows) + width**2 * square * follows
     each = shares.kinds[own.row] * sparse
@@ -177,11 +185,11 @@ def extents(flora: Flora, subplants: Branches, farthest: bool = True) -> Floats:
     Without ``farthest``, the radius of crowns that lean is about the mean of all sides.
     """
     bound = flora.sampled_bound[subplants.row]
-    some = formed_subplants(flora.rows, subplants)
+    some = shaped_subplants(flora.rows, subplants)
     if len(some):
         own, rows = subplants.take(some), flora.rows
         crown, stool = own.crown.astype(np.float64), are_stools(rows, own.row)
-        stretch = along(rows, own.row, own.crown)
+        stretch = length_factors(rows, own.row, own.crown)
         lean = np.hypot(*crown[:, LIGHT].T[:2]) if farthest else 0.0
         reach = crown[:, WIDTH] * (1 + lean)
         reach = np.where(stool, np.sqrt(np.minimum(reach, MOST_LEANING)), reach)
@@ -203,7 +211,7 @@ def outlines(flora: Flora, plants: Branches, low: Floats, high: Floats) -> tuple
     Returns
     -------
     length : (n,) float64
-        Unit of heights and widths of the species, metres.
+        Unit of heights and widths of the species, meters.
     low : (n,) float64
         Where the crown begins, in such units.
     width : (n,) float64
@@ -216,21 +224,21 @@ def outlines(flora: Flora, plants: Branches, low: Floats, high: Floats) -> tuple
     rows, crown = flora.rows, plants.crown.astype(np.float64)
     start = rows["start"][plants.row, LATERAL, 0] * first_forks(rows, plants.row)
     left = np.minimum((1 - crown[:, BASE]) / (1 - start), 1.0)
-    length = plants.length / along(rows, plants.row, plants.crown)
+    length = plants.length / length_factors(rows, plants.row, plants.crown)
     return length, high - (high - low) * left, crown[:, WIDTH], crown[:, LIGHT][:, :2]
 
 
 def bounds(flora: Flora, subplants: Branches) -> tuple[Floats, Floats]:
-    """Bounds of sub-plants (n, 3) as `Flora.bound`, and how far (n,) these may reach beyond that; metres."""
+    """Bounds of sub-plants (n, 3) as `Flora.bound`, and how far (n,) these may reach beyond that; meters."""
     bound = flora.bound[subplants.row] * subplants.length[:, None]
     out = subplants.radius * flora.widest[subplants.row] + flora.leaf_reach[subplants.row] * subplants.scale
-    some = formed_subplants(flora.rows, subplants)
+    some = shaped_subplants(flora.rows, subplants)
     if len(some):
         own, rows = subplants.take(some), flora.rows
         crown = own.crown.astype(np.float64)
         raised = crown[:, BASE] > 0
         bound[some[raised]] = flora.raised_bound[own.row[raised]] * own.length[raised, None]
-        stretch = along(rows, own.row, own.crown)
+        stretch = length_factors(rows, own.row, own.crown)
         longer = crown[:, WIDTH] * (1 + np.linalg.norm(crown[:, LIGHT], axis=1))
         longer = np.where(are_stools(rows, own.row), np.minimum(longer, MOST_LEANING), longer)
         # Nothing on a limb moves farther than that is longer, and forks move as far as the trunk is to them.

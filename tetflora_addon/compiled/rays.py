@@ -163,8 +163,8 @@ class LeafOutlines:
     @property
     def middle(self) -> Floats:
         """Middle (n, 3) of each."""
-        centre = self.model.positions.mean(axis=0)
-        return self.base + self.size[:, None] * sum(self.frame[:, :, k] * centre[k] for k in range(3))
+        center = self.model.positions.mean(axis=0)
+        return self.base + self.size[:, None] * sum(self.frame[:, :, k] * center[k] for k in range(3))
 
     @property
     def radius(self) -> Floats:
@@ -226,7 +226,7 @@ class WoodOutlines:
 
 
 @dataclass(frozen=True)
-class Things:
+class PlantElements:
     """All leaves and parts of branches of a sub-plant: those of each of its parts, one after the other.
 
     ``middle`` (3, n) and ``radius`` (n,) are spheres around them, ``group`` (n,) is the number of their order, and
@@ -249,7 +249,7 @@ class Things:
         return np.concatenate(found)
 
 
-def things_of(
+def elements_of(
     rows: Table,
     forms: Sequence[Sequence[LeafModel]],
     subplants: Branches,
@@ -257,7 +257,7 @@ def things_of(
     first: int,
     length: Floats,
     orders: int | None = None,
-) -> Things:
+) -> PlantElements:
     """Grow a sub-plant to its last leaf.
 
     Parameters
@@ -271,7 +271,7 @@ def things_of(
     first : int
         First of these.
     length : (r,) float64
-        Usual length of a branch of each row at plant scale 1, metres.
+        Usual length of a branch of each row at plant scale 1, meters.
     """
     parts, groups, dense = [], [], []
     while len(subplants) and orders != 0:
@@ -285,7 +285,7 @@ def things_of(
             dense.append(ratio[owner])
     middle = np.concatenate([p.middle.T for p in parts], axis=1)
     radius = np.concatenate([p.radius for p in parts])
-    return Things(parts, middle, radius, np.concatenate(groups), np.concatenate(dense))
+    return PlantElements(parts, middle, radius, np.concatenate(groups), np.concatenate(dense))
 
 
 def _wood(rows: Table, bodies: Branches, lines: Axes) -> tuple[WoodOutlines, Integers]:

@@ -7,7 +7,7 @@ of a species share one set of paths: what lies beyond a branch that a path has f
 branches of its kind. Each row takes the paths of its parents on, as many as it needs (splitting and thinning of paths;
 Kahn and Harris, "Estimation of particle transmission by random sampling", 1951).
 
-Those of trunks know which limbs they are on, so that they can be moved as the crown form of a plant moves its limbs.
+Those of trunks know which limbs they are on, so that they can be moved as the crown shape of a plant moves its limbs.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Points:
     frame : (k, 3, 3) float32
         Of leaves, before they turn to the light; of wood the axis is the third column.
     row : (k,) int32
-        Row that describes the leaf (its size, colour and turn to the light) or the branch.
+        Row that describes the leaf (its size, color and turn to the light) or the branch.
     outward : (k,) float32
         Place between the inside and the outside of the crown.
     light : (k,) float32
@@ -101,7 +101,7 @@ def draw_samples(rows: Table, leaf_area: Floats, wood_area: Floats, length: Floa
     leaf_area, wood_area : (r, r) float64
         Expected area in a sub-plant by the row that contributes it.
     length : (r,) float64
-        Typical length of a branch, metres.
+        Typical length of a branch, meters.
     """
     leaves, wood = [], []
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
@@ -443,7 +443,7 @@ def limbs_of(
             out.root[some] = np.einsum("nji,nj->ni", base.frame[some], way) / base.length[some, None]
             out.kind[some] += LIMB
             weight = rows["count_by_length"][own.row]
-            longer = weight * own.vigour
+            longer = weight * own.vigor
             follows = longer / np.maximum(1 - weight + longer, 1e-12)
             out.follows[some] = np.where(row[some] == own.row, 0.0, follows)
     return out

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .asset_plan import Keeping
+from .asset_plan import OriginalPolicy
 
 #: Bytes that Cycles takes for a triangle of an asset with its tree, and for an instance; what Blender takes for one.
 CYCLES_TRIANGLE, CYCLES_INSTANCE, BLENDER_INSTANCE = 290.0, 1_670.0, 160.0
@@ -52,16 +52,16 @@ class AssetCosts:
             return bool((self.triangles * self.instances).sum() <= EEVEE_FEW)
         return bool(self._loaded.sum() + self._of_instances.sum() <= SAFE * left)
 
-    def keeping(self, cycles: bool, left: float, always: bool = True) -> Keeping:
+    def originals(self, cycles: bool, left: float, always: bool = True) -> OriginalPolicy:
         """How instances are drawn that are refined: because not all can be the originals, or whatever it costs.
 
         always: whether some assets may be the originals everywhere.
         """
         kept = np.zeros(len(self.triangles), bool)
         if not cycles:
-            return Keeping(kept, EEVEE_WHOLE)
+            return OriginalPolicy(kept, EEVEE_WHOLE)
         if not always and self.plain(cycles, left):
-            return Keeping(kept, CYCLES_WHOLE, shared=True, kites=False)
+            return OriginalPolicy(kept, CYCLES_WHOLE, shared=True, kites=False)
         # Those that cover most for what they take; none but these is loaded at all.
         cost = self._loaded + self._of_instances
         if always:
@@ -70,7 +70,7 @@ class AssetCosts:
             for one in order.tolist():  # of some dozens; one that does not fit keeps no other out
                 kept[one] = cost[one] <= room
                 room -= cost[one] if kept[one] else 0.0
-        return Keeping(kept, NEVER, shared=True)
+        return OriginalPolicy(kept, NEVER, shared=True)
 
     @property
     def _loaded(self) -> NDArray[np.float64]:

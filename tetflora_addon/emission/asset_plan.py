@@ -21,10 +21,10 @@ from ..arrays import column
 from ..camera.camera import Camera
 from ..growth.hashing import Draw, uniform
 from ..proxies.asset_facets import facet_totals, facets_of_assets
-from ..proxies.drawn import triangle_corners
 from ..proxies.microsurfaces import Facets
+from ..proxies.primitives import triangle_corners
 from ..refinement.asset_parts import AssetParts, PlacedAssets
-from ..refinement.decisions import real_fraction
+from ..refinement.decisions import explicit_fraction
 from ..refinement.loop import Refinement
 from ..subplants.pieces import chunks
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
@@ -43,7 +43,7 @@ _KITES_BATCH = 200_000
 
 
 @dataclass(frozen=True)
-class Keeping:
+class OriginalPolicy:
     """When an instance is drawn as the original.
 
     Attributes
@@ -71,18 +71,18 @@ class AssetPlan:
 
     Attributes
     ----------
-    whole : (k,) int64
+    originals : (k,) int64
         Instances that are the originals.
     meshes, kites : AssetParts of m, of k
         PlacedClusters that are meshes of their own faces, and of kites for their leaves.
     """
 
-    whole: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    originals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     meshes: AssetParts = field(default_factory=AssetParts.empty)
     kites: AssetParts = field(default_factory=AssetParts.empty)
 
     @classmethod
-    def of(cls, placed: PlacedAssets, keeping: Keeping, shown: list[Shown]) -> AssetPlan:
+    def of(cls, placed: PlacedAssets, originals: OriginalPolicy, shown: list[Shown]) -> AssetPlan:
         """What a drawing has shown."""
         every = {
             label: AssetParts.concatenate([AssetParts.empty(), *(rows for what, rows in shown if what == label)])
@@ -90,7 +90,7 @@ class AssetPlan:
         }
         whole = np.zeros(len(placed), bool)
         whole[every["original"].instance] = True
-        whole |= keeping.always[placed.instances.asset]
+        whole |= originals.always[placed.instances.asset]
         return cls(np.flatnonzero(whole), every["cluster"], every["kites"])
 
 
@@ -114,7 +114,7 @@ class ClusterRows(AssetParts):
     @property
     def parts(self) -> AssetParts:
         """The clusters themselves."""
-        return AssetParts(self.instance, self.cluster, self.centre, self.totals, self.extent)
+        return AssetParts(self.instance, self.cluster, self.center, self.totals, self.extent)
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class PlacedClusters(FrontierKind):
     ----------
     placed : PlacedAssets
     camera : Camera
-    keeping : Keeping
+    originals : OriginalPolicy
     limit : float
         Width in pixels up to which leaves are facets.
     looks : (i,) str
@@ -136,7 +136,7 @@ class PlacedClusters(FrontierKind):
 
     placed: PlacedAssets
     camera: Camera
-    keeping: Keeping
+    originals: OriginalPolicy
     limit: float
     looks: NDArray[np.str_]
     larger: float = 1.0
@@ -144,11 +144,11 @@ class PlacedClusters(FrontierKind):
     def everything(self) -> ClusterRows:
         """All instances."""
         whole = self.placed.wholes()
-        return ClusterRows.of(whole, self.keeping.always[self.placed.instances.asset])
+        return ClusterRows.of(whole, self.originals.always[self.placed.instances.asset])
 
     def spheres(self, rows: ClusterRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """As of `FrontierKind`."""
-        return rows.centre, rows.reach
+        return rows.center, rows.reach
 
     def optical(self, rows: ClusterRows) -> NDArray[np.float64]:
         """As of `FrontierKind`; of what is drawn as it is, for facets that only tell what is covered."""
@@ -178,7 +178,7 @@ class PlacedClusters(FrontierKind):
 
     def to_be_opened(self, rows: ClusterRows) -> NDArray[np.bool_]:
         """Those above clusters with meshes of their own, of which some may be real."""
-        return ~rows.shown & (self._mesh_of[rows.cluster] < 0) & (self.real(rows)[0] > 0.0)
+        return ~rows.shown & (self._mesh_of[rows.cluster] < 0) & (self.explicit(rows)[0] > 0.0)
 
     def ordered(self, rows: ClusterRows) -> ClusterRows:
         """As of `FrontierKind`."""
@@ -190,25 +190,25 @@ class PlacedClusters(FrontierKind):
 
     def _wide(self, rows: ClusterRows) -> NDArray[np.bool_]:
         """PlacedClusters (n,) of which leaves are wide enough for kites of theirs to be told apart."""
-        return rows.totals.width > KITES * self.camera.extent_around(rows.centre)
+        return rows.totals.width > KITES * self.camera.extent_around(rows.center)
 
-    def real(self, rows: AssetParts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def explicit(self, rows: AssetParts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Fractions (n,) of clusters that are meshes, if only of kites, and (n,) that are their own faces."""
-        pixels = rows.totals.width / np.maximum(self.camera.extent_around(rows.centre), 1e-300)
-        if not self.keeping.kites:
+        pixels = rows.totals.width / np.maximum(self.camera.extent_around(rows.center), 1e-300)
+        if not self.originals.kites:
             # An instance costs as much as three facets: all that is seen is real, but for specks.
             pixels = pixels * FARTHER
-        some = real_fraction(pixels, self.limit)
+        some = explicit_fraction(pixels, self.limit)
         # A card or a leaf of two triangles is no more than a kite.
-        plain = (self.placed.assets.leaf_faces[rows.cluster] <= SIMPLE) | (not self.keeping.kites)
-        return some, np.where(plain, some, some * real_fraction(pixels, KITES))
+        plain = (self.placed.assets.leaf_faces[rows.cluster] <= SIMPLE) | (not self.originals.kites)
+        return some, np.where(plain, some, some * explicit_fraction(pixels, KITES))
 
     def met(self, rows: ClusterRows, shown: list[Shown]) -> ClusterRows:
         """As of `FrontierKind`."""
         assets, asset = self.placed.assets, self.placed.instances.asset[rows.instance]
-        some, full = self.real(rows)
+        some, full = self.explicit(rows)
         number = uniform(self.placed.keys(rows), Draw.TRANSITION)
-        whole = ~rows.shown & (rows.cluster == assets.root[asset]) & (full >= self.keeping.fraction)
+        whole = ~rows.shown & (rows.cluster == assets.root[asset]) & (full >= self.originals.fraction)
         own = ~rows.shown & ~whole & (self._mesh_of[rows.cluster] == rows.cluster)
         mesh = own & (number < full)
         kites = own & ~mesh & (number < some) & (assets.clusters.leaves[rows.cluster] > 0)
@@ -224,7 +224,7 @@ class PlacedClusters(FrontierKind):
         for whose, made in self._facets(rows.take(facets), side[facets]):
             canvas.add_facets(whose, made)
         some = rows.take(np.flatnonzero(rows.shown))
-        faces = 0.0 if self.keeping.shared else some.totals.polygons.sum()
+        faces = 0.0 if self.originals.shared else some.totals.polygons.sum()
         wide = self._wide(some)
         near = some.take(np.flatnonzero(wide))
         for run in chunks(self.placed.assets.clusters.leaves[near.cluster], _KITES_BATCH):
@@ -232,7 +232,7 @@ class PlacedClusters(FrontierKind):
         # Wood, and leaves of few pixels.
         totals = facet_totals(self.placed, some)
         totals = replace(totals, leaf_area=np.where(wide, 0.0, totals.leaf_area))
-        least = COVERING * self.camera.extent_around(some.centre)
+        least = COVERING * self.camera.extent_around(some.center)
         made = facets_of_assets(self.placed, some, totals, np.maximum(least, np.sqrt(self.one_leaf(some))), least)
         canvas.add_shown(triangle_corners(made), float(faces))
 
@@ -255,7 +255,7 @@ class PlacedClusters(FrontierKind):
             yield (ASSETS, look), facets_of_assets(self.placed, own, totals, leaf[some], side[some], out)
 
 
-def explicit_plan(result: Refinement, keeping: Keeping) -> AssetPlan:
+def explicit_plan(result: Refinement, originals: OriginalPolicy) -> AssetPlan:
     """Where shells stand for all other instances: what lies in explicit tetrahedra for the most part."""
     placed = result.assets.placed
     assets, asset, number = placed.assets, placed.instances.asset, len(placed.assets.clusters)
@@ -269,5 +269,5 @@ def explicit_plan(result: Refinement, keeping: Keeping) -> AssetPlan:
     most = np.bincount(of, area * inside[inner], len(pair)) >= 0.5 * np.bincount(of, area, len(pair))
     own = placed.parts(*np.divmod(pair[most], max(number, 1)))
     faces = np.bincount(own.instance, own.totals.polygons, len(placed))
-    whole = keeping.always[asset] | (faces >= keeping.fraction * assets.clusters.faces[assets.root[asset]])
+    whole = originals.always[asset] | (faces >= originals.fraction * assets.clusters.faces[assets.root[asset]])
     return AssetPlan(np.flatnonzero(whole), own.take(~whole[own.instance]))

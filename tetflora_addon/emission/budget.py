@@ -73,12 +73,12 @@ class Detail:
         return max(ASSETS_FINEST / self.coarser, 1.0)
 
 
-def enough(camera: Camera, facet: float = 1.0) -> float:
+def image_limit(camera: Camera, facet: float = 1.0) -> float:
     """Polygons and facets that an image shows, about."""
     return max(A_PIXEL * camera.width * camera.height / facet**2, NEVER_TOO_MANY)
 
 
-def afford(
+def fit_to_budget(
     result: Refinement,
     camera: Camera,
     settings: RefinementSettings,
@@ -102,7 +102,7 @@ def afford(
         if not np.isfinite(most):
             return detail
         return replace(detail, refinement=_fitted_shells(result, most, faces), tolerance=np.inf)
-    polygons = float(len(result.holdings.polygons))
+    polygons = float(len(result.cell_polygons.polygons))
     number = primitives(result, camera, settings.facet)
     coarser = float(np.clip(np.sqrt(number / NEVER_TOO_MANY), 1.0 / FINEST, 1.0))
     left = max(most - polygons, 0.01 * most) if np.isfinite(most) else most
@@ -141,6 +141,6 @@ def _fitted_shells(result: Refinement, allowed: float, faces: float) -> Refineme
 
 def _large(result: Refinement) -> NDArray[np.float64]:
     """Polygons (cells,) that stay polygons although their cell is a proxy."""
-    held = result.holdings.polygons
+    held = result.cell_polygons.polygons
     large = np.isinf(held.totals.width)
     return np.bincount(held.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)

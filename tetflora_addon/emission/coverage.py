@@ -3,7 +3,7 @@
 """Coverage of the image by what is drawn: where pixels are full, what lies behind is hidden, and nothing else is.
 
 The paper renders front to back and keeps an alpha buffer (sections 6.3 and 7). What is drawn here is opaque, so that a
-depth for each pixel says the same: a pixel is full from the depth of what covers its centre on. Parts are tested by
+depth for each pixel says the same: a pixel is full from the depth of what covers its center on. Parts are tested by
 their bounds against the farthest depth in the rectangle of pixels that they touch, as by Greene, Kass and Miller
 ("Hierarchical Z-buffer visibility", SIGGRAPH 1993), but from maxima of overlapping squares; a part is hidden only where
 all of that is full before it begins.
@@ -38,7 +38,7 @@ class Footprints(Arrays):
     low, high : (n, 2) float32
         Corners of a rectangle that holds each of them, pixels from the lower left of the buffer.
     near : (n,) float32
-        Least depth, metres.
+        Least depth, meters.
     """
 
     low: NDArray[np.float32]
@@ -59,7 +59,7 @@ class Coverage:
     Attributes
     ----------
     depth : (height, columns) float32
-        Depth of what covers the centre of each pixel, metres; infinite where nothing does.
+        Depth of what covers the center of each pixel, meters; infinite where nothing does.
     """
 
     def __init__(self, camera: Camera, tile: tuple[int, int] | None = None) -> None:
@@ -73,7 +73,7 @@ class Coverage:
         self._scale = np.array([wide.width / (right - left), wide.height / (top - bottom)])
 
     def project(self, points: NDArray[np.floating]) -> tuple[NDArray, NDArray, NDArray]:
-        """Columns and rows (n,) in pixels, and depths (n,) in metres, of points (n, 3)."""
+        """Columns and rows (n,) in pixels, and depths (n,) in meters, of points (n, 3)."""
         return _projected(self.camera, points, self._scale)
 
     def cells(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> NDArray[np.int64]:
@@ -83,13 +83,13 @@ class Coverage:
         up = np.clip(np.nan_to_num(row), 0, height - 1).astype(np.int64) // CELL
         return up * (width // CELL + 1) + across
 
-    def of_spheres(self, centre: NDArray[np.float64], radius: NDArray[np.float64]) -> Footprints:
-        """Footprints of spheres around points (n, 3), radii (n,) in metres.
+    def of_spheres(self, center: NDArray[np.float64], radius: NDArray[np.float64]) -> Footprints:
+        """Footprints of spheres around points (n, 3), radii (n,) in meters.
 
         Those that reach behind the eye's plane may touch everything, unless they are out of view as a whole.
         """
         camera = self.camera
-        column, row, depth = self.project(centre)
+        column, row, depth = self.project(center)
         near = depth - radius
         left, _, bottom, _ = camera.window
         scale = self._scale
@@ -97,20 +97,20 @@ class Coverage:
             reach = radius[:, None] * scale
         elif camera.kind == "PANO":
             angle = np.arcsin(np.clip(radius / np.maximum(depth, 1e-9), 0.0, 1.0))
-            local = camera.to_camera_space(centre)
+            local = camera.to_camera_space(center)
             cosine = np.hypot(local[:, 0], local[:, 2]) / np.maximum(depth, 1e-9)
             reach = np.stack([angle / np.maximum(cosine - np.sin(angle), 1e-3), angle], axis=1) * scale
         else:
             # The silhouette of a sphere beside the axis is an ellipse, longer by its slope.
             slope = np.stack([column / scale[0] + left, row / scale[1] + bottom], axis=1)
             reach = (radius / np.maximum(near, 1e-9))[:, None] * np.sqrt(1.0 + slope**2) * scale
-        place, reach = np.stack([column, row], axis=1), reach + self.blur(centre, depth)[:, None]
+        place, reach = np.stack([column, row], axis=1), reach + self.blur(center, depth)[:, None]
         low, high = place - reach, place + reach
         if camera.kind != "ORTHO":
             around = near <= camera.near if camera.kind == "PERSP" else near <= 0.0
-            beside = around & (camera.clearance(centre) > radius)
+            outside = around & (camera.distance_to_view(center) > radius)
             low[around], high[around] = -np.inf, np.inf
-            high[beside] = -np.inf
+            high[outside] = -np.inf
         if camera.kind == "PANO":
             round_ = high[:, 0] - low[:, 0] > self.width / 2.0
             low[round_], high[round_] = -np.inf, np.inf
@@ -187,12 +187,12 @@ class Coverage:
         return (out & known) | self.outside(prints)
 
     def draw(self, column: NDArray, row: NDArray, depth: NDArray) -> None:
-        """Fill pixels whose centres triangles cover, given the columns, rows and depths (n, 3) of their corners."""
+        """Fill pixels whose centers triangles cover, given the columns, rows and depths (n, 3) of their corners."""
         low_x, high_x = column.min(axis=1), column.max(axis=1)
         low_y, high_y = row.min(axis=1), row.max(axis=1)
         far = depth.max(axis=1)
         # What is nearer than that does not hide what is behind it from all eyes.
-        ok = (depth.min(axis=1) > max(self.camera.hides_from, 0.0)) & np.isfinite(far)
+        ok = (depth.min(axis=1) > max(self.camera.min_occluding_depth, 0.0)) & np.isfinite(far)
         if self.camera.kind == "PANO":
             ok &= high_x - low_x < self.width / 2.0
         x0 = np.clip(np.ceil(low_x - 0.5), self.first, self.end).astype(np.int64)

@@ -23,10 +23,10 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.hashing import mix, uniform
 from ..processes.pool import in_processes
-from ..proxies.drawn import Drawn, Triangles, joined, triangle_corners
+from ..proxies.cast_shadows import ShadowReach
 from ..proxies.facet_weights import FacetWeights
-from ..proxies.microsurfaces import Facets, kept_out_of_view
-from ..proxies.thrown_shadows import ThrownShadows
+from ..proxies.microsurfaces import Facets, pushed_outside_view
+from ..proxies.primitives import Primitive, Triangles, joined, triangle_corners
 from ..refinement.contents import polygon_totals
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
@@ -58,8 +58,8 @@ NEVER_TOO_MANY = 50_000.0
 #: Optical depth in the shade up to which shadows are refined where somebody asks for it, and how many times as many
 #: facets outside there may be then.
 LIT, SHADOWS = 1.5, 6.0
-#: Largest side of facets outside over their distance from the view; metres that count least, and from which on it grows
-#: faster. The same of those whose shadows fall into the view, over the metres that these fall, and the least of these.
+#: Largest side of facets outside over their distance from the view; meters that count least, and from which on it grows
+#: faster. The same of those whose shadows fall into the view, over the meters that these fall, and the least of these.
 _BESIDE, _THROWN = (0.1, 8.0, 15.0), (0.02, 1.0)
 #: Parts outside that are drawn at a time.
 _OUTSIDE_BATCH = 20_000
@@ -73,7 +73,7 @@ _UNSEEN = 0.05
 _MERGE, _LEFT = 230, 232
 
 #: What becomes of facets, which the camera sees or not. Another process may call it.
-Form = Callable[[Facets, bool], Any]
+FacetConverter = Callable[[Facets, bool], Any]
 
 
 @dataclass(frozen=True)
@@ -84,10 +84,10 @@ class Parts:
     """
 
     species: int | None
-    facets: tuple[tuple[Drawn, bool], ...]
+    facets: tuple[tuple[Primitive, bool], ...]
     look: str = ""
 
-    def __iter__(self) -> Iterator[tuple[Drawn, bool]]:
+    def __iter__(self) -> Iterator[tuple[Primitive, bool]]:
         return iter(self.facets)
 
 
@@ -106,10 +106,10 @@ class Drawing:
         Side of facets that are seen, pixels.
     hidden : float
         Sides of facets over those that are asked for: the larger, the fewer stand for what is not seen.
-    shadows : ThrownShadows
+    shadows : ShadowReach
     shade : Shade
     occluders : (t, 3, 3) float64
-        Triangles of opaque polygons, metres.
+        Triangles of opaque polygons, meters.
     form : callable or None
         What becomes of facets where they are made; without, they stay what they are.
     most : float
@@ -123,10 +123,10 @@ class Drawing:
     camera: Camera
     facet: float
     hidden: float
-    shadows: ThrownShadows
+    shadows: ShadowReach
     shade: Shade
     occluders: NDArray[np.float64]
-    form: Form | None = None
+    form: FacetConverter | None = None
     most: float = np.inf
     shadow: float = 0.0
 
@@ -140,7 +140,7 @@ def drawing(
     weights: FacetWeights,
     hidden: float = 1.0,
     occluders: NDArray[np.float64] | None = None,
-    form: Form | None = None,
+    form: FacetConverter | None = None,
     most: float = np.inf,
     shadow: float = 0.0,
     assets: PlacedClusters | None = None,
@@ -148,10 +148,10 @@ def drawing(
     """What a refinement is drawn with, see `Drawing`."""
     points = SharePoints.concatenate([result.plants.points, result.assets.points])
     polygons = result.polygons
-    places = np.concatenate([points.position, polygons.centre])
+    places = np.concatenate([points.position, polygons.center])
     shade = Shade(places, np.concatenate([points.optical_area, polygon_totals(polygons).optical_area]), result.lights)
     lowest = result.plants.parts.branches.position[:, 2].min(initial=places[:, 2].min(initial=np.inf))
-    shadows = ThrownShadows(camera, result.lights, float(lowest))
+    shadows = ShadowReach(camera, result.lights, float(lowest))
     kinds: list[FrontierKind] = [GrownPlants(flora, camera, transition, weights, result.lights)]
     parts: list[Arrays] = [result.plants.parts]
     if assets is not None:
@@ -200,14 +200,14 @@ def _tiles(
         found, beyond, columns = [some.take(slice(0))], [some.take(slice(0))], [np.zeros(0, np.int64)]
         while len(some):
             pool = frontier.pool(kind, some)
-            prints = whole.of_spheres(pool.centre, pool.radius)
+            prints = whole.of_spheres(pool.center, pool.radius)
             out = whole.outside(prints)
             low, high = np.clip(prints.low[:, 0], 0, whole.width), np.clip(prints.high[:, 0], 0, whole.width)
             wide = ~out & (high - low > TILE / 2) & kind.can_open(some)
             beyond.append(some.take(np.flatnonzero(out)))
             stay = np.flatnonzero(~out & ~wide)
             found.append(some.take(stay))
-            middle = np.clip(whole.project(pool.centre[stay])[0], 0, whole.width - 1)
+            middle = np.clip(whole.project(pool.center[stay])[0], 0, whole.width - 1)
             columns.append(np.searchsorted(ends, middle, side="right") - 1)
             some = kind.opened(kind.met(some.take(np.flatnonzero(wide)), frontier.shown))[0]
         inside.append((type(some).concatenate(found), np.clip(np.concatenate(columns), 0, number - 1)))
@@ -246,7 +246,7 @@ class _Tile:
         self.coverage = Coverage(given.camera, around or (0, 1))
         self.frontier = Frontier(given.kinds, self.coverage, given.facet)
         self._meshes: dict[tuple[str, int, int], list[MeshBuffers]] = {}
-        self._facets: dict[tuple[Whose, bool], list[Drawn]] = {}
+        self._facets: dict[tuple[Whose, bool], list[Primitive]] = {}
         # What was made between two depths: whose facets, or kinds and meshes, and their corners.
         self._waiting: list[tuple[Any, Any, NDArray[np.float32]]] = []
         self.number = 0.0
@@ -280,7 +280,7 @@ class _Tile:
                 if self.number > _FULL * most:
                     frontier.hidden[number].append(slab)
                 elif len(slab):
-                    side = kind.larger * given.facet * given.camera.extent_around(slab.centre)
+                    side = kind.larger * given.facet * given.camera.extent_around(slab.center)
                     kind.draw(self, slab, side, frontier.shown)
             self._cover()
         self._draw_hidden(list(map(Waiting.concatenate, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))
@@ -403,7 +403,7 @@ class _Tile:
 
     def _merge(self, facets: Facets, whose: Whose) -> None:
         """Few large facets for many that are hidden; each lies behind full pixels as a whole, or is as it was."""
-        number = uniform(_keys_of(facets.centre), _MERGE)
+        number = uniform(_keys_of(facets.center), _MERGE)
         # Where there are few, all of the last are kept; where there are many, as if they had been merged as well.
         likely = 1.0 / (MERGED[-1] * self.given.hidden**2)
         some = np.flatnonzero(number < max(1.0 / MERGED[-1], likely))
@@ -425,8 +425,8 @@ class _Tile:
         """Hidden parts: facets that grow with their depth in the shade, as many as are allowed."""
         given, sides = self.given, []
         for pool in pools:
-            pixels = np.minimum(HIDDEN * np.exp(given.shade.depth(pool.centre) / SHADED), LARGEST)
-            sides.append(pixels * given.facet * given.camera.extent_around(pool.centre))
+            pixels = np.minimum(HIDDEN * np.exp(given.shade.depth(pool.center) / SHADED), LARGEST)
+            sides.append(pixels * given.facet * given.camera.extent_around(pool.center))
         self._draw_unseen(pools, sides, most, self._add_hidden)
 
     def _add_hidden(self, facets: Facets, whose: Whose) -> None:
@@ -434,11 +434,11 @@ class _Tile:
 
         Where light reaches them they are divided; in the shade each shrinks: what lies before it keeps the light out.
         """
-        dark = self.given.shade.depth(facets.centre) > DARK
+        dark = self.given.shade.depth(facets.center) > DARK
         while len(facets):
             hidden = self._hidden(facets)
             self._keep(facets.take(np.flatnonzero(hidden)), False, whose)
-            large = facets.side > self.given.facet * self.given.camera.extent_around(facets.centre)
+            large = facets.side > self.given.facet * self.given.camera.extent_around(facets.center)
             lit, rest = (np.flatnonzero(~hidden & large & own) for own in (~dark, dark))
             smaller = facets.take(rest)
             facets = Facets.concatenate([quarters(facets.take(lit)), replace(smaller, side=0.5 * smaller.side)])
@@ -448,20 +448,20 @@ class _Tile:
         """Parts out of view: facets as large as their distance and the shadows that they throw allow."""
 
         def add(facets: Facets, whose: Whose) -> None:
-            self._keep(kept_out_of_view(facets, self.coverage.camera.clearance), False, whose)
+            self._keep(pushed_outside_view(facets, self.coverage.camera.distance_to_view), False, whose)
 
         given = self.given
         if given.shadow > 0.0:
             fine, pools = map(list, zip(*map(self._for_shadows, given.kinds, pools), strict=True))
-            extents = [given.shadow * given.camera.extent_around(pool.centre) for pool in fine]
+            extents = [given.shadow * given.camera.extent_around(pool.center) for pool in fine]
             sides = list(map(np.minimum, map(self._sides_outside, fine), extents))
             self._draw_unseen(fine, sides, SHADOWS * most, add, 1.0)
         self._draw_unseen(pools, list(map(self._sides_outside, pools)), most, add)
 
     def _sides_outside(self, pool: Waiting) -> NDArray[np.float64]:
-        """Sides (n,) of facets of parts out of view, metres."""
-        away = self.given.camera.clearance(pool.centre)
-        fallen = self.given.shadows.distance(pool.centre, away, pool.radius)
+        """Sides (n,) of facets of parts out of view, meters."""
+        away = self.given.camera.distance_to_view(pool.center)
+        fallen = self.given.shadows.distance(pool.center, away, pool.radius)
         part, nearest, far = _BESIDE
         away = np.maximum(away, nearest)
         soft, least = _THROWN
@@ -473,12 +473,12 @@ class _Tile:
         frontier = Frontier(given.kinds, self.coverage, given.shadow)
         pool = frontier.pool(kind, pool.parts)
         while len(pool):
-            away = given.camera.clearance(pool.centre)
-            lit = given.shade.depth(pool.centre, pool.radius) < LIT
-            lit &= np.isfinite(given.shadows.distance(pool.centre, away, pool.radius))
+            away = given.camera.distance_to_view(pool.center)
+            lit = given.shade.depth(pool.center, pool.radius) < LIT
+            lit &= np.isfinite(given.shadows.distance(pool.center, away, pool.radius))
             left.append(pool.take(np.flatnonzero(~lit)))
             pool = pool.take(np.flatnonzero(lit))
-            pixels = 2.0 * pool.radius / given.camera.extent_around(pool.centre)
+            pixels = 2.0 * pool.radius / given.camera.extent_around(pool.center)
             large = kind.can_open(pool.parts) & (pixels > DETAIL * given.shadow) & (pool.count > FEW)
             fine.append(pool.take(np.flatnonzero(~large)))
             pool = frontier.pool(kind, kind.opened(pool.parts.take(np.flatnonzero(large)))[0])
@@ -492,7 +492,7 @@ class _Tile:
         add: Callable[[Facets, Whose], None],
         leaves: float = HIDDEN_LEAVES,
     ) -> None:
-        """Facets of parts that nobody sees, of sides (n,) in metres or so many leaves; no more than so many."""
+        """Facets of parts that nobody sees, of sides (n,) in meters or so many leaves; no more than so many."""
         drawn = []
         for kind, pool, side in zip(self.given.kinds, pools, sides, strict=True):
             parts, kept = pool.parts, kind.enough(pool.parts)
@@ -511,24 +511,24 @@ class _Tile:
             self._facets.setdefault((whose, seen), []).append(facets if form is None else form(facets, seen))
 
 
-def _keys_of(centre: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """Keys (n,) of things by their places (n, 3), to a tenth of a millimetre."""
-    key = np.zeros(len(centre), np.uint64)
+def _keys_of(center: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """Keys (n,) of things by their places (n, 3), to a tenth of a millimeter."""
+    key = np.zeros(len(center), np.uint64)
     for axis in range(3):
-        key = mix(key ^ np.rint(centre[:, axis] * 1e4).astype(np.int64).view(np.uint64))
+        key = mix(key ^ np.rint(center[:, axis] * 1e4).astype(np.int64).view(np.uint64))
     return key
 
 
-def _places(drawn: Drawn) -> NDArray[np.float64]:
+def _places(drawn: Primitive) -> NDArray[np.float64]:
     """A place (n, 3) of each facet, or of what is drawn for it."""
-    return drawn.corners[:, 0].astype(np.float64) if isinstance(drawn, Triangles) else drawn.centre.astype(np.float64)
+    return drawn.corners[:, 0].astype(np.float64) if isinstance(drawn, Triangles) else drawn.center.astype(np.float64)
 
 
 def quarters(facets: Facets) -> Facets:
     """Four facets (4 n,) in the place of each of facets (n,): what lines between the middles of its sides divide."""
     corners = triangle_corners(facets).astype(np.float64)
     half = replace(facets, side=0.5 * facets.side)
-    parts = [replace(half, centre=0.5 * (facets.centre + corners[:, k])) for k in range(3)]
+    parts = [replace(half, center=0.5 * (facets.center + corners[:, k])) for k in range(3)]
     return Facets.concatenate([*parts, replace(half, across=-facets.across, along=-facets.along)])
 
 
@@ -541,18 +541,18 @@ def _facets_of_faces(
     def middle(values: NDArray[np.float64]) -> NDArray[np.float64]:
         return (values.sum(axis=1) - (values.shape[1] - size)[:, None] * values[:, -1]) / size[:, None]
 
-    centre = middle(corners)
+    center = middle(corners)
     along = unit(corners[:, 1] - corners[:, 0])
-    vector = np.zeros_like(centre)
+    vector = np.zeros_like(center)
     for k in range(1, corners.shape[1] - 1):
         vector += 0.5 * np.cross(corners[:, k] - corners[:, 0], corners[:, k + 1] - corners[:, 0])
     area = np.linalg.norm(vector, axis=1)
     across = unit(np.cross(along, vector))
-    colour = buffers.attributes["tf_colour"][1][faces].astype(np.float64)
+    color = buffers.attributes["tf_color"][1][faces].astype(np.float64)
     through = buffers.attributes["tf_transmission"][1][faces].astype(np.float64)
     velocity = None
     if "velocity" in buffers.attributes:
         moving = buffers.attributes["velocity"][1].astype(np.float64)
         every = np.minimum(np.arange(corners.shape[1]), size[:, None] - 1) + buffers.face_offsets[faces, None]
         velocity = middle(moving[buffers.corner_verts[every]])
-    return Facets(centre, across, along, np.sqrt(area), colour, through, velocity, stretch=np.ones(len(area)))
+    return Facets(center, across, along, np.sqrt(area), color, through, velocity, stretch=np.ones(len(area)))

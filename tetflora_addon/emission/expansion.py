@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What expanding plants takes, before it is done: the leaves and the wood that are near a camera are far finer.
 
-A spruce three metres away has a hundred times as many polygons as the same one from afar. Branches are few beside the
+A spruce three meters away has a hundred times as many polygons as the same one from afar. Branches are few beside the
 polygons on them, so the nearest plants are grown to their twigs to ask each branch how fine it will be.
 """
 

@@ -31,7 +31,7 @@ from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose
 #: Least fraction of a surface that is opaque where it hides what is behind.
 OPAQUE = 0.99
 #: Triangles that are drawn at a time.
-_AT_ONCE = 200_000
+_BATCH = 200_000
 #: Draws of the place of a facet in its triangle.
 _PLACE_U, _PLACE_V = 222, 223
 
@@ -43,7 +43,7 @@ class FaceRows(Arrays):
     Attributes
     ----------
     face, instance : (n,) int32
-    centre : (n, 3) float64
+    center : (n, 3) float64
     reach : (n,) float64
         As of `Polygons`.
     optical : (n,) float64
@@ -52,19 +52,19 @@ class FaceRows(Arrays):
 
     face: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     instance: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    centre: NDArray[np.float64] = field(metadata=column(3))
+    center: NDArray[np.float64] = field(metadata=column(3))
     reach: NDArray[np.float64]
     optical: NDArray[np.float64]
 
     @classmethod
     def of(cls, whole: Polygons) -> FaceRows:
         """Whole faces (n,)."""
-        return cls(whole.face, whole.instance, whole.centre, whole.reach, polygon_totals(whole).optical_area)
+        return cls(whole.face, whole.instance, whole.center, whole.reach, polygon_totals(whole).optical_area)
 
     def whole(self, meshes: Meshes) -> Polygons:
         """The faces themselves, of meshes."""
         none = np.full(len(self), -1, np.int32), np.zeros(0, np.int32), np.zeros((0, 3, 3))
-        return Polygons(meshes, self.face, self.instance, *none, self.centre, self.reach)
+        return Polygons(meshes, self.face, self.instance, *none, self.center, self.reach)
 
 
 @dataclass(frozen=True)
@@ -96,20 +96,20 @@ class Faces(FrontierKind):
 
     def spheres(self, rows: FaceRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """As of `FrontierKind`."""
-        return rows.centre, rows.reach
+        return rows.center, rows.reach
 
     def optical(self, rows: FaceRows) -> NDArray[np.float64]:
         """As of `FrontierKind`: what is kept is one face, however large."""
-        extent = self.camera.extent_around(rows.centre)
+        extent = self.camera.extent_around(rows.center)
         return np.where(self._wide(rows), np.minimum(rows.optical, extent**2), rows.optical)
 
     def ordered(self, rows: FaceRows) -> FaceRows:
         """As of `FrontierKind`."""
-        return rows.take(np.lexsort([rows.face, *rows.centre.T]))
+        return rows.take(np.lexsort([rows.face, *rows.center.T]))
 
     def _wide(self, rows: FaceRows) -> NDArray[np.bool_]:
         width = self.meshes.width[rows.face] * self.meshes.mean_scale[rows.instance]
-        return width >= self.limit * self.camera.extent_around(rows.centre)
+        return width >= self.limit * self.camera.extent_around(rows.center)
 
     def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], shown: list[Shown]) -> None:
         """As of `FrontierKind`."""
@@ -136,14 +136,14 @@ class Faces(FrontierKind):
         polygons = rows.whole(self.meshes)
         for look in np.unique(looks).tolist():
             own = np.flatnonzero(looks == look)
-            for run in chunks(rows.optical[own] / side[own] ** 2 + 1, _AT_ONCE):
+            for run in chunks(rows.optical[own] / side[own] ** 2 + 1, _BATCH):
                 some = own[run]
                 yield (None, look), chosen_facets(polygons.take(some), rows.optical[some], side[some])
 
     def triangles(self, rows: FaceRows, least: float = 0.0) -> NDArray[np.float64]:
-        """Corners (t, 3, 3) of the triangles of opaque faces that are so many pixels wide at least, metres."""
+        """Corners (t, 3, 3) of the triangles of opaque faces that are so many pixels wide at least, meters."""
         meshes = self.meshes
-        wide = 2.0 * rows.reach >= least * self.camera.extent_around(rows.centre)
+        wide = 2.0 * rows.reach >= least * self.camera.extent_around(rows.center)
         some = rows.take(np.flatnonzero(wide & (meshes.coverage[meshes.slot[rows.face]] >= OPAQUE)))
         owner, index = spread(meshes.face_size[some.face] - 2)
         return meshes.corners(meshes.face_triangle[some.face][owner] + index, some.instance[owner])
@@ -155,7 +155,7 @@ def _stays(rows: FaceRows, side: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:
-    """Facets of polygons (n,) that stand for an area ``optical`` (n,) in m², with sides (n,) in metres.
+    """Facets of polygons (n,) that stand for an area ``optical`` (n,) in m², with sides (n,) in meters.
 
     Their number is random; its expectation is the area over that of a facet.
     """
@@ -177,14 +177,14 @@ def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArra
     corners = weights @ meshes.corners(triangle[pick], instance)
     root, v = np.sqrt(uniform(key, _PLACE_U)), uniform(key, _PLACE_V)
     at = np.stack([1 - root, root * (1 - v), root * v], axis=1)
-    centre = np.einsum("nk,nki->ni", at, corners)
+    center = np.einsum("nk,nki->ni", at, corners)
     normal = unit(vector[pick])
     edges = np.roll(corners, -1, axis=1) - corners
     longest = np.linalg.norm(edges, axis=2).argmax(axis=1)
     along = unit(edges[np.arange(len(pick)), longest])
     slot = meshes.slot[face]
-    material = meshes.colours[slot], meshes.transmission[slot]
-    return Facets(centre, np.cross(along, normal), along, side[thing], *material)
+    material = meshes.colors[slot], meshes.transmission[slot]
+    return Facets(center, np.cross(along, normal), along, side[thing], *material)
 
 
 def _keys(polygons: Polygons, owner: NDArray[np.int64]) -> NDArray[np.uint64]:

@@ -45,11 +45,11 @@ class Waiting(Arrays):
     Attributes
     ----------
     parts : Arrays of n
-    centre : (n, 3) float64
+    center : (n, 3) float64
     radius : (n,) float64
-        Metres.
+        Meters.
     near : (n,) float64
-        Least depth of the sphere, metres.
+        Least depth of the sphere, meters.
     cell : (n,) int64
         Cell of the image that its middle is in.
     count : (n,) float64
@@ -57,7 +57,7 @@ class Waiting(Arrays):
     """
 
     parts: Arrays
-    centre: NDArray[np.float64]
+    center: NDArray[np.float64]
     radius: NDArray[np.float64]
     near: NDArray[np.float64]
     cell: NDArray[np.int64]
@@ -89,7 +89,7 @@ class FrontierKind:
     larger = 1.0
 
     def spheres(self, parts: Arrays) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Middles (n, 3) of spheres around parts, and radii (n,), metres."""
+        """Middles (n, 3) of spheres around parts, and radii (n,), meters."""
         raise NotImplementedError
 
     def optical(self, parts: Arrays) -> NDArray[np.float64]:
@@ -101,13 +101,13 @@ class FrontierKind:
         return np.zeros(len(parts))
 
     def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], shown: list[Shown]) -> None:
-        """Draw parts that are seen, with facets of sides (n,), metres."""
+        """Draw parts that are seen, with facets of sides (n,), meters."""
         raise NotImplementedError
 
     def unseen(
         self, parts: Arrays, side: NDArray[np.float64], kept: NDArray[np.float64], shown: list[Shown]
     ) -> Iterator[tuple[Whose, Facets]]:
-        """Facets of sides (n,), metres, of a fraction (n,) of parts that nobody sees."""
+        """Facets of sides (n,), meters, of a fraction (n,) of parts that nobody sees."""
         raise NotImplementedError
 
     def enough(self, parts: Arrays) -> NDArray[np.float64]:
@@ -168,11 +168,11 @@ class Frontier:
 
     def pool(self, kind: FrontierKind, parts: Arrays) -> Waiting:
         """Parts (n,) of a kind with spheres around them."""
-        centre, radius = kind.spheres(parts)
-        column, row, depth = self.coverage.project(centre)
-        side = kind.larger * self.facet * self.coverage.camera.extent_around(centre)
+        center, radius = kind.spheres(parts)
+        column, row, depth = self.coverage.project(center)
+        side = kind.larger * self.facet * self.coverage.camera.extent_around(center)
         count = kind.optical(parts) / np.maximum(side**2, 1e-12)
-        return Waiting(parts, centre, radius, depth - radius, self.coverage.cells(column, row), count)
+        return Waiting(parts, center, radius, depth - radius, self.coverage.cells(column, row), count)
 
     def slabs(self, parts: Sequence[Arrays], most: float = np.inf) -> Iterator[list[Waiting]]:
         """Parts of each kind that are to be drawn, some at a time; what they cover is to be drawn before more follow.
@@ -222,7 +222,7 @@ class Frontier:
         """What is to be drawn of parts that begin before depths (n,), and what of theirs begins beyond."""
         kind, ready, later = self.kinds[number], [slab.take(slice(0))], []
         while len(slab):
-            prints = self.coverage.of_spheres(slab.centre, slab.radius)
+            prints = self.coverage.of_spheres(slab.center, slab.radius)
             outside = self.coverage.outside(prints)
             hidden = ~outside & self.coverage.hidden(prints)
             self.outside[number].append(slab.take(np.flatnonzero(outside)))
@@ -242,6 +242,6 @@ class Frontier:
 
     def large(self, kind: FrontierKind, pool: Waiting) -> NDArray[np.bool_]:
         """Parts (n,) that are to be opened: more of them shows than their samples tell."""
-        pixels = 2.0 * pool.radius / self.coverage.camera.extent_around(pool.centre)
+        pixels = 2.0 * pool.radius / self.coverage.camera.extent_around(pool.center)
         shows = (pixels > DETAIL) & (pool.count > FEW)
         return kind.can_open(pool.parts) & (shows | kind.to_be_opened(pool.parts))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..growth.envelopes import reaches
+from ..growth.envelopes import envelope_reach
 from ..growth.growth import WholeBranches
 from ..leaves.levels import coarse_error
 from ..species.species import LEAF_KINDS
@@ -63,7 +63,7 @@ class LeafDetail:
         size = self.flora.rows["leaf_size"][branches.row].sum(axis=1) * branches.scale
         for factor in ("leaf_size_tip", "leaf_size_young"):
             size = size * np.maximum(self.flora.rows[factor][branches.row], 1.0)
-        beside = size + reaches(self.flora.rows)[branches.row] * branches.length
+        beside = size + envelope_reach(self.flora.rows)[branches.row] * branches.length
         # The base tells of most branches that they are too far away.
         around = camera.extent_around(branches.position)
         pixels = size / self._nearest(around, branches.length + beside) / self.tolerance
@@ -83,7 +83,7 @@ class LeafDetail:
         return np.array([max((coarse_error(f) for f in own), default=0.0) for own in forms])
 
     def _nearest(self, extent: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Metres (n,) that a pixel spans at things up to a distance (n,) nearer than where it spans ``extent`` (n,)."""
+        """Meters (n,) that a pixel spans at things up to a distance (n,) nearer than where it spans ``extent`` (n,)."""
         if self.camera.kind == "ORTHO":
             return extent
         return np.maximum(extent - self.camera.pixel_size * away, 1e-9)

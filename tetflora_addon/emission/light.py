@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..light.buffers import LightBuffer
-from ..light.illumination import Illumination, Lit
-from ..light.receivers import Clouds, Sheets, cell_of_node
+from ..light.illumination import Illumination, LampBuffers
+from ..light.receivers import MediumCells, SurfaceElements, cell_of_node
 from ..light.scattering import DIRECTIONS
 from ..light.sources import Near, World, buffers_of, light_resolution, split_areas, to_eye
 from ..proxies.microsurfaces import Facets
@@ -37,7 +37,7 @@ ORDERS = 2
 #: Attributes of baked light: linear radiance of the side to which normals point, and of the other side.
 FRONT, BACK = "tf_light_front", "tf_light_back"
 #: Facets and faces whose light is computed together; some 2 kB each.
-AT_ONCE = 1 << 16
+BATCH = 1 << 16
 #: Maximum longer side in pixels of a lamp's buffer, with ground in it and without.
 GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
 #: Suns have views of their own of what is nearer to the camera than these fractions of the distance to the farthest
@@ -46,14 +46,14 @@ NEAR_FRACTIONS, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
 
 
 def shadow_steps(
-    clouds: Clouds,
+    clouds: MediumCells,
     lights: Sequence[Light],
     world: World,
     occluders: NDArray[np.float64] | None = None,
     resolution: int = 512,
     ground: ArrayLike = (0.0, 0.0, 0.0),
     orders: int = ORDERS,
-    sheets: Sheets | None = None,
+    sheets: SurfaceElements | None = None,
     near: Near | None = None,
 ) -> Generator[float, None, Illumination]:
     """Render a scene from all of its lights; yields the fraction that is done.
@@ -62,37 +62,37 @@ def shadow_steps(
 
     Parameters
     ----------
-    clouds : Clouds
+    clouds : MediumCells
         All tetrahedra that hold something.
     lights : sequence of Light
     world : World
     occluders : (t, 3, 3) float64, optional
-        Triangles of opaque polygons, metres.
+        Triangles of opaque polygons, meters.
     resolution : int
         Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_FRACTION` of it.
     ground : (3,) float
-        Mean colour of the polygons, which lights crowns from below.
+        Mean color of the polygons, which lights crowns from below.
     orders : int
         Orders of scattering that are gathered one by one, at least 1.
-    sheets : Sheets, optional
+    sheets : SurfaceElements, optional
         Facets and leaves as they are drawn. Clumps smaller than tetrahedra shadow themselves, which an even cloud does
         not; a pixel should be about as large as a sheet.
     near : Near, optional
         Part of the scene that gets buffers of its own from suns.
     """
-    sheets = Sheets.none(len(clouds)) if sheets is None else sheets
+    sheets = SurfaceElements.none(len(clouds)) if sheets is None else sheets
     lamps = []
     split = split_areas(tuple(lights))
     for number, light in enumerate(split):
         buffers = buffers_of(light, clouds, sheets, occluders, resolution, near) if light.shadow else []
-        lamps.append(Lit(light, buffers))
+        lamps.append(LampBuffers(light, buffers))
         yield 0.3 * (number + 1) / len(split)
     fewer, number = sheets.thinned(SKY_SHEETS)
     # Between sheets there are gaps that coarse pixels do not see.
     fine = fewer.pixels(SKY_SHEET_PIXELS) if len(sheets) else int(np.clip(resolution * SKY_FRACTION, *SKY_PIXELS))
     sky: list[LightBuffer | None] = []
-    for towards in DIRECTIONS:
-        light = Light("SUN", np.zeros(3), -towards)
+    for toward in DIRECTIONS:
+        light = Light("SUN", np.zeros(3), -toward)
         views = buffers_of(light, clouds, fewer, occluders, fine)
         sky.append(views[0] if views else None)
         yield 0.3 + 0.3 * len(sky) / len(DIRECTIONS)
@@ -111,9 +111,9 @@ class Sources:
     lights : tuple of Light
     world : World
     occluders : (t, 3, 3) float64
-        Triangles of ground and buildings, metres.
+        Triangles of ground and buildings, meters.
     ground : (3,) float64
-        Their mean colour, linear.
+        Their mean color, linear.
     """
 
     lights: tuple[Light, ...]
@@ -139,17 +139,17 @@ class SheetList:
     def add_facets(self, facets: Facets) -> None:
         """Facets, as squares of the same area."""
         half = 0.5 * facets.side[:, None]
-        a, b, c = half * facets.across, half * facets.along, facets.centre
+        a, b, c = half * facets.across, half * facets.along, facets.center
         self._parts.append(np.stack([c - a - b, c + a - b, c + a + b, c - a + b], axis=1).astype(np.float32))
 
     def add_faces(
         self, positions: NDArray[np.floating], corner_verts: NDArray[np.integer], offsets: NDArray[np.integer]
     ) -> None:
-        """Add faces of a mesh: positions (v, 3) in metres, ``corner_verts`` (c,), first corners (f + 1,)."""
+        """Add faces of a mesh: positions (v, 3) in meters, ``corner_verts`` (c,), first corners (f + 1,)."""
         self._parts.append(positions[corner_verts[_four_corners(offsets)]].astype(np.float32))
 
     def corners(self) -> NDArray[np.float32]:
-        """All of them, (m, 4, 3), metres."""
+        """All of them, (m, 4, 3), meters."""
         return np.concatenate(self._parts) if self._parts else np.zeros((0, 4, 3), np.float32)
 
 
@@ -178,7 +178,7 @@ class BakedLight:
 
     def of_facets(self, facets: Facets, sheets: NDArray[np.integer]) -> tuple[NDArray, NDArray]:
         """Radiance (n, 3) of the fronts and of the backs of facets, which are these sheets (n,) of the list."""
-        surface = facets.centre, facets.normal, facets.colour, facets.transmission
+        surface = facets.center, facets.normal, facets.color, facets.transmission
         return self.illumination.facet_radiance(*surface, self.cell[sheets], self.camera, sheets)
 
     def of_spheres(self, facets: Facets, sheets: NDArray[np.integer]) -> NDArray:
@@ -187,8 +187,8 @@ class BakedLight:
         A sphere covers what its facet covers for the camera, and shows what the camera would see of the facet.
         """
         front, back = self.of_facets(facets, sheets)
-        towards = np.sum(facets.normal * to_eye(self.camera, facets.centre), axis=1) > 0.0
-        return np.where(towards[:, None], front, back)
+        toward = np.sum(facets.normal * to_eye(self.camera, facets.center), axis=1) > 0.0
+        return np.where(toward[:, None], front, back)
 
     def of_shells(self) -> NDArray:
         """Radiance (t, 4, 3) of tetrahedra at their vertices, in the order of ``refinement.nodes``."""
@@ -199,18 +199,18 @@ class BakedLight:
         positions: NDArray[np.floating],
         corner_verts: NDArray[np.integer],
         offsets: NDArray[np.integer],
-        colour: NDArray[np.floating],
+        color: NDArray[np.floating],
         transmission: NDArray[np.floating],
         sheets: NDArray[np.integer],
     ) -> tuple[NDArray, NDArray]:
         """Radiance (f, 3) of the fronts and of the backs of a mesh's faces, which are these sheets (f,) of the list.
 
-        The mesh is in the layout of `buffers.MeshBuffers`, with a colour (f, 3) and transmission (f,) for each face.
+        The mesh is in the layout of `buffers.MeshBuffers`, with a color (f, 3) and transmission (f,) for each face.
         """
         corners = positions[corner_verts[_four_corners(offsets)]].astype(np.float64)
         normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-        surface = _middles(corners), normal, colour.astype(np.float64), transmission.astype(np.float64)
+        surface = _middles(corners), normal, color.astype(np.float64), transmission.astype(np.float64)
         return self.illumination.facet_radiance(*surface, self.cell[sheets], self.camera, sheets)
 
 
@@ -234,7 +234,7 @@ def baked_attributes(
 
 
 def _middles(corners: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Centres of area (m, 3) of quadrilaterals and of triangles that repeat their last corner."""
+    """Centers of area (m, 3) of quadrilaterals and of triangles that repeat their last corner."""
     triangle = (corners[:, 2] == corners[:, 3]).all(axis=1)[:, None]
     return np.where(triangle, corners[:, :3].mean(axis=1), corners.mean(axis=1))
 
@@ -249,13 +249,13 @@ def baked_light(
     corners, cell = made.corners(), cell_of_node(refinement)
     replaced = ~np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)) | facets
     replaced &= len(corners) > 0
-    clouds = Clouds.of(flora, refinement, ~replaced)
+    clouds = MediumCells.of(flora, refinement, ~replaced)
     inside = np.full(len(corners), -1, np.int64)
-    for start in range(0, len(corners), AT_ONCE):
-        part = slice(start, start + AT_ONCE)
+    for start in range(0, len(corners), BATCH):
+        part = slice(start, start + BATCH)
         inside[part] = cell[refinement.tree.locate(_middles(corners[part].astype(np.float64)))]
     # A leaf that reaches out of all tetrahedra that hold something has no cell; it shadows like the others.
-    sheets = replace(Sheets.of(corners, inside, len(clouds)), replaced=replaced)
+    sheets = replace(SurfaceElements.of(corners, inside, len(clouds)), replaced=replaced)
     yield 0.05
     resolution, near = light_resolution(camera), None
     if len(corners):

@@ -25,7 +25,7 @@ from ..proxies.facet_weights import FacetWeights
 from ..proxies.hotspots import light_ratios
 from ..proxies.microsurfaces import Facets, piece_facets, subplant_facets
 from ..refinement.contents import PlantParts, as_pieces
-from ..refinement.decisions import real_fraction
+from ..refinement.decisions import explicit_fraction
 from ..refinement.lights import Light
 from ..refinement.shares import opened
 from ..species.species import LEAF_KINDS
@@ -71,13 +71,13 @@ class GrownPlants(FrontierKind):
 
     def spheres(self, parts: PlantParts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """As far as samples of their leaves and wood reach."""
-        branches, alone = parts.branches, parts.alone
+        branches, alone = parts.branches, parts.branch_only
         across, low, high = extents(self.flora, branches).T
         middle = np.where(alone, 0.5, 0.5 * (np.minimum(low, 0.0) + high)) * branches.length
         half = np.where(alone, 0.5, 0.5 * (high - np.minimum(low, 0.0)))
         across = np.where(alone, 0.5 * parts.extent / np.maximum(branches.length, 1e-12), across)
-        centre = branches.position + middle[:, None] * branches.frame[:, :, 2]
-        return centre, branches.length * np.hypot(across, half) + branches.radius
+        center = branches.position + middle[:, None] * branches.frame[:, :, 2]
+        return center, branches.length * np.hypot(across, half) + branches.radius
 
     def optical(self, parts: PlantParts) -> NDArray[np.float64]:
         """As of `FrontierKind`."""
@@ -91,7 +91,7 @@ class GrownPlants(FrontierKind):
         """As of `FrontierKind`."""
         bound = extents(self.flora, parts.branches, farthest=False)
         silhouette = 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * parts.branches.length**2
-        whole = parts.alone | ~parts.can_open(self.flora)
+        whole = parts.branch_only | ~parts.can_open(self.flora)
         return np.where(whole, 1.0, opaque_fractions(silhouette, parts.totals.optical_area))
 
     def can_open(self, parts: PlantParts) -> NDArray[np.bool_]:
@@ -115,9 +115,9 @@ class GrownPlants(FrontierKind):
     def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], _shown: list[Shown]) -> None:
         """As of `FrontierKind`."""
         parts, branches = slab.parts, slab.parts.branches
-        extent = self.camera.extent_around(slab.centre)
-        lines = parts.alone | ~parts.can_open(self.flora)
-        lines &= parts.alone | (2.0 * slab.radius > LINES * extent) | (self.transition.of_branches(branches) > 0)
+        extent = self.camera.extent_around(slab.center)
+        lines = parts.branch_only | ~parts.can_open(self.flora)
+        lines &= parts.branch_only | (2.0 * slab.radius > LINES * extent) | (self.transition.of_branches(branches) > 0)
         self._draw_subplants(canvas, branches.take(np.flatnonzero(~lines)), side[~lines])
         self._draw_branches(canvas, branches.take(np.flatnonzero(lines)), side[lines])
 
@@ -127,10 +127,10 @@ class GrownPlants(FrontierKind):
         """As of `FrontierKind`."""
         species = self.flora.species_of(parts.branches.row)
         for s in np.unique(species).tolist():
-            some = np.flatnonzero((species == s) & ~parts.alone)
+            some = np.flatnonzero((species == s) & ~parts.branch_only)
             if len(some):
                 yield (s, ""), self._of_subplants(parts.branches.take(some), side[some], side[some], 1.0 - kept[some])
-            some = np.flatnonzero((species == s) & parts.alone)
+            some = np.flatnonzero((species == s) & parts.branch_only)
             if len(some):
                 yield (s, ""), self._of_pieces(as_pieces(parts.branches.take(some)), side[some])
 
@@ -156,8 +156,8 @@ class GrownPlants(FrontierKind):
     ) -> Facets:
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_subplants(branches.row, count, self._share(branches))
-        once = self._once(branches, leaf) if seen else None
-        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, once)
+        hotspot_factor = self._once(branches, leaf) if seen else None
+        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, hotspot_factor)
 
     def _draw_branches(self, canvas: Canvas, branches: Branches, side: NDArray[np.float64]) -> None:
         """Branches alone: leaves that are large are real, wood is tubes or thin triangles, the rest is facets."""
@@ -165,22 +165,22 @@ class GrownPlants(FrontierKind):
             return
         flora, transition = self.flora, self.transition
         branches = replace(branches, plant=np.arange(len(branches), dtype=np.int32))
-        whole, real = WholeBranches(branches, axes(flora.rows, branches)), transition.of_own_leaves(branches)
+        whole, explicit = WholeBranches(branches, axes(flora.rows, branches)), transition.of_own_leaves(branches)
         pieces, owner = whole_pieces(flora.rows, whole)
         species = flora.species_of(branches.row)
         extent = np.maximum(transition.camera.extent_around(branches.position), 1e-300)
         wide = 2.0 * branches.radius / extent
-        tubes = uniform(branches.key, Draw.TRANSITION) < real_fraction(wide, TUBES)
+        tubes = uniform(branches.key, Draw.TRANSITION) < explicit_fraction(wide, TUBES)
         thin, detail = wide < BROAD, transition.detail
         for s in np.unique(species).tolist():
             own = species == s
-            left = np.flatnonzero(own[owner] & (real[owner] < 1.0))
+            left = np.flatnonzero(own[owner] & (explicit[owner] < 1.0))
             if len(left):
                 canvas.add_facets(
-                    (s, ""), self._of_pieces(pieces.take(left), side[owner[left]], real[owner[left]], seen=True)
+                    (s, ""), self._of_pieces(pieces.take(left), side[owner[left]], explicit[owner[left]], seen=True)
                 )
-            some = whole.take(np.flatnonzero(own & (real > 0.0)))
-            made = leaf_meshes(flora, s, [some], lambda b: (real[b.plant], transition.of_kites(b)), detail.lengths)
+            some = whole.take(np.flatnonzero(own & (explicit > 0.0)))
+            made = leaf_meshes(flora, s, [some], lambda b: (explicit[b.plant], transition.of_kites(b)), detail.lengths)
             for one in made if len(some) else ():
                 canvas.add_mesh((LEAF_KINDS[one.kind], one.form, s), one.buffers, True)
             # What is a few pixels wide has few sides; of wider wood all is drawn, or its shading would end at holes.
@@ -211,7 +211,7 @@ class GrownPlants(FrontierKind):
         canvas.add_mesh(("bark", 0, species), twig_buffers(self.flora, whole, 1.0 / likely[some], parts), True)
 
     def _of_pieces(
-        self, pieces: Pieces, side: NDArray[np.float64], real: NDArray[np.float64] | None = None, seen: bool = False
+        self, pieces: Pieces, side: NDArray[np.float64], explicit: NDArray[np.float64] | None = None, seen: bool = False
     ) -> Facets:
         """Facets of pieces: of their leaves where they are seen, of their wood as well where they are not."""
         flora, branches = self.flora, pieces.branches
@@ -219,8 +219,8 @@ class GrownPlants(FrontierKind):
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_pieces(branches.row, count, self._share(branches))
         wood = np.ones(len(pieces), bool) if seen else None
-        once = self._once(branches, leaf) if seen else None
-        return piece_facets(flora, pieces, leaf, side, weight, real, wood, once)
+        hotspot_factor = self._once(branches, leaf) if seen else None
+        return piece_facets(flora, pieces, leaf, side, weight, explicit, wood, hotspot_factor)
 
     def _optical(self, branches: Branches) -> NDArray[np.float64]:
         return self.flora.leaf_areas(branches) + self.flora.wood_areas(branches) / 2

@@ -27,9 +27,9 @@ from ..growth.growth import WholeBranches, trunks
 from ..growth.seeds import Seeds
 from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..refinement.contents import as_pieces, piece_totals
-from ..refinement.decisions import Decision, real_fraction
+from ..refinement.decisions import Decision, explicit_fraction
 from ..refinement.loop import Refinement
-from ..refinement.shared_parts import SharedParts, SharePoints, lowered
+from ..refinement.shared_parts import SharedParts, SharePoints, descend
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import chunks, expand
@@ -80,12 +80,12 @@ class Transition:
 
     @property
     def _own_width(self) -> NDArray[np.float64]:
-        """Width (r,) of the leaves that branches of rows bear, metres."""
+        """Width (r,) of the leaves that branches of rows bear, meters."""
         return self.flora.rows["leaf_size"][:, 0] * self.flora.leaf.width
 
     def _fraction(self, branches: Branches, widths: NDArray[np.float64], limit: float) -> NDArray[np.float64]:
         width = widths[branches.row] * branches.scale
-        return real_fraction(width / np.maximum(self.camera.extent_around(branches.position), 1e-300), limit)
+        return explicit_fraction(width / np.maximum(self.camera.extent_around(branches.position), 1e-300), limit)
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def inside_explicit(
             [replace(own, part=own.part + np.int32(start)) for (_, own), start in zip(made, first, strict=False)]
         )
         if len(points):
-            points = replace(points, cell=lowered(result.tree, points))
+            points = replace(points, cell=descend(result.tree, points))
 
 
 def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance: float = np.inf) -> Iterator[Block]:
@@ -153,8 +153,8 @@ def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance:
     for parts, inside in inside_explicit(
         plants, result, lambda parts, inside: (inside < 1.0) & (plants.pixels(parts) > MIXED)
     ):
-        full.append(parts.branches.take(np.flatnonzero((inside >= 0.5) & ~parts.alone)))
-        bodies.append(parts.branches.take(np.flatnonzero((inside >= 0.5) & parts.alone)))
+        full.append(parts.branches.take(np.flatnonzero((inside >= 0.5) & ~parts.branch_only)))
+        bodies.append(parts.branches.take(np.flatnonzero((inside >= 0.5) & parts.branch_only)))
     detail = LeafDetail(flora, camera, tolerance)
     runs = []
     for alone, some in ((False, Branches.concatenate(full)), (True, Branches.concatenate(bodies))):

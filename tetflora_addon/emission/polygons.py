@@ -52,7 +52,7 @@ class PolygonBlock:
 
 def kept_polygons(result: Refinement) -> Polygons:
     """Polygons that are kept where shells stand for all others: all in explicit tetrahedra, and large ones."""
-    held = result.holdings.polygons
+    held = result.cell_polygons.polygons
     proxy = result.chosen(Decision.PROXY, Decision.HIDDEN)[held.cell]
     kept = np.flatnonzero(~proxy | np.isinf(held.totals.width))
     rank = np.zeros(len(result.tree), np.int64)

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refinement.lights import Light, frame_towards
+from ..refinement.lights import Light, frame_toward
 
 #: Cells of the grid across the light along each side, and layers along it, at most.
 CELLS, LAYERS = 192, 64
-#: Least side of a cell, metres: an even fog of leaves knows nothing of smaller gaps.
+#: Least side of a cell, meters: an even fog of leaves knows nothing of smaller gaps.
 LEAST = 1.0
 _DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -28,7 +28,7 @@ class Shade:
     Parameters
     ----------
     position : (m, 3) float
-        Places that stand for areas (m,), metres.
+        Places that stand for areas (m,), meters.
     area : (m,) float
         One-sided area of sheets, m².
     lights : sequence of Light
@@ -37,8 +37,8 @@ class Shade:
 
     def __init__(self, position: NDArray[np.floating], area: NDArray[np.floating], lights: Sequence[Light]) -> None:
         suns = [light for light in lights if light.kind == "SUN" and light.shadow]
-        direction = max(suns, key=lambda one: float(np.mean(one.colour))).direction if suns else _DOWN
-        self._frame = frame_towards(direction)
+        direction = max(suns, key=lambda one: float(np.mean(one.color))).direction if suns else _DOWN
+        self._frame = frame_toward(direction)
         if not len(position):
             self._table = None
             return
@@ -57,7 +57,7 @@ class Shade:
         return (at[:, 0] * self._size[1] + at[:, 1]) * self._size[2] + at[:, 2]
 
     def depth(self, points: NDArray[np.float64], nearer: NDArray[np.float64] | float = 0.0) -> NDArray[np.float64]:
-        """Optical depth (n,) of all that is between the light and points (n, 3), moved so many metres towards it."""
+        """Optical depth (n,) of all that is between the light and points (n, 3), moved so many meters toward it."""
         if self._table is None:
             return np.zeros(len(points))
         local = points @ self._frame

@@ -13,7 +13,7 @@ from ..arrays import GOLDEN_TURN, spiral
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.hashing import mix, uniform
-from ..proxies.summaries import extinction_matrices, summarise
+from ..proxies.summaries import extinction_matrices, summarize
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..tetrahedra.geometry import EDGES, FACES, volume
@@ -21,7 +21,7 @@ from .light import BakedLight
 
 #: Fraction of its size by which a shell is smaller than its tetrahedron, minimum and maximum.
 GAP, MOST_GAP = 1e-3, 0.05
-# Minimum distance of faces, in steps between neighbouring numbers of single precision.
+# Minimum distance of faces, in steps between neighboring numbers of single precision.
 _STEPS = 8.0
 # As a mesh stores them, with the edge from each corner to the next, in the order of faces.
 _FACES, _EDGES = FACES.astype(np.int32), EDGES.astype(np.int32)
@@ -84,7 +84,7 @@ def _cell_noise(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def shell_buffers(
     vertices: ArrayLike,
-    colour: ArrayLike,
+    color: ArrayLike,
     transmission: ArrayLike,
     S: ArrayLike,
     normal: ArrayLike,
@@ -101,9 +101,9 @@ def shell_buffers(
     Parameters
     ----------
     vertices : (n, 4, 3) float
-        Corners of the cells in either orientation, metres, world space.
-    colour : (n, 3) float
-        Mean colour of the contents, linear.
+        Corners of the cells in either orientation, meters, world space.
+    color : (n, 3) float
+        Mean color of the contents, linear.
     transmission : (n,) float
         Fraction of the scattered light that passes through the sheets, 0 to 1.
     S : (n, 6) float
@@ -116,7 +116,7 @@ def shell_buffers(
         Place of each cell front to back as the camera sees them, in any unit. Cells are then written back to front:
         EEVEE blends the faces of a mesh in their order. Without it cells keep theirs.
     light : (n, 4, 3) float, optional
-        Radiance that the contents scatter towards the camera at each corner, albedo and phase included, W/(m² sr);
+        Radiance that the contents scatter toward the camera at each corner, albedo and phase included, W/(m² sr);
         becomes ``tf_light0`` to ``tf_light3`` for the material of baked light.
 
     Returns
@@ -134,8 +134,8 @@ def shell_buffers(
     if corners.ndim != 3 or corners.shape[1:] != (4, 3):
         raise ValueError(f"vertices must have shape (n, 4, 3), not {corners.shape}")
     count = len(corners)
-    columns = {"colour": (3,), "transmission": (), "S": (6,), "normal": (3,), "plane": (), "light": (4, 3), "rank": ()}
-    given = dict(zip(columns, (colour, transmission, S, normal, plane, light, rank), strict=True))
+    columns = {"color": (3,), "transmission": (), "S": (6,), "normal": (3,), "plane": (), "light": (4, 3), "rank": ()}
+    given = dict(zip(columns, (color, transmission, S, normal, plane, light, rank), strict=True))
     values = {name: np.asarray(value, np.float64) for name, value in given.items() if value is not None}
     for name, array in values.items():
         shape = (count, *columns[name])
@@ -173,7 +173,7 @@ def shell_buffers(
         corner_edges=(_FACE_EDGES + first_edge).ravel(),
         face_offsets=np.arange(0, 12 * count + 1, 3, dtype=np.int32),
         attributes={
-            "tf_colour": per_face(values["colour"]),
+            "tf_color": per_face(values["color"]),
             "tf_transmission": per_face(values["transmission"]),
             "tf_kappa": per_face(directional_mean(matrices)),
             "tf_s0": per_face(matrices[:, :3]),
@@ -192,7 +192,7 @@ def shell_buffers(
 
 
 def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = None) -> MeshBuffers | None:
-    """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, colour and orientation.
+    """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, color and orientation.
 
     They are written back to front, as EEVEE blends them. Tetrahedra with nothing but large polygons have an extinction
     of 0. With ``light`` shells carry the radiance of their contents, for the material of baked light.
@@ -209,14 +209,14 @@ def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = No
     if not fine.all():
         contents = replace(contents, polygons=contents.polygons.take(fine))
     assets = result.assets.placed, result.assets.held(len(result.tree))
-    summaries = summarise(flora, contents, index, len(nodes), assets)
+    summaries = summarize(flora, contents, index, len(nodes), assets)
     vertices = result.tree.vertices(nodes)
     matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
     vertices, matrices = set_apart(vertices, matrices)
     rank = result.rank[proxies]
     baked = None if light is None else light.of_shells()[proxies]
-    colour, transmission = summaries.colour, summaries.transmission
-    return shell_buffers(vertices, colour, transmission, matrices, normal, plane, rank=rank, light=baked)
+    color, transmission = summaries.color, summaries.transmission
+    return shell_buffers(vertices, color, transmission, matrices, normal, plane, rank=rank, light=baked)
 
 
 def set_apart(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Centre lines of branches, and how thick branches are along them.
+"""Center lines of branches, and how thick branches are along them.
 
 Lines are straight segments that bend at joints, turn to the sky or the ground, and sway. The radius is that of the base
 times a profile: linear from 1 to the taper, or by the pipe model, in which r^p is divided among the children (Shinozaki
@@ -19,12 +19,12 @@ from ..arrays import Arrays, Floats, Integers, Keys, Table, by_component, column
 from .branches import Branches
 from .hashing import Draw, signed
 from .rows import ranged, varied
-from .wind import axis_and_angle, is_windy, leant, moment, sway, turned_by, turned_vectors
+from .wind import axis_and_angle, is_windy, leaned, moment, sway, turned_by, turned_vectors
 
 
 @dataclass(frozen=True)
 class Axes(Arrays):
-    """Centre lines of branches: straight segments.
+    """Center lines of branches: straight segments.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Axes(Arrays):
         return start + (along - segment)[:, None] * step, self.frame(branch, segment)
 
     def bend(self) -> Floats:
-        """How far (n,) axes are from the straight line between their ends, metres."""
+        """How far (n,) axes are from the straight line between their ends, meters."""
         chord = self.knots[:, -1] - self.knots[:, 0]
         direction = chord / np.maximum(np.linalg.norm(chord, axis=1), 1e-300)[:, None]
         between = self.knots[:, 1:-1] - self.knots[:, :1]
@@ -110,7 +110,7 @@ def _to_front(array: NDArray) -> NDArray:
 
 
 def axes(rows: Table, branches: Branches) -> Axes:
-    """Centre lines of branches (n,), of as many segments as the row has that has most.
+    """Center lines of branches (n,), of as many segments as the row has that has most.
 
     Each joint bends by its part of the order's curvature and turns to the sky or the ground (Weber and Penn, "Creation
     and rendering of realistic trees", SIGGRAPH 1995, sections 4.1 and 4.8).
@@ -122,7 +122,7 @@ def axes(rows: Table, branches: Branches) -> Axes:
 
 
 def _axes(rows: Table, branches: Branches, ahead: float = 0.0) -> Axes:
-    """Centre lines so many seconds after the moment of the rows."""
+    """Center lines so many seconds after the moment of the rows."""
     segments = rows["segments"][branches.row]
     most = int(segments.max(initial=1))
     n = len(branches)
@@ -164,7 +164,7 @@ def _axes(rows: Table, branches: Branches, ahead: float = 0.0) -> Axes:
         own = branches.take(by_hand)
         knots[by_hand], frames[by_hand], turn = _drawn_axes(rows, own, most)
         if windy:
-            knots[by_hand], frames[by_hand], skies[by_hand] = _leant(
+            knots[by_hand], frames[by_hand], skies[by_hand] = _leaned(
                 rows, own, turn, knots[by_hand], frames[by_hand], ahead
             )
     return Axes(knots, frames, segments, skies)
@@ -179,7 +179,7 @@ def _drawn_axes(rows: Table, branches: Branches, most: int) -> tuple[NDArray, ND
     return knots[:, : most + 1], (turn[:, None] @ local)[:, :most], turn
 
 
-def _leant(
+def _leaned(
     rows: Table, branches: Branches, turn: NDArray, knots: NDArray, frames: NDArray, ahead: float
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Knots, frames and skies of branches drawn by hand in the wind, whose plants have the axes ``turn`` (n, 3, 3)."""
@@ -188,7 +188,7 @@ def _leant(
     up = turn[:, :, 2]
     whole = replace(branches, position=ground, frame=turn)
     rate = sway(rows, whole, ahead) / branches.scale[:, None]
-    bent = leant(knots - ground[:, None], up, rate) + ground[:, None]
+    bent = leaned(knots - ground[:, None], up, rate) + ground[:, None]
     axis, rate = axis_and_angle(rate)
     middle = (knots[:, 1:] + knots[:, :-1]) / 2 - ground[:, None]
     height = np.maximum(np.einsum("nsi,ni->ns", middle, up), 0.0)

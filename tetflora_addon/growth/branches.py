@@ -41,29 +41,29 @@ class Branches(Arrays):
     key : (n,) uint64
         Hash of the plant's seed and the path of child indices.
     position : (n, 3) float64
-        Base, metres, world space.
+        Base, meters, world space.
     frame : (n, 3, 3) float64
         Columns are the local axes at the base; the branch sets out along the third, the first points away from the
         parent.
     length, radius : (n,) float64
-        Length of the axis and radius at its base, metres.
+        Length of the axis and radius at its base, meters.
     scale : (n,) float64
         Scale of the plant, which leaves take as well.
-    vigour : (n,) float64
+    vigor : (n,) float64
         Length as the crown's shape has it here, relative to the longest; numbers of branches and leaves may follow it.
     outward : (n,) float64
         Where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
         themselves, along which it grows.
     sky : (n, 3) float64 or None
-        In the wind: where the direction that was up without it has turned to. Plants grow towards that, so that wind
+        In the wind: where the direction that was up without it has turned to. Plants grow toward that, so that wind
         moves them and does not change how they grow.
     later : Pose or None
         Position and frame a moment later, where it is asked how plants move.
     year : (n, 2) float64 or None
-        On a day of the year: the day that it is for the plant, and its place among the autumn colours of its species.
+        On a day of the year: the day that it is for the plant, and its place among the autumn colors of its species.
     crown : (n, 5) float32 or None
-        Where plants have crown forms: what trunks and their stems know of these, see `formed`; of all others the factor
-        on their length in the first column, and 0.
+        Where plants have crown shapes: what trunks and their stems know of these, see `crown_effects`; of all others
+        the factor on their length in the first column, and 0.
     """
 
     row: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
@@ -74,7 +74,7 @@ class Branches(Arrays):
     length: Floats
     radius: Floats
     scale: Floats
-    vigour: Floats
+    vigor: Floats
     outward: Floats
     sky: Floats | None = None
     later: Pose | None = None

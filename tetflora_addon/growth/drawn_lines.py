@@ -21,7 +21,7 @@ MAX_DRAWN = 1000
 
 @dataclass(frozen=True)
 class DrawnLines:
-    """Drawn branches as arrays of one width, metres in the plant's space; parents come before children.
+    """Drawn branches as arrays of one width, meters in the plant's space; parents come before children.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ def leaf_start(rows: Table, branches: Branches) -> Floats:
     return ranged(rows, "leaf_start", branches.row, branches.key, Draw.LEAF_START)
 
 
-def reaches(rows: Table) -> Floats:
+def envelope_reach(rows: Table) -> Floats:
     """How far the solids that leaves fill reach from the axes of branches (r,), in lengths of these."""
     return rows["envelope_radius"] * np.where(rows["envelope"] == BOX, np.sqrt(2.0), 1.0)
 

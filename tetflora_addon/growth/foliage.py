@@ -36,12 +36,12 @@ class Leaves(Arrays):
         Index of the branch that bears the leaf.
     key : (n,) uint64
     position : (n, 3) float64
-        Base of the leaf, metres.
+        Base of the leaf, meters.
     frame : (n, 3, 3) float32
         Columns: across, along the midrib, upper side; before it turns to the light. Single precision is off by some
-        nanometres at the tip of a leaf, and its cosines are ten times as fast.
+        nanometers at the tip of a leaf, and its cosines are ten times as fast.
     size : (n,) float64
-        Metres by which the leaf model is scaled.
+        Meters by which the leaf model is scaled.
     light : (n,) float64
         How far it turns to the sky; (1,) where that is the same for all.
     sky : (3,) float64 or (n, 3) float32
@@ -99,7 +99,7 @@ def youth(rows: Table, row: Integers, t: Floats) -> Floats:
 
 
 def leaf_sizes(rows: Table, row: Integers, key: Keys, outward: Floats, t: Floats) -> Floats:
-    """Metres (m,) by which models of leaves are scaled at plant scale 1; (1,) where all are alike.
+    """Meters (m,) by which models of leaves are scaled at plant scale 1; (1,) where all are alike.
 
     They are on rows (m,) or (1,), at places (m,) between inside and outside, and fractions t (m,) of branches.
     """
@@ -244,7 +244,7 @@ def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArr
     light : (n,) or (1,) float64
         0 leaves them as they are, 1 makes them level.
     sky : (3,) or (n, 3) float64
-        Unit vector towards the sky.
+        Unit vector toward the sky.
 
     Returns
     -------

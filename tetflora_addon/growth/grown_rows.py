@@ -96,7 +96,7 @@ def _alive(law: NodeLaw, places: tuple, now: float, extra: float) -> float:
 def living(row: np.void, sort: int, bare: float = 0.0, dead: float | None = None) -> float:
     """Mean number of children of one sort of branches of a row that is not full-grown.
 
-    ``bare`` is where the lowest are at least, by a crown form; or if they are dead ones ``dead`` where the topmost are.
+    ``bare`` is where the lowest are at least, by a crown shape; or of dead ones ``dead`` where the topmost are.
     """
     own, number, (mean, variation) = row["growing"][sort], row["count"][sort, 0], row["start"][sort]
     begins = varied_begin(own[BEGIN], own[VARIES], _GAUSS)
@@ -117,7 +117,7 @@ def spread_children(
     """Children of one sort of a mean branch of a row that is not full-grown, as many as stand for all.
 
     ``bare`` and ``dead`` are as in `living`; ``among`` (2,) is where the row's children begin and end among those of
-    the order's branch, by a crown form.
+    the order's branch, by a crown shape.
 
     Returns
     -------
@@ -149,16 +149,16 @@ def lengths(rows: Table, row: Integers, fraction: Floats) -> Floats:
     return out
 
 
-def fullness_of(rows: Table, row: Integers, vigour: Floats, own: Floats | None = None) -> Floats:
-    """Factor (n,) on the numbers of branches and leaves on branches of rows (n,) and vigours (n,).
+def fullness_of(rows: Table, row: Integers, vigor: Floats, own: Floats | None = None) -> Floats:
+    """Factor (n,) on the numbers of branches and leaves on branches of rows (n,) and vigors (n,).
 
-    ``own`` (n,) are their vigours without the crown forms of their plants.
+    ``own`` (n,) are their vigors without the crown shapes of their plants.
     """
     weight = rows["count_by_length"][row]
-    full = 1 - weight + weight * vigour
+    full = 1 - weight + weight * vigor
     least = rows["least"][row]
     if least.any():  # what has just begun to grow bears nothing yet
-        own = vigour if own is None else own
+        own = vigor if own is None else own
         full = full * np.where(least > 0, np.clip(own / np.maximum(least, 1e-9), 0, 1), 1.0)
     return full
 
@@ -196,7 +196,7 @@ class Grown:
     density : (2, n) float64
         Nodes above the begin, and nodes that live for a while, over those of the law.
     described : (n,) float64
-        Where nodes would begin without the crown forms of plants.
+        Where nodes would begin without the crown shapes of plants.
     """
 
     on: Mask
@@ -239,7 +239,7 @@ def grown_nodes(
     start: Floats,
     draw: Floats,
     chance: Floats,
-    formed: tuple[Floats, Floats] | None = None,
+    shaped: tuple[Floats, Floats] | None = None,
 ) -> Grown:
     """Living nodes of branches for children of one sort.
 
@@ -255,8 +255,8 @@ def grown_nodes(
         Bare part of each, and the random numbers between -1 and 1 that it follows.
     chance : (n,) float64
         Random numbers by which the nodes of the full-grown branch are rounded.
-    formed : pair of (n,) float64, optional
-        Where the lowest and the topmost are at least, because of crown forms.
+    shaped : pair of (n,) float64, optional
+        Where the lowest and the topmost are at least, because of crown shapes.
     """
     row, key = branches.row, branches.key
     own = rows["growing"][row, sort]
@@ -270,9 +270,9 @@ def grown_nodes(
     rounded = (1 - settled) * whole + settled * np.floor(whole + chance)
     density = np.stack([np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0), own[:, EXTRA]])
     last, described = own[:, UNTIL], law.number_at(start * now)
-    if formed is not None:
-        last = np.where(last > start, np.maximum(last, formed[1]), last)
-        start = np.maximum(start, formed[0])
+    if shaped is not None:
+        last = np.where(last > start, np.maximum(last, shaped[1]), last)
+        start = np.maximum(start, shaped[0])
     ends = np.stack([law.number_at(place * now) for place in (start, own[:, FRESH], last)])
     ends = np.maximum(ends, ends[0])
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Table, by_component, columns, dot, spread
 from ..species.growing import faded
-from ..species.members import dead_vigour
-from . import formed
+from ..species.members import dead_vigor
+from . import crown_effects
 from .axes import Axes, axes, profile
 from .branches import Branches, Pose
-from .crown_forms import BASE
+from .crown_shapes import BASE
 from .envelopes import BOX
 from .grown_rows import FADES, NOW, Grown, child_number, fullness_of, grown_nodes, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
@@ -76,8 +76,8 @@ def trunks(rows: Table, seeds: Seeds) -> Branches:
     later = _later(seeds, frame, sky, moment(rows)) if moment(rows) else None
     year, crown = plant_years(rows, row, key), None
     if seeds.crown is not None:
-        crown, girth = formed.formed_trunks(rows, row, frame, seeds.crown)
-        length, radius = length * formed.along(rows, row, crown), radius * girth
+        crown, thickness = crown_effects.shaped_trunks(rows, row, frame, seeds.crown)
+        length, radius = length * crown_effects.length_factors(rows, row, crown), radius * thickness
     return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later, year, crown)
 
 
@@ -101,7 +101,7 @@ def chosen_drawn(rows: Table, plants: Branches, owner: Integers, index: Integers
     """Some of the branches drawn by hand, given by plant (m,) and number (m,)."""
     plant = plants.take(owner)
     row = (rows["drawn_rows"][plant.row, 0] + index).astype(np.int32)
-    length, radius, vigour, outward = rows["size"][row].T
+    length, radius, vigor, outward = rows["size"][row].T
 
     def begun(at: Branches | Pose) -> tuple[Floats, Floats]:
         start = np.einsum("nij,nj->ni", at.frame, rows["knots"][row, 0]) * plant.scale[:, None]
@@ -115,13 +115,13 @@ def chosen_drawn(rows: Table, plants: Branches, owner: Integers, index: Integers
         {"length": length * plant.scale, "radius": radius * plant.scale},
     )
     where = {"position": position, "frame": frame, "later": later}
-    return replace(plant, row=row, key=key, vigour=vigour, outward=outward, **where, **size)
+    return replace(plant, row=row, key=key, vigor=vigor, outward=outward, **where, **size)
 
 
 def fullness(rows: Table, branches: Branches) -> Floats:
     """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
-    vigour, crown = branches.vigour, branches.crown
-    return fullness_of(rows, branches.row, vigour, None if crown is None else vigour / crown[:, 0])
+    vigor, crown = branches.vigor, branches.crown
+    return fullness_of(rows, branches.row, vigor, None if crown is None else vigor / crown[:, 0])
 
 
 def branch_counts(rows: Table, branches: Branches, sort: int = LATERAL) -> Integers:
@@ -133,9 +133,9 @@ def branch_counts(rows: Table, branches: Branches, sort: int = LATERAL) -> Integ
         number = np.maximum(np.floor(wanted + uniform(key, _ROUND[sort])), 1)  # what divides goes on
         return np.where(child >= 0, number, 0).astype(np.int64)
     whorl = np.maximum(rows["whorl"][child], 1)
-    if formed.are_formed(rows, branches):
+    if crown_effects.are_shaped(rows, branches):
         start = rows["start"][row, DEAD, 0] if sort == DEAD else _started(rows, branches, sort)
-        wanted = wanted * formed.numbers(rows, row, branches.crown[:, BASE], sort, start)
+        wanted = wanted * crown_effects.count_factors(rows, row, branches.crown[:, BASE], sort, start)
     nodes = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64)
     grown = living_nodes(rows, branches, sort)
     if grown is not None:
@@ -154,11 +154,11 @@ def living_nodes(rows: Table, branches: Branches, sort: int) -> Grown | None:
     if sort != DEAD:
         draw = signed(key, _START[sort])
     start = start[:, 0] if sort == DEAD else start[:, 0] + start[:, 1] * draw
-    if formed.are_formed(rows, branches):
+    if crown_effects.are_shaped(rows, branches):
         base, none = branches.crown[:, BASE], np.zeros(len(row))
-        bare = formed.bare_part(rows, row, base)
+        bare = crown_effects.bare_part(rows, row, base)
         if sort == LATERAL:
-            ends, wanted = (bare, none), wanted * formed.sparser(rows, row, base)
+            ends, wanted = (bare, none), wanted * crown_effects.limb_count_factors(rows, row, base)
         elif sort == DEAD:
             ends = none, bare
     chance = uniform(key, _ROUND[sort])
@@ -178,7 +178,7 @@ def leaf_counts(rows: Table, branches: Branches) -> Integers:
 
 
 def radius_at(rows: Table, branches: Branches, t: Floats) -> Floats:
-    """Radius at fractions t (n,) of the branches (n,), metres."""
+    """Radius at fractions t (n,) of the branches (n,), meters."""
     return branches.radius * profile(rows, branches.row, branches.key, t)
 
 
@@ -209,7 +209,7 @@ def chosen_children(
         index, more, extra = grown.chosen(owner, index, rows["whorl"][row])
         path = path + more
     key = child_key(parent.key, child_number(index, path))
-    fading, shaped = 1.0, formed.are_formed(rows, parents)
+    fading, shaped = 1.0, crown_effects.are_shaped(rows, parents)
     if sort == FORK:
         whorl, node, within, fraction = counts[owner], np.zeros_like(index), index, np.ones(len(index))
         t = np.ones(len(index))
@@ -223,18 +223,18 @@ def chosen_children(
         base = parent.crown[:, BASE] if shaped else None
         if sort == DEAD:
             start, end = rows["start"][parent.row, sort].T
-            end = formed.dead_end(rows, parent.row, base) if shaped else end
+            end = crown_effects.dead_end(rows, parent.row, base) if shaped else end
         else:
             start, end = _started(rows, parent, sort), 1.0
             if shaped and sort == LATERAL:
-                start = np.maximum(start, formed.bare_part(rows, parent.row, base))
+                start = np.maximum(start, crown_effects.bare_part(rows, parent.row, base))
         t = start + (end - start) * fraction
         if grown is not None:
             there, part, own = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
             on = grown.on[owner]
             t, fraction = np.where(on, there, t), np.where(on, part, fraction)
         among = rows["fraction"][parent.row, sort]
-        low, high = (formed.fractions(rows, parent.row, base) if shaped and sort == LATERAL else among).T
+        low, high = (crown_effects.lateral_fractions(rows, parent.row, base) if shaped and sort == LATERAL else among).T
         fraction = low + (high - low) * fraction
         if grown is not None:
             first, last = among.T
@@ -255,9 +255,9 @@ def chosen_children(
         angle = np.where(counts[owner] > 1, angle, 0.0)
     full_length, reach = parent.length, 1.0
     if shaped:
-        lean, reach = formed.reaches(rows, parent, azimuth, sort)
+        lean, reach = crown_effects.child_factors(rows, parent, azimuth, sort)
         angle = angle * lean
-        full_length = full_length / formed.along(rows, parent.row, parent.crown)
+        full_length = full_length / crown_effects.length_factors(rows, parent.row, parent.crown)
     frame = turned(frame, azimuth, angle)
     around = parent.outward
     limb = (rows["order"][parent.row] == 1) & (sort != FORK)
@@ -266,22 +266,20 @@ def chosen_children(
         around = np.where(limb, first + (last - first) * t, around)
     radius = radius_at(rows, parent, t)
     if sort == LATERAL:
-        vigour = lengths(rows, parent.row, fraction) * fading
-        radius = np.where(
-            rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_radius"][parent.row] * vigour, radius
-        )
-        vigour = vigour * reach
-        measure = full_length * rows["nominal"][parent.row] * vigour
+        vigor = lengths(rows, parent.row, fraction) * fading
+        radius = np.where(rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_radius"][parent.row] * vigor, radius)
+        vigor = vigor * reach
+        measure = full_length * rows["nominal"][parent.row] * vigor
     elif sort == DEAD:
-        vigour = dead_vigour(fraction) * reach
-        measure = full_length * rows["nominal"][parent.row] * vigour
+        vigor = dead_vigor(fraction) * reach
+        measure = full_length * rows["nominal"][parent.row] * vigor
     elif sort == FORK:
-        vigour, measure = parent.vigour, full_length  # which follows the crown already
+        vigor, measure = parent.vigor, full_length  # which follows the crown already
         if shaped:
-            measure = measure * formed.along(rows, row, parent.crown)
+            measure = measure * crown_effects.length_factors(rows, row, parent.crown)
         radius = radius * np.maximum(whorl, 1) ** (-1 / rows["fork_power"][parent.row])
     else:
-        vigour, measure = np.ones(len(index)), parent.scale
+        vigor, measure = np.ones(len(index)), parent.scale
     length = measure * ranged(rows, "length", row, key, Draw.LENGTH)
     thickness = ranged(rows, "thickness", row, key, Draw.THICKNESS)
     radius = (length if sort == SPUR else radius) * thickness
@@ -289,8 +287,10 @@ def chosen_children(
     if lines.later is not None:
         again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)
         later = Pose(again.position, again.frame, again.sky)
-    own = row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, sky, later, parent.year
-    return Branches(*own, None if parent.crown is None else formed.handed_on(parent, sort, reach, azimuth, angle))
+    own = row, parent.plant, key, position, frame, length, radius, parent.scale, vigor, around, sky, later, parent.year
+    return Branches(
+        *own, None if parent.crown is None else crown_effects.handed_on(parent, sort, reach, azimuth, angle)
+    )
 
 
 def sorts_of(rows: Table, parents: Branches) -> list[int]:

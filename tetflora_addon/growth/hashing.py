@@ -38,8 +38,8 @@ class Draw(IntEnum):
     BRANCHES_ROUND = 8
     LEAVES = 9
     LEAVES_ROUND = 10
-    BRANCH_COLOUR = 11
-    LEAF_COLOUR = 12
+    BRANCH_COLOR = 11
+    LEAF_COLOR = 12
     LEAF_SIZE = 13
     TAPER = 14
     BRANCH_START = 15

@@ -21,7 +21,7 @@ from ..species.growing import EVEN
 from ..species.members import expected_forks, least_length, part_segments
 from ..species.skeletons import drawn_branches
 from ..species.species import (
-    CROWN_SHAPES,
+    CROWN_PROFILES,
     LEAF_ENVELOPES,
     LEAF_INCLINATIONS,
     LEAF_KINDS,
@@ -58,8 +58,8 @@ _FORK_POWER = 2.0
 ROW_DTYPE = np.dtype(
     [(name, np.float64, (2,)) for name in _RANGES]
     + [(name, np.float64) for name in _NUMBERS]
-    + [(name, np.float64, (2, 3)) for name in ("branch_colour", "leaf_colour")]
-    + [(name, np.float64, (3,)) for name in ("leaf_colour_tip", "leaf_colour_young")]
+    + [(name, np.float64, (2, 3)) for name in ("branch_color", "leaf_color")]
+    + [(name, np.float64, (3,)) for name in ("leaf_color_tip", "leaf_color_young")]
     + [(name, np.int64) for name in _INTEGERS]
     + [(name, np.int64) for name in ("crown", "leaf_kind", "species", "order", "rings")]
     + [("envelope", np.int64), ("envelope_radius", np.float64), ("inclination", np.int64)]
@@ -77,22 +77,22 @@ ROW_DTYPE = np.dtype(
 )
 """One kind of branch.
 
-Ranges are (mean, variation), colours ((r, g, b), variation of each). Beyond the keys of an order: ``rings`` are those
+Ranges are (mean, variation), colors ((r, g, b), variation of each). Beyond the keys of an order: ``rings`` are those
 that a flared base gets besides its joints; ``next`` the rows of children, -1 for none, ``count`` how many, ``start``
 the part that stays bare, or of dead ones where they begin and end, ``fraction`` where these begin and end among all
 children of the order's branch; ``part`` the ends of this row on the order's branch and ``nominal`` the length of that
 in lengths of this; ``pipe_radius`` the radius of a lateral by the pipe model in radii of this; ``continues`` marks
 stems beyond a fork; ``outward`` branches whose own axis leads from the inside of the crown to the outside; ``tropic``
-sub-plants whose shape depends on how they stand to the sky; ``gradient`` leaves whose size or colour differs between
+sub-plants whose shape depends on how they stand to the sky; ``gradient`` leaves whose size or color differs between
 inside and outside, or old and young; ``sunlit`` leaves that turn to the sky otherwise outside than inside; ``exact``
 plants that are all the same; ``dead`` branches that are broken off or bare. Of axes that are not full-grown ``growing``
 says where children of each sort are (`grown_rows`), ``settled``, ``conical`` and ``ramps`` are those of
-`species.growing.PartGrown`, and ``least`` is the vigour below which a branch is new, or about to die.
+`species.growing.PartGrown`, and ``least`` is the vigor below which a branch is new, or about to die.
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
-``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (metres,
+``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (meters,
 in the plant's space, evenly spaced), ``radii`` over that of the base, ``frames`` along it, and its ``size``: length,
-radius, vigour and place between inside and outside.
+radius, vigor and place between inside and outside.
 """
 
 
@@ -123,8 +123,8 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
     if one.exact:
         one = without_variation(one)
     drawn = None
-    if one.form is not None:
-        drawn = drawn_lines(drawn_branches(one.form))
+    if one.skeleton is not None:
+        drawn = drawn_lines(drawn_branches(one.skeleton))
     cuts = [fork_cuts(order) for order in one.orders]
     ahead = 0 if drawn is None else 1 + len(drawn.order)
     begin = first + ahead + np.concatenate([[0], np.cumsum([len(c) - 1 for c in cuts])])
@@ -210,8 +210,8 @@ def _drawn_rows(one: Species, drawn: DrawnLines, number: int, first: int, begin:
         row["knots"], row["frames"] = drawn.knots[b], drawn.frames[b]
         row["radii"] = drawn.radii[b] / drawn.radius[b]
         row["taper"] = min(row["radii"][-1], 1.0), 0
-        vigour = drawn.length[b] / longest[drawn.order[b]]
-        row["size"] = drawn.length[b], drawn.radius[b], vigour, drawn.outward[b]
+        vigor = drawn.length[b] / longest[drawn.order[b]]
+        row["size"] = drawn.length[b], drawn.radius[b], vigor, drawn.outward[b]
         out.append(row)
     return out
 
@@ -222,12 +222,12 @@ def _row(order: Order, species: int, number: int) -> np.void:
     for name in (*_RANGES, *_NUMBERS, *_INTEGERS):
         value = np.asarray(getattr(order, name), dtype=np.float64)
         row[name] = np.radians(value) if name in _DEGREES else value
-    row["branch_colour"], row["leaf_colour"] = order.branch_colour, order.leaf_colour
-    row["leaf_colour_tip"], row["leaf_colour_young"] = order.leaf_colour_tip, order.leaf_colour_young
-    sizes, colours = {order.leaf_size_tip, order.leaf_size_young}, {order.leaf_colour_tip, order.leaf_colour_young}
-    row["gradient"] = sizes != {1.0} or colours != {order.leaf_colour.mean}
+    row["branch_color"], row["leaf_color"] = order.branch_color, order.leaf_color
+    row["leaf_color_tip"], row["leaf_color_young"] = order.leaf_color_tip, order.leaf_color_young
+    sizes, colors = {order.leaf_size_tip, order.leaf_size_young}, {order.leaf_color_tip, order.leaf_color_young}
+    row["gradient"] = sizes != {1.0} or colors != {order.leaf_color.mean}
     row["sunlit"] = order.leaf_light_tip != order.leaf_light.mean
-    row["crown"], row["leaf_kind"] = CROWN_SHAPES.index(order.crown), LEAF_KINDS.index(order.leaf_kind)
+    row["crown"], row["leaf_kind"] = CROWN_PROFILES.index(order.crown), LEAF_KINDS.index(order.leaf_kind)
     row["envelope"] = LEAF_ENVELOPES.index(order.leaf_envelope)
     row["envelope_radius"] = order.leaf_envelope_radius if row["envelope"] else 0.0
     row["inclination"] = LEAF_INCLINATIONS.index(order.leaf_inclination)
@@ -328,14 +328,14 @@ def _flare_rings(row: np.void) -> int:
 
 
 def _pipe_radius(row: np.void, thickest: float) -> float:
-    """Radius of a lateral of vigour 1 such that all together have what the taper takes away, in r^p."""
+    """Radius of a lateral of vigor 1 such that all together have what the taper takes away, in r^p."""
     low, high = row["fraction"][LATERAL]
     at, weight, fading = low + (high - low) * EVEN, 1.0, 1.0
     if row["growing"][LATERAL, NOW] > 0:
         _, at, weight, fading = spread_children(row, LATERAL)
-    vigour = lengths(row[None], np.zeros(at.shape, np.int64), at) * fading
+    vigor = lengths(row[None], np.zeros(at.shape, np.int64), at) * fading
     lost = 1 - row["taper"][0] ** row["pipe"]
-    number = max(row["count"][LATERAL, 0], 1.0) * (weight * vigour ** row["pipe"]).mean()
+    number = max(row["count"][LATERAL, 0], 1.0) * (weight * vigor ** row["pipe"]).mean()
     return min((lost / max(number, 1e-12)) ** (1 / row["pipe"]), 1 / max(thickest, 1e-9))
 
 

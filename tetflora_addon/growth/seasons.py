@@ -3,12 +3,12 @@
 """Seasons: what stage each leaf is in on a day, as a function of its key, its plant and its species' year.
 
 Every leaf appears, grows, turns and falls on days of its own, which follow from its key, and every plant is early or
-late, and has autumn colours of its own, by its key. What that comes to on average for a plant on a day is a table of
+late, and has autumn colors of its own, by its key. What that comes to on average for a plant on a day is a table of
 days for each kind of leaves, made once from the same functions, so that whatever is not grown agrees with what is.
 
 Rows of a flora on a day have the column of `YEAR_COLUMN` besides; others have not, and nothing here costs them
 anything. Branches of such a flora have a ``year``: the day that it is for their plant, and where the plant stands
-among the autumn colours of its species.
+among the autumn colors of its species.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ from ..species.year import DAYS, MAX_AUTUMN, LeafYear
 from .hashing import Draw, mix_draw, uniform
 from .rows import with_columns
 
-#: Bits of a leaf's number for its days, for its colour, and for whether it follows the year at all.
+#: Bits of a leaf's number for its days, for its color, and for whether it follows the year at all.
 _BITS, _TINT_BITS = 13, 12
 #: Quantiles of deviations from a mean day in standard deviations: logistic, as courses of bud burst and leaf fall are,
 #: without the last hundredth at either end.
 _EVEN = 0.01 + 0.98 * (np.arange(1 << _BITS) + 0.5) / (1 << _BITS)
 _DEVIATIONS = np.sqrt(3) / np.pi * np.log(_EVEN / (1 - _EVEN))
 _DEVIATIONS /= _DEVIATIONS.std()
-#: Size of a leaf that has just appeared; what it takes to lose its fresh colour, in times of growth.
+#: Size of a leaf that has just appeared; what it takes to lose its fresh color, in times of growth.
 _FIRST_SIZE, _FRESH = 0.12, 1.6
-#: How far the colours of a plant's leaves follow the plant rather than each leaf by itself.
+#: How far the colors of a plant's leaves follow the plant rather than each leaf by itself.
 _OF_PLANT = 0.5
 #: Days between two entries of tables, and nodes of the integrals from which they are made.
 _STEP = 0.5
 _NODES = 64
 PRESENT, SIZE, AREA, FRESH, AUTUMN, DRY = range(6)
 """Rows of tables: expected number of leaves there are, sum of their sizes and of the squares of these, all over what
-it is in summer; and the parts of the last that have the fresh colour, those of autumn, and that of dead leaves."""
+it is in summer; and the parts of the last that have the fresh color, those of autumn, and that of dead leaves."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Season:
 _LEAF_DTYPE = np.dtype(
     [(name, np.float64) for name in ("appear", "turn", "fall", "origin", "growth", "turning", "kept", "turnover")]
     + [(name, np.float64) for name in ("appear_spread", "turn_spread", "fall_spread")]
-    + [("any_fresh", np.bool_), ("colours", np.int64), ("fresh", np.float64, (3,)), ("dry", np.float64, (3,))]
+    + [("any_fresh", np.bool_), ("colors", np.int64), ("fresh", np.float64, (3,)), ("dry", np.float64, (3,))]
     + [("autumn", np.float64, (MAX_AUTUMN, 3))]
 )
 YEAR_COLUMN = [
@@ -117,7 +117,7 @@ YEAR_COLUMN = [
     *((name, np.float64) for name in ("day", "middle", "spring", "autumn")),
 ]
 """``year`` are the days of the leaves that the row bears, counted from ``origin``, half a year before the middle of
-their life, and of the fall those after the change of colour; ``follows`` whether there are any; ``day`` is the scene's
+their life, and of the fall those after the change of color; ``follows`` whether there are any; ``day`` is the scene's
 day, ``middle`` that in the middle of the life of the species' leaves, ``spring`` and ``autumn`` are days by which its
 plants differ."""
 
@@ -156,14 +156,14 @@ def _numbers(leaf: LeafYear) -> np.void:
     out["origin"] = leaf.origin
     out["appear"], out["turn"] = leaf.appear - leaf.origin, leaf.turn - leaf.origin
     out["fall"] = leaf.fall - leaf.turn
-    out["any_fresh"], out["colours"] = leaf.fresh is not None, len(leaf.autumn)
+    out["any_fresh"], out["colors"] = leaf.fresh is not None, len(leaf.autumn)
     out["fresh"] = leaf.fresh or 0.0
     out["autumn"][: len(leaf.autumn)] = np.reshape(leaf.autumn, (-1, 3))
     return out
 
 
 def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
-    """The day that it is for plants (n, 2), and where they stand among autumn colours, 0 to 1; None without seasons.
+    """The day that it is for plants (n, 2), and where they stand among autumn colors, 0 to 1; None without seasons.
 
     Parameters
     ----------
@@ -204,9 +204,9 @@ class Stages(Arrays):
     size : (n,) float64
         Over that in summer.
     fresh, turned, dead : (n,) float64
-        How far each has the fresh colour, then its colour of autumn, and that of dead leaves.
+        How far each has the fresh color, then its color of autumn, and that of dead leaves.
     tint : (n,) float64
-        Its place among the autumn colours but for what is the plant's, 0 to 1.
+        Its place among the autumn colors but for what is the plant's, 0 to 1.
     """
 
     there: Mask
@@ -254,7 +254,7 @@ def _springtime(year: np.void | Table, day: Floats, deviation: Floats) -> tuple[
 def _autumntime(year: np.void | Table, day: Floats, turns: Floats, falls: Floats) -> tuple[Mask, Floats]:
     """Whether leaves still hang, and how far they have turned; likewise."""
     since = day - year["turn"] - year["turn_spread"] * turns
-    turned = np.where(year["colours"] > 0, smoothstep(since / np.maximum(year["turning"], 1e-6) + 0.5), 0.0)
+    turned = np.where(year["colors"] > 0, smoothstep(since / np.maximum(year["turning"], 1e-6) + 0.5), 0.0)
     return since < year["fall"] + year["fall_spread"] * falls, turned
 
 
@@ -273,10 +273,10 @@ def leaf_table(leaf: LeafYear | None) -> Floats:
     arrived, size, fresh = _springtime(year, days[:, None], finer)
     hangs, turned = _autumntime(year, days[:, None, None], some[:, None], some)
     number, lengths, area, young = ((arrived * v).mean(axis=1) for v in (1.0, size, size**2, size**2 * fresh))
-    held, coloured = hangs.mean(axis=(1, 2)), (hangs * turned).mean(axis=(1, 2))
+    held, colored = hangs.mean(axis=(1, 2)), (hangs * turned).mean(axis=(1, 2))
     gone = leaf.kept * (1.0 - number * held)  # and hangs on
     sums = (number * held + gone, lengths * held + gone, area * held + gone)
-    out = np.stack([*sums, young * (held - coloured), area * coloured, gone])
+    out = np.stack([*sums, young * (held - colored), area * colored, gone])
     out *= leaf.turnover
     out[:3] += 1.0 - leaf.turnover
     return out
@@ -312,18 +312,18 @@ def expected_of(leaf: LeafYear | None, days: Floats, column: int) -> Floats:
     return expected(leaf_table(leaf)[None], origin, np.zeros(len(days), np.int64), days, [column])[0]
 
 
-def autumn_colours(year: Table, hue: Floats, tint: Floats) -> Floats:
-    """Autumn colours (n, 3) of leaves, from their years (n,) or (1,), the hues (n,) of plants and their own tints."""
-    number = np.maximum(year["colours"], 1)
+def autumn_colors(year: Table, hue: Floats, tint: Floats) -> Floats:
+    """Autumn colors (n, 3) of leaves, from their years (n,) or (1,), the hues (n,) of plants and their own tints."""
+    number = np.maximum(year["colors"], 1)
     place = (1.0 - _OF_PLANT) * tint + _OF_PLANT * hue
     which = np.minimum((place * number).astype(np.int64), number - 1)
     autumn = year["autumn"]
     return autumn[0][which] if len(autumn) == 1 else autumn[np.arange(len(which)), which]
 
 
-def mean_autumn_colours(year: Table, hue: Floats) -> Floats:
+def mean_autumn_colors(year: Table, hue: Floats) -> Floats:
     """Means (n, 3) of the same over the leaves of plants with hues (n,)."""
-    number = np.maximum(year["colours"], 1)[:, None]
+    number = np.maximum(year["colors"], 1)[:, None]
     first = (_OF_PLANT * hue)[:, None]
     edges = np.arange(MAX_AUTUMN + 1) / number
     inside = np.clip(edges, first, first + 1.0 - _OF_PLANT)
@@ -332,7 +332,7 @@ def mean_autumn_colours(year: Table, hue: Floats) -> Floats:
 
 
 def in_season(summer: Floats, fresh: Floats, stages: Stages, autumn: Floats, dry: Floats) -> Floats:
-    """Colours (n, 3) of leaves at their stages, from those that they have when they are at the end of each."""
+    """Colors (n, 3) of leaves at their stages, from those that they have when they are at the end of each."""
     out = summer + stages.fresh[:, None] * (fresh - summer)
     out += stages.turned[:, None] * (autumn - out)
     out += stages.dead[:, None] * (dry - out)

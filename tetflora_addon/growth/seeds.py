@@ -19,21 +19,21 @@ class Seeds(Arrays):
     Attributes
     ----------
     identifiers : tuple of str
-        Species that ``species`` counts through, as in the catalogue; in a scene, kinds of plants.
+        Species that ``species`` counts through, as in the catalog; in a scene, kinds of plants.
     species : (n,) int32
         Index into ``identifiers``.
     seed : (n,) int64
         Random seed of each plant; any value.
     position : (n, 3) float64
-        Where the trunk leaves the ground, metres.
+        Where the trunk leaves the ground, meters.
     frame : (n, 3, 3) float64
         Rotation of each plant; its columns are the plant's axes in world space, +z along the upright trunk.
     scale : (n,) float64
         Uniform scale, greater than zero.
     crown : (n, 5) float64 or None
-        Crown forms, see `crown_forms`; None where all plants are as described.
+        Crown shapes, see `crown_shapes`; None where all plants are as described.
     motion : (n, 6) float64 or None
-        How plants move as a whole: metres a second, then the rotation vector about their foot, radians a second. None
+        How plants move as a whole: meters a second, then the rotation vector about their foot, radians a second. None
         where all stand still.
     """
 

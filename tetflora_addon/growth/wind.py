@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Wind: how far branches bend and leaves turn at a moment, as a function of their keys, their places and the time.
 
-A branch turns by equal parts at its base and at each joint, towards where the wind pushes it: so it bends, stays as
+A branch turns by equal parts at its base and at each joint, toward where the wind pushes it: so it bends, stays as
 long as it is, and carries what grows on it along. It leans by a mean, more so in gusts, which travel over the land with
 the wind, and sways about that at its natural frequency. Each order adds its own movement, slow at the trunk and quick
 at the twigs, as in "Physically Guided Animation of Trees" (Habel, Kusternig and Wimmer, 2009); that branches which
@@ -32,7 +32,7 @@ from .rows import SPUR_ORDER, with_columns
 #: power of the ratio; plants' wood is not the same everywhere, and has grown in the wind (1.5 looks right).
 _LEAN, _SLENDER, _POWER, _LEAN_LIMITS = 0.03, 60.0, 1.5, (0.01, 0.45)
 _OVER_TRUNK = np.array([1.0, 3.0, 5.0, 6.0])
-#: Metres a second at which the lean is that. Drag grows no faster than the speed where leaves and twigs give way
+#: Meters a second at which the lean is that. Drag grows no faster than the speed where leaves and twigs give way
 #: (de Langre, "Effects of Wind on Plants", 2008), and slower in a storm.
 _STRONG, _STORM = 10.0, 30.0
 #: Frequency of a cantilever, 1.875² / 4π √(E / ρ) radius / length² for wood of 8 GPa and 900 kg/m³ (Euler and
@@ -42,13 +42,13 @@ _SPEED_OF_BENDING, _LOADED, _RATES = 834.0, 0.4, (0.1, 2.5)
 _SWAY = np.array([0.5, 0.5, 0.25])
 _SWAY_RATES = np.array([1.0, 1.13, 1.29])  # over the natural frequency, or all would move on ellipses
 _SWAY_DRAWS = (Draw.SWAY_ALONG, Draw.SWAY_ACROSS, Draw.SWAY_UP)
-#: Frequencies of gusts in hertz, weights, and cycles a metre across the wind.
+#: Frequencies of gusts in hertz, weights, and cycles a meter across the wind.
 _GUST_RATES = np.array([0.06, 0.17, 0.43])
 _GUST_WEIGHTS = np.array([0.5, 0.3, 0.2])
 _GUST_ACROSS = np.array([0.004, -0.013, 0.031])
-#: Sine of the angle by which leaves flutter at `_STRONG`, and the rate in hertz of a leaf of so many metres.
+#: Sine of the angle by which leaves flutter at `_STRONG`, and the rate in hertz of a leaf of so many meters.
 _FLUTTER, _FLUTTER_MOST, _FLUTTER_RATE, _FLUTTER_SIZE = 0.22, 0.45, 3.0, 0.06
-#: Cycles by which plants drawn by hand are apart for each metre between them: their branches have no key in common.
+#: Cycles by which plants drawn by hand are apart for each meter between them: their branches have no key in common.
 _APART = np.array([0.37, 0.23, 0.0])
 
 #: Seconds between two looks: the velocity is that of the instant, as near as single precision tells.
@@ -59,14 +59,14 @@ AIR_DTYPE = np.dtype(
     + [("axes", np.float64, (3, 3)), ("origin", np.float64, (3,))]
 )
 """The wind: seconds, period after which all repeats (0: never), seconds between the two looks that tell how fast
-things move (0: not needed), metres a second, fraction by which gusts are stronger or
-weaker, as rows where it blows to, across that, and up, and where in the world positions are counted from, metres."""
+things move (0: not needed), meters a second, fraction by which gusts are stronger or
+weaker, as rows where it blows to, across that, and up, and where in the world positions are counted from, meters."""
 
 WIND_COLUMNS = [("lean", np.float64), ("pace", np.float64), ("flutter", np.float64), ("flutter_rate", np.float64)] + [
     ("air", AIR_DTYPE)
 ]
-"""``lean`` is the mean turn of a branch's tip, radians (of plants drawn by hand: for each metre above ground at scale
-1); ``pace`` the natural frequency times the length, hertz metres (likewise: hertz at scale 1); ``flutter`` the largest
+"""``lean`` is the mean turn of a branch's tip, radians (of plants drawn by hand: for each meter above ground at scale
+1); ``pace`` the natural frequency times the length, hertz meters (likewise: hertz at scale 1); ``flutter`` the largest
 sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency, hertz."""
 
 
@@ -85,7 +85,7 @@ class Wind:
     moving : bool
         Whether vertices shall have velocities.
     origin : tuple of float
-        Where in the world positions are counted from, metres.
+        Where in the world positions are counted from, meters.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def moment(rows: Table) -> float:
 
 
 def widest_sway(rows: Table) -> Floats:
-    """Largest turn (...) of tips of branches of rows (...) at any time, radians (for those drawn by hand by metre)."""
+    """Largest turn (...) of tips of branches of rows (...) at any time, radians (for those drawn by hand by meter)."""
     if not is_windy(rows):
         return np.zeros(rows.shape)
     most = np.linalg.norm(_SWAY + [1, 0, 0])
@@ -187,7 +187,7 @@ def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:
     """Rotation vectors (n, 3), radians, of branches' tips against their bases.
 
     For plants drawn by hand ``branches`` are the whole plants: where they stand, and which way is up; what comes out is
-    for each metre of height at scale 1.
+    for each meter of height at scale 1.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:
         force[axis] = amplitude * np.sin(2 * np.pi * _cycles(air, rate * quicker, ahead, uniform(key, draw) + place))
     force[0] += 1.0
     force *= rows["lean"][row] * gusts(rows, branches.position, ahead)
-    # Towards the force by an angle that is largest where it comes from the side.
+    # Toward the force by an angle that is largest where it comes from the side.
     return cross(branches.frame[:, :, 2], force.T @ air["axes"])
 
 
@@ -271,7 +271,7 @@ def rotation_vectors(turn: Floats) -> Floats:
     return vector * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 1.0)[:, None]
 
 
-def leant(points: Floats, up: Floats, turn: Floats) -> Floats:
+def leaned(points: Floats, up: Floats, turn: Floats) -> Floats:
     """Points of plants drawn by hand, bent over: all at one height turn alike, so that nothing comes apart.
 
     Parameters
@@ -281,7 +281,7 @@ def leant(points: Floats, up: Floats, turn: Floats) -> Floats:
     up : (n, 3) float64
         Unit vectors along the plants' upright axes.
     turn : (n, 3) float64
-        Rotation vector across ``up`` for each metre of height.
+        Rotation vector across ``up`` for each meter of height.
 
     Returns
     -------

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Floats, Integers
 from ..errors import SpeciesError
 from .outlines import Blade, simplified, traced
-from .surfaces import LeafSurface, drawn, joined, surface, tube
+from .surfaces import LeafSurface, joined, surface, tube, variant_offsets
 
 #: Tolerance of the outline that all others are taken from.
 FINEST = 2e-4
@@ -180,7 +180,9 @@ def bend(blade: Blade, flat: Floats, amount: float = 1.0) -> Floats:
     """
     x, y = flat[:, 0], flat[:, 1]
     # Of each variant (k, 1), from -1 to 1.
-    lean, larger, folded, curled, waved, phase, turned, cupped = (amount * drawn(i)[:, None] for i in range(8))
+    lean, larger, folded, curled, waved, phase, turned, cupped = (
+        amount * variant_offsets(i)[:, None] for i in range(8)
+    )
     half = max(blade.width / 2.0, 1e-6)
     across = np.abs(x) / half
     wide = x * (1.0 + 0.06 * larger * np.sign(x) * 4.0 * np.clip(y * (1.0 - y), 0.0, 1.0))
@@ -202,10 +204,10 @@ def _petiole(blade: Blade, rows: int) -> LeafSurface:
     """The petiole: a tube from the twig to the blade, a little bent; its texture lies below that of the blade."""
     rings = 4 if rows > 8 else 2
     along = np.linspace(0.0, 1.0, rings)
-    points = np.zeros((len(drawn(0)), rings, 3))
+    points = np.zeros((len(variant_offsets(0)), rings, 3))
     points[..., 1] = blade.petiole * along
-    points[..., 2] = -0.1 * blade.petiole * np.sin(np.pi * along) * (1.0 + 0.5 * drawn(9)[:, None])
-    points[..., 0] = 0.06 * blade.petiole * np.sin(np.pi * along) * drawn(10)[:, None]
+    points[..., 2] = -0.1 * blade.petiole * np.sin(np.pi * along) * (1.0 + 0.5 * variant_offsets(9)[:, None])
+    points[..., 0] = 0.06 * blade.petiole * np.sin(np.pi * along) * variant_offsets(10)[:, None]
     radius = _PETIOLE * (1.0 - blade.petiole) * np.linspace(1.25, 0.8, rings) * min(1.0, 3.0 * blade.width)
     made = tube(points, radius, 5 if rows > 8 else 3)
     made.uv[:] = np.stack([made.uv[:, 0], (made.uv[:, 1] - 1.0) * blade.petiole], axis=1)

@@ -155,7 +155,7 @@ def _middles(points: Floats, part: Integers) -> Floats:
     return np.stack([np.bincount(part[own], axis[own]) for axis in points.T], axis=1) / number[:, None]
 
 
-#: What the colour of the leaf is times that of spines, straw on green, and of the felt on areoles.
+#: What the color of the leaf is times that of spines, straw on green, and of the felt on areoles.
 _SPINE, _FELT = (3.6, 1.9, 2.7), (1.7, 0.85, 0.9)
 #: Height and radius of an areole over the distance of areoles, sides of it, and of a spine.
 _CUSHION, _SIDES, _EDGES = (0.07, 0.11), 5, 3
@@ -178,7 +178,7 @@ def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel,
     LeafModel
         Spines and areoles come after its own faces.
     tint : (f, 3) float32
-        What the colour of the leaf is times that of each face.
+        What the color of the leaf is times that of each face.
     """
     place, normal = _areoles(model, part, spines.distance)
     height, wide = (spines.distance * size for size in _CUSHION)
@@ -197,10 +197,10 @@ def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel,
         root, root + length[:, None] * along, across, cross(along, across), spines.thickness / 2, _EDGES
     )
     made, tints = model, [np.ones((model.polygons, 3))]
-    for points, colour in ((felt, _FELT), (needles, _SPINE)):
+    for points, color in ((felt, _FELT), (needles, _SPINE)):
         far = np.linalg.norm(points, axis=-1, keepdims=True)  # none reaches farther than the model, as bounds know it
         made = _with_triangles(made, points * np.minimum(model.reach / np.maximum(far, 1e-300), 1.0))
-        tints.append(np.tile(colour, (len(points), 1)))
+        tints.append(np.tile(color, (len(points), 1)))
     return made, np.concatenate(tints).astype(np.float32)
 
 

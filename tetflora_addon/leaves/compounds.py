@@ -11,7 +11,7 @@ import numpy as np
 from ..parameters import described, limited
 from .blades import blade_surface
 from .outlines import Blade
-from .surfaces import VARIANTS, LeafSurface, drawn, joined, tube
+from .surfaces import VARIANTS, LeafSurface, joined, tube, variant_offsets
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ def compound_surface(compound: Compound, tolerance: float, amount: float = 1.0, 
     blade = blade_surface(compound.leaflet, tolerance / compound.length, amount)
     parts, petals = [], compound.around > 0
     for i in range(len(place)):
-        lean = angle[i] + 0.06 * amount * drawn(20 + i)
-        rise = np.arctan(compound.cup) + 0.1 * amount * drawn(60 + i)
+        lean = angle[i] + 0.06 * amount * variant_offsets(20 + i)
+        rise = np.arctan(compound.cup) + 0.1 * amount * variant_offsets(60 + i)
         cos, sin, high, flat = np.cos(lean), np.sin(lean), np.sin(rise), np.cos(rise)
         along = np.stack([sin * flat, cos * flat, high], axis=1)
         across = np.stack([cos, -sin, np.zeros(VARIANTS)], axis=1)
         up = np.cross(across, along)
-        size = length[i] * (1.0 + 0.05 * amount * drawn(100 + i))
+        size = length[i] * (1.0 + 0.05 * amount * variant_offsets(100 + i))
         frame = np.stack([factor * across, along, up], axis=2) * size[:, None, None]
         at = np.zeros((VARIANTS, 3))
         at[:, 1], at[:, 2] = place[i], 0.0 if petals else -compound.curl * place[i] ** 2

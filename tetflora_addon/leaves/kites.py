@@ -133,9 +133,9 @@ def _sheet(points: Floats, area: Floats) -> tuple[Floats, float, float]:
     if np.linalg.norm(mean) < whole / 2:
         return np.array([0.0, 0.0, 1.0]), 0.0, np.inf
     normal, weight = mean / np.linalg.norm(mean), area / whole
-    centred = points - (weight[:, None] * points.mean(axis=1)).sum(axis=0)
-    across = np.cross(_longer_axis(centred, weight, normal), normal)
-    side = np.sign(centred.mean(axis=1) @ across)
+    centered = points - (weight[:, None] * points.mean(axis=1)).sum(axis=0)
+    across = np.cross(_longer_axis(centered, weight, normal), normal)
+    side = np.sign(centered.mean(axis=1) @ across)
     normals = vectors / np.where(area == 0.0, 1.0, area)[:, None]
     fold = float(np.clip(-(weight * side * (normals @ across)).sum(), -0.9, 0.9))
     expected = np.sqrt(1.0 - fold**2) * normal - (fold * side)[:, None] * across

@@ -35,7 +35,7 @@ _FINER = 0.75
 _DEARER = 1.35
 #: Faces with less than this as texture coordinate v, negative, are stems; their tints, of petioles and of shoots.
 _STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
-#: Steps of needles towards an area, the relative thickness from which on one tells how it grows with the thickness, and
+#: Steps of needles toward an area, the relative thickness from which on one tells how it grows with the thickness, and
 #: the power by which it is taken to grow before: shoots stay, and needles hide more of each other.
 _FITS, _FITTED, _GROWTH = 3, 0.01, 0.75
 #: Factors of thickness and width at most, and that of a width by which is seen how the area grows with it.
@@ -63,7 +63,7 @@ class LeafLevel:
     error : float
         Largest distance of the margin from that of the shape, in lengths of the leaf.
     tint : (f, 3) float32
-        What the colour of a leaf is times that of each face: shoots are brown, petioles pale.
+        What the color of a leaf is times that of each face: shoots are brown, petioles pale.
     """
 
     model: LeafModel
@@ -176,7 +176,7 @@ def _brighter(shape: Shape, made: LeafSurface) -> float:
 
     A shoot sends back w (1 - p) / (1 - p w) where its needles send back w: p of what one scatters meets another
     (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform broadleaved and coniferous
-    canopies", 2005). The colour of a species is that of its shoots.
+    canopies", 2005). The color of a species is that of its shoots.
     """
     again = 1.0 - shown_area(shape, made) / float(made.areas().mean())
     return min(1.0 / (1.0 - again * (1.0 - _SCATTERED)), _BRIGHTEST)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sample leaves: a small polygon list that is copied to every leaf of a plant.
 
-A leaf model lies with its base at the origin, its midrib along +y, one unit long, its upper side towards +z.
+A leaf model lies with its base at the origin, its midrib along +y, one unit long, its upper side toward +z.
 """
 
 from __future__ import annotations
@@ -173,9 +173,9 @@ def mean_silhouette(model: LeafModel) -> float:
     corners = fans(model)[1]
     number = np.arange(_DIRECTIONS)
     total = 0.0
-    for towards in spiral((number + 0.5) / _DIRECTIONS, number, GOLDEN_ANGLE):
-        across = perpendicular(towards[None])[0]
-        flat = corners @ np.stack([across, np.cross(towards, across)], axis=1)
+    for toward in spiral((number + 0.5) / _DIRECTIONS, number, GOLDEN_ANGLE):
+        across = perpendicular(toward[None])[0]
+        flat = corners @ np.stack([across, np.cross(toward, across)], axis=1)
         low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
         # In cells, the middles of which are whole numbers.
         flat = (flat - low) * (_CELLS / np.maximum(high - low, 1e-12)) - 0.5
@@ -284,15 +284,15 @@ def _outlined(half: list[tuple[float, float]], fold: float, droop: float) -> Lea
 
 def _flower() -> LeafModel:
     """Quads around a point half a unit along: an open flower that looks up, its petals raised at their tips."""
-    petals, half_width, cup, centre = 5, 0.24, 0.12, np.array([0.0, 0.5, 0.0])
+    petals, half_width, cup, center = 5, 0.24, 0.12, np.array([0.0, 0.5, 0.0])
     turn = 2 * np.pi * (np.arange(petals) + 0.5) / petals - np.pi / 2
     along = np.stack([np.cos(turn), np.sin(turn), np.zeros(petals)], axis=1)
     across = np.stack([-along[:, 1], along[:, 0], along[:, 2]], axis=1)
     rise = np.array([0.0, 0.0, cup])
-    right, left = (centre + 0.36 * along + side * across + 0.9 * rise for side in (-half_width, half_width))
-    corners = np.stack([right, centre + 0.52 * along + 0.7 * rise, left], axis=1)
+    right, left = (center + 0.36 * along + side * across + 0.9 * rise for side in (-half_width, half_width))
+    corners = np.stack([right, center + 0.52 * along + 0.7 * rise, left], axis=1)
     faces = [[0, 3 * i + 1, 3 * i + 2, 3 * i + 3] for i in range(petals)]
-    return leaf_model(np.concatenate([centre[None], corners.reshape(-1, 3)]), faces)
+    return leaf_model(np.concatenate([center[None], corners.reshape(-1, 3)]), faces)
 
 
 _LOBED = [(0.17, 0.2), (0.1, 0.34), (0.28, 0.5), (0.16, 0.62), (0.28, 0.8), (0.14, 0.96)]

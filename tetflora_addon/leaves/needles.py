@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..parameters import limited
-from .surfaces import VARIANTS, LeafSurface, drawn, joined, surface, tube
+from .surfaces import VARIANTS, LeafSurface, joined, surface, tube, variant_offsets
 
 _GOLDEN_ANGLE = np.radians(137.508)
 #: What is not seen of the gaps between needles, of their distance along the shoot.
@@ -44,9 +44,7 @@ class Needles:
     angle: float = limited(50.0, 0, 120, "angle between shoot and needle at the base of the shoot, degrees")
     angle_tip: float = limited(25.0, 0, 120, "the same at its tip")
     flat: float = limited(0.3, 0, 1, "0: needles all around the shoot, 1: in one plane")
-    bend: float = limited(
-        0.12, -0.5, 0.5, "how far needles bend towards the tip of the shoot, fraction of their length"
-    )
+    bend: float = limited(0.12, -0.5, 0.5, "how far needles bend toward the tip of the shoot, fraction of their length")
     shoot: float = limited(0.9, 0.01, 1, "length of a shoot that bears them")
     shoots: int = limited(1, 1, 12, "shoots, spread as a fan")
     spread: float = limited(0.0, 0, 180, "angle between the outer shoots of a fan, degrees")
@@ -85,7 +83,7 @@ def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Le
     place = (node + 0.5 + 0.4 * np.stack([np.sin(i * 7.1 + 3.0 * k + number) for k in range(VARIANTS)])) / (last + 1)
     angle = np.radians(needles.angle + (needles.angle_tip - needles.angle) * place)
     angle = angle * (1.0 + 0.18 * np.sin(5.3 * i + 1.7 * np.arange(VARIANTS)[:, None]))
-    turn = node * _GOLDEN_ANGLE + 1.3 * drawn(3 + number)[:, None] + 0.25 * np.sin(11.7 * i)
+    turn = node * _GOLDEN_ANGLE + 1.3 * variant_offsets(3 + number)[:, None] + 0.25 * np.sin(11.7 * i)
     side, up = np.cos(turn), np.sin(turn) * (1.0 - needles.flat)
     size = np.maximum(np.hypot(side, up), 1e-9)
     zero = np.zeros_like(side)
@@ -102,8 +100,8 @@ def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Le
     length = needles.length * (1.0 + 0.15 * np.sin(3.1 * i + np.arange(VARIANTS)[:, None]))
     length = length * np.clip(0.75 + 1.5 * np.minimum(place, 1.15 - place), 0.0, 1.0)
     start = place[..., None] * needles.shoot * axis
-    towards = axis - (direction * axis).sum(-1, keepdims=True) * direction
-    made = [_needles(start, direction, towards, length, needles, tolerance, factor)]
+    toward = axis - (direction * axis).sum(-1, keepdims=True) * direction
+    made = [_needles(start, direction, toward, length, needles, tolerance, factor)]
     rings = 2 if tolerance > _FLAT else 5
     stem = np.zeros((VARIANTS, rings, 3))
     stem[..., 1] = np.linspace(0.0, needles.shoot, rings)
@@ -114,17 +112,17 @@ def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Le
 
 
 def _needles(
-    start: Floats, direction: Floats, towards: Floats, length: Floats, needles: Needles, tolerance: float, factor: float
+    start: Floats, direction: Floats, toward: Floats, length: Floats, needles: Needles, tolerance: float, factor: float
 ) -> LeafSurface:
-    """Needles from starts (k, n, 3) in directions, of lengths (k, n), bent towards vectors (k, n, 3)."""
+    """Needles from starts (k, n, 3) in directions, of lengths (k, n), bent toward vectors (k, n, 3)."""
     flat, three = tolerance > _FLAT, tolerance > _THREE
     along, wide = next((np.array(along), np.array(wide)) for error, along, wide in _PROFILES if tolerance > error)
     rings, (variants, count) = len(along), length.shape
     reach = length[..., None, None]
     axis = start[:, :, None] + reach * (
-        along[:, None] * direction[:, :, None] + needles.bend * (along**2)[:, None] * towards[:, :, None]
+        along[:, None] * direction[:, :, None] + needles.bend * (along**2)[:, None] * toward[:, :, None]
     )
-    across = np.cross(direction, towards + 1e-3)
+    across = np.cross(direction, toward + 1e-3)
     across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)
     other = np.cross(across, direction)
     radius = factor * needles.thickness / 2.0 * wide

@@ -215,7 +215,7 @@ class Blade:
         return length * ramp, np.stack([np.sin(angle), np.cos(angle)], axis=1)
 
     def _teeth(self, s: Floats) -> Floats:
-        """Heights (n,) of teeth over the mean margin, lower towards both ends."""
+        """Heights (n,) of teeth over the mean margin, lower toward both ends."""
         if not self.teeth:
             return np.zeros_like(s)
         along = self._along(s)

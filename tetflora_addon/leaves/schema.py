@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SpeciesError, shown
+from ..errors import SpeciesError, quoted
 from ..parameters import FileReader
 from .blades import check_outline
 from .bodies import closed_parts

@@ -14,12 +14,12 @@ from ..arrays import Floats, Integers, Mask
 
 #: Leaves of a form that are bent, folded and grown in different ways.
 VARIANTS = 6
-#: Steps towards an area at most, and the relative difference from which on it is reached.
+#: Steps toward an area at most, and the relative difference from which on it is reached.
 _FITS, _FITTED = 12, 1e-7
 _GOLDEN = 0.6180339887498949
 
 
-def drawn(number: int) -> Floats:
+def variant_offsets(number: int) -> Floats:
     """Even numbers (k,) from -1 to 1, one for each variant; others for each number that they are drawn by."""
     step = (_GOLDEN * (number + 1) ** 2 + 0.31 * number) % 1.0
     return 2.0 * ((np.arange(VARIANTS) * (_GOLDEN + 0.4 * step) + step) % 1.0) - 1.0

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask
 from ..camera.camera import Camera
-from ..refinement.rasterise import buffer_size, image_places, occluder_depth, tetrahedron_fragments
+from ..refinement.rasterize import buffer_size, image_places, occluder_depth, tetrahedron_fragments
 from ..refinement.visibility import OPAQUE, depth_in_front
 
 #: Distance behind polygons at which their shadows begin, in pixels of the buffer: none shadows what lies on it.
 BIAS = 1.5
 #: Points that are looked up together; some 500 bytes each.
-POINTS_AT_ONCE = 1 << 18
+POINT_BATCH = 1 << 18
 #: Maximum number of parts along each side of a sheet, and maximum fraction of a pixel that a sheet covers.
 _MOST_CUTS, _MOST_COVERED = 64, 0.98
 
@@ -35,7 +35,7 @@ class _Taps:
 
     pixel: Integers
     weight: Floats
-    metres: Floats
+    meters: Floats
 
 
 class LightBuffer:
@@ -48,11 +48,11 @@ class LightBuffer:
     resolution : int
         Longer side of the buffer, pixels.
     vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra that do not overlap, metres.
+        Positively oriented tetrahedra that do not overlap, meters.
     extinction : (n,) float64
         κ ≥ 0 along the light, 1/m.
     occluders : (t, 3, 3) float64, optional
-        Opaque triangles, metres.
+        Opaque triangles, meters.
     sheets : (m, 4, 3) float64, optional
         Corners of opaque facets or leaves, which count by the fraction of each pixel that they cover. Their numbers
         are n to n + m − 1, after the tetrahedra.
@@ -112,12 +112,12 @@ class LightBuffer:
         numbers, sheets = seen, sheets[seen]
         if not len(sheets):
             return
-        centre = sheets.mean(axis=1)
+        center = sheets.mean(axis=1)
         vector = np.cross(sheets[:, 2] - sheets[:, 0], sheets[:, 3] - sheets[:, 1]) / 2.0
         if self.camera.kind == "ORTHO":
             seen, pixel_area = np.abs(vector @ self.camera.frame[:, 2]), np.full(len(sheets), across**2)
         else:
-            away = centre - self.camera.position
+            away = center - self.camera.position
             distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
             seen = np.abs(np.sum(vector * away, axis=1)) / distance
             # Beside the middle of a flat view a pixel sees less of the sphere.
@@ -132,13 +132,13 @@ class LightBuffer:
             u, v = np.repeat(x, count), np.tile(x, count)
             weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
             part_covers = covered / count**2
-            alike, step = np.flatnonzero(cuts == count), max(POINTS_AT_ONCE // int(count) ** 2, 1)
+            alike, step = np.flatnonzero(cuts == count), max(POINT_BATCH // int(count) ** 2, 1)
             for start in range(0, len(alike), step):
                 some = alike[start : start + step]
                 points = np.einsum("kc,mcx->mkx", weights, sheets[some]).reshape(-1, 3)
-                owner, pixel, metres, fraction = self._gathered_parts(points, np.repeat(some, count**2), part_covers)
+                owner, pixel, meters, fraction = self._gathered_parts(points, np.repeat(some, count**2), part_covers)
                 depth = -np.log1p(-np.minimum(fraction, _MOST_COVERED))
-                yield numbers[owner].astype(np.int32), pixel.astype(np.int32), metres, np.zeros(len(owner)), depth
+                yield numbers[owner].astype(np.int32), pixel.astype(np.int32), meters, np.zeros(len(owner)), depth
 
     def _gathered_parts(
         self, points: Floats, owner: Integers, covered: Floats
@@ -154,8 +154,8 @@ class LightBuffer:
             owner * (self.width * self.height) + nearest, return_index=True, return_inverse=True
         )
         fraction = np.bincount(own.ravel(), covered[owner], len(key))
-        metres = np.bincount(own.ravel(), taps.metres, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
-        return owner[first], nearest[first], metres, fraction
+        meters = np.bincount(own.ravel(), taps.meters, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
+        return owner[first], nearest[first], meters, fraction
 
     def _near_view(self, sheets: NDArray[np.floating], margin: float) -> Mask:
         """Sheets (m,) that may reach into a sun's view, which may show part of the scene; for other lights all."""
@@ -182,7 +182,7 @@ class LightBuffer:
         Parameters
         ----------
         points : (m, 3) float64
-            Metres, world space.
+            Meters, world space.
         cells : (m,) int
             Tetrahedron that holds each or sheet on which it lies, −1 where there is none.
         own_depth : (m,) float64
@@ -197,8 +197,8 @@ class LightBuffer:
             Whether the point is in view.
         """
         result, seen = np.ones(len(points)), np.zeros(len(points), bool)
-        for start in range(0, len(points), POINTS_AT_ONCE):
-            part = slice(start, start + POINTS_AT_ONCE)
+        for start in range(0, len(points), POINT_BATCH):
+            part = slice(start, start + POINT_BATCH)
             taps, inside = self._taps(points[part])
             depth = exact = own_depth[part][inside][:, None]
             if len(self):
@@ -208,7 +208,7 @@ class LightBuffer:
                 # Small ones may overlap; what begins before the last fragment was counted in full.
                 counted = np.where(own < place, self._depth[own], self._partly(own, taps))
                 drawn = np.where(has & (own <= place), counted, 0.0)
-                # Where the point's own tetrahedron does not reach into a pixel, its neighbours do, or nothing is there.
+                # Where the point's own tetrahedron does not reach into a pixel, its neighbors do, or nothing is there.
                 depth = np.maximum(np.maximum(depth - drawn, 0.0) + np.minimum(drawn, exact), exact)
             some = np.flatnonzero(inside) + start
             result[some] = (np.exp(-depth) * taps.weight).sum(axis=1)
@@ -231,8 +231,8 @@ class LightBuffer:
         if not len(self):
             return result
         emitted, arriving = self._emitted, self._arriving
-        for start in range(0, len(points), POINTS_AT_ONCE):
-            taps, inside = self._taps(points[start : start + POINTS_AT_ONCE])
+        for start in range(0, len(points), POINT_BATCH):
+            taps, inside = self._taps(points[start : start + POINT_BATCH])
             place, found = self._last_before(taps)
             through = np.exp(-(self._up_to(place, taps) - self._before[place]))[..., None]
             light = arriving[place] * through + emitted[place] * (1.0 - through)
@@ -264,13 +264,13 @@ class LightBuffer:
         before[later] = light[later - 1]
         return before
 
-    def _key(self, pixel: NDArray, metres: Floats) -> Floats:
-        return pixel + np.clip(metres / self._reach, 0.0, 1.0) * 0.999999
+    def _key(self, pixel: NDArray, meters: Floats) -> Floats:
+        return pixel + np.clip(meters / self._reach, 0.0, 1.0) * 0.999999
 
     def _taps(self, points: Floats) -> tuple[_Taps, Mask]:
         """Pixels around those points (k,) that are in view, and which these are (m,)."""
         size = np.array([self.width, self.height])
-        place, depth, metres = image_places(self.camera, points, size)
+        place, depth, meters = image_places(self.camera, points, size)
         inside = (depth >= self.camera.near) & (place >= -1e-9).all(axis=1) & (place <= size + 1e-9).all(axis=1)
         place = place[inside] - 0.5
         low = np.floor(place)
@@ -282,11 +282,11 @@ class LightBuffer:
                 row = np.clip(low[:, 1] + up, 0, self.height - 1).astype(np.int64)
                 pixels.append(row * self.width + column)
                 weights.append(np.abs(1 - aside - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1]))
-        return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), metres[inside]), inside
+        return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), meters[inside]), inside
 
     def _last_before(self, taps: _Taps) -> tuple[Integers, Mask]:
         """The last fragment (k, 4) that begins in front of each point in each pixel, and whether there is one."""
-        key = self._key(taps.pixel, taps.metres[:, None])
+        key = self._key(taps.pixel, taps.meters[:, None])
         place = np.searchsorted(self._order_key, key.ravel(), side="right").reshape(key.shape) - 1
         found = place >= 0
         place = np.maximum(place, 0)
@@ -301,7 +301,7 @@ class LightBuffer:
 
     def _partly(self, place: Integers, taps: _Taps) -> Floats:
         """Optical depth of fragments as far as it lies in front of the points."""
-        inside = (taps.metres[:, None] - self._entry[place]) / np.maximum(self._thickness[place], 1e-9)
+        inside = (taps.meters[:, None] - self._entry[place]) / np.maximum(self._thickness[place], 1e-9)
         return self._depth[place] * np.clip(inside, 0.0, 1.0)
 
     def _up_to(self, place: Integers, taps: _Taps) -> Floats:

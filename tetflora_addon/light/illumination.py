@@ -21,17 +21,17 @@ from ..refinement.lights import Light
 from ..tetrahedra.geometry import volume
 from . import scattering
 from .buffers import LightBuffer
-from .receivers import Clouds, Sheets
+from .receivers import MediumCells, SurfaceElements
 from .sources import World, arriving
 
 #: Maximum ratio of an order of scattering to the one before: 1 would never end.
 _MOST_AGAIN = 0.97
 #: Facets that are shaded together; some 1 kB each.
-_AT_ONCE = 1 << 16
+_BATCH = 1 << 16
 
 
 @dataclass(frozen=True)
-class Lit:
+class LampBuffers:
     """A lamp and its buffers: one, six all around, or none where nothing blocks its light."""
 
     light: Light
@@ -43,23 +43,23 @@ class Illumination:
 
     Attributes
     ----------
-    clouds : Clouds of n
-    sheets : Sheets
+    clouds : MediumCells of n
+    sheets : SurfaceElements
         What blocks light in place of some of the clouds.
-    lamps : list of Lit
+    lamps : list of LampBuffers
         Area lights are several of them.
     ambient : (n, 4, 9, 3) float32
-        Light from the sky and from what is lit, at the tetrahedra's key points, by harmonic and colour.
+        Light from the sky and from what is lit, at the tetrahedra's key points, by harmonic and color.
     """
 
     def __init__(
         self,
-        clouds: Clouds,
-        sheets: Sheets,
-        lamps: list[Lit],
+        clouds: MediumCells,
+        sheets: SurfaceElements,
+        lamps: list[LampBuffers],
         sky: list[LightBuffer | None],
         world: World,
-        fewer: tuple[Sheets, Integers],
+        fewer: tuple[SurfaceElements, Integers],
     ) -> None:
         self.clouds, self.sheets, self.lamps = clouds, sheets, lamps
         # Sheets of the sky's buffers, and the number that each of ``sheets`` has among them.
@@ -81,7 +81,7 @@ class Illumination:
         Parameters
         ----------
         points : (m, 3) float64
-            Metres.
+            Meters.
         cells : (m,) int
             Tetrahedron (index into the clouds) that holds each, −1 for none.
         sheets : (m,) int, optional
@@ -89,16 +89,16 @@ class Illumination:
 
         Yields
         ------
-        towards : (m, 3) float64
+        toward : (m, 3) float64
             Unit vectors to the lamp.
         irradiance : (m, 3) float64
             W/m² that arrive on a surface that faces it, shadows included.
         """
         for lit in self.lamps:
-            towards, light = arriving(lit.light, points)
+            toward, light = arriving(lit.light, points)
             if lit.buffers:
-                light = light * self._through(lit.buffers, points, cells, towards, sheets)[:, None]
-            yield towards, light
+                light = light * self._through(lit.buffers, points, cells, toward, sheets)[:, None]
+            yield toward, light
 
     def around(self, points: Floats, cells: Integers) -> Floats:
         """Light from all sides at points, as harmonics (m, 9, 3): sky, and what tetrahedra and polygons scatter.
@@ -120,15 +120,15 @@ class Illumination:
         """Irradiance (m, 3) of vertices or faces of meshes, with unit normals, on the side of the normals, W/m²."""
         cells = np.full(len(points), -1)
         result = scattering.irradiance(self.around(points, cells), normals)
-        for towards, light in self.direct(points, cells):
-            result += light * np.maximum(np.sum(normals * towards, axis=1), 0.0)[:, None]
+        for toward, light in self.direct(points, cells):
+            result += light * np.maximum(np.sum(normals * toward, axis=1), 0.0)[:, None]
         return result
 
     def facet_radiance(
         self,
-        centre: Floats,
+        center: Floats,
         normal: Floats,
-        colour: Floats,
+        color: Floats,
         transmission: Floats,
         cells: Integers,
         camera: Camera | None = None,
@@ -138,9 +138,9 @@ class Illumination:
 
         Parameters
         ----------
-        centre, normal : (m, 3) float64
-            Metres; unit vectors that point to the front.
-        colour : (m, 3) float64
+        center, normal : (m, 3) float64
+            Meters; unit vectors that point to the front.
+        color : (m, 3) float64
             Linear RGB.
         transmission : (m,) float64
             Fraction of the scattered light that passes through; 0 for bark.
@@ -156,15 +156,15 @@ class Illumination:
         front, back : (m, 3) float32
             Linear RGB, as a pixel shows it.
         """
-        front, back = np.zeros((2, len(centre), 3), np.float32)
-        for start in range(0, len(centre), _AT_ONCE):
-            part = slice(start, start + _AT_ONCE)
-            fractions = scattering.scattered_fractions(colour[part], transmission[part])
-            view = None if camera is None else to_eye(camera, centre[part])
-            sides = scattering.facet_ambient(normal[part], fractions, self.around(centre[part], cells[part]), view)
+        front, back = np.zeros((2, len(center), 3), np.float32)
+        for start in range(0, len(center), _BATCH):
+            part = slice(start, start + _BATCH)
+            fractions = scattering.scattered_fractions(color[part], transmission[part])
+            view = None if camera is None else to_eye(camera, center[part])
+            sides = scattering.facet_ambient(normal[part], fractions, self.around(center[part], cells[part]), view)
             on = None if sheets is None else sheets[part]
-            for towards, light in self.direct(centre[part], cells[part], on):
-                added = scattering.facet_direct(normal[part], fractions, towards, light, view)
+            for toward, light in self.direct(center[part], cells[part], on):
+                added = scattering.facet_direct(normal[part], fractions, toward, light, view)
                 sides = sides[0] + added[0], sides[1] + added[1]
             front[part], back[part] = sides
         return front, back
@@ -172,7 +172,7 @@ class Illumination:
     def cloud_radiance(
         self,
         points: Floats,
-        colour: Floats,
+        color: Floats,
         transmission: Floats,
         cells: Integers,
         camera: Camera,
@@ -184,7 +184,7 @@ class Illumination:
 
         Parameters
         ----------
-        points, colour, transmission, cells
+        points, color, transmission, cells
             As for `facet_radiance`.
         camera : Camera
         normal : (m, 3) float64, optional
@@ -195,10 +195,10 @@ class Illumination:
             As for `direct`.
         """
         result = np.zeros((len(points), 3), np.float32)
-        for start in range(0, len(points), _AT_ONCE):
-            part = slice(start, start + _AT_ONCE)
+        for start in range(0, len(points), _BATCH):
+            part = slice(start, start + _BATCH)
             fractions, view = (
-                scattering.scattered_fractions(colour[part], transmission[part]),
+                scattering.scattered_fractions(color[part], transmission[part]),
                 to_eye(camera, points[part]),
             )
             around = self.around(points[part], cells[part])
@@ -208,10 +208,10 @@ class Illumination:
                 axis = axis * np.where(np.sum(axis * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
                 planes = scattering.facet_ambient(axis, fractions, around, view)[0]
             on = None if sheets is None else sheets[part]
-            for towards, light in self.direct(points[part], cells[part], on):
-                particles += scattering.particle_direct(fractions, towards, light, view)
+            for toward, light in self.direct(points[part], cells[part], on):
+                particles += scattering.particle_direct(fractions, toward, light, view)
                 if plane is not None:
-                    planes = planes + scattering.facet_direct(axis, fractions, towards, light, view)[0]
+                    planes = planes + scattering.facet_direct(axis, fractions, toward, light, view)[0]
             weight = 0.0 if plane is None else plane[part][:, None]
             result[part] = (1.0 - weight) * particles + weight * planes
         return result
@@ -223,13 +223,13 @@ class Illumination:
         """
         cells = np.repeat(np.arange(len(self.clouds)), 4)
         c = self.clouds
-        points, means = c.key_points.reshape(-1, 3), (c.colour[cells], c.transmission[cells])
+        points, means = c.key_points.reshape(-1, 3), (c.color[cells], c.transmission[cells])
         return self.cloud_radiance(points, *means, cells, camera, c.normal[cells], c.plane[cells]).reshape(-1, 4, 3)
 
     def scatter(self, ground: Floats, orders: int) -> Iterator[float]:
         """Sample the sky at the key points, then scatter; the last step of `emission.light.shadow_steps`.
 
-        Light is reflected by polygons of colour ``ground`` (3,). So many ``orders`` are gathered one by one; the rest
+        Light is reflected by polygons of color ``ground`` (3,). So many ``orders`` are gathered one by one; the rest
         is their geometric series. Yields the fraction that is done.
         """
         count = len(self.clouds)
@@ -238,7 +238,7 @@ class Illumination:
         bright = scattering.irradiance(self._world.parts.sum(axis=0)[None], up)[0]
         for lit in self.lamps:
             if lit.light.kind == "SUN":
-                bright += lit.light.colour * max(-lit.light.direction[2], 0.0)
+                bright += lit.light.color * max(-lit.light.direction[2], 0.0)
         self._ground = np.asarray(ground, np.float64) * bright / np.pi
         if not count:
             return
@@ -269,11 +269,11 @@ class Illumination:
         return np.clip((weight @ last) / np.where(former > 0.0, former, np.inf), 0.0, _MOST_AGAIN)
 
     def _through(
-        self, buffers: list[LightBuffer], points: Floats, cells: Integers, towards: Floats, sheets: Integers | None
+        self, buffers: list[LightBuffer], points: Floats, cells: Integers, toward: Floats, sheets: Integers | None
     ) -> Floats:
         """Transmittance (m,) through the first of several views that sees each point."""
         empty = np.append(self.sheets.replaced, True)[cells]
-        own = np.where(empty, 0.0, self.clouds.own_depth(points, cells, towards))
+        own = np.where(empty, 0.0, self.clouds.own_depth(points, cells, toward))
         owner = np.where(empty, -1, cells) if sheets is None else np.where(sheets < 0, cells, sheets + len(self.clouds))
         result, waiting = np.exp(-own), np.ones(len(points), bool)
         for buffer in buffers:
@@ -290,10 +290,10 @@ class Illumination:
             return result
         if sheets is not None:
             sheets = np.append(self._number, -1)[sheets]
-        for part, buffer, towards in zip(self._world.parts, self._sky, scattering.DIRECTIONS, strict=True):
+        for part, buffer, toward in zip(self._world.parts, self._sky, scattering.DIRECTIONS, strict=True):
             through = np.ones(len(points))
             if buffer is not None:
-                through = self._through([buffer], points, cells, towards, sheets)
+                through = self._through([buffer], points, cells, toward, sheets)
             result += through[:, None, None] * part
         return result
 
@@ -307,8 +307,8 @@ class Illumination:
     def _from_clouds(self, points: Floats) -> Floats:
         """Light (m, 9, 3) that tetrahedra and polygons scatter."""
         result = np.zeros((len(points), scattering.HARMONICS, 3))
-        for buffer, towards in zip(self._sky, scattering.DIRECTIONS, strict=True):
+        for buffer, toward in zip(self._sky, scattering.DIRECTIONS, strict=True):
             if buffer is not None:
                 light = buffer.scattered(points)
-                result += scattering.harmonics(towards)[:, None] * light[:, None, :] * scattering.SOLID_ANGLE
+                result += scattering.harmonics(toward)[:, None] * light[:, None, :] * scattering.SOLID_ANGLE
         return result

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Mask
 from ..compiled.flora import Flora
-from ..proxies.microsurfaces import trapped
-from ..proxies.summaries import extinction_matrices, summarise
+from ..proxies.microsurfaces import recollision_albedo
+from ..proxies.summaries import extinction_matrices, summarize
 from ..refinement.loop import Refinement
 from ..tetrahedra.geometry import barycentric, barycentric_gradients, volume
 from .scattering import albedo
 
-#: How far the key points lie from the centroid towards the vertices. So placed, the mean over the four is that over
+#: How far the key points lie from the centroid toward the vertices. So placed, the mean over the four is that over
 #: the tetrahedron for anything that is quadratic in it (Hammer, Marlowe and Stroud 1956).
 INWARDS = 1.0 / np.sqrt(5.0)
 # Barycentric coordinates of the key points.
@@ -35,16 +35,16 @@ _ROOMY = 1.5
 
 
 @dataclass(frozen=True)
-class Clouds(Arrays):
+class MediumCells(Arrays):
     """Tetrahedra in the light, explicit ones included: n of them, without overlap.
 
     Attributes
     ----------
     vertices : (n, 4, 3) float64
-        Positively oriented, metres.
+        Positively oriented, meters.
     matrices : (n, 6) float64
         S of κ(ω) = √(ωᵀSω), as `summaries.extinction_matrices` gives it, 1/m².
-    colour : (n, 3) float64
+    color : (n, 3) float64
     transmission : (n,) float64
         Means of their contents.
     normal : (n, 3) float64
@@ -55,17 +55,17 @@ class Clouds(Arrays):
 
     vertices: Floats
     matrices: Floats
-    colour: Floats
+    color: Floats
     transmission: Floats
     normal: Floats
     plane: Floats
 
     @classmethod
-    def of(cls, flora: Flora, refinement: Refinement, even: Mask | None = None) -> Clouds:
+    def of(cls, flora: Flora, refinement: Refinement, even: Mask | None = None) -> MediumCells:
         """All cells of a refinement, in the order of ``refinement.nodes``.
 
         Where ``even`` (n,) is set, nothing else stands for the leaves, and the cloud dims what they scatter as their
-        clumps do, of whose area the effective one is a fraction; see `proxies.microsurfaces.trapped`.
+        clumps do, of whose area the effective one is a fraction; see `proxies.microsurfaces.recollision_albedo`.
         """
         nodes, contents = refinement.nodes, refinement.contents
         # Large polygons are walls, not fog: they are occluders.
@@ -73,15 +73,15 @@ class Clouds(Arrays):
         if not fine.all():
             contents = replace(contents, polygons=contents.polygons.take(fine))
         assets = refinement.assets.placed, refinement.assets.held(len(refinement.tree))
-        summaries = summarise(flora, contents, cell_of_node(refinement), len(nodes), assets)
+        summaries = summarize(flora, contents, cell_of_node(refinement), len(nodes), assets)
         vertices = refinement.tree.vertices(nodes)
         matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
-        colour = summaries.colour
+        color = summaries.color
         if even is not None:
             whole = summaries.optical_area
             part = summaries.effective_area(volume(vertices)) / np.where(whole > 0.0, whole, np.inf)
-            colour = trapped(colour, np.where(even & (whole > 0.0), part, 1.0))
-        return cls(vertices, matrices, colour, summaries.transmission, normal, plane)
+            color = recollision_albedo(color, np.where(even & (whole > 0.0), part, 1.0))
+        return cls(vertices, matrices, color, summaries.transmission, normal, plane)
 
     @cached_property
     def gradients(self) -> Floats:
@@ -96,7 +96,7 @@ class Clouds(Arrays):
     @cached_property
     def albedo(self) -> Floats:
         """Fraction (n, 3) of the light that is scattered again."""
-        return albedo(self.colour, self.transmission)
+        return albedo(self.color, self.transmission)
 
     def extinction(self, directions: Floats, cells: NDArray | slice = slice(None)) -> Floats:
         """κ (m,) of some tetrahedra along unit directions (3,) or (m, 3), 1/m."""
@@ -105,21 +105,21 @@ class Clouds(Arrays):
         basis = np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z], axis=1)
         return np.sqrt(np.maximum(np.sum(matrices * basis, axis=1), 0.0))
 
-    def own_depth(self, points: Floats, cells: Integers, towards: Floats) -> Floats:
+    def own_depth(self, points: Floats, cells: Integers, toward: Floats) -> Floats:
         """Optical depth (m,) between points and where light enters their tetrahedra; 0 where the cell is −1.
 
-        ``towards`` (3,) or (m, 3) are unit vectors to the light.
+        ``toward`` (3,) or (m, 3) are unit vectors to the light.
         """
         result = np.zeros(len(points))
         some = np.flatnonzero(cells >= 0)
         own = cells[some]
-        towards = np.broadcast_to(towards, (len(points), 3))[some]
+        toward = np.broadcast_to(toward, (len(points), 3))[some]
         inside = np.maximum(barycentric(self.vertices[own], points[some]), 0.0)
-        slopes = np.einsum("nkx,nx->nk", self.gradients[own], towards)
-        # Towards the light a coordinate falls by its slope; the cell ends where the first reaches zero.
+        slopes = np.einsum("nkx,nx->nk", self.gradients[own], toward)
+        # Toward the light a coordinate falls by its slope; the cell ends where the first reaches zero.
         with np.errstate(divide="ignore", invalid="ignore"):
             lengths = np.where(slopes < 0.0, inside / -slopes, np.inf).min(axis=1)
-        result[some] = np.where(np.isfinite(lengths), lengths, 0.0) * self.extinction(towards, own)
+        result[some] = np.where(np.isfinite(lengths), lengths, 0.0) * self.extinction(toward, own)
         return result
 
     def weights(self, points: Floats, cells: Integers) -> Floats:
@@ -130,20 +130,20 @@ class Clouds(Arrays):
 
 
 def cell_of_node(refinement: Refinement) -> Integers:
-    """Number (nodes,) in `Clouds.of` of each node of the tree, −1 where it is none of them."""
+    """Number (nodes,) in `MediumCells.of` of each node of the tree, −1 where it is none of them."""
     index = np.full(len(refinement.tree), -1, dtype=np.int64)
     index[refinement.nodes] = np.arange(len(refinement.nodes))
     return index
 
 
 @dataclass(frozen=True)
-class Sheets:
+class SurfaceElements:
     """Facets, leaves or other small opaque quadrilaterals: m of them, in n tetrahedra.
 
     Attributes
     ----------
     corners : (m, 4, 3) float64
-        Metres; a triangle repeats a corner.
+        Meters; a triangle repeats a corner.
     cell : (m,) int64
         Tetrahedron (index into the clouds) of each, none negative; the nearest where it lies in none.
     replaced : (n,) bool
@@ -158,13 +158,13 @@ class Sheets:
         return len(self.cell)
 
     @classmethod
-    def none(cls, count: int) -> Sheets:
+    def none(cls, count: int) -> SurfaceElements:
         """No sheets among a number of tetrahedra."""
         return cls(np.zeros((0, 4, 3)), np.zeros(0, np.int64), np.zeros(count, bool))
 
     @classmethod
-    def of(cls, corners: Floats, cell: Integers, count: int) -> Sheets:
-        """Sheets with corners (m, 4, 3) in metres, by tetrahedron (m,) out of ``count``.
+    def of(cls, corners: Floats, cell: Integers, count: int) -> SurfaceElements:
+        """Sheets with corners (m, 4, 3) in meters, by tetrahedron (m,) out of ``count``.
 
         They replace the clouds of tetrahedra that have some. Those with a negative ``cell`` belong to the first.
         """
@@ -180,7 +180,7 @@ class Sheets:
         reach = np.ptp(self.corners.reshape(-1, 3), axis=0).max()
         return int(np.clip(reach / max(_ROOMY * side, 1e-9), *limits))
 
-    def thinned(self, most: int) -> tuple[Sheets, Integers]:
+    def thinned(self, most: int) -> tuple[SurfaceElements, Integers]:
         """At most so many sheets, larger as they are fewer, and the number (m,) of each of these among them, or −1."""
         step = -(-len(self) // most)
         if step <= 1:
@@ -192,9 +192,9 @@ class Sheets:
         corners = self.corners[order]
         middle = corners.mean(axis=1, keepdims=True)
         grown = middle + (corners - middle) * np.sqrt(len(self) / len(order))
-        return Sheets(grown, self.cell[order], self.replaced), number
+        return SurfaceElements(grown, self.cell[order], self.replaced), number
 
-    def samples(self, clouds: Clouds) -> tuple[Floats, Integers, Integers, KeyMeans]:
+    def samples(self, clouds: MediumCells) -> tuple[Floats, Integers, Integers, KeyMeans]:
         """Where light from all sides is sampled.
 
         Returns

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light from all sides as spherical harmonics, and how leaves, bark and clouds scatter light (paper, section 7).
 
-Irradiance changes so slowly with the normal that nine numbers a colour hold it within a few percent (Ramamoorthi and
+Irradiance changes so slowly with the normal that nine numbers a color hold it within a few percent (Ramamoorthi and
 Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001).
 
 A facet is a sheet that scatters as the material of proxies does: evenly over the side of the light or, for the fraction
@@ -33,7 +33,7 @@ _SNUB = (0.8662468181078206, 0.4225186537611115, 0.2666354015167047)
 #: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
 #: absorb on the whole way. Products over 1 are cut off.
 THROUGH_TINT = np.array([1.15, 1.1, 0.55])
-#: Fraction of the waxy surface's own, colourless reflection (4 % at a refractive index of 1.5), and its roughness.
+#: Fraction of the waxy surface's own, colorless reflection (4 % at a refractive index of 1.5), and its roughness.
 GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
 
 
@@ -49,7 +49,7 @@ def _directions() -> Floats:
     return np.array(points)
 
 
-#: Unit vectors (24, 3) towards the sky, each of the same solid angle.
+#: Unit vectors (24, 3) toward the sky, each of the same solid angle.
 DIRECTIONS = _directions()
 #: Solid angle of each, steradians.
 SOLID_ANGLE = 4.0 * np.pi / len(DIRECTIONS)
@@ -77,7 +77,7 @@ def harmonics(directions: Floats) -> Floats:
 def irradiance(light: Floats, normals: Floats) -> Floats:
     """Irradiance (..., 3) of surfaces with unit normals (..., 3), W/m², not below 0.
 
-    ``light`` (..., 9, 3) is the radiance from all sides by harmonic and colour.
+    ``light`` (..., 9, 3) is the radiance from all sides by harmonic and color.
     """
     return np.maximum(np.einsum("...k,...kc->...c", harmonics(normals) * _COSINE, light), 0.0)
 
@@ -87,17 +87,17 @@ def fluence(light: Floats) -> Floats:
     return light[..., 0, :] * np.sqrt(4.0 * np.pi)
 
 
-def scattered_fractions(colour: Floats, transmission: Floats) -> Fractions:
+def scattered_fractions(color: Floats, transmission: Floats) -> Fractions:
     """Fractions of light that sheets reflect (n, 3) and transmit (n, 3) diffusely, and that they mirror (n,)."""
     through = transmission[:, None]
     gloss = np.where(transmission > 0.0, GLOSS, 0.0)
     rest = (1.0 - gloss)[:, None]
-    return rest * (1.0 - through) * colour, rest * through * np.minimum(colour * THROUGH_TINT, 1.0), gloss
+    return rest * (1.0 - through) * color, rest * through * np.minimum(color * THROUGH_TINT, 1.0), gloss
 
 
-def albedo(colour: Floats, transmission: Floats) -> Floats:
+def albedo(color: Floats, transmission: Floats) -> Floats:
     """Fraction (n, 3) of light that sheets scatter in any way."""
-    reflected, through, gloss = scattered_fractions(colour, transmission)
+    reflected, through, gloss = scattered_fractions(color, transmission)
     return reflected + through + gloss[:, None]
 
 
@@ -122,7 +122,7 @@ _PHASE_BANDS = _bands()
 
 
 def facet_direct(
-    normal: Floats, fractions: Fractions, towards: Floats, arriving: Floats, view: Floats | None = None
+    normal: Floats, fractions: Fractions, toward: Floats, arriving: Floats, view: Floats | None = None
 ) -> tuple[Floats, Floats]:
     """Radiance of the front, where normals point, and of the back of facets (n, 3 each) by one light.
 
@@ -130,10 +130,10 @@ def facet_direct(
     ``view`` to the eye the gloss is as even as what is scattered.
     """
     reflected, through, gloss = fractions
-    cosine = np.sum(normal * towards, axis=1)
+    cosine = np.sum(normal * toward, axis=1)
     same = reflected * arriving / np.pi * np.abs(cosine)[:, None]
     other = through * arriving / np.pi * np.abs(cosine)[:, None]
-    lobe = np.abs(cosine) / np.pi if view is None else _mirrored(normal, towards, view)
+    lobe = np.abs(cosine) / np.pi if view is None else _mirrored(normal, toward, view)
     same = same + (gloss * lobe)[:, None] * arriving
     lit = (cosine > 0.0)[:, None]
     return np.where(lit, same, other), np.where(lit, other, same)
@@ -159,10 +159,10 @@ def facet_ambient(
     )
 
 
-def _mirrored(normal: Floats, towards: Floats, view: Floats) -> Floats:
+def _mirrored(normal: Floats, toward: Floats, view: Floats) -> Floats:
     """BRDF times cosine (n,) of a rough mirror on the side of the light (GGX; Walter et al. 2007), Fresnel 1."""
-    light, eye = np.sum(normal * towards, axis=1), np.sum(normal * view, axis=1)
-    half = towards + view
+    light, eye = np.sum(normal * toward, axis=1), np.sum(normal * view, axis=1)
+    half = toward + view
     half = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-9)
     alpha = GLOSS_ROUGHNESS**4
     spread = np.sum(normal * half, axis=1) ** 2 * (alpha - 1.0) + 1.0
@@ -175,10 +175,10 @@ def _mirrored(normal: Floats, towards: Floats, view: Floats) -> Floats:
     return np.where(light * eye > 0.0, density * inwards / (2.0 * np.maximum(masking, 1e-9)), 0.0)
 
 
-def particle_direct(fractions: Fractions, towards: Floats, arriving: Floats, view: Floats) -> Floats:
+def particle_direct(fractions: Fractions, toward: Floats, arriving: Floats, view: Floats) -> Floats:
     """Radiance (n, 3) of a thick cloud of sheets that face all ways, by one light; the gloss is even."""
     reflected, through, gloss = fractions
-    cosine = np.sum(towards * view, axis=1)
+    cosine = np.sum(toward * view, axis=1)
     phase = reflected * sphere_phase(cosine)[:, None] + through * sphere_phase(-cosine)[:, None]
     return (phase + gloss[:, None] / (4.0 * np.pi)) * arriving
 

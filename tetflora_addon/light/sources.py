@@ -14,7 +14,7 @@ from ..arrays import GOLDEN_ANGLE, Floats, spiral
 from ..camera.camera import Camera, to_eye
 from ..refinement.lights import Light, image_size, lamp_views, light_views
 from .buffers import LightBuffer
-from .receivers import Clouds, Sheets
+from .receivers import MediumCells, SurfaceElements
 from .scattering import DIRECTIONS, HARMONICS, harmonics
 
 #: Maximum number of points on an area light along each of its sides.
@@ -28,7 +28,7 @@ _LEAST_BLEND = 1e-3
 
 
 def split_areas(lights: tuple[Light, ...]) -> list[Light]:
-    """Lights with each area as a few points of it, the same every time; colours add up."""
+    """Lights with each area as a few points of it, the same every time; colors add up."""
     made: list[Light] = []
     for light in lights:
         if light.kind != "AREA":
@@ -37,7 +37,7 @@ def split_areas(lights: tuple[Light, ...]) -> list[Light]:
         across, along = _disk_points() if light.ellipse else _grid_points(light.span)
         for x, y in zip(across, along, strict=True):
             position = light.position + x * light.span[0] + y * light.span[1]
-            made.append(replace(light, position=position, colour=light.colour / len(across)))
+            made.append(replace(light, position=position, color=light.color / len(across)))
     return made
 
 
@@ -64,23 +64,23 @@ def arriving(light: Light, points: Floats) -> tuple[Floats, Floats]:
     light : Light
         An area counts as the point in its middle, see `split_areas`.
     points : (m, 3) float64
-        Metres.
+        Meters.
 
     Returns
     -------
-    towards : (m, 3) float64
+    toward : (m, 3) float64
         Unit vectors to the light.
     irradiance : (m, 3) float64
         W/m² on a surface that faces the light, linear RGB.
     """
     if light.kind == "SUN":
-        return np.tile(-light.direction, (len(points), 1)), np.tile(light.colour, (len(points), 1))
+        return np.tile(-light.direction, (len(points), 1)), np.tile(light.color, (len(points), 1))
     away = light.position - points
     distance = np.linalg.norm(away, axis=1)
     # No nearer than the lamp's own surface.
     distance = np.maximum(distance, max(light.width / 2.0 if light.kind != "AREA" else 0.0, 1e-6))
-    towards = away / distance[:, None]
-    ahead = -(towards @ light.direction)
+    toward = away / distance[:, None]
+    ahead = -(toward @ light.direction)
     falloff = 1.0 / distance**2
     if light.kind == "AREA":
         falloff = falloff * np.maximum(ahead, 0.0)
@@ -88,7 +88,7 @@ def arriving(light: Light, points: Floats) -> tuple[Floats, Floats]:
         edge = np.cos(light.angle)
         blend = np.clip((ahead - edge) / max((1.0 - edge) * light.blend, _LEAST_BLEND), 0.0, 1.0)
         falloff = falloff * blend * blend * (3.0 - 2.0 * blend)
-    return towards, falloff[:, None] * light.colour
+    return toward, falloff[:, None] * light.color
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class World:
     Attributes
     ----------
     parts : (24, 9, 3) float64
-        Radiance of each part by harmonic and colour; the sum over the visible parts is that of the sky.
+        Radiance of each part by harmonic and color; the sum over the visible parts is that of the sky.
     """
 
     parts: Floats
@@ -107,9 +107,9 @@ class World:
     def of(cls, radiance: Callable[[Floats], ArrayLike]) -> World:
         """A sky whose radiance (m, 3) in unit directions (m, 3) is known."""
         index = np.arange(SKY_POINTS) + 0.5
-        towards = spiral(1.0 - 2.0 * index / SKY_POINTS, index, GOLDEN_ANGLE)
-        seen = np.broadcast_to(np.asarray(radiance(towards), np.float64), (SKY_POINTS, 3)) * (4.0 * np.pi / SKY_POINTS)
-        part, basis = np.argmax(towards @ DIRECTIONS.T, axis=1), harmonics(towards)
+        toward = spiral(1.0 - 2.0 * index / SKY_POINTS, index, GOLDEN_ANGLE)
+        seen = np.broadcast_to(np.asarray(radiance(toward), np.float64), (SKY_POINTS, 3)) * (4.0 * np.pi / SKY_POINTS)
+        part, basis = np.argmax(toward @ DIRECTIONS.T, axis=1), harmonics(toward)
         parts = np.zeros((len(DIRECTIONS), HARMONICS, 3))
         for k in range(HARMONICS):
             for channel in range(3):
@@ -117,9 +117,9 @@ class World:
         return cls(parts)
 
     @classmethod
-    def plain(cls, colour: ArrayLike) -> World:
+    def plain(cls, color: ArrayLike) -> World:
         """A sky of the same radiance (3,) everywhere."""
-        return cls.of(lambda towards: np.asarray(colour, np.float64))
+        return cls.of(lambda toward: np.asarray(color, np.float64))
 
     @property
     def dark(self) -> bool:
@@ -129,7 +129,7 @@ class World:
 
 @dataclass(frozen=True)
 class Near:
-    """The surroundings of an eye (3,), which suns see in views of their own, by radii, the smallest first; metres."""
+    """The surroundings of an eye (3,), which suns see in views of their own, by radii, the smallest first; meters."""
 
     eye: Floats
     radii: tuple[float, ...] = ()
@@ -141,7 +141,12 @@ def light_resolution(camera: Camera) -> int:
 
 
 def buffers_of(
-    light: Light, clouds: Clouds, sheets: Sheets, occluders: Floats | None, resolution: int, near: Near | None = None
+    light: Light,
+    clouds: MediumCells,
+    sheets: SurfaceElements,
+    occluders: Floats | None,
+    resolution: int,
+    near: Near | None = None,
 ) -> list[LightBuffer]:
     """Buffers in which a light sees tetrahedra, sheets and polygons: one, six all around, or none.
 
@@ -153,7 +158,7 @@ def buffers_of(
     return [_buffer(view, light, clouds, sheets, occluders, resolution) for view in views]
 
 
-def _views(light: Light, clouds: Clouds, occluders: Floats | None, resolution: int) -> list[Camera]:
+def _views(light: Light, clouds: MediumCells, occluders: Floats | None, resolution: int) -> list[Camera]:
     corners = clouds.vertices.reshape(-1, 3)
     if light.kind != "SUN":
         return lamp_views(light.position, corners, resolution)
@@ -177,7 +182,7 @@ def _closer(view: Camera, near: Near) -> list[Camera]:
 
 
 def _buffer(
-    view: Camera, light: Light, clouds: Clouds, sheets: Sheets, occluders: Floats | None, resolution: int
+    view: Camera, light: Light, clouds: MediumCells, sheets: SurfaceElements, occluders: Floats | None, resolution: int
 ) -> LightBuffer:
     along = light.direction if light.kind == "SUN" else -to_eye(view, clouds.vertices.mean(axis=1))
     extinction = np.where(sheets.replaced, 0.0, clouds.extinction(along))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Keys, Mask
 from ..growth.hashing import uniform
-from .plane import NO_DISTANCE, Neighbours, Spacing
+from .plane import NO_DISTANCE, Neighbors, Spacing
 from .rules import Companion, Rules
 from .site import SiteDraw
 
@@ -51,7 +51,7 @@ class Company:
                 fine[asked[Spacing(rule.distance, self._standing(species)).admit(points[asked], len(asked))]] = True
             elif rule.strength < 0.0:
                 others = self._standing(rule.other if species == rule.species else rule.species)
-                fine[asks] = ~Neighbours(others, rule.distance).near(points[asks])
+                fine[asks] = ~Neighbors(others, rule.distance).near(points[asks])
             elif species == rule.species:
                 # Who seeks its own kind, or what comes later, needs founders; those left alone go in the end.
                 others = self._standing(rule.other)
@@ -60,7 +60,7 @@ class Company:
                 if self._reaches(rule.other, rule.species, set()):
                     founds = asks & (uniform(keys, SiteDraw.FOUNDER) < _FOUNDERS)
                     others = np.concatenate([others, points[founds]]) if rule.other == species else others
-                fine[asks] = founds[asks] | Neighbours(others, rule.distance).near(points[asks])
+                fine[asks] = founds[asks] | Neighbors(others, rule.distance).near(points[asks])
         return fine
 
     def add(self, species: int, points: Floats) -> None:
@@ -77,10 +77,10 @@ class Company:
             for number, rule in seeking:
                 asked = np.flatnonzero(~gone & (species == rule.species) & _follows(keys, number, rule))
                 there = points[~gone & (species == rule.other)]
-                alone = ~Neighbours(older._standing(rule.other), rule.distance).near(points[asked])
+                alone = ~Neighbors(older._standing(rule.other), rule.distance).near(points[asked])
                 # Among their own kind they meet themselves as well.
                 least = 2 if rule.other == rule.species else 1
-                alone[alone] = ~Neighbours(there, rule.distance).near(points[asked[alone]], least)
+                alone[alone] = ~Neighbors(there, rule.distance).near(points[asked[alone]], least)
                 gone[asked[alone]] = True
                 changed |= bool(alone.any())
         return gone

@@ -132,14 +132,14 @@ class Stratum:
         Plants on a square meter that suits.
     area : float
         Of one plant seen from above, m².
-    colour : (3,) float64
+    color : (3,) float64
         Linear RGB.
     """
 
     suits: Floats
     number: float
     area: float
-    colour: Floats
+    color: Floats
 
 
 def covered(strata: Sequence[Stratum], cells: int) -> Floats:
@@ -151,6 +151,6 @@ def tinted(strata: Sequence[Stratum], soil: Floats, cells: int) -> Floats:
     """Mean linear RGB (cells, 3) of bare soil (3,) and what lies on it."""
     areas = [one.number * one.area * one.suits for one in strata]
     whole = sum(areas, np.full(cells, 1e-12))
-    mean = sum((area[:, None] * one.colour for area, one in zip(areas, strata, strict=True)), np.zeros((cells, 3)))
+    mean = sum((area[:, None] * one.color for area, one in zip(areas, strata, strict=True)), np.zeros((cells, 3)))
     hidden = covered(strata, cells)[:, None]
     return (1.0 - hidden) * soil + hidden * mean / whole[:, None]

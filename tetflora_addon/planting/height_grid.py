@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ground as a regular grid of heights: what water, light and growth ask of it is asked of neighbouring cells."""
+"""The ground as a regular grid of heights: what water, light and growth ask of it is asked of neighboring cells."""
 
 from __future__ import annotations
 

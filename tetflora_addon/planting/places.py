@@ -42,7 +42,7 @@ class Placement(Arrays):
     Attributes
     ----------
     position : (n, 3) float64
-        Metres, world space.
+        Meters, world space.
     azimuth : (n,) float64
         Rotation about the vertical, radians; comes before the tilt.
     scale : (n,) float64
@@ -80,7 +80,7 @@ class Placement(Arrays):
         """Unit quaternions (n, 4), w first: the turn about the vertical, then the shortest one to ``up``."""
         cos, sin = np.cos(0.5 * self.azimuth), np.sin(0.5 * self.azimuth)
         x, y, z = self.up.T
-        # The shortest turn from (0, 0, 1) to (x, y, z) is (1 + z, -y, x, 0), normalised; trunks never point down.
+        # The shortest turn from (0, 0, 1) to (x, y, z) is (1 + z, -y, x, 0), normalized; trunks never point down.
         length = np.sqrt(np.maximum(2.0 * (1.0 + z), 1e-12))
         w, i, j = (1.0 + z) / length, -y / length, x / length
         return np.stack([w * cos, i * cos + j * sin, j * cos - i * sin, w * sin], axis=1)

@@ -71,7 +71,7 @@ class Lines:
     """
 
     def __init__(self, start: Floats, end: Floats, reach: Floats) -> None:
-        """Pieces from ``start`` to ``end``, (e, 2) each, and how far from them it matters, (e,) above 0; metres."""
+        """Pieces from ``start`` to ``end``, (e, 2) each, and how far from them it matters, (e,) above 0; meters."""
         low = (np.minimum(start, end) - reach[:, None]).min(axis=0)
         span = (np.maximum(start, end) + reach[:, None]).max(axis=0) - low
         cell = max(reach.max() / 4.0, np.sqrt(span.prod() / _CELLS), span.max() / _CELLS)
@@ -118,7 +118,7 @@ class Lines:
         return np.clip(place, 0, (self.columns - 1, self.rows - 1))
 
     def _gap(self, points: Floats, piece: Integers) -> Floats:
-        """Distance of each point from its piece, metres."""
+        """Distance of each point from its piece, meters."""
         start, along = self.start[piece], self.along[piece]
         length = np.maximum((along * along).sum(axis=1), np.finfo(np.float64).tiny)
         fraction = np.clip(((points - start) * along).sum(axis=1) / length, 0.0, 1.0)
@@ -127,7 +127,7 @@ class Lines:
 
 
 def lines_along(lines: Sequence[Floats], reach: Sequence[float]) -> Lines | None:
-    """Lines through points (k, 2) each, and how far from them it matters, metres; None without any.
+    """Lines through points (k, 2) each, and how far from them it matters, meters; None without any.
 
     A line of one point is a place of its own.
     """
@@ -147,7 +147,7 @@ def _cut(start: Floats, end: Floats, reach: Floats, longest: float) -> tuple[Flo
     return begin, begin + step, reach[piece]
 
 
-NO_DISTANCE = 1e-4  # metres; less is none, and its cells could not be counted
+NO_DISTANCE = 1e-4  # meters; less is none, and its cells could not be counted
 
 # Points that are too close lie at most two cells apart. The own cell comes first: whoever is there is near.
 _NEAR = sorted(
@@ -155,11 +155,11 @@ _NEAR = sorted(
 )
 
 
-class Neighbours:
+class Neighbors:
     """Points on the map, (m, 2), that others are asked to keep near or far."""
 
     def __init__(self, points: Floats, distance: float) -> None:
-        """Sort the points by cell; the distance is at least `NO_DISTANCE`, metres."""
+        """Sort the points by cell; the distance is at least `NO_DISTANCE`, meters."""
         self.distance = distance
         self.cell = distance / np.sqrt(2.0)
         cells = cells_of(points, self.cell)
@@ -198,7 +198,7 @@ class Spacing:
     Attributes
     ----------
     distance : float
-        Metres.
+        Meters.
     points : (m, 2) float64
         Those that stand; they may crowd cells.
     """
@@ -217,7 +217,7 @@ class Spacing:
         """Indices of candidates, (k,) and at most ``most``, that keep their distance; earlier ones go first."""
         if self.free:
             return np.arange(min(most, len(candidates)))
-        undecided = np.flatnonzero(~Neighbours(self.points, self.distance).near(candidates))
+        undecided = np.flatnonzero(~Neighbors(self.points, self.distance).near(candidates))
         chosen = []
         while len(undecided):
             # One speaker a cell, the earliest; those with no earlier speaker nearby are in.
@@ -225,7 +225,7 @@ class Spacing:
             speakers = np.sort(undecided[first])
             winners = speakers[~self._outranked(candidates[speakers])]
             chosen.append(winners)
-            undecided = undecided[~Neighbours(candidates[winners], self.distance).near(candidates[undecided])]
+            undecided = undecided[~Neighbors(candidates[winners], self.distance).near(candidates[undecided])]
         kept = np.sort(np.concatenate(chosen))[:most] if chosen else np.zeros(0, np.int64)
         self.points = np.concatenate([self.points, candidates[kept]])
         return kept
@@ -256,7 +256,7 @@ def packed(cells: Integers) -> Integers:
     return cells[:, 0] * np.int64(2**32) + cells[:, 1]
 
 
-# The lattice's cell for a metre from clump to clump: peaks of the noise are counted in the tests.
+# The lattice's cell for a meter from clump to clump: peaks of the noise are counted in the tests.
 CELL = 0.73
 _OCTAVES = ((1.0, 1.0), (2.17, 0.35))  # frequency and weight; not a multiple, or lattices would coincide
 _BARE, _FULL = -0.1, 0.25  # values of the noise below which nothing grows, and above which all does
@@ -295,9 +295,9 @@ def clumps(points: Floats, size: float, clumping: float, key: Keys) -> Floats:
     Parameters
     ----------
     points : (n, 2) float64
-        Places on the map, metres.
+        Places on the map, meters.
     size : float
-        Metres from clump to clump, on average.
+        Meters from clump to clump, on average.
     clumping : float
         0: suitable everywhere; 1: nothing between the clumps.
     key : uint64

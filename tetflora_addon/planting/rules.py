@@ -271,7 +271,7 @@ def _check_companion(rule: Companion, species: int) -> None:
         )
 
 
-#: Distance of neighbors in crown radii: a birch wood at 3 to 4 m is closed, and light still falls between the crowns.
+#: Distance of neighbors in crown radii: a birch forest at 3 to 4 m is closed, and light still falls between the crowns.
 CROWN_RADII = 1.2
 #: The same in sides of the square that each plant has where a density is asked for: nine in ten then find a place.
 SQUARE_SIDES = 0.25

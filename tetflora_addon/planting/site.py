@@ -140,7 +140,7 @@ class Site:
 
     @property
     def area(self) -> float:
-        """Square metres of the map on which places are drawn; each counts as much as it is suitable at most."""
+        """Square meters of the map on which places are drawn; each counts as much as it is suitable at most."""
         return float(self.cumulative[-1])
 
     def draw(self, key: Keys, first: int, count: int, enough: int | None = None, suits: Suits | None = None) -> Sample:
@@ -287,7 +287,7 @@ def _near_areas(
     corners, source = np.concatenate(columns, axis=2), np.arange(len(triangles))
     for _ in range(_DIVISIONS):
         low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
-        allowed = np.full(len(corners), -np.inf)  # size that needs no division, metres
+        allowed = np.full(len(corners), -np.inf)  # size that needs no division, meters
         for box_low, box_high in boxes:
             touched = ((low <= box_high) & (high >= box_low)).all(axis=1)
             size = float((box_high - box_low).max()) / 8.0

@@ -92,14 +92,14 @@ def stroke_key(seed: int, stroke: int) -> Keys:
     return child_key(key_of_seed(seed), stroke)
 
 
-def within(places: Floats, centre: Sequence[float], radius: float) -> Mask:
+def within(places: Floats, center: Sequence[float], radius: float) -> Mask:
     """Which places, (n, 2) or more columns, lie in a circle on the map."""
-    gap = places[:, :2] - np.asarray(centre, float)[:2]
+    gap = places[:, :2] - np.asarray(center, float)[:2]
     return np.einsum("ij,ij->i", gap, gap) <= radius * radius
 
 
 def cell_size(density: float) -> float:
-    """Side in metres of the square that one plant has at a density in plants per square metre."""
+    """Side in meters of the square that one plant has at a density in plants per square meter."""
     return 1.0 / sqrt(density)
 
 
@@ -109,17 +109,17 @@ def too_many(brush: Brush) -> bool:
 
 
 def reach_of(brush: Brush) -> float:
-    """Radius around the middle of the circle within which plants that stand have a say in a dab, metres."""
+    """Radius around the middle of the circle within which plants that stand have a say in a dab, meters."""
     return brush.radius + max(brush.min_distance, cell_size(brush.density) * sqrt(2.0))
 
 
-def paint(brush: Brush, centre: Sequence[float], standing: Floats, key: Keys, dab: int) -> tuple[Floats, Keys]:
+def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, dab: int) -> tuple[Floats, Keys]:
     """Where one dab sets new plants.
 
     Parameters
     ----------
     brush : Brush
-    centre : sequence of float
+    center : sequence of float
         Middle of the circle; what is beyond x and y does not count.
     standing : (m, 2) or (m, 3) float64
         Plants that are there, those that the same stroke has set among them. Those far away may be left out.
@@ -142,7 +142,7 @@ def paint(brush: Brush, centre: Sequence[float], standing: Floats, key: Keys, da
     if too_many(brush):
         raise ValueError(f"the brush covers more than {MOST_CELLS:,} cells; lower its radius")
     side = cell_size(brush.density)
-    middle = np.asarray(centre, float)[:2]
+    middle = np.asarray(center, float)[:2]
     first, last = (np.floor((middle + sign * brush.radius) / side).astype(np.int64) for sign in (-1.0, 1.0))
     grid = np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij")
     cells = np.stack(grid, axis=-1).reshape(-1, 2)
@@ -173,25 +173,25 @@ def paint(brush: Brush, centre: Sequence[float], standing: Floats, key: Keys, da
     return np.concatenate(found), np.concatenate(keys)
 
 
-def erase(brush: Brush, centre: Sequence[float], standing: Floats, key: Keys, dab: int) -> Integers:
+def erase(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, dab: int) -> Integers:
     """Which plants, as numbers of places (m, 2) or (m, 3), one dab removes: a fraction of all in the circle."""
-    inside = np.flatnonzero(within(standing, centre, brush.radius))
+    inside = np.flatnonzero(within(standing, center, brush.radius))
     return inside[_drawn(brush, inside, key, dab)]
 
 
-def thin(brush: Brush, centre: Sequence[float], standing: Floats, key: Keys, dab: int) -> Integers:
+def thin(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, dab: int) -> Integers:
     """Which plants one dab removes where they are denser than the brush, as numbers of places (m, 2) or (m, 3).
 
     Of each cell one plant stays, and of two that are closer than the minimum distance one. Which one depends on a hash
     of its place: so plants outside of the circle can stay too, and doing it again changes nothing.
     """
-    near = np.flatnonzero(within(standing, centre, reach_of(brush)))
+    near = np.flatnonzero(within(standing, center, reach_of(brush)))
     near = near[np.argsort(_ranks(standing[near, :2]), kind="stable")]
     _, first = np.unique(cells_of(standing[near, :2], cell_size(brush.density)), return_index=True)
     winners = near[np.sort(first)]
     winners = winners[admitted(standing[winners, :2], np.zeros((0, 2)), brush.min_distance)]
     gone = np.sort(near[~np.isin(near, winners)])
-    gone = gone[within(standing[gone], centre, brush.radius)]
+    gone = gone[within(standing[gone], center, brush.radius)]
     return gone[_drawn(brush, gone, key, dab)]
 
 
@@ -215,7 +215,7 @@ def individuals(brush: Brush, keys: Keys) -> dict[str, NDArray]:
 def dabs_along(last: Sequence[float], to: Sequence[float], spacing: float) -> Floats:
     """Places of dabs from one to another place of the mouse, the first left out and the last kept, (n, 3).
 
-    They are about ``spacing`` metres apart, or farther where there would be more than `_MOST_DABS`.
+    They are about ``spacing`` meters apart, or farther where there would be more than `_MOST_DABS`.
     """
     a, b = np.asarray(last, float), np.asarray(to, float)
     number = int(np.clip(np.ceil(np.linalg.norm(b - a) / max(spacing, _TINY)), 1, _MOST_DABS))
@@ -237,7 +237,7 @@ def admitted(places: Floats, standing: Floats, distance: float) -> Integers:
     first, second = first[early], second[early]
     state = np.zeros(len(undecided), np.int8)  # 0 undecided, 1 in, -1 out
     while (open_ := state == 0).any():
-        # Whoever has no earlier neighbour that may yet come in is in; its later neighbours are out.
+        # Whoever has no earlier neighbor that may yet come in is in; its later neighbors are out.
         waits = np.zeros(len(state), bool)
         waits[second[state[first] == 0]] = True
         state[open_ & ~waits] = 1

@@ -20,9 +20,9 @@ class Path:
     Attributes
     ----------
     points : (k, 2) float64
-        Metres, k at least 1; a cyclic line repeats its first point.
+        Meters, k at least 1; a cyclic line repeats its first point.
     half_width : float
-        Metres to either side in which nothing grows; 0 keeps nothing free.
+        Meters to either side in which nothing grows; 0 keeps nothing free.
     """
 
     points: Floats
@@ -36,7 +36,7 @@ class Terrain:
     Attributes
     ----------
     triangles : (t, 3, 3) float64
-        Corners, metres in world space; either side may be up.
+        Corners, meters in world space; either side may be up.
     weight : (t, 3) float, optional
         How suitable the corners are, 0 to 1 (vertex groups); linear between.
     uv : (t, 3, 2) float, optional

@@ -4,7 +4,7 @@
 
 Hollows are filled to where they flow over (Planchon & Darboux, "A fast, simple and versatile algorithm to fill the
 depressions of digital elevation models", Catena 46, 2002); what is uphill of a cell follows from flow that spreads over
-all lower neighbours (Freeman, "Calculating catchment area with divergent flow based on a regular grid", Computers &
+all lower neighbors (Freeman, "Calculating catchment area with divergent flow based on a regular grid", Computers &
 Geosciences 17, 1991); wetness is the topographic index ln(a / tan β) (Beven & Kirkby, "A physically based, variable
 contributing area model of basin hydrology", Hydrological Sciences Bulletin 24, 1979).
 """
@@ -26,7 +26,7 @@ _FINEST, _MOST = 1.0, 1_000_000
 _LEVEL = 0.01  # tan β; less is as level
 _DRAIN = 1e-6  # least fall of filled ground toward its outlet
 _SPREAD = 1.1  # exponent of the fall (Freeman 1991): flow down a cone is even all around
-# Neighbours of a cell: rows and columns away, and how far in cells.
+# Neighbors of a cell: rows and columns away, and how far in cells.
 _AROUND = tuple((i, j, float(np.hypot(i, j))) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
 
 
@@ -35,7 +35,7 @@ def filled(height: Floats, cell: float) -> Floats:
 
     Notes
     -----
-    All is flooded, and the flood sinks until each cell is as high as its ground, or a hair above its lowest neighbour.
+    All is flooded, and the flood sinks until each cell is as high as its ground, or a hair above its lowest neighbor.
     Rows are swept to and fro, then columns; the result does not depend on that.
     """
     ground = np.pad(height, 1, constant_values=np.nan)
@@ -71,12 +71,12 @@ def _sweep(water: Floats, ground: Floats, lines: range, before: int, cell: float
 def catchment(surface: Floats, cell: float) -> Floats:
     """Area that is uphill of each cell of a surface (h, w), with its own, (h, w) in m²; NaN where there is no ground.
 
-    Cells without a lower neighbour are outlets. All of the area arrives at these.
+    Cells without a lower neighbor are outlets. All of the area arrives at these.
 
     Notes
     -----
     A cell is done when all that flow into it are: as many rounds as the longest way of water has cells, each with only
-    the cells that it finishes. What arrives is summed in the order of neighbours, so the result is the same anywhere.
+    the cells that it finishes. What arrives is summed in the order of neighbors, so the result is the same anywhere.
     """
     rows, columns = surface.shape
     wide = columns + 2
@@ -111,7 +111,7 @@ def catchment(surface: Floats, cell: float) -> Floats:
 
 
 def steepness(surface: Floats, cell: float) -> Floats:
-    """Tan β of each cell of a surface (h, w), from its neighbours to both sides where it has them; NaN stays."""
+    """Tan β of each cell of a surface (h, w), from its neighbors to both sides where it has them; NaN stays."""
     around = np.pad(surface, 1, constant_values=np.nan)
     rises = []
     for line in (around[:, 1:-1], around[1:-1].T):

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The states of the loop, one after the other, as small as a preview needs them (paper, figure 8), and their colours.
+"""The states of the loop, one after the other, as small as a preview needs them (paper, figure 8), and their colors.
 
-Plants and pieces are gone; the number, extinction and colour of the tetrahedra stay. Corners and the order of drawing
+Plants and pieces are gone; the number, extinction and color of the tetrahedra stay. Corners and the order of drawing
 come from the last state's tree: nodes keep their numbers, and a tetrahedron that is divided later stands in the tree's
-order where its parts stand. Colours are RGB as a screen shows them (sRGB), 0 to 1.
+order where its parts stand. Colors are RGB as a screen shows them (sRGB), 0 to 1.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from ..refinement.contents import Contents
 from ..refinement.decisions import Decision, contributions, mean_extinction
 from ..refinement.loop import Refinement, step_of
 from ..refinement.statistics import Step
-from ..subplants.pieces import piece_leaf_colours
+from ..subplants.pieces import piece_leaf_colors
 from ..tetrahedra.geometry import volume
 from ..tetrahedra.tree import TetrahedralTree
 
 #: Bytes that all levels may take together, beside the tree; levels in between are left out beyond.
 MOST_BYTES = 256_000_000
-#: By what was decided; the overlay's text has the same colours. Blue and orange, which few eyes confuse.
+#: By what was decided; the overlay's text has the same colors. Blue and orange, which few eyes confuse.
 FORMS: dict[Decision, tuple[float, float, float]] = {
     Decision.SPLIT: (0.95, 0.95, 0.95),
     Decision.EXPLICIT: (0.35, 0.85, 0.25),
@@ -60,8 +60,8 @@ class Level(Arrays):
         Pixels of the image that its contents change.
     extinction : (t,) float32
         κ of its contents spread evenly, 1/m; optical depth is κ times the way through it.
-    colour : (t, 3) float32
-        Mean colour of its contents, linear RGB.
+    color : (t, 3) float32
+        Mean color of its contents, linear RGB.
     figures : Step
         Counts for the overlay.
     number : int
@@ -74,7 +74,7 @@ class Level(Arrays):
     visibility: NDArray[np.float32]
     contribution: NDArray[np.float32]
     extinction: NDArray[np.float32]
-    colour: NDArray[np.float32]
+    color: NDArray[np.float32]
     figures: Step
     number: int
 
@@ -113,7 +113,7 @@ class Levels:
         return self.levels[min(max(number, 0), len(self.levels) - 1)]
 
     def vertices(self, level: Level, chosen: NDArray | slice = slice(None)) -> NDArray[np.float32]:
-        """Corners (t, 4, 3) float32 of a level's tetrahedra, or of some, metres from the camera's `origin`."""
+        """Corners (t, 4, 3) float32 of a level's tetrahedra, or of some, meters from the camera's `origin`."""
         return self.tree.vertices(level.nodes[chosen]).astype(np.float32)
 
     def back_to_front(self, level: Level, camera: Camera, chosen: NDArray | None = None) -> Integers:
@@ -156,47 +156,47 @@ def _level(flora: Flora, state: Refinement) -> Level:
         visibility=state.transmittance.astype(np.float32),
         contribution=contributions(state.cells, state.transmittance).astype(np.float32),
         extinction=extinction.astype(np.float32),
-        colour=mean_colours(flora, state.contents, nodes, len(tree)).astype(np.float32),
+        color=mean_colors(flora, state.contents, nodes, len(tree)).astype(np.float32),
         figures=step_of(state),
         number=state.passes - 1,
     )
 
 
-def mean_colours(flora: Flora, contents: Contents, nodes: Integers, size: int) -> Floats:
-    """Mean colours (t, 3) of what nodes (t,) hold, weighted by what shows: leaves once, closed surfaces half.
+def mean_colors(flora: Flora, contents: Contents, nodes: Integers, size: int) -> Floats:
+    """Mean colors (t, 3) of what nodes (t,) hold, weighted by what shows: leaves once, closed surfaces half.
 
     Unlike `proxies.summaries` without orientation and clumping, which a preview does not show.
     """
     row, piece_row = contents.subplants.items.row, contents.pieces.items.branches.row
     parts = []
-    for held, leaf_colours, wood in (
-        (contents.subplants, flora.leaf_colours, flora.wood_colour[row]),
-        (contents.pieces, partial(piece_leaf_colours, flora), flora.rows["branch_colour"][piece_row, 0]),
+    for held, leaf_colors, wood in (
+        (contents.subplants, flora.leaf_colors, flora.wood_color[row]),
+        (contents.pieces, partial(piece_leaf_colors, flora), flora.rows["branch_color"][piece_row, 0]),
     ):
         if len(held):
-            parts.append((held.cell, held.totals.leaf_area, leaf_colours(held.items)))
+            parts.append((held.cell, held.totals.leaf_area, leaf_colors(held.items)))
             parts.append((held.cell, held.totals.wood_area / 2, wood))
     if len(contents.polygons.cell):
         polygons, totals = contents.polygons.items, contents.polygons.totals
-        colours = polygons.meshes.colours[polygons.meshes.slot[polygons.face]]
-        parts.append((contents.polygons.cell, totals.optical_area, colours))
+        colors = polygons.meshes.colors[polygons.meshes.slot[polygons.face]]
+        parts.append((contents.polygons.cell, totals.optical_area, colors))
     sums, area = np.zeros((size, 3)), np.zeros(size)
-    for cells, weight, colours in parts:
+    for cells, weight, colors in parts:
         area += np.bincount(cells, weight, size)
         for k in range(3):
-            sums[:, k] += np.bincount(cells, weight * colours[:, k], size)
+            sums[:, k] += np.bincount(cells, weight * colors[:, k], size)
     return sums[nodes] / np.where(area > 0.0, area, 1.0)[nodes, None]
 
 
 def ramp(fraction: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Colours (n, 3) for fractions (n,): dark violet at 0, through green, to bright yellow at 1."""
+    """Colors (n, 3) for fractions (n,): dark violet at 0, through green, to bright yellow at 1."""
     at = np.clip(fraction, 0.0, 1.0) * (len(_RAMP) - 1)
     low = np.minimum(at.astype(np.intp), len(_RAMP) - 2)
     return (_RAMP[low] + (_RAMP[low + 1] - _RAMP[low]) * (at - low)[:, None]).astype(np.float32)
 
 
-def colours_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
-    """Colours (t, 3) of a level's tetrahedra.
+def colors_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
+    """Colors (t, 3) of a level's tetrahedra.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def colours_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
         By how often space was divided, by visibility, by what was decided, or by the logarithm of the pixels that are
         changed.
     deepest : int
-        Depth of the brightest colour: colours stay from level to level.
+        Depth of the brightest color: colors stay from level to level.
 
     Raises
     ------
@@ -221,12 +221,12 @@ def colours_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
         return ramp(np.log(pixels / _LEAST) / np.log(_MOST / _LEAST))
     if mode == "FORM":
         table = np.zeros((len(Decision), 3), np.float32)
-        for decision, colour in FORMS.items():
-            table[decision] = colour
+        for decision, color in FORMS.items():
+            table[decision] = color
         return table[level.decision]
     raise ValueError(f'unknown color mode "{mode}"; use LEVEL, VISIBILITY, FORM or CONTRIBUTION')
 
 
 def as_shown(linear: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Linear colours (..., 3) as a screen shows them (IEC 61966-2-1)."""
+    """Linear colors (..., 3) as a screen shows them (IEC 61966-2-1)."""
     return srgb_of(np.clip(linear, 0.0, 1.0)).astype(np.float32)

@@ -46,8 +46,8 @@ class Shapes:
     Attributes
     ----------
     positions : (v, 3) float32
-        Metres from ``origin``.
-    colours : (v, 3) float32
+        Meters from ``origin``.
+    colors : (v, 3) float32
         As a screen shows them, shaded by a fixed light.
     indices : (m, 3) int32 for faces, or (m, 2) int32 for edges
     plants : int
@@ -55,11 +55,11 @@ class Shapes:
     of : int
         Plants that there are.
     origin : (3,) float64
-        Near most plants, metres, world space.
+        Near most plants, meters, world space.
     """
 
     positions: NDArray[np.float32]
-    colours: NDArray[np.float32]
+    colors: NDArray[np.float32]
     indices: NDArray[np.int32]
     plants: int
     of: int
@@ -67,7 +67,7 @@ class Shapes:
 
 
 def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
-    """Plants as crowns and trunks of some twenty triangles each, in the mean colours of their species.
+    """Plants as crowns and trunks of some twenty triangles each, in the mean colors of their species.
 
     Of more than ``most`` plants only some are shown; ``flora`` has the species in the order of ``seeds.identifiers``.
     """
@@ -79,7 +79,7 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     low, high, *radii = profile.T
     length, low, wider, light = outlines(flora, trunk, low, high)
     rings = (1.0 + light @ around[:, :2].T)[:, :, None] * around
-    wood, leaves = flora.wood_colour[trunk.row], flora.leaf_colours(trunk)
+    wood, leaves = flora.wood_color[trunk.row], flora.leaf_colors(trunk)
     radii = [radius * wider for radius in radii]
     if trunk.year is not None:
         left = np.minimum(flora.day.leaf_share(trunk), 1.0)
@@ -124,9 +124,9 @@ def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Sha
     local = corner * [1.0, 1.0, 0.0] * radius[:, None, None]
     local[:, :, 2] = np.where(corner[:, 2] > 0.0, high[:, None], low[:, None])
     positions = np.einsum("nij,nvj->nvi", trunk.frame, local) + trunk.position[:, None]
-    colours = np.repeat(as_shown(np.maximum(flora.leaf_colours(trunk), flora.wood_colour[trunk.row])), 8, axis=0)
+    colors = np.repeat(as_shown(np.maximum(flora.leaf_colors(trunk), flora.wood_color[trunk.row])), 8, axis=0)
     indices = _repeated(edges, 8, len(trunk))
-    return Shapes(positions.reshape(-1, 3).astype(np.float32), colours, indices, len(trunk), of, origin)
+    return Shapes(positions.reshape(-1, 3).astype(np.float32), colors, indices, len(trunk), of, origin)
 
 
 def thinned(seeds: Seeds, heights: Floats, most: int = MOST_PLANTS) -> Seeds:
@@ -135,7 +135,7 @@ def thinned(seeds: Seeds, heights: Floats, most: int = MOST_PLANTS) -> Seeds:
     Parameters
     ----------
     heights : (s,) float64
-        Of each kind, metres.
+        Of each kind, meters.
     """
     if len(seeds) <= most:
         return seeds
@@ -201,7 +201,7 @@ _TRUNK = 0.03  # radius of the trunk over that of the crown
 def simple_crowns(
     matrices: Floats,
     size: tuple[float, float, float],
-    colour: Sequence[float],
+    color: Sequence[float],
     boxes: bool = False,
 ) -> Shapes:
     """Plants of one size as crowns, stretched and turned as their places are; of very many every second, or third.
@@ -211,8 +211,8 @@ def simple_crowns(
     matrices : (n, 4, 4) float64
         To world space.
     size : tuple of float
-        Radius of the crown, its base and its top above the ground, metres.
-    colour : (3,) float
+        Radius of the crown, its base and its top above the ground, meters.
+    color : (3,) float
         Linear RGB.
     boxes : bool
         Edges of boxes instead of faces.
@@ -222,10 +222,10 @@ def simple_crowns(
     shown = matrices[:: max(-(-of // MOST_PLANTS), 1)]
     positions = corners @ shown[:, :3, :3].transpose(0, 2, 1) + (shown[:, None, :3, 3] - origin)
     shade = np.interp(corners[:, 2], [0.0, size[2]], _SHADES)
-    colours = as_shown(np.clip(np.asarray(colour) * shade[:, None], 0.0, 1.0))
+    colors = as_shown(np.clip(np.asarray(color) * shade[:, None], 0.0, 1.0))
     return Shapes(
         positions.reshape(-1, 3).astype(np.float32),
-        np.tile(colours, (len(shown), 1)).astype(np.float32),
+        np.tile(colors, (len(shown), 1)).astype(np.float32),
         _repeated(indices, len(corners), len(shown)),
         len(shown),
         of,
@@ -239,7 +239,7 @@ def joined(parts: Sequence[Shapes]) -> Shapes:
     firsts = np.cumsum([0, *(len(part.positions) for part in parts)]).tolist()
     return Shapes(
         np.concatenate([(part.positions + (part.origin - origin)).astype(np.float32) for part in parts]),
-        np.concatenate([part.colours for part in parts]),
+        np.concatenate([part.colors for part in parts]),
         np.concatenate([part.indices + np.int32(first) for part, first in zip(parts, firsts, strict=False)]),
         sum(part.plants for part in parts),
         sum(part.of for part in parts),

@@ -54,11 +54,11 @@ class Projected:
     ----------
     corners : (n, 5, 3) float64
         The four vertices, on which opacity is 0, and the nearest point of the ray on which each tetrahedron is
-        thickest; world space, metres.
+        thickest; world space, meters.
     opacity : (n,) float64
         Of the thick point: 1 − e^(−κ · thickness).
     thickness : (n,) float64
-        Along that ray, metres.
+        Along that ray, meters.
     triangles : (m, 3) int32
         Corners of triangles, counted through all tetrahedra (five each); those of one follow one another. They face
         either way.
@@ -83,7 +83,7 @@ def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
     Parameters
     ----------
     vertices : (n, 4, 3) float64
-        Of either orientation, metres, world space, all `drawable`. In the order in which they are to be drawn.
+        Of either orientation, meters, world space, all `drawable`. In the order in which they are to be drawn.
     extinction : (n,) float64
         κ ≥ 0, 1/m.
     camera : Camera

@@ -118,7 +118,7 @@ def number(limit: float | None = None) -> int:
     Parameters
     ----------
     limit : float, optional
-        Bytes that Blender and they may take together; by default as `use` was told.
+        Bytes that Blender and they may take together; by default as `set_memory_limit` was told.
     """
     if _pool.stopped or _pool.broken or not _python():
         return 0
@@ -132,7 +132,7 @@ def share(limit: float) -> float:
     return number(limit) * _pool.largest
 
 
-def use(limit: float) -> None:
+def set_memory_limit(limit: float) -> None:
     """Keep within a part of a limit of bytes for Blender and all processes together, from now on."""
     with _pool.changed:
         _pool.limit = _PART * limit

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Facets of the clusters of assets: places, orientations and colours are those of samples on their faces.
+"""Facets of the clusters of assets: places, orientations and colors are those of samples on their faces.
 
 Sizes, numbers and the order in which facets come and go are those of plants (`facet_sizes`, `microsurfaces`).
 """
@@ -18,7 +18,7 @@ from ..growth.hashing import signed, uniform
 from ..refinement.asset_parts import AssetParts, PlacedAssets
 from ..refinement.contents import Totals
 from .facet_weights import by_number
-from .microsurfaces import Facets, facet_numbers, trapped
+from .microsurfaces import Facets, facet_numbers, recollision_albedo
 
 #: Child indices of facets of leaves and of wood start here; draws of their numbers, turns and places.
 _LEAF_PATH, _WOOD_PATH = 1 << 42, 1 << 43
@@ -29,8 +29,8 @@ _MOVED = 1.5
 
 def facet_totals(placed: PlacedAssets, parts: AssetParts) -> Totals:
     """Totals (n,) of clusters, with closed leaves as if they were sheets: half of each is never seen."""
-    totals, bodies = parts.totals, placed.bodies(parts)
-    return replace(totals, leaf_area=totals.leaf_area + bodies / 2, wood_area=totals.wood_area - bodies)
+    totals, closed_leaves = parts.totals, placed.closed_leaves(parts)
+    return replace(totals, leaf_area=totals.leaf_area + closed_leaves / 2, wood_area=totals.wood_area - closed_leaves)
 
 
 def asset_weights(placed: PlacedAssets, parts: AssetParts, number: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -46,7 +46,7 @@ def facets_of_assets(
     wood: NDArray[np.float64],
     left_out: NDArray[np.float64] | None = None,
 ) -> Facets:
-    """Facets of clusters (n,) with `facet_totals`, of sides for leaves and for wood (n,), metres.
+    """Facets of clusters (n,) with `facet_totals`, of sides for leaves and for wood (n,), meters.
 
     A fraction (n,) of them is left out.
     """
@@ -78,10 +78,10 @@ def _placed(
     samples, clusters = placed.assets.samples, placed.assets.clusters
     pick = placed.picked(parts, part_key, leafy, owner, index)
     instance = parts.instance[owner]
-    centre = placed.to_world(samples.position[pick], instance)
+    center = placed.to_world(samples.position[pick], instance)
     local = samples.normal[pick].astype(np.float64)
     linear, some = placed.instances.linear, placed.stretched[instance]
-    normal = np.zeros_like(centre)
+    normal = np.zeros_like(center)
     for i in range(3):
         for k in range(3):
             normal[:, i] += linear[instance, i, k] * local[:, k]
@@ -103,7 +103,7 @@ def _placed(
     again = np.flatnonzero(index >= number[owner])
     if len(again):
         for axis, by in ((across, _MOVE), (along, _MOVE + 1)):
-            centre[again] += (_MOVED * side[again] * signed(key[again], by))[:, None] * axis[again]
-    colour = trapped(samples.colour[pick].astype(np.float64), weight)
+            center[again] += (_MOVED * side[again] * signed(key[again], by))[:, None] * axis[again]
+    color = recollision_albedo(samples.color[pick].astype(np.float64), weight)
     through, rough = (own[pick].astype(np.float64) for own in (samples.transmission, samples.roughness))
-    return Facets(centre, across, along, side, colour, through, roughness=rough)
+    return Facets(center, across, along, side, color, through, roughness=rough)

@@ -13,7 +13,7 @@ their first facet is drawn, in steps of a fraction of a second, with fewer rays 
 never refined later, so that no two frames of a film, and no two computers of a farm, have different ones.
 
 Sub-plants are tested together with all that grow around them, of any parent, because facets spill over and reach
-across the gaps between neighbours. Next siblings alone asked for up to a twentieth more area, and made aspens too
+across the gaps between neighbors. Next siblings alone asked for up to a twentieth more area, and made aspens too
 dense. Facets of pieces are compared in the same way with what branches themselves bear.
 
 Nobody measures anew for a day or an age. Plants with fewer leaves have greater weights, as less hides behind them: the
@@ -35,28 +35,28 @@ from numpy.typing import NDArray
 from ..arrays import GOLDEN_TURN, Floats, Integers, Mask, Table, spiral, spread
 from ..compiled.clumping import fingerprint
 from ..compiled.flora import Flora, compile_species
-from ..compiled.rays import Things, basis, things_of
+from ..compiled.rays import PlantElements, basis, elements_of
 from ..growth.branches import Branches
 from ..growth.envelopes import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
 from ..growth.seeds import Seeds
-from ..jobs import at_once, mapped
+from ..jobs import mapped, run_to_end
 from ..refinement.contents import piece_totals, subplant_totals
 from ..species.ages import ages_of, with_age
 from ..species.species import Species
-from ..storage import remembered
+from ..storage import cached
 from ..subplants.pieces import Pieces, open_subplants
 from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_facets
 
 #: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
 #: are made differently.
-TABLE = Path(__file__).resolve().parent.parent / "catalogue" / "tables" / "facet_weights.json"
+TABLE = Path(__file__).resolve().parent.parent / "catalog" / "tables" / "facet_weights.json"
 _METHOD = 3
 #: Facets of a sub-plant for which weights are known; in between, weights are linear in the logarithm.
 COUNTS = 2.0 ** np.arange(-4, 11)
 #: Polygons of all families of a row, and the most members of one.
-_POLYGONS, _NEIGHBOURS = 150_000.0, 60
+_POLYGONS, _NEIGHBORS = 150_000.0, 60
 #: The same of solids of leaves, which have no parts that would tell as much with fewer.
 _POLYGONS_OF_SOLIDS = 400_000.0
 #: Facets for each number, over all families: copies are made up to the first; with fewer than the second a number is
@@ -149,7 +149,7 @@ def _of_states(flora: Flora, species: tuple[tuple[int, tuple[int, ...]], ...]) -
 
 def _found_of(flora: Flora, number: int) -> Floats:
     """Weights (2, r, k) of one species, measured if need be."""
-    at_once(_measuring(flora, number))
+    run_to_end(_measuring(flora, number))
     return _known(flora, number)
 
 
@@ -160,7 +160,7 @@ def unmeasured(flora: Flora) -> list[int]:
 
 
 def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, float], None, None]:
-    """Measure weights that are not known yet; `facet_weights` has them afterwards.
+    """Measure weights that are not known yet; `facet_weights` has them afterward.
 
     Yields
     ------
@@ -181,7 +181,7 @@ def _measuring(flora: Flora, number: int) -> Generator[tuple[str, float], None, 
     name = flora.species[number].name
     found = yield from mapped(fitting(flora, number, RAYS), lambda done: (name, done))
     content = digest(flora, number)
-    _keep(content, remembered(_KIND, content, found.shape, lambda: found))
+    _keep(content, cached(_KIND, content, found.shape, lambda: found))
 
 
 def _known(flora: Flora, number: int) -> Floats | None:
@@ -193,7 +193,7 @@ def _known(flora: Flora, number: int) -> Floats | None:
     if name not in _found:
         rows = int((flora.rows["species"] == number).sum())
         try:
-            _keep(name, remembered(_KIND, name, (2, rows, len(COUNTS)), _unknown))
+            _keep(name, cached(_KIND, name, (2, rows, len(COUNTS)), _unknown))
         except LookupError:
             return None
     return _found[name]
@@ -244,7 +244,7 @@ def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float,
     out, seen, done, every = np.ones((2, len(rows), len(COUNTS))), {}, 0, 2 * len(rows)
     for row, families in _families(flora, number).items():
         apart = _apart(flora, families)
-        for kind, make in enumerate((Families.of_subplants, Families.of_branches)):
+        for kind, make in enumerate((SiblingGroups.of_subplants, SiblingGroups.of_branches)):
             steps = _fitted(make(flora, *apart), rays, seen)
             out[kind, row - rows[0]] = yield from mapped(steps, lambda part, done=done: min((done + part) / every, 1.0))
             done += 1
@@ -258,7 +258,7 @@ def _families(flora: Flora, number: int) -> dict[int, list[Branches]]:
         some = []
         for row in np.unique(level.row):
             own, most = np.flatnonzero(level.row == row), _POLYGONS / FAMILIES / max(flora.polygons[row], 1.0)
-            for members in _neighbours(level, own, plant, most):
+            for members in _neighbors(level, own, plant, most):
                 some.append(members)
                 found.setdefault(int(row), []).append(level.take(members))
         chosen = np.concatenate(some)
@@ -267,9 +267,9 @@ def _families(flora: Flora, number: int) -> dict[int, list[Branches]]:
     return {row: _affordable(flora, families) for row, families in found.items()}
 
 
-def _neighbours(level: Branches, own: Integers, plant: Integers, most: float) -> Iterator[Integers]:
+def _neighbors(level: Branches, own: Integers, plant: Integers, most: float) -> Iterator[Integers]:
     """Sub-plants next to one of each plant."""
-    members = int(np.clip(most, 1, _NEIGHBOURS))
+    members = int(np.clip(most, 1, _NEIGHBORS))
     for p in np.unique(plant[own]):
         kin = own[plant[own] == p]
         first = kin[np.argmin(mix(level.key[kin]))]
@@ -296,7 +296,7 @@ def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, Floats]:
 
 
 def _fitted(
-    sight: Families, rays: float, seen: dict[object, list[tuple[View, Integers]]]
+    sight: SiblingGroups, rays: float, seen: dict[object, list[tuple[View, Integers]]]
 ) -> Generator[float, None, Floats]:
     """Weights (k,) for one row; yields the fraction that is done.
 
@@ -307,7 +307,7 @@ def _fitted(
         return np.ones(len(COUNTS))
     if sight.content not in seen:
         looked = []
-        for view in look(sight.grown(), sight.beyond):
+        for view in cast_rays(sight.grown(), sight.beyond):
             looked.append(view)
             yield 0.05 * len(looked)
         seen[sight.content] = looked
@@ -343,7 +343,7 @@ def _weight(least: Floats, met: int) -> float:
     return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else LARGEST
 
 
-#: Families that are seen side by side, at most.
+#: Siblings that are seen side by side, at most.
 FAMILIES = 6
 #: Rays across a family, and directions of rays.
 _RAYS, _DIRECTIONS = 36, 6
@@ -373,15 +373,15 @@ class View:
 
 
 @dataclass(frozen=True)
-class Families:
-    """Families of sub-plants, or what their branches themselves bear.
+class SiblingGroups:
+    """Siblings of sub-plants, or what their branches themselves bear.
 
     Attributes
     ----------
     flora : Flora
     some : Branches of n
     beyond : (3,) float64
-        Offset at which a copy meets none of them, metres.
+        Offset at which a copy meets none of them, meters.
     area, leaf : (n,) float64
         Optical area of each, and area of one of its leaves, m².
     pieces : Pieces or None
@@ -396,12 +396,12 @@ class Families:
     pieces: Pieces | None
 
     @classmethod
-    def of_subplants(cls, flora: Flora, some: Branches, beyond: Floats) -> Families:
+    def of_subplants(cls, flora: Flora, some: Branches, beyond: Floats) -> SiblingGroups:
         """Whole sub-plants."""
         return cls(flora, some, beyond, subplant_totals(flora, some).optical_area, flora.one_leaf_area(some), None)
 
     @classmethod
-    def of_branches(cls, flora: Flora, some: Branches, beyond: Floats) -> Families:
+    def of_branches(cls, flora: Flora, some: Branches, beyond: Floats) -> SiblingGroups:
         """Branches with their own leaves only."""
         pieces, owner = open_subplants(flora, some)[2:]
         area = np.bincount(owner, piece_totals(flora, pieces).optical_area, len(some))
@@ -414,14 +414,14 @@ class Families:
         bare = not ((rows["next"] >= 0).any() or rows["phantom"].any())
         return self.some.key.tobytes() + self.some.position.tobytes(), bare or self.pieces is not None
 
-    def grown(self) -> Things:
+    def grown(self) -> PlantElements:
         """The real leaves and wood."""
         forms = self.flora.forms[int(self.flora.species_of(self.some.row[:1])[0])]
         rows, orders = len(self.flora.rows), None if self.pieces is None else 1
-        return things_of(self.flora.rows, forms, self.some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
+        return elements_of(self.flora.rows, forms, self.some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
 
     def facets(self, side: float, copies: int) -> Facets:
-        """Facets of a side in metres for several copies of all side by side, each copy with other facets."""
+        """Facets of a side in meters for several copies of all side by side, each copy with other facets."""
         if self.pieces is None:
             several = Branches.concatenate([self._copy(self.some, n) for n in range(copies)])
             return subplant_facets(self.flora, several, np.full(len(several), side))
@@ -437,7 +437,7 @@ class Families:
         return replace(branches, key=key, position=branches.position + number * self.beyond)
 
 
-def look(things: Things, beyond: Floats) -> Iterator[tuple[View, Integers]]:
+def cast_rays(things: PlantElements, beyond: Floats) -> Iterator[tuple[View, Integers]]:
     """Views of families, and the numbers (m,) of the rays of each that meet anything.
 
     Directions are spread over the half sphere; the lattice is as fine for all of them.
@@ -457,29 +457,29 @@ def look(things: Things, beyond: Floats) -> Iterator[tuple[View, Integers]]:
 def least_weights(view: View, facets: Facets) -> Floats:
     """For each ray that any of the facets can block, the least weight with which one does."""
     reach, largest = CIRCUMRADIUS * facets.side[:, None], np.sqrt(LARGEST)
-    centre, a, b = (view.flat(v).T for v in (facets.centre, facets.across * reach, facets.along * reach))
+    center, a, b = (view.flat(v).T for v in (facets.center, facets.across * reach, facets.along * reach))
     # A triangle's sides are where these three numbers are 1: each is linear in x and y, and grows by x and y by (3, n).
     with np.errstate(divide="ignore", invalid="ignore"):
         aside, up = np.stack([[b[1], -b[0]], [-a[1], a[0]]]) / (a[0] * b[1] - a[1] * b[0])
     grow = 2.0 * SIN_60 * aside
     by_x, by_y = (np.stack([-2.0 * u, u + v, u - v]) for u, v in zip(up, grow, strict=True))
     wide = SIN_60 * np.abs(a[0])
-    low = np.ceil(centre[0] + largest * np.minimum(b[0], -b[0] / 2 - wide)).astype(np.int64)
-    high = np.floor(centre[0] + largest * np.maximum(b[0], -b[0] / 2 + wide)).astype(np.int64)
+    low = np.ceil(center[0] + largest * np.minimum(b[0], -b[0] / 2 - wide)).astype(np.int64)
+    high = np.floor(center[0] + largest * np.maximum(b[0], -b[0] / 2 + wide)).astype(np.int64)
     facet, step = spread(np.maximum(high - low + 1, 0))
     # On each line of the lattice, rays from where the last of the sides is entered to where the first is left.
     column = low[facet] + step
-    x = column - centre[0][facet]
+    x = column - center[0][facet]
     at, slope = by_x[:, facet] * x, by_y[:, facet]
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = (largest - at) / slope
-    enter = np.where(slope < 0, ends, -np.inf).max(axis=0) + centre[1][facet]
-    leave = np.where(slope > 0, ends, np.inf).min(axis=0) + centre[1][facet]
+    enter = np.where(slope < 0, ends, -np.inf).max(axis=0) + center[1][facet]
+    leave = np.where(slope > 0, ends, np.inf).min(axis=0) + center[1][facet]
     first = np.ceil(np.where(enter <= leave, enter, 0.0)).astype(np.int64)
     last = np.floor(np.where(enter <= leave, leave, -1.0)).astype(np.int64)
     line, step = spread(np.maximum(last - first + 1, 0))
     row = first[line] + step
-    y = row - centre[1][facet[line]]
+    y = row - center[1][facet[line]]
     # How many times as large the triangle has to be to reach the ray.
     scale = (at[:, line] + slope[:, line] * y).max(axis=0)
     inside = np.flatnonzero(scale <= largest)  # a side along the line has neither been entered nor left
@@ -529,7 +529,7 @@ def variants(species: Species) -> Iterator[tuple[str, Flora]]:
 def ages_measured(species: Species) -> list[float]:
     """Ages of which weights are measured, rising; 0.0 stands for the full one."""
     ages = ages_of(species)
-    if ages.scaled or species.form is not None:
+    if ages.scaled or species.skeleton is not None:
         return [0.0]
     found = [(part * ages.full, part * ages.full) for part in _YOUNG] + [(ages.full, 0.0)]
     if np.isfinite(ages.lifespan):

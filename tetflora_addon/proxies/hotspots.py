@@ -4,7 +4,7 @@
 
 Light and eye share gaps within an angle of about the size of leaves over the distance between them. Facets that are
 larger than the leaves for which they stand have a wider hotspot, and crowns around the shadow of the viewer's head were
-a twentieth too bright. The colour of facets makes up for that by view and light, as the visibility of aggregates does
+a twentieth too bright. The color of facets makes up for that by view and light, as the visibility of aggregates does
 for Zhou, Huang, Ramamoorthi, Sen and Yan ("Appearance-Preserving Scene Aggregation for Level-of-Detail Rendering"), so
 that crowns send back as much light in all directions together as before.
 """
@@ -79,7 +79,7 @@ def balance(chord: Floats, extinction: Floats, leaf: Floats, facet: Floats) -> F
     extinction : (n,) float64
         1/m.
     leaf, facet : (n,) float64
-        Roots of the areas, metres. Facets are not smaller than leaves.
+        Roots of the areas, meters. Facets are not smaller than leaves.
     """
     chord = np.maximum(chord, 1e-3)
     small, large = _CHORD * extinction * leaf, _CHORD * extinction * np.maximum(facet, leaf)
@@ -87,17 +87,17 @@ def balance(chord: Floats, extinction: Floats, leaf: Floats, facet: Floats) -> F
     return ratio * mean_overlap(large) / mean_overlap(small)
 
 
-def balanced_colours(colour: Floats, once: Floats) -> Floats:
-    """Colours (n, 3) with which light that is scattered once changes by factors (n,).
+def balanced_colors(color: Floats, hotspot_factor: Floats) -> Floats:
+    """Colors (n, 3) with which light that is scattered once changes by factors (n,).
 
     Of all light that a crown of albedo ω sends back, 1 − pω was scattered once.
     """
-    single = 1.0 - _RECOLLISION * np.clip(colour, 0.0, 1.0)
-    return np.clip(colour * once[:, None] ** single**_POWER, 0.0, 1.0)
+    single = 1.0 - _RECOLLISION * np.clip(color, 0.0, 1.0)
+    return np.clip(color * hotspot_factor[:, None] ** single**_POWER, 0.0, 1.0)
 
 
 def light_ratios(flora: Flora, subplants: Branches, facet: Floats, camera: Camera, lights: Sequence[Light]) -> Floats:
-    """`balance` (n,) of sub-plants with facets of sides (n,), metres: the mean over lamps by their strength there.
+    """`balance` (n,) of sub-plants with facets of sides (n,), meters: the mean over lamps by their strength there.
 
     The sky has no hotspot. Where there are lamps, it is taken for little.
     """
@@ -108,11 +108,11 @@ def light_ratios(flora: Flora, subplants: Branches, facet: Floats, camera: Camer
     leaf, eye = np.sqrt(flora.one_leaf_area(subplants)), to_eye(camera, place)
     total, strength = np.zeros(len(place)), np.zeros(len(place))
     for light in lights:
-        towards, away = -light.direction, 1.0
+        toward, away = -light.direction, 1.0
         if light.kind != "SUN":
             away = np.maximum(np.linalg.norm(light.position - place, axis=1), 1e-9)
-            towards = (light.position - place) / away[:, None]
-        own = float(np.mean(light.colour)) / away**2
-        total += own * balance(np.linalg.norm(eye - towards, axis=1), extinction, leaf, facet)
+            toward = (light.position - place) / away[:, None]
+        own = float(np.mean(light.color)) / away**2
+        total += own * balance(np.linalg.norm(eye - toward, axis=1), extinction, leaf, facet)
         strength += own
     return np.where(strength > 0.0, total / np.maximum(strength, 1e-300), 1.0)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Microsurfaces: few facets that stand for the many surfaces of what is not made explicit (paper, sections 1 and 7).
 
-Each facet takes its place, orientation and colour from a leaf or branch that the compiled species expects in the
+Each facet takes its place, orientation and color from a leaf or branch that the compiled species expects in the
 sub-plant. Facets are about as large as a pixel; on average they keep the area and orientation of the plants.
 
 Each lies in a plane of the faces of leaves, drawn in proportion to their areas: a leaf that is folded along its midrib
@@ -25,14 +25,14 @@ from ..compiled.placed import placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import axes
 from ..growth.branches import Branches
-from ..growth.colours import leaf_colours_at, mean_leaf_colours
+from ..growth.colors import leaf_colors_at, mean_leaf_colors
 from ..growth.foliage import leaf_start, outwardness, place_leaves, settled, youth
 from ..growth.hashing import Draw, child_key, mix, signed, uniform
 from ..growth.seasons import AREA, PRESENT, leaf_stages
 from ..growth.wind import moment
 from ..refinement.contents import Totals, piece_totals, subplant_totals
 from ..subplants.pieces import Pieces
-from .hotspots import balanced_colours
+from .hotspots import balanced_colors
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
 _WOOD_PATH = 1 << 41
@@ -58,26 +58,26 @@ class Facets(Arrays):
 
     Attributes
     ----------
-    centre : (n, 3) float64
+    center : (n, 3) float64
     across, along : (n, 3) float64
         Unit vectors in the facet's plane.
     side : (n,) float64
-        Root of the area, metres.
-    colour : (n, 3) float64
+        Root of the area, meters.
+    color : (n, 3) float64
     transmission : (n,) float64
     velocity : (n, 3) float64 or None
-        Metres a second; None for plants at rest.
+        Meters a second; None for plants at rest.
     roughness : (n,) float64 or None
         Of the gloss of assets; None where the material knows.
     stretch : (n,) float64 or None
         Length along ``along`` over that of an equilateral triangle of the same area; None for 1.
     """
 
-    centre: Floats
+    center: Floats
     across: Floats
     along: Floats
     side: Floats
-    colour: Floats
+    color: Floats
     transmission: Floats
     velocity: Floats | None = None
     roughness: Floats | None = None
@@ -95,8 +95,8 @@ def subplant_facets(
     leaf_side: Floats,
     wood_side: Floats | None = None,
     weight: Floats | None = None,
-    real: Floats | None = None,
-    once: Floats | None = None,
+    explicit: Floats | None = None,
+    hotspot_factor: Floats | None = None,
 ) -> Facets:
     """Facets of sub-plants.
 
@@ -105,20 +105,20 @@ def subplant_facets(
     flora : Flora
     subplants : Branches of n
     leaf_side, wood_side : (n,) float64
-        Side of a facet for leaves and for wood (the same if not given), metres; facets for leaves are never smaller
+        Side of a facet for leaves and for wood (the same if not given), meters; facets for leaves are never smaller
         than the leaves.
     weight : (n,) float64, optional
         Fraction of their area that facets get, see `facet_weights`.
-    real : (n,) float64, optional
+    explicit : (n,) float64, optional
         Fraction of each sub-plant that is drawn as it is; as many of its facets are left out at random.
-    once : (n,) float64, optional
+    hotspot_factor : (n,) float64, optional
         Light that leaves send to the eye once over what facets do, see `hotspots`.
     """
     totals = subplant_totals(flora, subplants)
     part = np.ones(len(subplants)) if weight is None else weight
     wood_side = leaf_side if wood_side is None else wood_side
-    leaves = _leaves_of_subplants(flora, subplants, totals, leaf_side, part, real, once)
-    made = _joined([leaves, _wood_of_subplants(flora, subplants, totals, wood_side, part, real)])
+    leaves = _leaves_of_subplants(flora, subplants, totals, leaf_side, part, explicit, hotspot_factor)
+    made = _joined([leaves, _wood_of_subplants(flora, subplants, totals, wood_side, part, explicit)])
     return made if subplants.crown is None else made.take(np.flatnonzero(made.side > 0))
 
 
@@ -128,21 +128,21 @@ def piece_facets(
     leaf_side: Floats,
     wood_side: Floats | None = None,
     weight: Floats | None = None,
-    real: Floats | None = None,
-    real_wood: Mask | None = None,
-    once: Floats | None = None,
+    explicit: Floats | None = None,
+    explicit_wood: Mask | None = None,
+    hotspot_factor: Floats | None = None,
 ) -> Facets:
     """Facets of pieces of branches; parameters as for `subplant_facets`.
 
-    Here ``real`` is the fraction of the leaves, and ``real_wood`` (n,) marks pieces whose wood is drawn as it is.
+    Here ``explicit`` is the fraction of the leaves, and ``explicit_wood`` (n,) marks pieces whose wood is drawn.
     """
     totals = piece_totals(flora, pieces)
-    if real_wood is not None:
-        totals = replace(totals, wood_area=np.where(real_wood, 0.0, totals.wood_area))
+    if explicit_wood is not None:
+        totals = replace(totals, wood_area=np.where(explicit_wood, 0.0, totals.wood_area))
     part = np.ones(len(pieces)) if weight is None else weight
     return _joined(
         [
-            _leaves_of_pieces(flora, pieces, totals, leaf_side, part, real, once),
+            _leaves_of_pieces(flora, pieces, totals, leaf_side, part, explicit, hotspot_factor),
             _wood_of_pieces(flora, pieces, totals, leaf_side if wood_side is None else wood_side, part),
         ]
     )
@@ -153,29 +153,32 @@ def _joined(parts: list[Facets]) -> Facets:
     return Facets.concatenate([p if p.stretch is not None else replace(p, stretch=np.ones(len(p))) for p in parts])
 
 
-def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], within: bool = False) -> Facets:
+def pushed_outside_view(facets: Facets, distance_to_view: Callable[[NDArray], NDArray], within: bool = False) -> Facets:
     """Facets that are out of view, moved away from it where they would reach into it, so that they keep their area.
 
-    Where there is no room beside it, they are shrunk, or left out. ``clearance`` gives the distance (n,) of
-    points (n, 3) from the view in metres. With ``within``, facets whose middle is in the view stay as they are.
+    Where there is no room beside it, they are shrunk, or left out. ``distance_to_view`` gives the distance (n,) of
+    points (n, 3) from the view in meters. With ``within``, facets whose middle is in the view stay as they are.
     """
-    reach, centre = CIRCUMRADIUS * facets.side, facets.centre
-    away = clearance(centre)
+    reach, center = CIRCUMRADIUS * facets.side, facets.center
+    away = distance_to_view(center)
     stay = (away <= 0.0) & within
     short = reach - away
     some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach) & ~stay)
     if len(some):
-        here, step = centre[some], 0.1 * reach[some, None]
-        slope = np.stack([clearance(here + step * axis) - clearance(here) for axis in np.eye(3)], axis=1) / step
+        here, step = center[some], 0.1 * reach[some, None]
+        slope = (
+            np.stack([distance_to_view(here + step * axis) - distance_to_view(here) for axis in np.eye(3)], axis=1)
+            / step
+        )
         steep = np.maximum(np.einsum("ni,ni->n", slope, slope), _LEAST_SLOPE)
-        centre = centre.copy()
-        centre[some] += (short[some] / steep)[:, None] * slope
-    fraction = np.where(stay, 1.0, np.clip(clearance(centre) / np.maximum(reach, 1e-12), 0.0, 1.0))
-    return replace(facets, centre=centre, side=facets.side * fraction).take(np.flatnonzero(fraction > 0.0))
+        center = center.copy()
+        center[some] += (short[some] / steep)[:, None] * slope
+    fraction = np.where(stay, 1.0, np.clip(distance_to_view(center) / np.maximum(reach, 1e-12), 0.0, 1.0))
+    return replace(facets, center=center, side=facets.side * fraction).take(np.flatnonzero(fraction > 0.0))
 
 
 def facet_numbers(
-    key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int, real: NDArray | None = None
+    key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int, explicit: NDArray | None = None
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Owner, index, key and area of the facets that areas (n,) are cut into; their expected number is area / facet.
 
@@ -187,9 +190,9 @@ def facet_numbers(
     owner, index = spread(counts)
     one = facet * np.where(expected >= 1.0, expected / np.maximum(counts, 1), 1.0)
     own = child_key(key[owner], index + path)
-    if real is None or not real.any():
+    if explicit is None or not explicit.any():
         return owner, index, own, one[owner]
-    kept = np.flatnonzero(uniform(own, Draw.TRANSITION) >= real[owner])
+    kept = np.flatnonzero(uniform(own, Draw.TRANSITION) >= explicit[owner])
     return owner[kept], index[kept], own[kept], one[owner[kept]]
 
 
@@ -247,34 +250,34 @@ def _leaves_of_subplants(
     totals: Totals,
     side: NDArray,
     weight: NDArray,
-    real: NDArray | None,
-    once: NDArray | None,
+    explicit: NDArray | None,
+    hotspot_factor: NDArray | None,
 ) -> Facets:
     rows, points = flora.rows, flora.samples.leaves
     one = flora.one_leaf_area(subplants)
     facet = np.maximum(side**2, one)
-    owner, index, key, area = facet_numbers(subplants.key, totals.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
+    owner, index, key, area = facet_numbers(subplants.key, totals.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, explicit)
     pick, place, base, area = _picked(flora, points, subplants, owner, index, key, area)
     leaf_row = points.row[pick]
     frame = products(base, gathered(points.frame, pick).astype(np.float64))
     frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
     half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
-    centre = place + half_leaf[:, None] * frame[:, :, 1]
+    center = place + half_leaf[:, None] * frame[:, :, 1]
     across, along = _in_a_face(flora, leaf_row, key, frame)
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
     many = area / one.clip(1e-300)[owner]
     day = None if subplants.year is None else (subplants, owner)
-    colour = leaf_colours_of_facets(flora, leaf_row, key, many, outward, points.young[pick], day)
+    color = leaf_colors_of_facets(flora, leaf_row, key, many, outward, points.young[pick], day)
     of_day = None if day is None else _of_kinds(flora, subplants, owner, rows["leaf_kind"][leaf_row])
     made = Facets(
-        centre,
+        center,
         across,
         along,
         np.sqrt(area * weight[owner] if of_day is None else area * weight[owner] * of_day),
-        dimmed(colour, owner, weight, once),
+        facet_albedo(color, owner, weight, hotspot_factor),
         flora.leaf.transmission[leaf_row],
-        _carried(flora, subplants, owner, centre),
+        _carried(flora, subplants, owner, center),
     )
     return made if of_day is None else made.take(np.flatnonzero(of_day > 0))
 
@@ -297,8 +300,8 @@ def _leaves_of_pieces(
     totals: Totals,
     side: NDArray,
     weight: NDArray,
-    real: NDArray | None,
-    once: NDArray | None,
+    explicit: NDArray | None,
+    hotspot_factor: NDArray | None,
 ) -> Facets:
     branches, rows = pieces.branches, flora.rows
     row = branches.row
@@ -309,39 +312,41 @@ def _leaves_of_pieces(
         one = one * shown / np.maximum(number, 1e-300)
     facet = np.maximum(side**2, one)
     start = leaf_start(rows, branches)
-    owner, index, key, area, t = _along(flora, pieces, totals.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, real)
+    owner, index, key, area, t = _along(
+        flora, pieces, totals.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, explicit
+    )
     bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # many pieces get no facet
     own = branches.take(bearers)
     lines = axes(rows, own)
     leaves = place_leaves(rows, own, lines, np.searchsorted(bearers, owner), index, key, t)
     frame = settled(rows, row[owner], leaves.frame, leaves.light, leaves.sky)
-    centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
+    center = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     across, along = _in_a_face(flora, row[owner], key, frame)
     places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
     many = area / one.clip(1e-300)[owner]
-    colour = leaf_colours_of_facets(
+    color = leaf_colors_of_facets(
         flora, row[owner], key, many, *places, None if branches.year is None else (branches, owner)
     )
-    colour = dimmed(colour, owner, weight, once)
+    color = facet_albedo(color, owner, weight, hotspot_factor)
     transmission = flora.leaf.transmission[row[owner]]
     velocity = None
     if own.later is not None:
         there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
         velocity = (there.position - leaves.position) / moment(rows)
-    return Facets(centre, across, along, np.sqrt(area * weight[owner]), colour, transmission, velocity)
+    return Facets(center, across, along, np.sqrt(area * weight[owner]), color, transmission, velocity)
 
 
 def _wood_of_subplants(
-    flora: Flora, subplants: Branches, totals: Totals, side: NDArray, weight: NDArray, real: NDArray | None
+    flora: Flora, subplants: Branches, totals: Totals, side: NDArray, weight: NDArray, explicit: NDArray | None
 ) -> Facets:
     points = flora.samples.wood
     wood = totals.wood_area / 2
-    owner, index, key, area = facet_numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, real)
-    pick, centre, base, area = _picked(flora, points, subplants, owner, index, key, area)
+    owner, index, key, area = facet_numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, explicit)
+    pick, center, base, area = _picked(flora, points, subplants, owner, index, key, area)
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
-    colour = flora.rows["branch_colour"][points.row[pick], 0]
-    velocity = _carried(flora, subplants, owner, centre)
-    return _strips(centre, axis, key, np.sqrt(area * weight[owner]), dimmed(colour, owner, weight, None), velocity)
+    color = flora.rows["branch_color"][points.row[pick], 0]
+    velocity = _carried(flora, subplants, owner, center)
+    return _strips(center, axis, key, np.sqrt(area * weight[owner]), facet_albedo(color, owner, weight, None), velocity)
 
 
 def _wood_of_pieces(flora: Flora, pieces: Pieces, totals: Totals, side: NDArray, weight: NDArray) -> Facets:
@@ -349,35 +354,35 @@ def _wood_of_pieces(flora: Flora, pieces: Pieces, totals: Totals, side: NDArray,
     owner, _, key, area, t = _along(flora, pieces, wood, side**2, none, _WOOD_PATH, _WOOD_COUNT)
     vector = (pieces.end - pieces.start)[owner]
     place = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
-    centre = pieces.start[owner] + place[:, None] * vector
+    center = pieces.start[owner] + place[:, None] * vector
     axis = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300)
-    colour = flora.rows["branch_colour"][pieces.branches.row[owner], 0]
+    color = flora.rows["branch_color"][pieces.branches.row[owner], 0]
     velocity = None
     if pieces.branches.later is not None:
         lines = axes(flora.rows, pieces.branches)
         velocity = (lines.later.at(owner, t)[0] - lines.at(owner, t)[0]) / moment(flora.rows)
-    return _strips(centre, axis, key, np.sqrt(area * weight[owner]), dimmed(colour, owner, weight, None), velocity)
+    return _strips(center, axis, key, np.sqrt(area * weight[owner]), facet_albedo(color, owner, weight, None), velocity)
 
 
 def _strips(
-    centre: NDArray, axis: NDArray, key: Keys, side: NDArray, colour: NDArray, velocity: NDArray | None
+    center: NDArray, axis: NDArray, key: Keys, side: NDArray, color: NDArray, velocity: NDArray | None
 ) -> Facets:
     """Facets of wood: long and thin, as branches are, along axes (n, 3)."""
     stretch, none = np.full(len(side), STRETCH), np.zeros(len(side))
     # Turned about their axes at random, since closed tubes face all ways around.
     aside, turn = perpendicular(axis), 2 * np.pi * uniform(key, _TURN)[:, None]
     across = np.cos(turn) * aside + np.sin(turn) * np.cross(axis, aside)
-    return Facets(centre, across, axis, side, colour, none, velocity, stretch=stretch)
+    return Facets(center, across, axis, side, color, none, velocity, stretch=stretch)
 
 
-def _carried(flora: Flora, subplants: Branches, owner: Integers, centre: Floats) -> Floats | None:
+def _carried(flora: Flora, subplants: Branches, owner: Integers, center: Floats) -> Floats | None:
     """Velocities (m, 3) of points (m, 3) of sub-plants that move with their bases; None for plants at rest."""
     if subplants.later is None:
         return None
     own = subplants.take(owner)
-    local = np.einsum("nji,nj->ni", own.frame, centre - own.position)
+    local = np.einsum("nji,nj->ni", own.frame, center - own.position)
     there = own.later.position + np.einsum("nij,nj->ni", own.later.frame, local)
-    return (there - centre) / moment(flora.rows)
+    return (there - center) / moment(flora.rows)
 
 
 def _along(
@@ -388,7 +393,7 @@ def _along(
     start: Floats,
     path: int,
     draw: int,
-    real: Floats | None = None,
+    explicit: Floats | None = None,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
     """Owner, index, key, area and place along the branch of the facets of pieces, see `facet_numbers`.
 
@@ -403,7 +408,7 @@ def _along(
     length = np.maximum(pieces.t1 - first, 0.0)
     part = np.where(length > 0, np.maximum(high - low, length) / np.maximum(length, 1e-12), 0.0)
     numbered = mix(pieces.branches.key ^ (number.astype(np.uint64) + np.uint64(path)))
-    owner, index, key, one = facet_numbers(numbered, area * part, facet, path, draw, real)
+    owner, index, key, one = facet_numbers(numbered, area * part, facet, path, draw, explicit)
     t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + index * _GOLDEN) % 1.0)
     on = np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner]))
     return owner[on], index[on], key[on], one[on], t[on]
@@ -412,41 +417,41 @@ def _along(
 OnDay = tuple[Branches, Integers] | None
 
 
-def leaf_colours_of_facets(
+def leaf_colors_of_facets(
     flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray, on_day: OnDay
 ) -> Floats:
-    """Colours of facets that stand for several leaves (n,) each: a mean varies less than the colour of one leaf.
+    """Colors of facets that stand for several leaves (n,) each: a mean varies less than the color of one leaf.
 
     ``on_day`` are branches, and those (n,) whose leaves they are, where these may not be as in summer.
     """
     several = np.sqrt(np.maximum(leaves, 1))
-    deviation = signed(key, Draw.LEAF_COLOUR) / several
-    mean = mean_leaf_colours(flora.rows, row, outward, young)
+    deviation = signed(key, Draw.LEAF_COLOR) / several
+    mean = mean_leaf_colors(flora.rows, row, outward, young)
     if on_day is not None:
         branches, owner = on_day
-        summer, mean = mean, flora.day.own_colours(branches, flora.rows["leaf_kind"][row], mean, owner)
+        summer, mean = mean, flora.day.own_colors(branches, flora.rows["leaf_kind"][row], mean, owner)
         day, hue = (gathered(branches.year[:, i], owner) for i in range(2))
         stages = leaf_stages(flora.rows, row, key, day)
-        one = leaf_colours_at(flora.rows, row, summer, stages, hue)
+        one = leaf_colors_at(flora.rows, row, summer, stages, hue)
         mean = mean + np.where(stages.there, 1.0 / several, 0.0)[:, None] * (one - mean)
-    return np.clip(mean + gathered(flora.rows["leaf_colour"][:, 1], row) * deviation[:, None], 0, 1)
+    return np.clip(mean + gathered(flora.rows["leaf_color"][:, 1], row) * deviation[:, None], 0, 1)
 
 
-def dimmed(colour: NDArray, owner: NDArray, weight: NDArray, once: NDArray | None) -> Floats:
-    """Colours (m, 3) of facets of owners (m,), by the weights of these (n,) and what light and eye share of them."""
-    colour = trapped(colour, weight[owner])
-    return colour if once is None else balanced_colours(colour, once[owner])
+def facet_albedo(color: NDArray, owner: NDArray, weight: NDArray, hotspot_factor: NDArray | None) -> Floats:
+    """Colors (m, 3) of facets of owners (m,), by the weights of these (n,) and what light and eye share of them."""
+    color = recollision_albedo(color, weight[owner])
+    return color if hotspot_factor is None else balanced_colors(color, hotspot_factor[owner])
 
 
-def trapped(colour: Floats, weight: Floats) -> Floats:
-    """Colour (n, 3) of clusters of surfaces that are seen by a fraction ``weight`` (n,) of their area.
+def recollision_albedo(color: Floats, weight: Floats) -> Floats:
+    """Color (n, 3) of clusters of surfaces that are seen by a fraction ``weight`` (n,) of their area.
 
     What one surface scatters meets another of its cluster with the probability p = 1 − weight, and is dimmed again:
     ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform
     broadleaved and coniferous canopies", 2005).
     """
     p = np.clip(1.0 - weight, 0.0, 1.0)[:, None]
-    return colour * (1.0 - p) / (1.0 - p * colour)
+    return color * (1.0 - p) / (1.0 - p * color)
 
 
 #: Planes of each kind of leaf: quantiles of the areas of its faces.

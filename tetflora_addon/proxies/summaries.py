@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Summaries of tetrahedra: optical area, colour, orientation of what they hold (paper, 6.5), and extinction."""
+"""Summaries of tetrahedra: optical area, color, orientation of what they hold (paper, 6.5), and extinction."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..compiled.clumping import factors
 from ..compiled.flora import Flora
 from ..compiled.orientation import leaf_moments, own_leaf_moments, wood_moments
 from ..refinement.asset_parts import AssetParts, PlacedAssets
-from ..refinement.contents import Contents, Held
-from ..refinement.polygons import MEASURED_AT_ONCE
-from ..subplants.pieces import Pieces, chunks, outward_ends, piece_leaf_colours
+from ..refinement.contents import Contents, InCells
+from ..refinement.polygons import MEASURE_BATCH
+from ..subplants.pieces import Pieces, chunks, outward_ends, piece_leaf_colors
 
 #: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways:
 #: ½) and 1; at ½ (normals around a circle) it gives .646 for 2/π = .637.
@@ -31,7 +31,7 @@ class Summaries:
     ----------
     optical_area : (n,) float64
         m², as it is; leaves count once, the closed surfaces of branches and other solids half.
-    colour : (n, 3) float64
+    color : (n, 3) float64
         Linear RGB.
     transmission : (n,) float64
         Fraction of scattered light that goes through.
@@ -43,7 +43,7 @@ class Summaries:
     """
 
     optical_area: Floats
-    colour: Floats
+    color: Floats
     transmission: Floats
     moment: Floats
     clumping: Floats | None = None
@@ -55,12 +55,12 @@ class Summaries:
         return self.optical_area * factors(self.clumping, volumes)
 
 
-def summarise(
+def summarize(
     flora: Flora,
     contents: Contents,
     index: Integers,
     count: int,
-    assets: tuple[PlacedAssets, Held[AssetParts]] | None = None,
+    assets: tuple[PlacedAssets, InCells[AssetParts]] | None = None,
 ) -> Summaries:
     """Sum up contents by tetrahedron.
 
@@ -75,7 +75,7 @@ def summarise(
     assets : PlacedAssets, Held of AssetParts, optional
         Clusters of instances, from `SharedAssets.held`.
     """
-    sums = np.zeros((count, 16))  # area, then times area: colour, transmission, moment, clumping
+    sums = np.zeros((count, 16))  # area, then times area: color, transmission, moment, clumping
     for held in (contents.subplants, contents.pieces):
         keep = np.flatnonzero(index[held.cell] >= 0)
         if len(keep) == 0:  # clumping and orientation are computed only for plants
@@ -86,13 +86,13 @@ def summarise(
         row = branches.row
         # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
         if branches is own:
-            leaf_colour, wood_colour = flora.leaf_colours(branches), flora.wood_colour[row]
+            leaf_color, wood_color = flora.leaf_colors(branches), flora.wood_color[row]
             leaf_moment = leaf_moments(flora.orientation, branches)
             wood_moment, transmission = wood_moments(flora.orientation, branches), flora.transmission[row]
             clumped = clumping.coefficients(branches, clumping.whole)
         else:
             axis = unit(own.end - own.start)
-            leaf_colour, wood_colour = piece_leaf_colours(flora, own), flora.rows["branch_colour"][row, 0]
+            leaf_color, wood_color = piece_leaf_colors(flora, own), flora.rows["branch_color"][row, 0]
             outward = np.mean(outward_ends(flora, own), axis=0)
             leaf_moment = own_leaf_moments(flora.orientation, row, axis, outward)
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
@@ -100,9 +100,9 @@ def summarise(
             clumped = clumping.coefficients(branches, clumping.own)
         leaf, wood = totals.leaf_area, totals.wood_area / 2
         moment = leaf[:, None, None] * leaf_moment + wood[:, None, None] * wood_moment
-        colour = leaf[:, None] * leaf_colour + wood[:, None] * wood_colour
+        color = leaf[:, None] * leaf_color + wood[:, None] * wood_color
         area = (leaf + wood)[:, None]
-        values = [area, colour, (leaf * transmission)[:, None], moment.reshape(-1, 9), area * clumped]
+        values = [area, color, (leaf * transmission)[:, None], moment.reshape(-1, 9), area * clumped]
         _add(sums, index[held.cell], np.concatenate(values, axis=1))
     _add_polygons(sums, contents, index)
     if assets is not None:
@@ -121,7 +121,7 @@ def _add_polygons(sums: Floats, contents: Contents, index: Integers) -> None:
     """Polygons are summed up triangle by triangle, which is exact under any sequence of cuts."""
     chosen = np.flatnonzero(index[contents.polygons.cell] >= 0)
     meshes = contents.polygons.items.meshes
-    for run in chunks(contents.polygons.items.triangle_counts[chosen], MEASURED_AT_ONCE):
+    for run in chunks(contents.polygons.items.triangle_counts[chosen], MEASURE_BATCH):
         some = chosen[run]
         polygons = contents.polygons.items.take(some)
         owner, triangle, fraction = polygons.triangles()
@@ -134,12 +134,12 @@ def _add_polygons(sums: Floats, contents: Contents, index: Integers) -> None:
         moment = (normal[:, :, None] * normal[:, None, :]).reshape(-1, 9)
         even = np.broadcast_to([1.0, 0.0], (len(face), 2))
         seen = np.concatenate(
-            [np.ones_like(optical), meshes.colours[slot], meshes.transmission[slot][:, None], moment, even], axis=1
+            [np.ones_like(optical), meshes.colors[slot], meshes.transmission[slot][:, None], moment, even], axis=1
         )
         _add(sums, index[contents.polygons.cell[some]][owner], optical * seen)
 
 
-def _add_assets(sums: Floats, placed: PlacedAssets, held: Held[AssetParts], index: Integers) -> None:
+def _add_assets(sums: Floats, placed: PlacedAssets, held: InCells[AssetParts], index: Integers) -> None:
     held = held.take(np.flatnonzero(index[held.cell] >= 0))
     clusters, cluster, area = placed.assets.clusters, held.items.cluster, held.totals.optical_area[:, None]
     local, full = clusters.moment[cluster], np.empty((len(cluster), 3, 3))
@@ -149,7 +149,7 @@ def _add_assets(sums: Floats, placed: PlacedAssets, held: Held[AssetParts], inde
     moment = turn @ full @ turn.transpose(0, 2, 1)
     moment /= np.maximum(np.trace(moment, axis1=1, axis2=2), 1e-300)[:, None, None]
     even = np.broadcast_to([1.0, 0.0], (len(cluster), 2))
-    look = clusters.colour[cluster], clusters.transmission[cluster][:, None]
+    look = clusters.color[cluster], clusters.transmission[cluster][:, None]
     seen = np.concatenate([np.ones_like(area), *look, moment.reshape(-1, 9), even], axis=1)
     _add(sums, index[held.cell], area * seen)
 

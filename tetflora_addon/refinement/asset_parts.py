@@ -36,28 +36,28 @@ class AssetParts(Arrays):
     instance : (n,) int32
     cluster : (n,) int32
         Of `AssetTable.clusters`.
-    centre : (n, 3) float64
-        Middle of its bound, metres.
+    center : (n, 3) float64
+        Middle of its bound, meters.
     totals : Totals of n
     extent : (n,) float64
-        Longest side of its bound, metres.
+        Longest side of its bound, meters.
     """
 
     instance: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     cluster: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    centre: NDArray[np.float64] = field(metadata=column(3))
+    center: NDArray[np.float64] = field(metadata=column(3))
     totals: Totals = field(metadata=nested(Totals))
     extent: NDArray[np.float64]
 
     @property
     def reach(self) -> NDArray[np.float64]:
-        """Distance (n,) from the middle within which all of each is, metres."""
+        """Distance (n,) from the middle within which all of each is, meters."""
         return 0.5 * np.sqrt(3.0) * self.extent
 
     def bounding_box(self) -> NDArray[np.float64]:
-        """Axis-aligned box (2, 3) around all of them, at least one, metres."""
+        """Axis-aligned box (2, 3) around all of them, at least one, meters."""
         reach = self.reach[:, None]
-        return np.stack([(self.centre - reach).min(axis=0), (self.centre + reach).max(axis=0)])
+        return np.stack([(self.center - reach).min(axis=0), (self.center + reach).max(axis=0)])
 
 
 class PlacedAssets:
@@ -100,8 +100,8 @@ class PlacedAssets:
         leaf, wood = self._areas(instance, cluster)
         width = clusters.width[cluster] * self.scale[instance]
         totals = Totals(leaf, wood, clusters.faces[cluster].astype(np.float64), width)
-        centre = self.to_world((low + high) / 2, instance)
-        return AssetParts(instance.astype(np.int32), cluster.astype(np.int32), centre, totals, side)
+        center = self.to_world((low + high) / 2, instance)
+        return AssetParts(instance.astype(np.int32), cluster.astype(np.int32), center, totals, side)
 
     def children(self, parts: AssetParts) -> tuple[AssetParts, NDArray[np.int64]]:
         """Children of clusters (n,), and whose each is (m,)."""
@@ -110,11 +110,11 @@ class PlacedAssets:
         return self.parts(parts.instance[owner], clusters.child[parts.cluster][owner] + index), owner
 
     def kites(self, parts: AssetParts) -> NDArray[np.float64]:
-        """Corners (k, 4, 3) of kites for all leaves of clusters (n,), metres."""
+        """Corners (k, 4, 3) of kites for all leaves of clusters (n,), meters."""
         leaves, clusters, asset = self.assets.leaves, self.assets.clusters, self.instances.asset[parts.instance]
         owner, index = spread(clusters.leaves[parts.cluster].astype(np.int64))
         own = leaves.take((self.assets.first_leaf[asset] + clusters.first_leaf[parts.cluster])[owner] + index)
-        corners = (own.centre - own.along, own.centre - own.across, own.centre + own.along, own.centre + own.across)
+        corners = (own.center - own.along, own.center - own.across, own.center + own.along, own.center + own.across)
         return np.stack([self.to_world(corner, parts.instance[owner]) for corner in corners], axis=1)
 
     def to_world(self, points: NDArray[np.floating], instance: NDArray[np.integer]) -> NDArray[np.float64]:
@@ -147,10 +147,10 @@ class PlacedAssets:
             wood[some] *= longer / scale[some]
         return leaf, wood
 
-    def bodies(self, parts: AssetParts) -> NDArray[np.float64]:
+    def closed_leaves(self, parts: AssetParts) -> NDArray[np.float64]:
         """Area (n,) of solids that facets stand for as for leaves, m²."""
         clusters = self.assets.clusters
-        part = clusters.body_area[parts.cluster] / np.maximum(clusters.wood_area[parts.cluster], 1e-300)
+        part = clusters.closed_leaf_area[parts.cluster] / np.maximum(clusters.wood_area[parts.cluster], 1e-300)
         return parts.totals.wood_area * part
 
     def keys(self, parts: AssetParts) -> NDArray[np.uint64]:
@@ -190,7 +190,7 @@ class SharedAssets(SharedParts[AssetParts]):
         """As `SharedParts.can_open`."""
         return self.placed.assets.clusters.children[parts.cluster] > 0
 
-    def alone(self, parts: AssetParts) -> NDArray[np.bool_]:
+    def branch_only(self, parts: AssetParts) -> NDArray[np.bool_]:
         """None of them counts apart."""
         return np.zeros(len(parts), bool)
 
@@ -200,14 +200,14 @@ class SharedAssets(SharedParts[AssetParts]):
 
     def points_on(self, parts: AssetParts, known: None) -> SharePoints:
         """Points on clusters, all in the root: at their samples."""
-        pixels = parts.extent / self.camera.extent_around(parts.centre)
+        pixels = parts.extent / self.camera.extent_around(parts.center)
         clusters, key = self.placed.assets.clusters, self.placed.keys(parts)
-        bodies = self.placed.bodies(parts)
+        closed_leaves = self.placed.closed_leaves(parts)
         number = np.ceil(np.maximum(pixels / PIXELS_A_POINT, FEWEST)) * self._times
         made = []
         for leafy in (True, False):
             sheets = parts.totals.leaf_area if leafy else np.zeros(len(parts))
-            solids = bodies if leafy else parts.totals.wood_area - bodies
+            solids = closed_leaves if leafy else parts.totals.wood_area - closed_leaves
             part = (sheets + solids / 2) / np.maximum(parts.totals.optical_area, 1e-300)
             there = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
             count = np.minimum(np.ceil(number * part), there)

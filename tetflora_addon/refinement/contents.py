@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Contents of tetrahedra: sub-plants, branches and explicit polygons, with their totals (paper, section 6.5).
 
-Plants are shared among tetrahedra, see `shares`. Polygons come from meshes that were modelled elsewhere; each is in one
+Plants are shared among tetrahedra, see `shares`. Polygons come from meshes that were modeled elsewhere; each is in one
 tetrahedron. Totals are what decisions need: areas, numbers of polygons, and the width of features.
 
 Polygons of divided tetrahedra are handed on to the children. What lies on one side of a plane goes there whole, what
@@ -24,7 +24,7 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds, extents
 from ..growth.branches import Branches
-from ..growth.envelopes import are_solids, reaches
+from ..growth.envelopes import are_solids, envelope_reach
 from ..growth.growth import fullness
 from ..growth.seasons import AREA, PRESENT
 from ..subplants.pieces import Pieces, chunks, leaf_fraction, piece_leaf_integrals, wood_areas
@@ -53,7 +53,7 @@ class Totals(Arrays):
     polygons : (n,) float64
         Expected faces if made explicit.
     width : (n,) float64
-        Width of the features, metres: that of the leaves, or of the branch where there are none. By tetrahedron: the
+        Width of the features, meters: that of the leaves, or of the branch where there are none. By tetrahedron: the
         mean, weighted by area. Infinite where polygons are drawn as they are whatever is decided; these count for a
         tetrahedron that holds nothing else.
     """
@@ -85,7 +85,7 @@ def subplant_totals(flora: Flora, subplants: Branches) -> Totals:
 
 
 def feature_width(flora: Flora, subplants: Branches) -> Floats:
-    """Width (n,) of the features of sub-plants, metres: that of their leaves, or of their branch without any."""
+    """Width (n,) of the features of sub-plants, meters: that of their leaves, or of their branch without any."""
     row = subplants.row
     width = np.where(flora.leaf_count[row] > 0, flora.leaf_width[row] * subplants.scale, 2.0 * subplants.radius)
     if subplants.year is None:
@@ -144,15 +144,15 @@ class PlantParts(Arrays):
     Attributes
     ----------
     branches : Branches of n
-    alone : (n,) bool
+    branch_only : (n,) bool
         Only the branch itself, with the leaves that it bears.
     totals : Totals of n
     extent : (n,) float64
-        Longest side, metres.
+        Longest side, meters.
     """
 
     branches: Branches = field(metadata=nested(Branches))
-    alone: Mask = field(metadata=column(dtype=bool))
+    branch_only: Mask = field(metadata=column(dtype=bool))
     totals: Totals = field(metadata=nested(Totals))
     extent: Floats
 
@@ -166,15 +166,15 @@ class PlantParts(Arrays):
         return cls(branches, alone, subplant_totals(flora, branches), extent)
 
     @classmethod
-    def of_bodies(cls, flora: Flora, branches: Branches) -> PlantParts:
+    def of_branches(cls, flora: Flora, branches: Branches) -> PlantParts:
         """Branches (n,) without what grows on them."""
-        extent = branches.length * np.maximum(1.0, 2.0 * reaches(flora.rows)[branches.row])
+        extent = branches.length * np.maximum(1.0, 2.0 * envelope_reach(flora.rows)[branches.row])
         return cls(branches, np.ones(len(branches), bool), piece_totals(flora, as_pieces(branches)), extent)
 
     def can_open(self, flora: Flora) -> Mask:
         """Parts (n,) on which something else grows."""
         row = self.branches.row
-        return ~self.alone & ((flora.rows["next"][row] >= 0).any(axis=1) | flora.rows["phantom"][row])
+        return ~self.branch_only & ((flora.rows["next"][row] >= 0).any(axis=1) | flora.rows["phantom"][row])
 
 
 def as_pieces(branches: Branches) -> Pieces:
@@ -185,7 +185,7 @@ def as_pieces(branches: Branches) -> Pieces:
 
 
 @dataclass(frozen=True)
-class Held(Arrays, Generic[Kind]):
+class InCells(Arrays, Generic[Kind]):
     """Things of one kind (n), each in one node of the tree.
 
     Attributes
@@ -201,7 +201,7 @@ class Held(Arrays, Generic[Kind]):
     totals: Totals
 
     @classmethod
-    def none(cls, kind: type[Kind]) -> Held[Kind]:
+    def none(cls, kind: type[Kind]) -> InCells[Kind]:
         """Nothing of a kind."""
         return cls(kind.empty(), _NONE, Totals.empty())
 
@@ -213,30 +213,30 @@ class Contents:
     A part of a plant that is shared by several tetrahedra is there once for each, with what that one holds of it.
     """
 
-    subplants: Held[Branches] = field(default_factory=lambda: Held.none(Branches))
-    pieces: Held[Pieces] = field(default_factory=lambda: Held.none(Pieces))
-    polygons: Held[Polygons] = field(default_factory=lambda: Held.none(Polygons))
+    subplants: InCells[Branches] = field(default_factory=lambda: InCells.none(Branches))
+    pieces: InCells[Pieces] = field(default_factory=lambda: InCells.none(Pieces))
+    polygons: InCells[Polygons] = field(default_factory=lambda: InCells.none(Polygons))
 
 
-def in_the_root(polygons: Polygons, large: Mask | None = None) -> Held[Polygons]:
+def in_the_root(polygons: Polygons, large: Mask | None = None) -> InCells[Polygons]:
     """Polygons (n,), all in the root; ``large`` ones (n,) stay polygons whatever is decided about their cells."""
     totals = polygon_totals(polygons)
     if large is not None:
         totals = replace(totals, width=np.where(large, np.inf, totals.width))
-    return Held(polygons, np.zeros(len(polygons), np.int32), totals)
+    return InCells(polygons, np.zeros(len(polygons), np.int32), totals)
 
 
-class Holdings:
+class PolygonsByCell:
     """Polygons in terminal nodes while a tree is divided: only what lies in divided nodes is taken out and copied."""
 
-    def __init__(self, polygons: Held[Polygons]) -> None:
+    def __init__(self, polygons: InCells[Polygons]) -> None:
         self._parts = [polygons]
 
     def __len__(self) -> int:
         return int(sum((part.cell >= 0).sum() for part in self._parts))
 
     @property
-    def polygons(self) -> Held[Polygons]:
+    def polygons(self) -> InCells[Polygons]:
         """All together; copies them into one, which is then kept until something changes."""
         self._parts = [_joined([_living(part) for part in self._parts])]
         return self._parts[0]
@@ -251,11 +251,11 @@ class Holdings:
         some = [part.take(_within(part, chosen)) for part in self._parts]
         return [(part.totals, part.cell) for part in some]
 
-    def put(self, polygons: Held[Polygons]) -> None:
+    def put(self, polygons: InCells[Polygons]) -> None:
         """Add polygons."""
         self._parts.append(polygons)
 
-    def take_out(self, chosen: Mask) -> Held[Polygons]:
+    def take_out(self, chosen: Mask) -> InCells[Polygons]:
         """Remove and return what lies in chosen nodes; ``chosen`` is (nodes,) bool."""
         out, kept = [], []
         for part in self._parts:
@@ -271,36 +271,36 @@ class Holdings:
         return _joined(out)
 
 
-def _within(part: Held[Polygons], chosen: Mask) -> Mask:
+def _within(part: InCells[Polygons], chosen: Mask) -> Mask:
     return chosen[np.maximum(part.cell, 0)] & (part.cell >= 0)
 
 
-def _living(part: Held[Polygons]) -> Held[Polygons]:
+def _living(part: InCells[Polygons]) -> InCells[Polygons]:
     """Without what has been taken out."""
     return part.take(part.cell >= 0)
 
 
-def _joined(parts: list[Held[Polygons]]) -> Held[Polygons]:
+def _joined(parts: list[InCells[Polygons]]) -> InCells[Polygons]:
     if len(parts) < 2:
-        return parts[0] if parts else Held.none(Polygons)
-    return Held.concatenate(parts)
+        return parts[0] if parts else InCells.none(Polygons)
+    return InCells.concatenate(parts)
 
 
 def large_polygons(polygons: Polygons, camera: Camera) -> Mask:
     """Polygons (n,) too large for a facet; leaves never are, since one facet may stand for several."""
     meshes, face = polygons.meshes, polygons.face
     optical = polygons.areas() * np.where(meshes.solid[face], 0.5, 1.0)
-    return ~meshes.leaf[face] & (optical >= (LARGE * camera.extent_around(polygons.centre)) ** 2)
+    return ~meshes.leaf[face] & (optical >= (LARGE * camera.extent_around(polygons.center)) ** 2)
 
 
-def bounding_bodies(flora: Flora, subplants: Branches) -> Floats:
+def bounding_capsules(flora: Flora, subplants: Branches) -> Floats:
     """Bodies that hold all vertices of sub-plants, from the compiled bounds alone.
 
     Returns
     -------
     (9, n) float64
-        A cylinder, and how far whatever is not within it reaches beyond: centre (3), axis (3), radius, half of the
-        height, and that pad. Metres, world space.
+        A cylinder, and how far whatever is not within it reaches beyond: center (3), axis (3), radius, half of the
+        height, and that pad. Meters, world space.
     """
     bound, pad = bounds(flora, subplants)
     bound = bound.T
@@ -317,34 +317,34 @@ def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDAr
 
     Returns
     -------
-    centre : (n, 3) float64
-        Metres, world space.
+    center : (n, 3) float64
+        Meters, world space.
     radius, half_height : (n,) float64
-        Across and along the branch's axis, metres.
+        Across and along the branch's axis, meters.
     """
-    bodies = bounding_bodies(flora, subplants)
-    return bodies[:3].T, bodies[6] + bodies[8], bodies[7] + bodies[8]
+    capsules = bounding_capsules(flora, subplants)
+    return capsules[:3].T, capsules[6] + capsules[8], capsules[7] + capsules[8]
 
 
 def bounding_box(flora: Flora, subplants: Branches) -> Floats:
-    """Axis-aligned box (2, 3) of all sub-plants' bounds, metres."""
-    bodies = bounding_bodies(flora, subplants)
-    axis = np.abs(bodies[3:6])
-    reach = bodies[7] * axis + bodies[6] * np.sqrt(np.maximum(1 - axis**2, 0)) + bodies[8]
-    return np.stack([(bodies[:3] - reach).min(axis=1), (bodies[:3] + reach).max(axis=1)])
+    """Axis-aligned box (2, 3) of all sub-plants' bounds, meters."""
+    capsules = bounding_capsules(flora, subplants)
+    axis = np.abs(capsules[3:6])
+    reach = capsules[7] * axis + capsules[6] * np.sqrt(np.maximum(1 - axis**2, 0)) + capsules[8]
+    return np.stack([(capsules[:3] - reach).min(axis=1), (capsules[:3] + reach).max(axis=1)])
 
 
-#: Metres (n,) at points (n, 3) that make no difference in the image.
+#: Meters (n,) at points (n, 3) that make no difference in the image.
 Slack = Callable[[Floats], Floats]
 
 #: Triangles of polygons that are lowered at a time; bounds what that takes to some hundred megabytes.
-LOWERED_AT_ONCE = 200_000
+DESCEND_BATCH = 200_000
 
 
 def cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tuple[Integers, Integers, Polygons]:
     """Clip polygons (n,) by a plane (n, 4) each.
 
-    Triangles that reach beyond their plane by no more than ``slack`` (n,), in metres, stay whole.
+    Triangles that reach beyond their plane by no more than ``slack`` (n,), in meters, stay whole.
 
     Returns
     -------
@@ -387,22 +387,22 @@ def cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tupl
     return np.concatenate([owner[stays], owner[from_]]), np.concatenate([larger, side]), parts
 
 
-def push_down(tree: TetrahedralTree, held: Held[Polygons], slack: Slack | None = None) -> Held[Polygons]:
+def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Slack | None = None) -> InCells[Polygons]:
     """Hand polygons of divided nodes on until all lie in terminal ones.
 
     What reaches no further than ``slack`` beyond a plane stays whole. Nothing is lost or held twice.
     """
-    placed = [Held.none(Polygons)]
+    placed = [InCells.none(Polygons)]
     while len(held):
         polygons, cells, crosses = held.items, held.cell.copy(), np.zeros(len(held), bool)
-        for some in chunks(polygons.triangle_counts, LOWERED_AT_ONCE):
+        for some in chunks(polygons.triangle_counts, DESCEND_BATCH):
             cells[some], crosses[some] = _lowered(tree, polygons.take(some), cells[some], slack)
         placed.append(replace(held, cell=cells).take(~crosses))
         polygons, cells, width = polygons.take(crosses), cells[crosses], held.totals.width[crosses]
-        loose = 0.0 if slack is None else slack(polygons.centre)
+        loose = 0.0 if slack is None else slack(polygons.center)
         owner, side, polygons = cut(polygons, tree.planes(cells), loose)
-        held = Held(polygons, tree.children[cells[owner], side], polygon_totals(polygons, width[owner]))
-    return Held.concatenate(placed)
+        held = InCells(polygons, tree.children[cells[owner], side], polygon_totals(polygons, width[owner]))
+    return InCells.concatenate(placed)
 
 
 def _lowered(
@@ -410,16 +410,16 @@ def _lowered(
 ) -> tuple[NDArray[np.int32], Mask]:
     """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""
     cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
-    centre, reach, touching = polygons.centre, polygons.reach, polygons.touching()
+    center, reach, touching = polygons.center, polygons.reach, polygons.touching()
     moving = np.flatnonzero(tree.children[cells, 0] >= 0)
     while len(moving):
         planes = tree.planes(cells[moving])
-        distance = np.einsum("ni,ni->n", np.take(centre, moving, axis=0), planes[:, :3]) + planes[:, 3]
+        distance = np.einsum("ni,ni->n", np.take(center, moving, axis=0), planes[:, :3]) + planes[:, 3]
         whole = np.abs(distance) > np.take(reach, moving)
         # The sphere is a first guess; slack and corners are computed only for what it leaves open.
         unclear = np.flatnonzero(~whole)
         some = moving[unclear]
-        loose = touching[some] if slack is None else np.maximum(touching[some], slack(centre[some]))
+        loose = touching[some] if slack is None else np.maximum(touching[some], slack(center[some]))
         whole[unclear] = np.abs(distance[unclear]) > reach[some] - loose
         left = np.flatnonzero(~whole[unclear])
         if len(left):

@@ -30,7 +30,7 @@ DEEP = 1.5
 BAND = 2.5
 
 
-def real_fraction(pixels: Floats, limit: float) -> Floats:
+def explicit_fraction(pixels: Floats, limit: float) -> Floats:
     """Fraction (n,) of leaves that are real by their width (n,) in pixels: a smooth step in its logarithm.
 
     It is 0 up to a limit in pixels and 1 from `BAND` times that on (beyond the paper, which switches at once).
@@ -59,13 +59,13 @@ class Terminals(Arrays):
     totals : Totals of n
     pixels, opacity : (n,) float64
         As in `visibility.Outline`.
-    feature : (n,) float64
+    feature_px : (n,) float64
         Width in pixels of what they hold, where it is nearest to the eye.
-    least_feature : (n,) float64
+    min_feature_px : (n,) float64
         The same where it is farthest away.
-    span : (n,) float64
+    longest_edge_px : (n,) float64
         Longest edge in pixels at their distance.
-    whole : (n,) bool
+    fully_inside : (n,) bool
         Whether all of each is in view. What crosses the border has the pixels of its visible part only.
     """
 
@@ -73,10 +73,10 @@ class Terminals(Arrays):
     totals: Totals
     pixels: Floats
     opacity: Floats
-    feature: Floats
-    least_feature: Floats
-    span: Floats
-    whole: Mask
+    feature_px: Floats
+    min_feature_px: Floats
+    longest_edge_px: Floats
+    fully_inside: Mask
 
     @classmethod
     def seen(
@@ -87,7 +87,7 @@ class Terminals(Arrays):
         outline = buffer.add(nodes, vertices, mean_extinction(totals, volume(vertices)))
         span = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.extent_around(vertices.mean(axis=1))
         features = feature_pixels(vertices, totals.width, camera)
-        return cls(nodes, totals, outline.pixels, outline.opacity, *features, span, outline.whole)
+        return cls(nodes, totals, outline.pixels, outline.opacity, *features, span, outline.fully_inside)
 
 
 def mean_extinction(totals: Totals, volumes: Floats) -> Floats:
@@ -101,7 +101,7 @@ def mean_extinction(totals: Totals, volumes: Floats) -> Floats:
 
 
 def feature_pixels(vertices: Floats, width: Floats, camera: Camera) -> tuple[Floats, Floats]:
-    """Widths (n,) in metres as pixels, where tetrahedra (n, 4, 3) are nearest to the eye and where farthest."""
+    """Widths (n,) in meters as pixels, where tetrahedra (n, 4, 3) are nearest to the eye and where farthest."""
     extent = camera.pixel_extent(vertices)
     return width / extent.min(axis=1), width / extent.max(axis=1)
 
@@ -124,11 +124,11 @@ def decide(cells: Terminals, transmittance: Floats, settings: RefinementSettings
     totals = cells.totals
     holds = totals.area > 0
     hidden = transmittance <= settings.hidden  # out of view: transmittance is 0
-    large_leaves = cells.feature >= settings.leaf_limit
+    large_leaves = cells.feature_px >= settings.leaf_limit
     few = totals.polygons <= settings.few_polygons
     # Leaves that are large at the near end may be tiny at the far end, as in all of a small image's view.
-    deep = large_leaves & (cells.least_feature < settings.leaf_limit / DEEP) & ~few
-    crossing = ~cells.whole & ~few & (cells.span > ACROSS_THE_BORDER * settings.block)
+    deep = large_leaves & (cells.min_feature_px < settings.leaf_limit / DEEP) & ~few
+    crossing = ~cells.fully_inside & ~few & (cells.longest_edge_px > ACROSS_THE_BORDER * settings.block)
     no_gain = few | ((cells.pixels <= settings.block**2) & ~crossing)
     small = (contributions(cells, transmittance) <= settings.cutoff**2) & ~crossing
     # Facets take their places from the plants, not from their tetrahedra, which only tell how much is seen.
@@ -136,10 +136,10 @@ def decide(cells: Terminals, transmittance: Floats, settings: RefinementSettings
     done = small | (no_gain & (cells.pixels <= settings.block**2)) if facets else small
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
     # Large leaves never become a proxy: a barely visible block of them is divided until its hidden parts show.
-    out[done & ~large_leaves & (cells.span <= settings.proxy_block)] = Decision.PROXY
+    out[done & ~large_leaves & (cells.longest_edge_px <= settings.proxy_block)] = Decision.PROXY
     out[large_leaves & no_gain & (~deep | small)] = Decision.EXPLICIT
     out[hidden] = Decision.HIDDEN
-    out[hidden & (cells.span > settings.hidden_block)] = Decision.SPLIT
+    out[hidden & (cells.longest_edge_px > settings.hidden_block)] = Decision.SPLIT
     out[~holds] = Decision.EMPTY
     return out
 
@@ -167,7 +167,7 @@ def without_splits(
 
     Very many leaves in a tetrahedron that is still large become a proxy: most may be far away or hidden.
     """
-    leafy = cells.feature >= settings.leaf_limit
+    leafy = cells.feature_px >= settings.leaf_limit
     known = (cells.pixels <= (UNKNOWN * settings.block) ** 2) | (cells.totals.polygons <= NO_POLYGONS)
     instead = np.where(leafy & known, Decision.EXPLICIT, Decision.PROXY)
     instead = np.where(transmittance <= settings.hidden, Decision.HIDDEN, instead)

@@ -54,7 +54,7 @@ class Stand:
     number : int
         All plants.
     foot : (k, 3) float64
-        Where some of them stand, metres.
+        Where some of them stand, meters.
     scale : (k,) float64
     which : (k,) int64
         Their crowns, as indices into the next.
@@ -158,7 +158,7 @@ def _primitives(stand: Stand, camera: Camera, settings: RefinementSettings) -> f
 
 
 def seen(stand: Stand, camera: Camera) -> tuple[Floats, Floats, float]:
-    """Of slices of crowns: metres (SLICES, k) that a pixel spans there, pixels (SLICES, k) that each covers.
+    """Of slices of crowns: meters (SLICES, k) that a pixel spans there, pixels (SLICES, k) that each covers.
 
     Last comes the fraction of the rows of the picture between the lowest and the highest of them.
     """
@@ -172,7 +172,9 @@ def seen(stand: Stand, camera: Camera) -> tuple[Floats, Floats, float]:
         away = np.linalg.norm(middle - camera.position, axis=2)
     else:
         away = np.ones(depth.shape) if camera.kind == "ORTHO" else depth
-    inside = np.clip(0.5 - camera.clearance(points).reshape(SLICES, -1) / (2.0 * np.maximum(reach, 1e-9)), 0.0, 1.0)
+    inside = np.clip(
+        0.5 - camera.distance_to_view(points).reshape(SLICES, -1) / (2.0 * np.maximum(reach, 1e-9)), 0.0, 1.0
+    )
     if camera.kind != "PANO":
         inside[(depth + reach < camera.near) | (depth - reach > camera.far)] = 0.0
     away = away if camera.kind == "ORTHO" else np.maximum(away, reach)

@@ -23,7 +23,7 @@ from ..camera.camera import Camera
 from ..tetrahedra.geometry import volume
 from ..tetrahedra.tree import TetrahedralTree
 from .decisions import Decision, Terminals, mean_extinction
-from .rasterise import buffer_size, image_places, occluder_depth, pixel_rays, tetrahedron_fragments
+from .rasterize import buffer_size, image_places, occluder_depth, pixel_rays, tetrahedron_fragments
 from .settings import RefinementSettings
 from .views import face_cameras
 from .visibility import AlphaBuffer
@@ -37,7 +37,7 @@ GROUND = 160
 _WIDE = 1.2
 #: Points farther than this from the middle of a view, as the tangent of the angle, need six views.
 _STEEP = 2.5
-#: Nearest that a lamp's view sees, metres.
+#: Nearest that a lamp's view sees, meters.
 _NEAR = 1e-2
 
 
@@ -50,20 +50,20 @@ class Light:
     kind : {'SUN', 'SPOT', 'POINT', 'AREA'}
         Parallel rays, a cone, all around, or a flat surface that shines to one side.
     position : (3,) float64
-        Metres, world space; of no meaning for the sun.
+        Meters, world space; of no meaning for the sun.
     direction : (3,) float64
         Unit vector in which it shines; of no meaning for a point.
     width : float
-        Angle in radians under which the sun is seen, or diameter in metres of the others: shadows are blurred by it.
+        Angle in radians under which the sun is seen, or diameter in meters of the others: shadows are blurred by it.
     angle : float
         Half of the spot's cone, radians.
-    colour : (3,) float64
+    color : (3,) float64
         Linear RGB times energy: for the sun W/m² on a surface that faces it, for the others the W/sr that they send
-        ahead, so that a surface at distance r that faces them gets colour / r² W/m².
+        ahead, so that a surface at distance r that faces them gets color / r² W/m².
     blend : float
         Fraction of a spot's cone over which it fades, 0 to 1.
     span : (2, 3) float64
-        Half edges of an area, or half axes of an ellipse, metres.
+        Half edges of an area, or half axes of an ellipse, meters.
     ellipse : bool
         Whether an area is a disk or an ellipse instead of a square or a rectangle.
     shadow : bool
@@ -75,7 +75,7 @@ class Light:
     direction: Floats
     width: float = 0.0
     angle: float = np.pi
-    colour: Floats = field(default_factory=lambda: np.ones(3))
+    color: Floats = field(default_factory=lambda: np.ones(3))
     blend: float = 0.0
     span: Floats = field(default_factory=lambda: np.zeros((2, 3)))
     ellipse: bool = False
@@ -93,9 +93,9 @@ def light_views(light: Light, vertices: Floats, points: Floats, resolution: int)
     ----------
     light : Light
     vertices : (n, 4, 3) float64
-        Tetrahedra that stand in the light, metres.
+        Tetrahedra that stand in the light, meters.
     points : (m, 3) float64
-        What receives it, metres.
+        What receives it, meters.
     resolution : int
         Longer side of their images, pixels.
 
@@ -104,7 +104,7 @@ def light_views(light: Light, vertices: Floats, points: Floats, resolution: int)
     list of Camera
         Empty where nothing stands between the sun and what receives its light.
     """
-    frame = frame_towards(light.direction)
+    frame = frame_toward(light.direction)
     if light.kind == "SUN":
         received, corners = points @ frame, vertices.reshape(-1, 3) @ frame
         # Only where something stands between the sun and what receives its light: ground goes on to the horizon.
@@ -136,7 +136,7 @@ def image_size(width: float, height: float) -> tuple[int, int]:
     return max(round(width * scale), 1), max(round(height * scale), 1)
 
 
-def frame_towards(direction: Floats) -> Floats:
+def frame_toward(direction: Floats) -> Floats:
     """Frame (3, 3) of a camera that looks in a direction (3,) of any length."""
     back = -np.asarray(direction, np.float64) / np.linalg.norm(direction)
     aside = np.eye(3)[np.argmin(np.abs(back))]
@@ -151,7 +151,7 @@ def lamp_views(position: Floats, points: Floats, resolution: int) -> list[Camera
     distance = np.linalg.norm(away, axis=1)
     far = float(distance.max(initial=0.0)) + 1.0
     middle = (points.min(axis=0) + points.max(axis=0)) / 2.0 - position
-    frame = frame_towards(middle if np.linalg.norm(middle) > _NEAR else np.array([0.0, 0.0, -1.0]))
+    frame = frame_toward(middle if np.linalg.norm(middle) > _NEAR else np.array([0.0, 0.0, -1.0]))
     local = away @ frame
     depth = -local[:, 2]
     if (depth > _NEAR).all():
@@ -171,12 +171,12 @@ class Shadows:
     ----------
     pixels : (n,) float64
         Pixels of the final image that are darkened if all of it is opaque and nothing else is in the light.
-    feature : (n,) float64
+    feature_px : (n,) float64
         Width in pixels of the shadows of what they hold, 0 where it is lost in the light's penumbra.
     """
 
     pixels: Floats
-    feature: Floats
+    feature_px: Floats
 
 
 def decide_by_shadows(
@@ -185,7 +185,7 @@ def decide_by_shadows(
     """Decisions (n,) where hidden tetrahedra are divided or made explicit for their shadows."""
     totals, out = cells.totals, decision.copy()
     counts = (decision == Decision.HIDDEN) & (shadows.pixels > settings.shadow_cutoff**2)
-    large = shadows.feature >= settings.shadow_cutoff
+    large = shadows.feature_px >= settings.shadow_cutoff
     few = totals.polygons <= settings.few_polygons
     explicit = counts & (few | (large & (shadows.pixels <= settings.block**2)))
     out[counts & ~explicit] = Decision.SPLIT
@@ -205,7 +205,7 @@ def shadows_of(
     """Shadows (n,) of hidden tetrahedra on what the camera sees.
 
     ``decision`` (n,) holds the `Decision` for each of ``cells``; ``ground`` (m, 3) are points that the camera sees
-    beside the plants, see `seen_ground`, metres.
+    beside the plants, see `seen_ground`, meters.
     """
     count, vertices = len(cells), tree.vertices(cells.nodes)
     pixels, feature = np.zeros(count), np.zeros(count)
@@ -216,7 +216,7 @@ def shadows_of(
     points = np.concatenate([ground, vertices[~hidden].mean(axis=1)])
     if not len(points):
         return Shadows(pixels, feature)
-    # Metres that a pixel of the image spans where light is received.
+    # Meters that a pixel of the image spans where light is received.
     receiving = camera.extent_around(points), camera.extent_around(vertices.mean(axis=1))
     for light in (one for one in lights if one.shadow):
         for view in light_views(light, vertices, points, settings.visibility_resolution):
@@ -252,7 +252,7 @@ def shadows_of(
 def seen_ground(camera: Camera, occluders: Floats | None, height: float) -> Floats:
     """Points (m, 3) where rays through the image meet occluders, triangles (t, 3, 3), or else level ground at a height.
 
-    All in metres, world space.
+    All in meters, world space.
     """
     views = face_cameras(camera, GROUND // 2) if camera.kind == "PANO" else [camera]
     found = []
@@ -279,9 +279,9 @@ def _fields(pixel: Integers, size: tuple[int, int]) -> tuple[Integers, int]:
 
 def _receive(view: Camera, size: tuple[int, int], points: Floats, extent: Floats, far: Floats, fine: Floats) -> None:
     """Put points that receive light into the fields: how far away they are, and how fine the image is there."""
-    place, depth, metres = image_places(view, points, size)
+    place, depth, meters = image_places(view, points, size)
     some = np.flatnonzero((depth > view.near) & (place >= 0.0).all(axis=1) & (place < size).all(axis=1))
     column, row = place[some].astype(np.int64).T
     field, _ = _fields(row * size[0] + column, size)
-    np.maximum.at(far, field, metres[some])
+    np.maximum.at(far, field, meters[some])
     np.minimum.at(fine, field, extent[some])

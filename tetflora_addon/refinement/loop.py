@@ -24,24 +24,24 @@ from ..tetrahedra.tree import TetrahedralTree
 from .asset_parts import PlacedAssets, SharedAssets
 from .contents import (
     Contents,
-    Held,
-    Holdings,
+    InCells,
+    PolygonsByCell,
     Slack,
     Totals,
     bounding_box,
     in_the_root,
     large_polygons,
-    push_down,
+    sort_into_children,
     sums,
 )
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
+from .outliers import Outliers, outliers_of
 from .polygons import Polygons
 from .settings import RefinementSettings
 from .shared_parts import SharedParts
 from .shares import SharedPlants
 from .statistics import Step, Stopwatch
-from .strays import Strays, strays_of
 from .views import PanoramaBuffers, is_anchored, pixels_of_buffer, widened_for
 from .visibility import AlphaBuffer, Buffers
 
@@ -71,7 +71,7 @@ class Refinement:
         All plants, shared among terminal nodes.
     assets : SharedAssets
         All instances of assets, likewise.
-    holdings : Holdings
+    cell_polygons : PolygonsByCell
         All polygons, in terminal nodes.
     cells : Terminals of t
         Terminal nodes that hold something.
@@ -87,7 +87,7 @@ class Refinement:
         False where a limit of the settings stopped the loop.
     seconds : dict of str to float
         Wall clock by step.
-    strays : Strays
+    outliers : Outliers
         What is left out.
     lights : sequence of Light
         Those that throw shadows.
@@ -98,7 +98,7 @@ class Refinement:
     tree: TetrahedralTree
     plants: SharedPlants
     assets: SharedAssets
-    holdings: Holdings
+    cell_polygons: PolygonsByCell
     cells: Terminals
     transmittance: NDArray[np.float64]
     decision: NDArray[np.int8]
@@ -106,7 +106,7 @@ class Refinement:
     passes: int
     complete: bool
     seconds: dict[str, float]
-    strays: Strays = field(default_factory=Strays)
+    outliers: Outliers = field(default_factory=Outliers)
     lights: Sequence[Light] = ()
     polygons: Polygons = field(default_factory=Polygons.empty)
 
@@ -123,8 +123,8 @@ class Refinement:
     @property
     def contents(self) -> Contents:
         """All plants and polygons, in terminal nodes: a copy, with a sub-plant for each node that it is shared by."""
-        subplants, bodies = self.plants.held_apart(len(self.tree))
-        return Contents(subplants, bodies, self.holdings.polygons)
+        subplants, branches = self.plants.held_apart(len(self.tree))
+        return Contents(subplants, branches, self.cell_polygons.polygons)
 
     @property
     def in_view(self) -> NDArray[np.bool_]:
@@ -166,7 +166,7 @@ def refine(
     camera : Camera
     settings : RefinementSettings
     occluders : (t, 3, 3) float64, optional
-        Triangles of explicit polygons that hide what is behind them, metres.
+        Triangles of explicit polygons that hide what is behind them, meters.
     polygons : Polygons, optional
         Explicit polygons to refine along with the plants.
     lights : sequence of Light
@@ -177,18 +177,18 @@ def refine(
     """
     clock = Stopwatch()
     placed = PlacedAssets.none() if placed is None else placed
-    strays = strays_of(flora, seeds, camera, polygons, placed)
-    seeds, polygons, placed = strays.others(seeds, polygons, placed)
+    outliers = outliers_of(flora, seeds, camera, polygons, placed)
+    seeds, polygons, placed = outliers.others(seeds, polygons, placed)
     filled = bool(np.isfinite(settings.proxy_block))
     plants, assets = SharedPlants(flora, seeds, camera, filled), SharedAssets(placed, camera, filled)
     settings = _on_day(settings, flora, plants.parts.branches)
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
-    own = Held.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
+    own = InCells.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
     bounds = _bounds(flora, plants, assets, polygons)
     tree = world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
     whole = Polygons.empty() if polygons is None else polygons
-    holdings, most = Holdings(push_down(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
+    cell_polygons, most = PolygonsByCell(sort_into_children(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
     divided = np.arange(len(tree)) == 0
     shared = plants, assets
     for kind in shared:
@@ -200,7 +200,7 @@ def refine(
     buffers = kind(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
-    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, shared, holdings, np.ones(len(tree), bool)))
+    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, shared, cell_polygons, np.ones(len(tree), bool)))
     clock.lap("visibility")
     passes = 0
     while True:
@@ -229,8 +229,8 @@ def refine(
             splitting &= ~barred
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
-        found = cells, transmittance, decision, ranks, passes, not limited, seconds, strays, lights, whole
-        state = Refinement(tree, plants, assets, holdings, *found)
+        found = cells, transmittance, decision, ranks, passes, not limited, seconds, outliers, lights, whole
+        state = Refinement(tree, plants, assets, cell_polygons, *found)
         if not splitting.any():
             return state
         if (yield state):
@@ -243,27 +243,29 @@ def refine(
         dividing, edge = np.zeros(len(tree), bool), np.zeros(len(tree))
         dividing[parents] = True
         edge[parents] = np.sqrt(squared_edges(tree.vertices(parents)).max(axis=1))
-        may_cut = len(holdings) <= most
-        new = push_down(tree, holdings.take_out(dividing), slack if may_cut else lambda at: np.full(len(at), np.inf))
-        holdings.put(new)
+        may_cut = len(cell_polygons) <= most
+        new = sort_into_children(
+            tree, cell_polygons.take_out(dividing), slack if may_cut else lambda at: np.full(len(at), np.inf)
+        )
+        cell_polygons.put(new)
         changed = plants.update(tree, dividing, edge) | assets.update(tree, dividing, edge)
         changed[new.cell] = True
         clock.lap("update")
         buffer.remove(changed)
         kept = cells.take(np.flatnonzero(~changed[cells.nodes]))
-        cells, buffer = _drawn(tree, buffers, buffer, kept, *_filled(tree, shared, holdings, changed))
+        cells, buffer = _drawn(tree, buffers, buffer, kept, *_filled(tree, shared, cell_polygons, changed))
         clock.lap("visibility")
 
 
 def _height(seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets) -> float:
-    """Median height of what there is, metres."""
+    """Median height of what there is, meters."""
     heights = [seeds.position[:, 2], placed.instances.position[:, 2]]
-    heights += [] if polygons is None else [polygons.centre[:, 2]]
+    heights += [] if polygons is None else [polygons.center[:, 2]]
     return float(np.median(np.concatenate(heights)))
 
 
 def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons | None) -> NDArray[np.float64]:
-    """Axis-aligned box (2, 3) of all that is there, metres."""
+    """Axis-aligned box (2, 3) of all that is there, meters."""
     boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
     boxes += [assets.parts.bounding_box()] if len(assets.parts) else []
     boxes += [] if polygons is None else [polygons.bounding_box()]
@@ -271,10 +273,10 @@ def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: 
 
 
 def _filled(
-    tree: TetrahedralTree, shared: Sequence[SharedParts], holdings: Holdings, changed: NDArray[np.bool_]
+    tree: TetrahedralTree, shared: Sequence[SharedParts], cell_polygons: PolygonsByCell, changed: NDArray[np.bool_]
 ) -> tuple[NDArray[np.intp], Totals]:
     """Nodes (n,) whose contents have changed and that hold something, and their totals."""
-    found = [*(kind.totals(changed) for kind in shared), *holdings.totals(changed)]
+    found = [*(kind.totals(changed) for kind in shared), *cell_polygons.totals(changed)]
     every = sums(Totals.concatenate([t for t, _ in found]), np.concatenate([c for _, c in found]), len(tree))
     nodes = np.flatnonzero(every.area > 0)
     return nodes, every.take(nodes)
@@ -299,7 +301,7 @@ def _drawn(
 
 
 def _slack(camera: Camera, resolution: int) -> Slack:
-    """A pixel of the alpha buffer, in metres: nothing smaller changes decisions."""
+    """A pixel of the alpha buffer, in meters: nothing smaller changes decisions."""
     pixels = max(pixels_of_buffer(camera, resolution), SLACK)
 
     def slack(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -347,7 +349,7 @@ def step_of(state: Refinement) -> Step:
     """Figures of a state, valid only before the loop goes on."""
     numbers = np.bincount(state.decision, minlength=len(Decision))
     explicit = state.decision == Decision.EXPLICIT
-    subplants, bodies = state.plants.numbers
+    subplants, branches = state.plants.numbers
     return Step(
         tetrahedra_made=int(state.tree.tetrahedra_made),
         levels=int(state.tree.levels),
@@ -356,9 +358,9 @@ def step_of(state: Refinement) -> Step:
         hidden=int(numbers[Decision.HIDDEN]),
         explicit=int(numbers[Decision.EXPLICIT]),
         subplants=subplants,
-        pieces=bodies,
-        foreign=len(state.holdings) + state.assets.numbers[0],
+        pieces=branches,
+        foreign=len(state.cell_polygons) + state.assets.numbers[0],
         polygons=round(float(state.totals.polygons[explicit].sum())),
         seconds=sum(state.seconds.values()),
-        memory_mb=(state.tree.nbytes + state.plants.nbytes + state.assets.nbytes + state.holdings.nbytes) / 1e6,
+        memory_mb=(state.tree.nbytes + state.plants.nbytes + state.assets.nbytes + state.cell_polygons.nbytes) / 1e6,
     )

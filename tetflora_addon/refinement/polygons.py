@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Explicit polygons (paper, sections 5 and 6.1): faces of meshes that were modelled elsewhere, and their fragments.
+"""Explicit polygons (paper, sections 5 and 6.1): faces of meshes that were modeled elsewhere, and their fragments.
 
 Nothing is copied when polygons move from tetrahedron to tetrahedron. A whole face is two numbers, the face and the
 instance of its mesh. A fragment, clipped off by a plane, is a triangle in the barycentric coordinates of one of the
@@ -22,8 +22,8 @@ from ..arrays import Arrays, Floats, Integers, Mask, spread
 from ..subplants.pieces import chunks
 
 #: Triangles that are measured at a time; bounds what that takes to some hundred megabytes.
-MEASURED_AT_ONCE = 200_000
-#: Metres, and factors, from which on squares of areas need not be numbers any more.
+MEASURE_BATCH = 200_000
+#: Meters, and factors, from which on squares of areas need not be numbers any more.
 _FARTHEST = 1e12
 #: A fragment that reaches beyond a plane by less than this fraction of its size is not cut again by rounding errors.
 _TOUCHING = 1e-9
@@ -47,8 +47,8 @@ class Surface:
         Corners of the triangles that faces consist of: n − 2 for a face of n corners, face after face.
     material : (f,) int32
         Slot of each face.
-    colours : (s, 3) float64
-        Mean colour of each slot's material, linear RGB.
+    colors : (s, 3) float64
+        Mean color of each slot's material, linear RGB.
     transmission, coverage : (s,) float64
         Fraction of scattered light that passes through, and of the surface that is opaque.
     solid : (f,) bool
@@ -58,7 +58,7 @@ class Surface:
     width : (f,) float64
         Width of the feature that the face belongs to, in the mesh's own units.
     attributes : mapping of str to (c, k) float32
-        Interpolated across faces: texture coordinates (k = 2), colours and vectors (k = 3), numbers (k = 1).
+        Interpolated across faces: texture coordinates (k = 2), colors and vectors (k = 3), numbers (k = 1).
     normals : (c, 3) float32 or None
         Of corners where any face is smooth, in the mesh's own space.
     look : str
@@ -71,7 +71,7 @@ class Surface:
     face_offsets: NDArray[np.int32]
     triangles: NDArray[np.int32]
     material: NDArray[np.int32]
-    colours: Floats
+    colors: Floats
     transmission: Floats
     coverage: Floats
     solid: Mask
@@ -131,7 +131,7 @@ class Meshes:
         self.first_vertex = starts([len(s.positions) for s in surfaces])
         self.first_corner = starts([len(s.corner_verts) for s in surfaces])
         self.first_face = starts([len(s.material) for s in surfaces])
-        self.first_slot = starts([len(s.colours) for s in surfaces])
+        self.first_slot = starts([len(s.colors) for s in surfaces])
         every = list(enumerate(surfaces))
         none, flat = np.zeros(0, np.int64), np.zeros((0, 3))
         self.positions = joined([s.positions for s in surfaces], flat)
@@ -141,7 +141,7 @@ class Meshes:
         self.triangles = joined([s.triangles + self.first_corner[i] for i, s in every], np.zeros((0, 3), np.int64))
         self.face_triangle = np.cumsum(self.face_size - 2) - (self.face_size - 2)
         self.slot = joined([s.material + self.first_slot[i] for i, s in every], none)
-        self.colours = joined([s.colours for s in surfaces], flat)
+        self.colors = joined([s.colors for s in surfaces], flat)
         self.transmission, self.coverage, self.width = (
             joined([getattr(s, name) for s in surfaces], np.zeros(0)) for name in ("transmission", "coverage", "width")
         )
@@ -164,8 +164,8 @@ class Meshes:
         return 0.5 * np.cross(b - a, c - a)
 
     @cached_property
-    def centres(self) -> Floats:
-        """Centres (f, 3) of the boxes around faces."""
+    def centers(self) -> Floats:
+        """Centers (f, 3) of the boxes around faces."""
         if not len(self.face_start):
             return np.zeros((0, 3))
         points = self.positions[self.corner_verts]
@@ -174,11 +174,11 @@ class Meshes:
 
     @cached_property
     def radii(self) -> Floats:
-        """Radii (f,) of the spheres about these centres that hold the faces."""
+        """Radii (f,) of the spheres about these centers that hold the faces."""
         if not len(self.face_start):
             return np.zeros(0)
         points = self.positions[self.corner_verts]
-        away = np.linalg.norm(points - np.repeat(self.centres, self.face_size, axis=0), axis=1)
+        away = np.linalg.norm(points - np.repeat(self.centers, self.face_size, axis=0), axis=1)
         return np.maximum.reduceat(away, self.face_start)
 
     @cached_property
@@ -195,11 +195,11 @@ class Meshes:
         return int(np.diff(self.first_face)[self.surface].sum())
 
     def to_world(self, points: Floats, instance: Integers) -> Floats:
-        """Points (n, k, 3) of instances (n,) in world space, metres."""
+        """Points (n, k, 3) of instances (n,) in world space, meters."""
         return points @ self.linear[instance] + self.origin[instance, None]
 
     def corners(self, triangle: Integers, instance: Integers) -> Floats:
-        """Corners (n, 3, 3) of triangles of instances in world space, metres."""
+        """Corners (n, 3, 3) of triangles of instances in world space, meters."""
         return self.to_world(self.positions[self.corner_verts[self.triangles[triangle]]], instance)
 
     def vectors(self, triangle: Integers, instance: Integers) -> Floats:
@@ -221,10 +221,10 @@ class Polygons(Arrays):
     triangle : (m,) int32
     weights : (m, 3, 3) float64
         Barycentric coordinates in the triangle, for each corner of the fragment a row.
-    centre : (n, 3) float64
-        Somewhere within, metres, world space.
+    center : (n, 3) float64
+        Somewhere within, meters, world space.
     reach : (n,) float64
-        Distance from there within which all of it lies, metres.
+        Distance from there within which all of it lies, meters.
     """
 
     meshes: Meshes
@@ -233,7 +233,7 @@ class Polygons(Arrays):
     part: NDArray[np.int32]
     triangle: NDArray[np.int32]
     weights: Floats
-    centre: Floats
+    center: Floats
     reach: Floats
 
     @classmethod
@@ -241,14 +241,14 @@ class Polygons(Arrays):
         """All faces of all instances, whole."""
         instance, face = spread(np.diff(meshes.first_face)[meshes.surface])
         face += meshes.first_face[meshes.surface][instance]
-        centre = np.zeros((len(face), 3))
-        for start in range(0, len(face), MEASURED_AT_ONCE):
-            some = slice(start, start + MEASURED_AT_ONCE)
-            centre[some] = meshes.to_world(meshes.centres[face[some], None], instance[some])[:, 0]
+        center = np.zeros((len(face), 3))
+        for start in range(0, len(face), MEASURE_BATCH):
+            some = slice(start, start + MEASURE_BATCH)
+            center[some] = meshes.to_world(meshes.centers[face[some], None], instance[some])[:, 0]
         reach = meshes.radii[face] * meshes.largest[instance]
         whole = np.full(len(face), -1, np.int32)
         none = np.zeros(0, np.int32), np.zeros((0, 3, 3))
-        return cls(meshes, face.astype(np.int32), instance.astype(np.int32), whole, *none, centre, reach)
+        return cls(meshes, face.astype(np.int32), instance.astype(np.int32), whole, *none, center, reach)
 
     @classmethod
     def empty(cls) -> Polygons:
@@ -261,11 +261,11 @@ class Polygons(Arrays):
     ) -> Polygons:
         """Fragments (n,) of faces, given by a triangle (n,) each and weights (n, 3, 3) in it."""
         corners = weights @ meshes.corners(triangle, instance)
-        centre = corners.mean(axis=1)
-        reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1, initial=0.0)
+        center = corners.mean(axis=1)
+        reach = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1, initial=0.0)
         part = np.arange(len(face), dtype=np.int32)
         numbers = (np.asarray(a, np.int32) for a in (face, instance, part, triangle))
-        return cls(meshes, *numbers, weights, centre, reach)
+        return cls(meshes, *numbers, weights, center, reach)
 
     def take(self, index: NDArray | slice) -> Polygons:
         """Rows by indices (k,), mask (n,) or slice; fragments go with the faces that refer to them."""
@@ -276,7 +276,7 @@ class Polygons(Arrays):
         part[cut] = np.arange(len(cut), dtype=np.int32)
         some = (a[index] for a in (self.face, self.instance))
         more = (a[rows] for a in (self.triangle, self.weights))
-        return Polygons(self.meshes, *some, part, *more, self.centre[index], self.reach[index])
+        return Polygons(self.meshes, *some, part, *more, self.center[index], self.reach[index])
 
     @classmethod
     def concatenate(cls, parts: Sequence[Polygons]) -> Polygons:
@@ -288,7 +288,7 @@ class Polygons(Arrays):
         shifted = [np.where(p.part < 0, p.part, p.part + n) for p, n in zip(parts, first, strict=True)]
         own = {
             name: np.concatenate([getattr(p, name) for p in parts])
-            for name in ("face", "instance", "triangle", "weights", "centre", "reach")
+            for name in ("face", "instance", "triangle", "weights", "center", "reach")
         }
         return replace(parts[0], part=np.concatenate(shifted).astype(np.int32), **own)
 
@@ -327,7 +327,7 @@ class Polygons(Arrays):
     def areas(self) -> Floats:
         """Areas (n,), m²."""
         areas = np.zeros(len(self))
-        for run in chunks(self.triangle_counts, MEASURED_AT_ONCE):
+        for run in chunks(self.triangle_counts, MEASURE_BATCH):
             some = self.take(run)
             owner, triangle, fraction = some.triangles()
             own = np.linalg.norm(self.meshes.vectors(triangle, some.instance[owner]), axis=1)
@@ -335,11 +335,11 @@ class Polygons(Arrays):
         return areas
 
     def bounding_box(self) -> Floats:
-        """Axis-aligned box (2, 3) around all of them, at least one, metres."""
-        return np.stack([(self.centre.T - self.reach).min(axis=1), (self.centre.T + self.reach).max(axis=1)])
+        """Axis-aligned box (2, 3) around all of them, at least one, meters."""
+        return np.stack([(self.center.T - self.reach).min(axis=1), (self.center.T + self.reach).max(axis=1)])
 
     def distances(self, planes: Floats) -> tuple[Floats, Floats]:
-        """Least and greatest signed distances (n,) of the corners from planes (n, 4), metres."""
+        """Least and greatest signed distances (n,) of the corners from planes (n, 4), meters."""
         low, high = np.zeros((2, len(self)))
         whole, cut = np.flatnonzero(self.part < 0), np.flatnonzero(self.part >= 0)
         if len(whole):
@@ -357,12 +357,12 @@ class Polygons(Arrays):
         return low, high
 
     def corner_distances(self, planes: Floats) -> Floats:
-        """Signed distances (n, 3) of the corners of fragments from planes (n, 4), metres."""
+        """Signed distances (n, 3) of the corners of fragments from planes (n, 4), meters."""
         corners = self.weights[self.part] @ self.meshes.corners(self.triangle[self.part], self.instance)
         return np.einsum("nki,ni->nk", corners, planes[:, :3]) + planes[:, 3:]
 
     def touching(self) -> Floats:
-        """Metres (n,) within which rounding errors may carry a corner across a plane."""
+        """Meters (n,) within which rounding errors may carry a corner across a plane."""
         return _TOUCHING * self.reach
 
 

@@ -20,12 +20,12 @@ from ..arrays import Arrays, Chunks, Floats, Growing, Integers, Mask, column, re
 from ..camera.camera import Camera
 from ..parallel import blocks, each_on_all_cores
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Held, Totals, sums
+from .contents import InCells, Totals, sums
 
 #: Parts larger than this many times the longest edge of a tetrahedron that is divided are opened.
 LARGE = 1.6
 #: Points that are lowered at a time; bounds what that takes.
-LOWERED_AT_ONCE = 200_000
+DESCEND_BATCH = 200_000
 #: Parts that have been opened are dropped once they are more than one in so many.
 _OPENED = 3
 
@@ -42,7 +42,7 @@ class SharePoints(Arrays):
     cell : (m,) int32
         Node of the tree that the point is in.
     position : (m, 3) float32
-        Metres, world space.
+        Meters, world space.
     leaf, wood : (m,) float32
         Area that it stands for, m²; one of the two is 0.
     """
@@ -59,7 +59,7 @@ class SharePoints(Arrays):
         return self.leaf + self.wood / 2
 
 
-def lowered(tree: TetrahedralTree, points: SharePoints, some: Integers | None = None) -> NDArray[np.int32]:
+def descend(tree: TetrahedralTree, points: SharePoints, some: Integers | None = None) -> NDArray[np.int32]:
     """Terminal nodes (m,) that points are in, below those that they are known to be in.
 
     some: indices (k,) of points, by default all, of which alone they are wanted (k,).
@@ -81,13 +81,13 @@ def lowered(tree: TetrahedralTree, points: SharePoints, some: Integers | None = 
             if len(left) < len(moving):
                 moving, place = moving[left], np.take(place, left, axis=0)
 
-    each_on_all_cores(lower, blocks(len(every), LOWERED_AT_ONCE))
+    each_on_all_cores(lower, blocks(len(every), DESCEND_BATCH))
     return cell
 
 
 @dataclass(frozen=True)
 class _Figures(Arrays):
-    """What a pass asks of all parts (n): the extent of those that can be opened (metres, else 0), their totals."""
+    """What a pass asks of all parts (n): the extent of those that can be opened (meters, else 0), their totals."""
 
     reach: Floats
     area: Floats
@@ -101,7 +101,7 @@ class SharedParts(Generic[Parts]):
     A pass costs what it changes. Parts that it opens are only marked, and new ones stay in chunks of their own, until
     somebody asks for `parts` or `points`; new points take the places of those on opened parts.
 
-    Parts are `Arrays` with the columns ``totals`` and ``extent``, metres. Subclasses say what can be opened, into what,
+    Parts are `Arrays` with the columns ``totals`` and ``extent``, meters. Subclasses say what can be opened, into what,
     and which points are on it.
 
     Parameters
@@ -124,14 +124,14 @@ class SharedParts(Generic[Parts]):
         """Points on parts (n,), all in the root; ``known`` is of `opened`, None at first."""
         raise NotImplementedError
 
-    def alone(self, parts: Parts) -> Mask:
+    def branch_only(self, parts: Parts) -> Mask:
         """Parts (n,) that count apart from others, as branches without what grows on them."""
         raise NotImplementedError
 
     def hold(self, parts: Parts, points: SharePoints) -> None:
         """Begin with parts and the points on them."""
         self._parts, self._figures = Chunks(parts), Growing(self._figures_of(parts))
-        self._points, self._alone = Growing(points), int(self.alone(parts).sum())
+        self._points, self._alone = Growing(points), int(self.branch_only(parts).sum())
 
     def _figures_of(self, parts: Parts) -> _Figures:
         reach, totals = np.where(self.can_open(parts), parts.extent, 0.0), parts.totals
@@ -167,7 +167,7 @@ class SharedParts(Generic[Parts]):
         dividing : (nodes,) bool
             Nodes that have been divided.
         edge : (nodes,) float64
-            Their longest edge, metres.
+            Their longest edge, meters.
 
         Returns
         -------
@@ -180,7 +180,7 @@ class SharedParts(Generic[Parts]):
         part = np.take(points.part, inside)
         large = np.take(self._figures.rows.reach, part) > LARGE * np.take(edge, np.take(points.cell, inside))
         # Handed on in place: millions of points that stay where they are are not looked at.
-        points.cell[inside] = cell = lowered(tree, points, inside)
+        points.cell[inside] = cell = descend(tree, points, inside)
         changed[cell] = True
         if large.any():
             opening = np.zeros(len(self._parts), bool)
@@ -199,12 +199,12 @@ class SharedParts(Generic[Parts]):
             count += len(new)
         new_parts, new_points = self._parts.kind.concatenate(parts), SharePoints.concatenate(points)
         if tree is not None:
-            new_points = replace(new_points, cell=lowered(tree, new_points))
+            new_points = replace(new_points, cell=descend(tree, new_points))
         left = np.take(self._points.rows.cell, gone)
         self._points.exchange(gone, new_points)
         self._parts.append(new_parts)
         self._figures.append(self._figures_of(new_parts))
-        self._alone += int(self.alone(new_parts).sum())
+        self._alone += int(self.branch_only(new_parts).sum())
         if _OPENED * self._parts.marked > len(self._parts):
             self._drop_opened()
         return np.concatenate([left, new_points.cell])
@@ -217,12 +217,12 @@ class SharedParts(Generic[Parts]):
             self._figures = Growing(self._figures.rows.take(there))
         return self._parts.joined()
 
-    def held(self, nodes: int) -> Held[Parts]:
+    def held(self, nodes: int) -> InCells[Parts]:
         """Parts, once for each node that holds some of them, with the totals of that."""
         parts, points = self.parts, self.points
         pair, row = np.unique(points.part.astype(np.int64) * nodes + points.cell, return_inverse=True)
         totals, _ = self.totals(np.ones(nodes, bool))
-        return Held(parts.take(pair // nodes), (pair % nodes).astype(np.int32), sums(totals, row, len(pair)))
+        return InCells(parts.take(pair // nodes), (pair % nodes).astype(np.int32), sums(totals, row, len(pair)))
 
     def totals(self, chosen: Mask) -> tuple[Totals, NDArray[np.int32]]:
         """Totals (k,) of points in chosen nodes, a mask (nodes,), and their nodes (k,)."""

@@ -29,7 +29,7 @@ from ..growth.growth import radius_at, trunks
 from ..growth.hashing import uniform
 from ..growth.seeds import Seeds
 from ..subplants.pieces import Pieces, open_branches
-from .contents import Held, PlantParts, as_pieces
+from .contents import InCells, PlantParts, as_pieces
 from .shared_parts import SharedParts, SharePoints
 
 #: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
@@ -44,7 +44,7 @@ _PLACES = np.linspace(0.0, 1.0, 9)
 #: How many times as many points there are where proxies fill their tetrahedra.
 FILLED = 4
 #: Sub-plants that are opened at a time; bounds what that takes to some hundred megabytes.
-OPENED_AT_ONCE = 40_000
+OPEN_BATCH = 40_000
 #: Draw of this module: where a part's run of samples starts.
 _START = 221
 
@@ -144,9 +144,9 @@ def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, Intege
     segments = flora.rows["segments"][parts.branches.row]
     for number in np.unique(segments):  # bending takes as long for all as for the most
         some = np.flatnonzero(segments == number)
-        for chosen in np.split(some, np.arange(OPENED_AT_ONCE, len(some), OPENED_AT_ONCE)):
+        for chosen in np.split(some, np.arange(OPEN_BATCH, len(some), OPEN_BATCH)):
             whole, body, grown, parent = open_branches(flora, parts.branches.take(chosen))
-            yield PlantParts.of_bodies(flora, whole.branches), chosen[body], whole.lines
+            yield PlantParts.of_branches(flora, whole.branches), chosen[body], whole.lines
             if len(grown):
                 yield PlantParts.of_subplants(flora, grown), chosen[body[parent]], None
 
@@ -175,9 +175,9 @@ class SharedPlants(SharedParts[PlantParts]):
         """As `SharedParts.can_open`."""
         return parts.can_open(self.flora)
 
-    def alone(self, parts: PlantParts) -> Mask:
+    def branch_only(self, parts: PlantParts) -> Mask:
         """Branches without what grows on them."""
-        return parts.alone
+        return parts.branch_only
 
     def opened(self, parts: PlantParts) -> Iterator[tuple[PlantParts, Integers, Axes | None]]:
         """As `opened` of this module."""
@@ -197,7 +197,7 @@ class SharedPlants(SharedParts[PlantParts]):
         out = np.zeros(len(parts), bool)
         for place in _PLACES:
             at = branches.position + place * axis
-            out |= (width > camera.extent_around(at)) & (camera.clearance(at) < beside)
+            out |= (width > camera.extent_around(at)) & (camera.distance_to_view(at) < beside)
         return out
 
     def points_on(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
@@ -208,9 +208,9 @@ class SharedPlants(SharedParts[PlantParts]):
             along = np.where(self.thick(parts), np.minimum(along, MOST_ALONG), 0.0).astype(np.int64)
         return share_points(self.flora, parts, self.pixels(parts), lines, times=self._times, along=along)
 
-    def held_apart(self, nodes: int) -> tuple[Held[Branches], Held[Pieces]]:
+    def held_apart(self, nodes: int) -> tuple[InCells[Branches], InCells[Pieces]]:
         """As `held`: sub-plants, and branches alone as one piece each."""
         every = self.held(nodes)
-        own, bodies = (every.take(np.flatnonzero(every.items.alone == alone)) for alone in (False, True))
-        pieces = as_pieces(bodies.items.branches)
-        return Held(own.items.branches, own.cell, own.totals), Held(pieces, bodies.cell, bodies.totals)
+        own, opened = (every.take(np.flatnonzero(every.items.branch_only == alone)) for alone in (False, True))
+        pieces = as_pieces(opened.items.branches)
+        return InCells(own.items.branches, own.cell, own.totals), InCells(pieces, opened.cell, opened.totals)

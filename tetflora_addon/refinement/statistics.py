@@ -78,9 +78,9 @@ class Statistics:
         Estimated megabytes of the meshes in Blender.
     steps : list of Step
         One for each pass through the loop.
-    strays : dict of str to float
+    outliers : dict of str to float
         Objects that were left out at least in part, because they are far beyond all others, and how far from the camera
-        that is, metres.
+        that is, meters.
     unknown : str
         Tells of plants that were left out because nobody has their species.
     """
@@ -102,17 +102,17 @@ class Statistics:
     seconds: dict[str, float] = field(default_factory=dict)
     memory_mb: float = 0.0
     steps: list[Step] = field(default_factory=list)
-    strays: dict[str, float] = field(default_factory=dict)
+    outliers: dict[str, float] = field(default_factory=dict)
     unknown: str = ""
 
     @property
     def left_out(self) -> str:
-        """A warning about what is unknown, or about strays; empty where there are none."""
-        if not self.strays or self.unknown:
+        """A warning about what is unknown, or about outliers; empty where there are none."""
+        if not self.outliers or self.unknown:
             return self.unknown
-        names = ", ".join(f'"{name}"' for name in sorted(self.strays)[:_NAMED])
-        more = f" and {len(self.strays) - _NAMED:,} more" if len(self.strays) > _NAMED else ""
-        away = f"{min(self.strays.values()) / 1e3:,.0f} km from the camera, far beyond all else"
+        names = ", ".join(f'"{name}"' for name in sorted(self.outliers)[:_NAMED])
+        more = f" and {len(self.outliers) - _NAMED:,} more" if len(self.outliers) > _NAMED else ""
+        away = f"{min(self.outliers.values()) / 1e3:,.0f} km from the camera, far beyond all else"
         return f"Left out, because too far to be seen: {names}{more}, {away}; move it closer or delete it"
 
     @property

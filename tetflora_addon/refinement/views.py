@@ -20,7 +20,7 @@ from ..growth.branches import Branches
 from .asset_parts import AssetParts
 from .contents import bounding_cylinders
 from .polygons import Polygons
-from .rasterise import buffer_size, occluder_depth, pixel_rays
+from .rasterize import buffer_size, occluder_depth, pixel_rays
 from .settings import RefinementSettings
 from .visibility import AlphaBuffer, Outline, fitting, hiding
 
@@ -71,7 +71,7 @@ class PanoramaBuffer:
     side : int
         Of each of the six faces, pixels.
     occluders : (t, 3, 3) float64, optional
-        Opaque triangles, metres.
+        Opaque triangles, meters.
     """
 
     def __init__(self, camera: Camera, side: int, occluders: Floats | None = None) -> None:
@@ -82,11 +82,11 @@ class PanoramaBuffer:
             directions = pixel_rays(face, side, side)[1]
             # Seen from the eye, a pixel at the side of a face is smaller than one in the middle.
             solid = (2.0 / side) ** 2 * (directions @ -face.frame[:, 2]) ** 3
-            worth = solid * pixels_per_solid_angle(camera, directions)
-            if worth.any():
+            pixel_weight = solid * pixels_per_solid_angle(camera, directions)
+            if pixel_weight.any():
                 some = occluders is not None and len(occluders)
                 end = occluder_depth(occluders, hiding(face), side, side) if some else None
-                self.faces.append(AlphaBuffer(face, side, end, worth))
+                self.faces.append(AlphaBuffer(face, side, end, pixel_weight))
         self._weight = np.zeros((len(self.faces), 0))
 
     def add(self, cells: Integers, vertices: Floats, extinction: ArrayLike) -> Outline:
@@ -103,8 +103,8 @@ class PanoramaBuffer:
             self._weight[number, cells[some]] = outline.pixels
             pixels[some] += outline.pixels
             opacity[some] += outline.pixels * outline.opacity
-        beside = self.camera.clearance(vertices.reshape(-1, 3)).reshape(-1, 4)
-        whole = (beside <= 0.0).all(axis=1)
+        outside = self.camera.distance_to_view(vertices.reshape(-1, 3)).reshape(-1, 4)
+        whole = (outside <= 0.0).all(axis=1)
         return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), whole)
 
     def remove(self, chosen: Mask) -> None:
@@ -157,17 +157,17 @@ def widened_for(
 ) -> Camera:
     """The camera with a margin, in fractions of the image, and what depth of field and motion blur add to it.
 
-    Polygons count by their centres: one large face from the eye to the horizon needs no margin.
+    Polygons count by their centers: one large face from the eye to the horizon needs no margin.
     """
     if not (camera.lens_radius > 0.0 or camera.shutter):
         return camera.widened(margin)
-    centre, radius, half_height = bounding_cylinders(flora, subplants)
+    center, radius, half_height = bounding_cylinders(flora, subplants)
     reach = np.hypot(radius, half_height)
     if polygons is not None:
-        centre, reach = np.concatenate([centre, polygons.centre]), np.append(reach, np.zeros(len(polygons)))
+        center, reach = np.concatenate([center, polygons.center]), np.append(reach, np.zeros(len(polygons)))
     if assets is not None:
-        centre, reach = np.concatenate([centre, assets.centre]), np.append(reach, assets.reach)
-    across, up = blur_margins(camera, centre, reach)
+        center, reach = np.concatenate([center, assets.center]), np.append(reach, assets.reach)
+    across, up = blur_margins(camera, center, reach)
     return camera.widened(margin + across, margin + up)
 
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Floats, Integers, Mask
 from ..camera.camera import Camera
 from ..camera.silhouette import silhouette_pixels
-from .rasterise import buffer_size, occluder_depth, tetrahedron_fragments
+from .rasterize import buffer_size, occluder_depth, tetrahedron_fragments
 
 #: Optical depth of one fragment at most. e^−60 is no light at all, and larger or infinite numbers would cost the
 #: cumulative sum over the whole image its precision.
@@ -51,13 +51,13 @@ class Outline:
         Area in pixels of the final image that the tetrahedron affects, hidden or not; 0 out of view.
     opacity : (n,) float64
         Mean of 1 − e^−τ over its own silhouette, 0 to 1; 0 out of view.
-    whole : (n,) bool
+    fully_inside : (n,) bool
         Whether all of it is in view.
     """
 
     pixels: Floats
     opacity: Floats
-    whole: Mask
+    fully_inside: Mask
 
 
 class AlphaBuffer:
@@ -71,7 +71,7 @@ class AlphaBuffer:
         Longer side of the buffer, pixels; `buffer_size` gives both sides.
     occluders_depth : (height · width,) float64, optional
         Where each pixel's ray ends at an opaque polygon, as `occluder_depth` gives it for the same size.
-    worth : (height · width,) float64, optional
+    pixel_weight : (height · width,) float64, optional
         Pixels of the final image that each pixel stands for, where the image is not the camera's own.
 
     Attributes
@@ -86,9 +86,9 @@ class AlphaBuffer:
     """
 
     def __init__(
-        self, camera: Camera, resolution: int, occluders_depth: Floats | None = None, worth: Floats | None = None
+        self, camera: Camera, resolution: int, occluders_depth: Floats | None = None, pixel_weight: Floats | None = None
     ) -> None:
-        self.camera, self.worth = camera, worth
+        self.camera, self.pixel_weight = camera, pixel_weight
         self.width, self.height = buffer_size(camera, resolution)
         self.end = None if occluders_depth is None else np.ravel(occluders_depth)
         if self.end is not None and len(self.end) != self.width * self.height:
@@ -107,7 +107,7 @@ class AlphaBuffer:
         cells : (n,) int
             Their numbers from now on, zero or positive, each new.
         vertices : (n, 4, 3) float64
-            Positively oriented, overlapping with none that is there, metres, world space.
+            Positively oriented, overlapping with none that is there, meters, world space.
         extinction : (n,) float64
             κ ≥ 0 along the way from the eye, 1/m; may be infinite.
 
@@ -123,13 +123,13 @@ class AlphaBuffer:
             depth = np.asarray(extinction, np.float64)[cell] * fragments.thickness
         # 0 · ∞ where a ray touches an opaque cell in a point: nothing.
         own = np.nan_to_num(np.minimum(depth, OPAQUE), nan=0.0)
-        counted = coverage if self.worth is None else coverage * self.worth[pixel]
+        counted = coverage if self.pixel_weight is None else coverage * self.pixel_weight[pixel]
         weight = np.bincount(cell, counted, count)
         opacity = np.bincount(cell, -counted * np.expm1(-own), count) / np.where(weight > 0.0, weight, 1.0)
         pixels, whole = silhouette_pixels(vertices, self.camera)
         final = self.camera.width * self.camera.height / (self.width * self.height)
         exact = whole & (weight > 0.0)
-        if self.worth is not None:
+        if self.pixel_weight is not None:
             exact, final = np.zeros(count, bool), 1.0
         # What lies behind an occluder is neither seen nor hides anything.
         open_ones = slice(None) if self.end is None else np.flatnonzero(fraction)
@@ -137,7 +137,10 @@ class AlphaBuffer:
         for name, values in (
             ("_cell", np.asarray(cells, np.int32)[cell]),
             ("_pixel", pixel),
-            ("_depth", own * np.minimum(coverage * fraction, 1.0) * (fragments.entry >= self.camera.hides_from)),
+            (
+                "_depth",
+                own * np.minimum(coverage * fraction, 1.0) * (fragments.entry >= self.camera.min_occluding_depth),
+            ),
             ("_fraction", counted * fraction / np.maximum(weight, 1e-300)[cell]),
             ("_before", np.ones(len(cell))),
         ):
@@ -179,7 +182,7 @@ class AlphaBuffer:
 
 def hiding(camera: Camera) -> Camera:
     """A camera that sees only opaque polygons that hide others from all eyes that it stands for."""
-    return replace(camera, near=max(camera.near, camera.hides_from))
+    return replace(camera, near=max(camera.near, camera.min_occluding_depth))
 
 
 def fitting(cells: int, finest: int) -> int:
@@ -199,7 +202,7 @@ class Buffers:
     resolution : int
         Longer side of the finest buffer, pixels.
     occluders : (t, 3, 3) float64, optional
-        Triangles of explicit polygons that hide what is behind them, metres.
+        Triangles of explicit polygons that hide what is behind them, meters.
     """
 
     def __init__(self, camera: Camera, resolution: int, occluders: Floats | None = None) -> None:

@@ -21,7 +21,7 @@ from .growing import Ages, NodeLaw, Nodes, PartGrown, rounded_least
 from .habit import with_habit
 from .members import expected_leaf_area
 from .skeletons import Skeleton
-from .species import Colour, Dead, Order, Range, Species
+from .species import Color, Dead, Order, Range, Species
 
 STAGES = ("seedling", "sapling", "mature", "old", "dying", "dead")
 #: Below a crown, nodes grow as this power of the height; with forks, there are so many more of them.
@@ -32,14 +32,14 @@ _ROSETTE = 0.9
 _TWIGS = 0.25
 #: Longest branches in lengths of their parents, where the description has shorter ones.
 _LONGEST = 0.6
-#: Girth of branches follows length as this power, that of stools the stems'; radius of the thinnest tips, metres.
+#: Girth of branches follows length as this power, that of stools the stems'; radius of the thinnest tips, meters.
 _STOUT, _STOOL, _TIP = 1.15, 0.7, 0.0012
 #: In a small plant, the topmost limbs are shorter than the crown's shape has them, crowns narrower than their limbs
 #: are long, the shoots of this year bare of branches, and trunks even cones.
 _SHORTER_TOP, _NARROW, _LEADER, _EVEN = 0.5, 0.2, 0.75, 1.3
 #: Branches that live for a while, for each of the others, on stems and on limbs; steps in which their number is found.
 _EXTRA, _STEPS = (3.0, 1.5), 14
-#: Metres of height up to which crowns have not closed.
+#: Meters of height up to which crowns have not closed.
 _SMALL = 3.0
 #: Of the length of a leafy twig: what is longer than so many bears no leaves itself.
 _LEAFY = 4.0
@@ -49,8 +49,8 @@ _LEAF, _FIRST = 1 / 3, 4.0
 _RAMP, _NEAR = 1.5, 0.1
 #: What is left of twigs and boughs at death, and years until they have fallen: twigs, boughs, limbs.
 _LEFT, _FALLEN = (0.3, 0.6, 1.0), (4.0, 12.0, 45.0)
-_GREY = (0.14, 0.122, 0.102)
-_GREYING = 4.0
+_GRAY = (0.14, 0.122, 0.102)
+_GRAYING = 4.0
 
 
 def ages_of(species: Species) -> Ages:
@@ -59,7 +59,7 @@ def ages_of(species: Species) -> Ages:
         return species.ages
     stem = _stem(species)
     height = float(np.prod([order.length.mean for order in species.orders[: stem + 1]]))
-    if height < 1.5 or len(species.orders) < 3 or species.form is not None:
+    if height < 1.5 or len(species.orders) < 3 or species.skeleton is not None:
         full = 1.0 if height < 3 else 3.0 * height
         return Ages(full, (3.0 / full, 1.3), scaled=True)
     full = 10.0 + 2.0 * height
@@ -99,7 +99,7 @@ def with_age(species: Species, years: float) -> Species:
     if years <= 0 or years == ages.full or (ages.scaled and years >= ages.full):
         return species
     species = replace(with_habit(species, species.habit), habit=0.0)
-    if ages.scaled or species.form is not None:
+    if ages.scaled or species.skeleton is not None:
         other = _scaled(species, min(ages.heights(years), 1.0))
     else:
         other = _Aged(species, ages, years).species()
@@ -111,14 +111,14 @@ def _scaled(species: Species, factor: float) -> Species:
     trunk, *rest = species.orders
     orders = (replace(trunk, length=trunk.length.scaled(factor)), *rest)
     orders = tuple(replace(order, leaf_size=order.leaf_size.scaled(factor)) for order in orders)
-    spur, bud, form = species.spur, species.bud, species.form
+    spur, bud, form = species.spur, species.bud, species.skeleton
     if spur is not None:
         spur = replace(spur, length=spur.length.scaled(factor), leaf_size=spur.leaf_size.scaled(factor))
     if bud is not None:
         bud = replace(bud, length=factor * bud.length)
     if form is not None:
         form = Skeleton(factor * form.points, factor * form.radius, form.parent, form.line)
-    return replace(species, orders=orders, spur=spur, bud=bud, form=form)
+    return replace(species, orders=orders, spur=spur, bud=bud, skeleton=form)
 
 
 def _stem(species: Species) -> int:
@@ -131,7 +131,7 @@ class _Aged:
     """One species at one age, which is not that of its description.
 
     ``stem`` and ``last`` are the order of the stem, and of the twigs. By order, ``whole`` are typical lengths when
-    full-grown, metres; ``now`` and ``before`` lengths over those, now and a year ago; ``stout`` radii over those when
+    full-grown, meters; ``now`` and ``before`` lengths over those, now and a year ago; ``stout`` radii over those when
     full-grown. ``fresh`` is the fraction of the branches on which there are more that live for a while, ``thin`` a
     factor on the number of leaves.
     """
@@ -142,9 +142,9 @@ class _Aged:
         self.whole = np.cumprod([order.length.mean for order in species.orders]).tolist()
         self.rosette = species.orders[self.stem].branch_start.mean > _ROSETTE
         self.now, self.before = (self._lengths(max(year, 1e-3)) for year in (years, years - 1))
-        girth = ages.girths(years)
+        diameter = ages.diameters(years)
         powers = [_STOOL if o < self.stem else 1.0 for o in range(self.stem + 1)]
-        self.stout = [girth**power for power in powers] + [now**_STOUT for now in self.now[self.stem + 1 :]]
+        self.stout = [diameter**power for power in powers] + [now**_STOUT for now in self.now[self.stem + 1 :]]
         self.youth = float(np.clip((1 - self.now[self.stem]) / 0.5, 0, 1))
         self.declined = ages.declined(years)
         self.dead = max(years - ages.lifespan, 1e-6) if years >= ages.lifespan else 0.0
@@ -152,7 +152,7 @@ class _Aged:
 
     def _lengths(self, years: float) -> list[float]:
         """Lengths by order over those when full-grown."""
-        height, limbs = self.ages.heights(years), self.ages.girths(years) ** self.ages.spread
+        height, limbs = self.ages.heights(years), self.ages.diameters(years) ** self.ages.spread
         limbs = float(np.clip(limbs, 0.45 * height, 1.4 * height**0.8))
         out = [height**0.5] * self.stem + [height]
         for o in range(self.stem + 1, self.last + 1):
@@ -168,8 +168,8 @@ class _Aged:
         out = self._made()
         if self.stem + 1 >= self.last or self.dead:
             return out
-        # As many leaves above each square metre of ground as when full-grown: young trees have more branches on a
-        # metre than will stay, old ones fewer leaves (leaf areas of McPherson, van Doorn and Peper, 2016).
+        # As many leaves above each square meter of ground as when full-grown: young trees have more branches on a
+        # meter than will stay, old ones fewer leaves (leaf areas of McPherson, van Doorn and Peper, 2016).
         height = self.now[self.stem]
         width = self.now[self.stem + 1] * (1 - _NARROW * max(1 - height, 0.0))
         wanted = expected_leaf_area(self.one) * width**2 * self.leafless * min(self.height / _SMALL, 1.0)
@@ -197,7 +197,7 @@ class _Aged:
 
     @property
     def height(self) -> float:
-        """Metres; of a palm with its fronds."""
+        """Meters; of a palm with its fronds."""
         top = self.now[self.stem + 1] * self.whole[self.stem + 1] if self.rosette else 0.0
         return self.now[self.stem] * self.whole[self.stem] + top
 
@@ -230,7 +230,7 @@ class _Aged:
         if not stool:
             changes |= self._leaves(o)
             thick = (one.thickness.mean for one in self.one.orders[: o + 1])
-            radius = prod((self.whole[0], *thick, self.stout[o]))  # typical one at the base, metres
+            radius = prod((self.whole[0], *thick, self.stout[o]))  # typical one at the base, meters
             mean = max(order.taper.mean, min(0.5, _TIP / max(radius, 1e-9)))
             changes["taper"] = Range(mean, min(order.taper.variation, mean, 1 - mean))
             changes["flare"] = order.flare * min(self.stout[o], 1.0) ** 0.5
@@ -324,7 +324,7 @@ class _Aged:
         return order.leaf_size.scaled(min(1.0, _LEAF * self.height / largest))
 
     def _leaves(self, o: int) -> dict[str, Any]:
-        """Leaves of an order: as many on a metre; on what is as short as a twig, as many as on twigs."""
+        """Leaves of an order: as many on a meter; on what is as short as a twig, as many as on twigs."""
         order, now = self.one.orders[o], self.now[o]
         own = order.leaves.mean * now * self.leafless
         changes = {"leaves": order.leaves.scaled(now * self.leafless), "leaf_size": self._leaf(order)}
@@ -351,13 +351,13 @@ class _Aged:
         }
 
     def _barked(self, order: Order) -> Order:
-        """Grey in death, and without flowers."""
+        """Gray in death, and without flowers."""
         if not self.dead:
             return order
-        grey = min(self.dead / _GREYING, 1.0)
-        mean, variation = order.branch_colour
-        mixed = tuple((1 - grey) * c + grey * g for c, g in zip(mean, _GREY, strict=True))
-        return replace(order, branch_colour=Colour(mixed, variation), leaves=Range(0.0))
+        gray = min(self.dead / _GRAYING, 1.0)
+        mean, variation = order.branch_color
+        mixed = tuple((1 - gray) * c + gray * g for c, g in zip(mean, _GRAY, strict=True))
+        return replace(order, branch_color=Color(mixed, variation), leaves=Range(0.0))
 
     def _dead_nodes(self, o: int) -> tuple[float, Nodes]:
         dead = self.one.dead

@@ -3,7 +3,7 @@
 """How a plant grows: sizes by age, and where branches leave a parent that is not as long as it will be.
 
 Sizes follow the function of Chapman and Richards (F. J. Richards, "A flexible growth function for empirical use", 1959;
-D. G. Chapman, 1961). Branches keep their place in metres while their parent grows beyond them. They are *nodes* on the
+D. G. Chapman, 1961). Branches keep their place in meters while their parent grows beyond them. They are *nodes* on the
 full-grown axis, numbered from where its crown begins; those of younger years, below, have negative numbers and stand
 closer, because shoots were shorter then.
 """
@@ -31,7 +31,7 @@ class Ages:
 
     full: float = limited(..., 0.1, 5000, "age at which it is as described")
     height: tuple[float, float] = limited((0.04, 1.2), *_CURVE, "curve of the height")
-    girth: tuple[float, float] = limited((0.03, 1.2), *_CURVE, "curve of the diameter of the trunk")
+    diameter: tuple[float, float] = limited((0.03, 1.2), *_CURVE, "curve of the diameter of the trunk")
     lifespan: float = limited(200.0, 0.2, 20000, "age at which it dies")
     decline: float = limited(0.75, 0.05, 0.99, "fraction of the lifespan from which on it declines")
     base: float = limited(2.0, 1, 10, "the bare part of the trunk grows as this power of the height")
@@ -44,9 +44,9 @@ class Ages:
         """Height over that at the full age; it stands still when the plant declines."""
         return grown(min(years, self.decline * self.lifespan), self.full, *self.height)
 
-    def girths(self, years: float) -> float:
+    def diameters(self, years: float) -> float:
         """Diameter of the trunk over that at the full age; it stands still at death."""
-        return grown(min(years, self.lifespan), self.full, *self.girth)
+        return grown(min(years, self.lifespan), self.full, *self.diameter)
 
     def declined(self, years: float) -> float:
         """How far it has declined: 0 in good health, 1 dead; what only grows in size does not."""

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Habit: the same species as it grows free, or between neighbors that take its light.
 
-Between neighbors a tree loses its lower limbs, keeps the others short, and puts on less girth for its height. Limbs
+Between neighbors a tree loses its lower limbs, keeps the others short, and has a thinner trunk for its height. Limbs
 bear twigs of the same size, as densely; so leaf area falls with the crown's projection, and with the crown's volume
 the number of limbs and twigs. What asks for light, as birches do, has fewer leaves on its twigs as well.
 """
@@ -41,7 +41,7 @@ def with_habit(species: Species, habit: float) -> Species:
         Of the first orders, bare lengths, lengths, thicknesses and numbers differ, within the limits of the schema. A
         species whose form is drawn by hand, and one of a single order, keep what they have.
     """
-    if habit == 0 or species.form is not None or len(species.orders) < 2:
+    if habit == 0 or species.skeleton is not None or len(species.orders) < 2:
         return species
     trunk, limb, *rest = species.orders
     bare, shorter = habit * BARE, 1 - habit * NARROWER
@@ -60,7 +60,7 @@ def with_habit(species: Species, habit: float) -> Species:
     if dead is not None:  # as close together on a bole that is bare for longer
         longer = starts["branch_start"].mean / max(before.branch_start.mean, 1e-6)
         dead = replace(dead, number=dead.number.scaled(min(longer, _MORE_DEAD)))
-    # As many branches, leaves and short shoots on a metre.
+    # As many branches, leaves and short shoots on a meter.
     fewer = {name: getattr(limb, name).scaled(shorter) for name in ("branches", "leaves", "spurs")}
     limb = replace(limb, length=limb.length.scaled(limb.length.allowed(shorter, ORDER_KEYS["length"])), **fewer)
     # Limbs are as slim as the trunk; what they bear is not.
@@ -73,7 +73,7 @@ def with_habit(species: Species, habit: float) -> Species:
 
 
 def _same_size(order: Order, longer: float, thicker: float) -> Order:
-    """Branches as long and as thick in metres as before, of parents whose length and girth are divided by factors."""
+    """Branches as long and as thick in meters as before, of parents whose length and width are divided by factors."""
     length = min(longer, LENGTH_HIGH / order.length.high)
     thickness = max(min(thicker, ORDER_KEYS["thickness"].high / order.thickness.high), 1.0)
     return replace(order, length=order.length.scaled(length), thickness=order.thickness.scaled(thickness))

@@ -47,7 +47,7 @@ _STEM = 0.03  # meters, of the stem in the middle of a patch
 _TREE = 3.0  # meters: what is lower has no branches that are dead wood
 _KEPT = {
     *("length", "thickness", "taper", "sides", "angle", "angle_tip", "branches", "branch_start"),
-    *("crown", "whorl", "count_by_length", "branch_colour"),
+    *("crown", "whorl", "count_by_length", "branch_color"),
 }
 #: Meters across which a handful of needles is strewn, their number, and the width of each.
 _STREWN, _HANDFUL, _NEEDLE = 0.13, 22, 0.0018
@@ -104,14 +104,14 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     if needles:
         number, radius = _LEAVES[1], 0.3
     twigs = 6 if needles else 7
-    colour, variation = _NEEDLE_BROWN if needles else _BROWN
+    color, variation = _NEEDLE_BROWN if needles else _BROWN
     parts = _parts()
     around = parts["around"] | {
         "length": _pair(radius / _STEM, 0.3 * radius / _STEM),
         "leaves": _pair(number / twigs, 0.3 * number / twigs),
         "leaf_size": _pair(0.95 * size, 0.15 * size),
-        "leaf_colour": [list(colour), list(variation)],
-        "leaf_colour_tip": [round(1.12 * c, 3) for c in colour],
+        "leaf_color": [list(color), list(variation)],
+        "leaf_color_tip": [round(1.12 * c, 3) for c in color],
     }
     middle = parts["middle"] | {"branches": [twigs, 1]}
     if needles:
@@ -138,7 +138,7 @@ def branch_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
         # Twigs of a branch that fell spread over the ground, and many are gone.
         order |= _parts()["twig"]
         order["branches"] = _pair(*_fewer(order.get("branches", 0), 6))
-        order["branch_colour"] = _weathered(order.get("branch_colour"), 0.4)
+        order["branch_color"] = _weathered(order.get("branch_color"), 0.4)
     orders[-1]["branches"] = 0
     orders[0] |= _parts()["bough"] | {"length": _pair(length, 0.4 * length)}
     orders[0].pop("angle_tip", None)
@@ -153,7 +153,7 @@ def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None
         return None
     length = min(max(0.25 * trunk.length.mean, 1.2), 1.84)
     radius = min(max(0.8 * trunk.length.mean * trunk.thickness.mean, 0.04), _BURIED)
-    colour = page["orders"][0].get("branch_colour")
+    color = page["orders"][0].get("branch_color")
     parts = _parts()
     log = parts["log"] | {
         "length": _pair(length / _BURIED, 0.3 * length / _BURIED),
@@ -163,7 +163,7 @@ def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None
     # The stem leads down, so that the log begins in the ground and comes out of it on its way.
     orders = [parts["stem"], log, parts["stub"]]
     for order, how in zip(orders, (0.65, 0.65, 0.7), strict=True):
-        order["branch_colour"] = _weathered(colour, how)
+        order["branch_color"] = _weathered(color, how)
     made = _page(species, "log", f"A fallen log of {species.name}, about {length:.1f} m long", orders)
     return made | {"leaf": page["leaf"], "blossom": parts["cut"], "blossom_transmission": 0}
 
@@ -201,9 +201,9 @@ def _fewer(value: Any, most: float) -> tuple[float, float]:
     return mean * factor, min(variation * factor + 1.0, mean * factor)
 
 
-def _weathered(colour: Any, how: float) -> list[list[float]]:
+def _weathered(color: Any, how: float) -> list[list[float]]:
     """A color of bark and its variation, turned to that of dead wood as far as asked."""
-    mean, variation = colour or [[0.16, 0.11, 0.07], [0.04, 0.03, 0.02]]
+    mean, variation = color or [[0.16, 0.11, 0.07], [0.04, 0.03, 0.02]]
     return [[round((1 - how) * c + how * w, 4) for c, w in zip(mean, _WEATHERED, strict=True)], variation]
 
 
@@ -272,15 +272,15 @@ def leaves_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     number = min(max(_SHED_AREA / area, _SHED_LEAVES[0]), _SHED_LEAVES[1])
     radius = min(max(sqrt(number * area / (_SHED_COVERED * pi)), 1.3 * around["leaf_size"][0]), _SHED_RADIUS)
     stem = middle["length"][0]
-    colour, variation = _autumn(species, leaf)
+    color, variation = _autumn(species, leaf)
     around |= {
         "length": [round(radius / stem, 4), round(0.3 * radius / stem, 4)],
         "thickness": _THREAD,
         "sides": 3,
         "leaves": [round(number / _ARMS, 4), round(0.2 * number / _ARMS, 4)],
         "leaf_start": 0.1,
-        "leaf_colour": [colour, variation],
-        "leaf_colour_tip": colour,
+        "leaf_color": [color, variation],
+        "leaf_color_tip": color,
     }
     middle |= {"thickness": _THREAD, "branches": [_ARMS, 0]}
     return made | {
@@ -318,7 +318,7 @@ def _autumn(species: Species, leaf: LeafYear) -> tuple[list[float], list[float]]
     """Mean and variation of the autumn colors of a tree's leaves, from the first to the last."""
     if not leaf.autumn:
         bearing = next(order for order in species.orders if order.leaves.mean > 0)
-        return [list(one) for one in (bearing.leaf_colour.mean, bearing.leaf_colour.variation)]
+        return [list(one) for one in (bearing.leaf_color.mean, bearing.leaf_color.variation)]
     number = len(leaf.autumn)
     # Hue of the plant and tint of the leaf count alike: their mean is distributed as a triangle.
     edges = [2 * x * x if x < 0.5 else 1 - 2 * (1 - x) ** 2 for x in (i / number for i in range(number + 1))]

@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Floats
 from ..leaves.models import LeafModel
 from .growing import EVEN, faded, shortened, some_nodes
-from .species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts, whole_cuts
+from .species import CROWN_PROFILES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts, whole_cuts
 
 
 @dataclass(frozen=True)
@@ -58,14 +58,14 @@ def expected_members(species: Species) -> Members:
         segments.append(number * float(fold @ part_segments(order)))
         leaves.append(full * order.leaves.mean * _fold(cuts, fold, order.leaf_start))
         spurs += full * order.spurs.mean * _fold(cuts, fold, order.spur_start)
-        if species.dead is not None and species.form is None and i <= 1:
+        if species.dead is not None and species.skeleton is None and i <= 1:
             dead += full * _dead_on(species.dead, order, i, cuts, fold)
         if i + 1 < len(species.orders):
-            at, vigour, weight = _laterals(order)
+            at, vigor, weight = _laterals(order)
             stems_there = weight * fold[np.searchsorted(cuts[1:-1], at, side="right")]
-            follow = 1 - species.orders[i + 1].count_by_length * (1 - vigour)
+            follow = 1 - species.orders[i + 1].count_by_length * (1 - vigor)
             if order.growing is not None:
-                follow = follow * np.clip(vigour / least_length(order), 0, 1)
+                follow = follow * np.clip(vigor / least_length(order), 0, 1)
             number = full * order.branches.mean * float(stems_there.mean())
             full = full * order.branches.mean * float((stems_there * follow).mean())
     on_spur = species.spur.leaves.mean if species.spur is not None else 0.0
@@ -96,7 +96,7 @@ def _laterals(order: Order) -> tuple[Floats, Floats, Floats | float]:
 
 
 def _ratios(order: Order, fraction: Floats) -> Floats:
-    return crown_ratio(np.full(fraction.shape, CROWN_SHAPES.index(order.crown)), 1 - fraction)
+    return crown_ratio(np.full(fraction.shape, CROWN_PROFILES.index(order.crown)), 1 - fraction)
 
 
 def least_length(order: Order) -> float:
@@ -151,13 +151,13 @@ def _dead_on(dead: Dead, order: Order, i: int, cuts: list[float], fold: np.ndarr
     wanted = (dead.on_limbs if i else dead.number).mean
     at = low + (high - low) * EVEN
     stems = fold[np.searchsorted(cuts[1:-1], at, side="right")]
-    full = 1 - dead.orders[0].count_by_length * (1 - dead_vigour(EVEN))
+    full = 1 - dead.orders[0].count_by_length * (1 - dead_vigor(EVEN))
     return wanted * np.array([stems.mean(), dead.orders[0].branches.mean * (full * stems).mean()])
 
 
-def dead_vigour(fraction: Floats) -> Floats:
+def dead_vigor(fraction: Floats) -> Floats:
     """Length ratio (n,) of dead branches from the lowest, of which half is left, to the highest."""
-    return crown_ratio(np.full(fraction.shape, CROWN_SHAPES.index("tapered")), fraction)
+    return crown_ratio(np.full(fraction.shape, CROWN_PROFILES.index("tapered")), fraction)
 
 
 def leaf_polygons(species: Species, order: Order) -> float:

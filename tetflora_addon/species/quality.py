@@ -55,7 +55,7 @@ def with_quality(species: Species, quality: float) -> Species:
     Species
         Sides, segments, bends, thicknesses, and numbers and sizes of branches and leaves differ, within the limits of
         the schema. Leaf area is kept, and the surface of wood as far as twigs stay thinner than what bears them, and
-        with both the mean colours. Where the limits do not let it reach the number, it comes as near as they do:
+        with both the mean colors. Where the limits do not let it reach the number, it comes as near as they do:
         below, some 12 branches of each order with 12 leaves in all; above, 10,000 leaves or branches on a branch.
 
     Raises
@@ -241,7 +241,7 @@ def _widened_forms(species: Species, larger: float) -> Species:
 
 
 def _lengths(species: Species) -> list[float]:
-    """Mean length of the longest branches of each order, metres."""
+    """Mean length of the longest branches of each order, meters."""
     lengths = [o.length.mean for o in species.orders]
     return [math.prod(lengths[: i + 1]) for i in range(len(lengths))]
 

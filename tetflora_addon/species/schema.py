@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..errors import SpeciesError, shown
-from ..files import json_of, read_whole
+from ..errors import SpeciesError, quoted
+from ..files import parse_json, read_whole
 from ..leaves.schema import read_forms
 from ..parameters import FileReader, Rgb, keys_of
 from .ecology import Ecology
@@ -39,17 +39,17 @@ DEFAULT_SPUR = {"length": [0.05, 0.02], "thickness": [0.03, 0.005], "angle": [50
 
 
 #: Of the wood that has lost its bark, and of bark without life.
-_GREY = [[0.14, 0.122, 0.102], [0.03, 0.027, 0.023]]
+_GRAY = [[0.14, 0.122, 0.102], [0.03, 0.027, 0.023]]
 #: Dead branches of a species that only says how many: broken off or bare, with bare twigs.
 DEFAULT_DEAD = (
     {
         "length": [0.06, 0.045], "thickness": [0.085, 0.025], "taper": [0.45, 0.2], "segments": 4, "sides": 4,
         "curvature": [0, 60], "angle": [88, 14], "angle_tip": 70, "azimuth": [137.5, 60], "branches": [6, 3],
-        "branch_start": 0.2, "branch_colour": _GREY,
+        "branch_start": 0.2, "branch_color": _GRAY,
     },
     {
         "length": [0.4, 0.26], "thickness": [0.32, 0.08], "taper": 0.4, "segments": 3, "sides": 3,
-        "curvature": [0, 80], "angle": [58, 18], "azimuth": [137.5, 40], "branch_colour": _GREY,
+        "curvature": [0, 80], "angle": [58, 18], "azimuth": [137.5, 40], "branch_color": _GRAY,
     },
 )  # fmt: skip
 
@@ -87,12 +87,12 @@ def _read_dead(reader: FileReader, data: Any, name: str) -> Dead:
 
 
 def _read_leaf_year(reader: FileReader, data: Any, name: str) -> LeafYear:
-    def colours(value: Any, name: str) -> tuple[Rgb, ...]:
+    def colors(value: Any, name: str) -> tuple[Rgb, ...]:
         if not isinstance(value, list) or len(value) > MAX_AUTUMN:
             raise reader.fail(name, f"must be a list of up to {MAX_AUTUMN} colors [r, g, b]")
         return tuple(reader.rgb(one, f"{name}[{i}]") for i, one in enumerate(value))
 
-    year = reader.read(LeafYear, data, name, {"autumn": colours})
+    year = reader.read(LeafYear, data, name, {"autumn": colors})
     reader.number(year.turn, f"{name}.turn", year.appear, year.appear + DAYS)
     reader.number(year.fall, f"{name}.fall", year.turn, year.appear + DAYS)
     return year
@@ -126,7 +126,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         raise reader.fail("format", f"must be {FORMAT} for this version of TetFlora, not {shown(data['format'])}")
     orders = data["orders"]
     if not isinstance(orders, list) or not 1 <= len(orders) <= MAX_ORDERS:
-        found = len(orders) if isinstance(orders, list) else shown(orders)
+        found = len(orders) if isinstance(orders, list) else quoted(orders)
         raise reader.fail("orders", f"must be a list of 1 to {MAX_ORDERS} orders, has {found}")
     read = tuple(_read_order(reader, o, f"orders[{i}]", i == 0, i == len(orders) - 1) for i, o in enumerate(orders))
     spur = None
@@ -164,7 +164,7 @@ def species_from_json(content: bytes | str, identifier: str, source: str) -> Spe
         It is not JSON, or breaks a rule of the format.
     """
     try:
-        data = json_of(content)
+        data = parse_json(content)
     except ValueError as error:
         raise SpeciesError(f"{source}: {error}") from None
     return species_from_dict(data, identifier, source)

@@ -36,11 +36,11 @@ class Skeleton:
     Attributes
     ----------
     points : (p, 3) float64
-        Metres in the plant's space: z up, the origin at its foot.
+        Meters in the plant's space: z up, the origin at its foot.
     radius : (p,) float64
-        Metres.
+        Meters.
     parent : (p,) int32
-        The point before, towards the root; -1 for roots. Parents stand before their children.
+        The point before, toward the root; -1 for roots. Parents stand before their children.
     line : (p,) int32, optional
         Which stroke of the artist's led to the point from the one before; all 0 where nobody knows.
 
@@ -89,9 +89,9 @@ class DrawnBranches:
     first : (b + 1,) int64
         First knot of each branch, and the number of knots.
     knots : (k, 3) float64
-        Metres, branch after branch from base to tip. A branch starts at the point of its parent where it leaves.
+        Meters, branch after branch from base to tip. A branch starts at the point of its parent where it leaves.
     radius : (k,) float64
-        Metres.
+        Meters.
     order : (b,) int32
         0 for trunks; at most ``MAX_ORDERS - 1``.
     parent : (b,) int32
@@ -99,7 +99,7 @@ class DrawnBranches:
     at : (b,) float64
         Where on the parent it leaves, fraction of the parent's length; 0 for trunks.
     length : (b,) float64
-        Along the knots, metres.
+        Along the knots, meters.
     outward : (b,) float64
         From order 2 on, the fraction of the limb's length (its ancestor of order 1) at which that line of branches
         leaves it; 0 for trunks and limbs.
@@ -124,7 +124,7 @@ class DrawnBranches:
 
     @cached_property
     def arc(self) -> Floats:
-        """(k,) float64: way along the branch from its base to each knot, metres."""
+        """(k,) float64: way along the branch from its base to each knot, meters."""
         return _arc(self.knots, self.first)
 
 
@@ -136,9 +136,9 @@ def skeleton_from_edges(
     Parameters
     ----------
     points : (n, 3) float
-        Metres in the plant's space.
+        Meters in the plant's space.
     radius : (n,) float, optional
-        Metres. Where it is missing or zero everywhere, radii follow the pipe rule, see Notes.
+        Meters. Where it is missing or zero everywhere, radii follow the pipe rule, see Notes.
     edges : (e, 2) int
         Ends of each edge, in any order and direction.
     source : str
@@ -169,7 +169,7 @@ def skeleton_from_edges(
     points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     edges = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
     given = np.zeros(len(points)) if radius is None else np.asarray(radius, dtype=np.float64).reshape(-1)
-    refused = f'"{source}" cannot be used as the form of a plant: '
+    refused = f'"{source}" cannot be the skeleton of a plant: '
     if not len(edges):
         raise SpeciesError(refused + "it has no edges; use a curve, or a mesh whose edges are the branches")
     if edges.min() < 0 or edges.max() >= len(points) or len(given) != len(points):

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Integers
 from ..leaves.models import LeafModel
-from ..parameters import Colour, Range, Rgb, described, limited, named
+from ..parameters import Color, Range, Rgb, described, limited, named
 from .ecology import Ecology
 from .growing import Ages, PartGrown
 from .skeletons import Skeleton
@@ -24,7 +24,7 @@ LEAF_ENVELOPES = ("none", "sphere", "cylinder", "cone", "box")
 """Solids around a branch that leaves may fill."""
 LEAF_INCLINATIONS = ("branch", "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform")
 """How leaves stand: as the branch has it, or by a distribution of the angle between their normals and its axis."""
-CROWN_SHAPES = (
+CROWN_PROFILES = (
     "conical",
     "spherical",
     "hemispherical",
@@ -70,7 +70,7 @@ class Order:
     segments: int = limited(1, 1, 32, "straight segments along a branch")
     sides: int = limited(4, 3, 64, "faces around a branch")
     curvature: Range = limited(
-        Range(0, 0), -360, 360, "bend along the length; positive bends towards the parent", "degrees"
+        Range(0, 0), -360, 360, "bend along the length; positive bends toward the parent", "degrees"
     )
     curvature_tip: float = limited(
         ...,
@@ -81,7 +81,7 @@ class Order:
         follows="curvature",
     )
     attraction: Range = limited(
-        Range(0, 0), -360, 360, "turn of a level branch towards the sky; negative turns down", "degrees"
+        Range(0, 0), -360, 360, "turn of a level branch toward the sky; negative turns down", "degrees"
     )
     angle: Range = limited(Range(0, 0), 0, 180, "angle between branch and parent, at the parent's base", "degrees")
     angle_tip: float = limited(
@@ -92,7 +92,7 @@ class Order:
     whorl: int = limited(1, 1, 12, "branches at each node: 1 alternate, 2 opposite, 3 or more a whorl")
     branches: Range = limited(Range(0, 0), 0, 10_000, "number of branches of the next order on each branch")
     branch_start: Range = limited(Range(0.1, 0), 0, 0.99, "part at the base without branches", "fraction of the length")
-    crown: str = named("cylindrical", CROWN_SHAPES, "how the length of child branches varies along the branch")
+    crown: str = named("cylindrical", CROWN_PROFILES, "how the length of child branches varies along the branch")
     count_by_length: float = limited(
         0.0,
         0,
@@ -127,30 +127,30 @@ class Order:
     )
     leaf_angle: Range = limited(Range(50, 15), 0, 180, "angle between branch and leaf", "degrees")
     leaf_azimuth: Range = limited(Range(137.5, 20), -360, 360, "rotation around the branch between leaves", "degrees")
-    leaf_light: Range = limited(Range(0.5, 0), 0, 1, "how strongly leaves turn towards the sky")
+    leaf_light: Range = limited(Range(0.5, 0), 0, 1, "how strongly leaves turn toward the sky")
     leaf_light_tip: float = limited(
         ...,
         0,
         1,
-        "how strongly leaves turn towards the sky at the outside of the crown (default: same as leaf_light)",
+        "how strongly leaves turn toward the sky at the outside of the crown (default: same as leaf_light)",
         follows="leaf_light",
     )
     leaf_spray: float = limited(0.0, 0, 1, "how strongly leaves spread horizontally to both sides of their branch")
     leaf_droop: float = limited(0.0, 0, 1, "how strongly leaves hang down")
-    branch_colour: Colour = described(Colour((0.16, 0.11, 0.07), (0.04, 0.03, 0.02)), "color of the bark", "linear RGB")
-    leaf_colour: Colour = described(Colour((0.08, 0.19, 0.03), (0.03, 0.06, 0.01)), "color of the leaves", "linear RGB")
-    leaf_colour_tip: Rgb = described(
+    branch_color: Color = described(Color((0.16, 0.11, 0.07), (0.04, 0.03, 0.02)), "color of the bark", "linear RGB")
+    leaf_color: Color = described(Color((0.08, 0.19, 0.03), (0.03, 0.06, 0.01)), "color of the leaves", "linear RGB")
+    leaf_color_tip: Rgb = described(
         ...,
-        "color of leaves at the outside of the crown (default: same as leaf_colour)",
+        "color of leaves at the outside of the crown (default: same as leaf_color)",
         "linear RGB",
-        follows="leaf_colour",
+        follows="leaf_color",
     )
-    leaf_colour_young: Rgb = described(
+    leaf_color_young: Rgb = described(
         ...,
         "color of young leaves, at the ends of the branches, inside the crown; those outside differ from it as other "
-        "leaves do (default: same as leaf_colour)",
+        "leaves do (default: same as leaf_color)",
         "linear RGB",
-        follows="leaf_colour",
+        follows="leaf_color",
     )
     #: How far it has grown; None where it is as long as it will be.
     growing: PartGrown | None = None
@@ -163,7 +163,7 @@ class Bud:
     length: float = limited(0.005, 0.0005, 0.1, "length", "m")
     width: float = limited(0.5, 0.05, 1.5, "width, fraction of the length")
     lateral: float = limited(1.0, 0, 1, "fraction of the leaves with a bud in their axil")
-    colour: Rgb = described((0.11, 0.06, 0.035), "color")
+    color: Rgb = described((0.11, 0.06, 0.035), "color")
 
 
 @dataclass(frozen=True)
@@ -198,11 +198,11 @@ class Species:
         Forms of the sample leaf, and of blossoms or fruit, where there are any; each leaf has one of them by chance. A
         string is the name of a Blender mesh object, which the bridge to Blender replaces by a model.
     spur : Order or None
-        A short shoot; its length is in metres and its thickness a fraction of that, as for a trunk.
+        A short shoot; its length is in meters and its thickness a fraction of that, as for a trunk.
     bud : Bud or None
     dead : Dead or None
-    form : Skeleton or None
-        Trunk and lower orders modelled by hand; only the orders above are grown.
+    skeleton : Skeleton or None
+        Trunk and lower orders modeled by hand; only the orders above are grown.
     aged : (Species, float) or None
         Of what, and at how many years, this is another age; see `ages.with_age`.
     year : Year or None
@@ -229,7 +229,7 @@ class Species:
     habit: float = limited(0.0, 0, 1, "how far trees are those of a dense stand, not free ones as described")
     stand_leaves: float = limited(1.0, 0.05, 1, "fraction of the leaves on a twig that are left in a dense stand")
     exact: bool = described(False, "whether all plants are the same: ranges have their means, and seeds do not matter")
-    form: Skeleton | None = None
+    skeleton: Skeleton | None = None
     aged: tuple[Species, float] | None = None
     year: Year | None = None
     ages: Ages | None = None
@@ -267,7 +267,7 @@ def crown_ratio(shape: Integers, r: Floats) -> Floats:
     Parameters
     ----------
     shape : (...) int
-        Index into `CROWN_SHAPES`.
+        Index into `CROWN_PROFILES`.
     r : (...) float64
         1 at the lowest child, 0 at the parent's tip.
 
@@ -275,7 +275,7 @@ def crown_ratio(shape: Integers, r: Floats) -> Floats:
     -----
     Weber and Penn 1995, table of ShapeRatio. "Receding" is their rule for the branches of branches (section 4.3):
     parent's length less 0.6 of the way to the child. Their number of leaves and of further branches, less by half
-    towards the tip, is what ``count_by_length`` 5/6 makes of it. The lower end of the two flames is raised from 0 to
+    toward the tip, is what ``count_by_length`` 5/6 makes of it. The lower end of the two flames is raised from 0 to
     0.05, so that no branch has zero length.
     """
     r = np.clip(r, 0.0, 1.0)

@@ -16,8 +16,8 @@ from ..parameters import Rgb, described, limited
 DAYS = 365.0
 """Length of the year; a date beyond it is one of the next year."""
 MAX_AUTUMN = 4
-"""Autumn colours of a kind of leaf at most."""
-#: Days by which spring comes later for each degree towards the pole (birch's bud burst in Europe from 44° to 68° N in
+"""Autumn colors of a kind of leaf at most."""
+#: Days by which spring comes later for each degree toward the pole (birch's bud burst in Europe from 44° to 68° N in
 #: 2010, first leaves of others 1.6 to 2.7: results of the BEAGLE project), and by which autumn comes earlier: leaves
 #: turn by .5 to 3 days a degree (Menzel, Estrella and Fabian, "Spatial and temporal variability of the phenological
 #: seasons in Germany", 2001, and others).

@@ -3,9 +3,9 @@
 """What a year does to plants: how they grow with the light that they take, and which of them die.
 
 Wood grows in proportion to the light that leaves take, less what the leaves cost (Monteith, "Climate and the efficiency
-of crop production in Britain", 1977). Trunks grow taller for their girth where it is dark beside them, crowns widen
-where it is light, limbs die where it is dark. A plant that grows much less than one of its girth that stands free dies
-soon; how much less depends on its tolerance of shade. All else, such as how many are left, follows.
+of crop production in Britain", 1977). Trunks grow taller for their basal diameter where it is dark beside them, crowns
+widen where it is light, limbs die where it is dark. A plant that grows much less than one of its basal diameter that
+stands free dies soon; how much less depends on its tolerance of shade. All else, such as how many are left, follows.
 
 How plants come: planted, or from seeds of the plants around and of the woods outside, where there is light.
 """
@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Mask
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, uniform
-from .guilds import Guilds
 from .light import Crowns, LightGrid
 from .plants import LYING, DeadPlants, Plants, Records, StandDraw, keys_of, newcomers
 from .site import StandSite
+from .traits import StandTraits
 
-#: Height for the girth over that in a closed stand: where the light beside the crown is full, and where there is none.
+#: Height for the basal diameter over that in a closed stand: where the light beside the crown is full, and where there
+#: is none.
 _SLENDER_LIT, _SLENDER_DARK = 0.72, 1.14
 #: Light beside a crown in which it begins to widen, for shade tolerance 0 and 5 (crowns of tolerant trees reach into
 #: each other); how much more lets it widen as fast as it can.
@@ -45,9 +46,9 @@ _LEANS, _MOST_OFFSET, _TURNS = 6.0, 0.6, 0.08
 _HALF_LIT = 0.1
 #: Girth at which plants cease to become thicker, over the largest that are known.
 _LARGEST = 1.3
-#: Part of the vigour that is this year's.
+#: Part of the vigor that is this year's.
 _RECENT = 0.3
-#: Vigour below which plants are likely to die, for shade tolerance 0 and 5, and the chance where it is 0.
+#: Vigor below which plants are likely to die, for shade tolerance 0 and 5, and the chance where it is 0.
 _WEAK, _DIES = (0.2, 0.025), 0.15
 #: Chance to die for other reasons: of so many in a lifespan, for each that is left; when the old die, in lifespans.
 _OTHERS, _OLD = 1.0, (0.8, 1.15)
@@ -57,7 +58,9 @@ _STANDS, _LIES = (2.0, 22.0), (8.0, 40.0)
 _DEAD_DIAMETER = 0.4
 
 
-def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guilds: Guilds, block: slice) -> Plants:
+def grown(
+    plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, traits: StandTraits, block: slice
+) -> Plants:
     """Some plants a year later.
 
     Parameters
@@ -71,13 +74,13 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
     x, y, radius, base, height = (
         value[block] for value in (crowns.x, crowns.y, crowns.radius, crowns.base, crowns.height)
     )
-    guild, taken = one.guild, taken[block]
+    species, taken = one.species, taken[block]
 
     def own(values: NDArray) -> NDArray:
-        return np.take(values, guild)
+        return np.take(values, species)
 
     away = radius + 0.5 * light.cell
-    deep = _BESIDE[0] + (_BESIDE[1] - _BESIDE[0]) * own(guilds.top)
+    deep = _BESIDE[0] + (_BESIDE[1] - _BESIDE[0]) * own(traits.crown_conicity)
     middle = height - deep * np.minimum(height - base, _LONG * height)
     places = ((away, 0.0), (-away, 0.0), (0.0, away), (0.0, -away))
     east, west, north, south = (light.at(x + dx, y + dy, middle, (x, y)) for dx, dy in places)
@@ -87,26 +90,26 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
         below += light.at(x + 0.5 * dx, y + 0.5 * dy, base, (x, y))
     below *= 0.2
 
-    free = np.pi * guilds.radii(guild, one.girth) ** 2 * own(guilds.free)
-    net = taken - own(guilds.cost) * crowns.leaves[block]
+    free = np.pi * traits.radii(species, one.basal) ** 2 * own(traits.free)
+    net = taken - own(traits.cost) * crowns.leaves[block]
     lit = np.clip(net / np.maximum(free, 1e-9), 0.0, 1.5)
-    vigour = (1.0 - _RECENT) * one.vigour + _RECENT * lit
-    rate = own(guilds.yields) * one.quality * one.strength
-    girth = one.girth + _thickening(one, np.maximum(net, 0.0) * rate, lit, guilds)
+    vigor = (1.0 - _RECENT) * one.vigor + _RECENT * lit
+    rate = own(traits.light_use_efficiency) * one.quality * one.strength
+    basal = one.basal + _increment(one, np.maximum(net, 0.0) * rate, lit, traits)
     dark = 1.0 - np.clip(side, 0.0, 1.0)
     slender = _SLENDER_LIT + (_SLENDER_DARK - _SLENDER_LIT) * dark
     short = 0.4 + 0.6 * np.sqrt(one.quality)
-    tall = np.maximum(height, slender * short * guilds.heights(guild, girth))
+    tall = np.maximum(height, slender * short * traits.heights(species, basal))
 
-    widest = guilds.radii(guild, girth)
-    level = _SIDE[0] + (_SIDE[1] - _SIDE[0]) / 5.0 * own(guilds.shade)
+    widest = traits.radii(species, basal)
+    level = _SIDE[0] + (_SIDE[1] - _SIDE[0]) / 5.0 * own(traits.shade)
     open_ = np.clip((side - level) / _SIDE_MORE, 0.0, 1.0)
-    closed = np.clip(1.0 - side / (_DARK * own(guilds.limit)), 0.0, 1.0)
-    widens = np.minimum(widest - guilds.radii(guild, one.girth) + _WIDENS * (widest - radius), widest - radius)
+    closed = np.clip(1.0 - side / (_DARK * own(traits.light_compensation)), 0.0, 1.0)
+    widens = np.minimum(widest - traits.radii(species, one.basal) + _WIDENS * (widest - radius), widest - radius)
     wide = radius + np.maximum(widens, 0.0) * open_ - _NARROWS * radius * closed
     wide = np.minimum(wide, widest)
 
-    limit = own(guilds.limit)
+    limit = own(traits.light_compensation)
     died = np.clip(1.0 - below / limit, 0.0, 1.0) * (tall - height + _RISES * (height - base))
     low = np.minimum(base + died, (1.0 - _SHORTEST) * tall)
     old_east, old_north = (
@@ -114,36 +117,38 @@ def grown(plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, guil
         for before, a, b in ((one.east, east, west), (one.north, north, south))
     )
     return replace(
-        one, girth=girth, height=tall, base=low, radius=wide, east=old_east, north=old_north, vigour=vigour,
+        one, basal=basal, height=tall, base=low, radius=wide, east=old_east, north=old_north, vigor=vigor,
         age=one.age + 1.0,
     )  # fmt: skip
 
 
 def _offset(a: Floats, b: Floats) -> Floats:
-    """Offset (n,) towards the light on one side, where there is such light on two."""
+    """Offset (n,) toward the light on one side, where there is such light on two."""
     more = _LEANS * (a - b) / (a + b + 0.2)
     return _MOST_OFFSET * more / (1.0 + np.abs(more))
 
 
-def _thickening(one: Plants, wood: NDArray, lit: NDArray, guilds: Guilds) -> Floats:
+def _increment(one: Plants, wood: NDArray, lit: NDArray, traits: StandTraits) -> Floats:
     """By how much plants (n,) become thicker that make so much wood, kg, and have so much of the light of free ones."""
     step = 0.002
-    rise = np.maximum(guilds.heights(one.guild, one.girth + step) - guilds.heights(one.guild, one.girth), 0.0) / step
-    more = np.take(guilds.solid, one.guild) * one.girth * (2.0 * one.height + one.girth * rise)
-    most = np.take(guilds.thickening, one.guild) * one.quality * one.strength
+    rise = (
+        np.maximum(traits.heights(one.species, one.basal + step) - traits.heights(one.species, one.basal), 0.0) / step
+    )
+    more = np.take(traits.mass_factor, one.species) * one.basal * (2.0 * one.height + one.basal * rise)
+    most = np.take(traits.diameter_increment, one.species) * one.quality * one.strength
     most *= np.minimum((1.0 + _HALF_LIT) * lit / (lit + _HALF_LIT), 1.0)
-    large = (one.girth / (_LARGEST * np.take(guilds.diameter, one.guild))) ** 2
+    large = (one.basal / (_LARGEST * np.take(traits.diameter, one.species))) ** 2
     wood = wood * np.maximum(1.0 - large**2, 0.0)
     return np.minimum(wood / np.maximum(more, 1e-9), most)
 
 
-def dying(plants: Plants, guilds: Guilds, year: int, block: slice) -> Mask:
+def dying(plants: Plants, traits: StandTraits, year: int, block: slice) -> Mask:
     """Which of some plants die in a year."""
     one = plants.take(block)
-    guild = one.guild
-    weak = np.take(_WEAK[0] + (_WEAK[1] - _WEAK[0]) / 5.0 * guilds.shade, guild)
-    stressed = _DIES * np.maximum(1.0 - one.vigour / weak, 0.0)
-    lifespan = np.take(guilds.lifespan, guild)
+    species = one.species
+    weak = np.take(_WEAK[0] + (_WEAK[1] - _WEAK[0]) / 5.0 * traits.shade, species)
+    stressed = _DIES * np.maximum(1.0 - one.vigor / weak, 0.0)
+    lifespan = np.take(traits.lifespan, species)
     chance = stressed + _OTHERS / lifespan
     old = _OLD[0] + (_OLD[1] - _OLD[0]) * uniform(one.key, StandDraw.OLD)
     return (uniform(child_key(one.key, year), StandDraw.DEATH) < chance) | (one.age > old * lifespan)
@@ -170,27 +175,28 @@ def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells:
 #: Most plants at once.
 MOST_PLANTS = 12_000_000
 _PLANTED, _SOWN = 0, 1
-#: Planted plants have this part of the girth of one that is 1.3 m high, those from seeds that; and are so many years.
-_PLANTED_GIRTH, _SOWN_GIRTH = 0.35, 0.25
+#: Planted plants have this part of the basal diameter of one that is 1.3 m high, those from seeds that; and are so many
+#: years.
+_PLANTED_DIAMETER, _SOWN_DIAMETER = 0.35, 0.25
 _PLANTED_AGE, _SOWN_AGE = 3.0, 3.0
-#: Metres of the grid on which seeds are spread, at least; and seeds on a square metre that make half as many plants as
+#: Meters of the grid on which seeds are spread, at least; and seeds on a square meter that make half as many plants as
 #: can come at all.
 _SEED_CELL, _HALF = 4.0, 20.0
 #: Part of the ground beyond that is below crowns of each species that bear seeds.
 _OUTSIDE = 0.1
 
 
-def planted(site: StandSite, guilds: Guilds, suits: Floats, density: float, seed: int) -> Plants:
+def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: float, seed: int) -> Plants:
     """Plants evenly spread, each somewhere in a square of its own.
 
     Parameters
     ----------
-    suits : (g, cells) float64
-        How well each guild grows.
+    suitability : (g, cells) float64
+        How well each species grows.
     density : float
         Plants on a hectare.
     """
-    if density <= 0.0 or guilds.planted.sum() <= 0.0:
+    if density <= 0.0 or traits.planted.sum() <= 0.0:
         return Plants.empty()
     width, depth = site.size
     side = 100.0 / np.sqrt(density)
@@ -204,29 +210,29 @@ def planted(site: StandSite, guilds: Guilds, suits: Floats, density: float, seed
     key = child_key(keys_of(seed, _PLANTED), index)
     x = (index % columns + 0.1 + 0.8 * uniform(key, StandDraw.X)) * (width / columns)
     y = (index // columns + 0.1 + 0.8 * uniform(key, StandDraw.Y)) * (depth / rows)
-    limits = np.cumsum(guilds.planted) / guilds.planted.sum()
-    guild = np.minimum(np.searchsorted(limits, uniform(key, StandDraw.GUILD), side="right"), len(limits) - 1)
+    limits = np.cumsum(traits.planted) / traits.planted.sum()
+    species = np.minimum(np.searchsorted(limits, uniform(key, StandDraw.SPECIES), side="right"), len(limits) - 1)
     cells = site.cells(x, y)
-    quality = suits[guild, cells]
+    quality = suitability[species, cells]
     there = quality > 0.0
     if site.plantable is not None:
         there &= uniform(key, StandDraw.PLANTABLE) < site.plantable.ravel()[cells]
     kept = np.flatnonzero(there)
-    girth = _PLANTED_GIRTH * guilds.first[guild]
-    return newcomers(key[kept], 0, guild[kept], x[kept], y[kept], girth[kept], quality[kept], _PLANTED_AGE, guilds)
+    basal = _PLANTED_DIAMETER * traits.first[species]
+    return newcomers(key[kept], 0, species[kept], x[kept], y[kept], basal[kept], quality[kept], _PLANTED_AGE, traits)
 
 
-class SeedRain:
+class SeedDispersal:
     """Seeds that fall on a site, and where they can become plants.
 
     Attributes
     ----------
     cell : float
-        Metres of the grid on which seeds are spread.
+        Meters of the grid on which seeds are spread.
     """
 
-    def __init__(self, site: StandSite, guilds: Guilds, suits: Floats, most: float, outside: float) -> None:
-        """Of a site, for guilds that grow so well on its cells.
+    def __init__(self, site: StandSite, traits: StandTraits, suitability: Floats, most: float, outside: float) -> None:
+        """Of a site, for species that grow so well on its cells.
 
         Parameters
         ----------
@@ -235,30 +241,30 @@ class SeedRain:
         outside : float
             Factor on the seeds from outside.
         """
-        self.site, self.guilds, self.suits, self.most = site, guilds, suits, most
+        self.site, self.traits, self.suitability, self.most = site, traits, suitability, most
         width, depth = site.size
         self.columns, self.rows = max(round(width / _SEED_CELL), 1), max(round(depth / _SEED_CELL), 1)
-        self.outside = outside * _OUTSIDE * guilds.rain * guilds.seeds
+        self.outside = outside * _OUTSIDE * traits.incoming_seeds * traits.fecundity
 
     def fallen(self, plants: Plants) -> Floats:
-        """Seeds (g, cells) on a square metre and year."""
+        """Seeds (g, cells) on a square meter and year."""
         width, depth = self.site.size
         column = np.minimum((plants.x * (self.columns / width)).astype(np.int64), self.columns - 1)
         row = np.minimum((plants.y * (self.rows / depth)).astype(np.int64), self.rows - 1)
         place = row * self.columns + column
         area = width * depth / (self.rows * self.columns)
         out = np.empty((len(self.outside), self.rows, self.columns))
-        bears = plants.age >= np.take(self.guilds.mature, plants.guild)
-        # Whole numbers, whose sum does not depend on the order: hundredths of a square metre of crown.
+        bears = plants.age >= np.take(self.traits.mature, plants.species)
+        # Whole numbers, whose sum does not depend on the order: hundredths of a square meter of crown.
         crown = np.rint(np.where(bears, 100.0 * np.pi * plants.radius**2, 0.0))
-        for guild in range(len(self.outside)):
-            own = plants.guild == guild
+        for species in range(len(self.outside)):
+            own = plants.species == species
             sums = np.bincount(place[own], crown[own], self.rows * self.columns).reshape(self.rows, self.columns)
             # About a normal distribution, whose mean distance is √(π / 2) standard deviations.
-            width = np.sqrt(1.0 + 12.0 / np.pi * self.guilds.dispersal[guild] ** 2 / area)
+            width = np.sqrt(1.0 + 12.0 / np.pi * self.traits.dispersal[species] ** 2 / area)
             for axis in (0, 1, 0, 1):
                 sums = _smoothed(sums, round((width - 1.0) / 2.0), axis)
-            out[guild] = sums * (0.01 * self.guilds.seeds[guild] / area) + self.outside[guild]
+            out[species] = sums * (0.01 * self.traits.fecundity[species] / area) + self.outside[species]
         return out.reshape(len(self.outside), -1)
 
     def plants(self, plants: Plants, light: LightGrid, year: int, first: int, seed: int) -> Plants:
@@ -281,20 +287,20 @@ class SeedRain:
         row = np.minimum((y * (self.rows / depth)).astype(np.int64), self.rows - 1)
         seeds = self.fallen(plants)[:, row * self.columns + column]
         # Light that seedlings need, and that in which they do well, falls with the tolerance of shade.
-        least = (0.9 * self.guilds.limit)[:, None]
+        least = (0.9 * self.traits.light_compensation)[:, None]
         lit = np.clip((ground[None, :] - least) / (3.0 * least), 0.0, 1.0)
-        able = seeds * lit * self.suits[:, here]
+        able = seeds * lit * self.suitability[:, here]
         total = able.sum(axis=0)
         chance = total / (total + _HALF)
         if site.plantable is not None:
             chance *= site.plantable.ravel()[here]
         kept = np.flatnonzero(come < chance)
         limits = np.cumsum(able[:, kept], axis=0)
-        guild = (uniform(key[kept], StandDraw.GUILD) * total[kept] >= limits).sum(axis=0)
-        guild = np.minimum(guild, len(self.outside) - 1)
-        quality = self.suits[guild, here[kept]]
-        girth = _SOWN_GIRTH * self.guilds.first[guild]
-        return newcomers(key[kept], first, guild, x[kept], y[kept], girth, quality, _SOWN_AGE, self.guilds)
+        species = (uniform(key[kept], StandDraw.SPECIES) * total[kept] >= limits).sum(axis=0)
+        species = np.minimum(species, len(self.outside) - 1)
+        quality = self.suitability[species, here[kept]]
+        basal = _SOWN_DIAMETER * self.traits.first[species]
+        return newcomers(key[kept], first, species, x[kept], y[kept], basal, quality, _SOWN_AGE, self.traits)
 
 
 def _smoothed(values: Floats, reach: int, axis: int) -> Floats:

@@ -18,19 +18,19 @@ from ..errors import TetFloraError
 from ..jobs import Progress
 from ..parallel import blocks, on_all_cores
 from ..setting import LENGTH, setting
-from .change import MOST_PLANTS, SeedRain, dying, fallen, grown, planted
-from .guilds import Guild, Guilds
+from .change import MOST_PLANTS, SeedDispersal, dying, fallen, grown, planted
 from .light import LightGrid
 from .plants import DeadPlants, Plants, Records, in_order
 from .site import StandSite
+from .traits import StandSpecies, StandTraits
 
 #: Plants that are looked at together.
 _BLOCK = 1 << 15
 #: Most records of a stand, some 70 bytes each here and again in the file.
 MOST_RECORDS = 20_000_000
-#: Metres of open ground beyond open edges.
+#: Meters of open ground beyond open edges.
 _MARGIN = 12.0
-#: Metres between the highest and the lowest ground up to which it counts as level.
+#: Meters between the highest and the lowest ground up to which it counts as level.
 _LEVEL = 0.5
 
 
@@ -63,12 +63,12 @@ class StandSettings:
     )
     outside: float = setting(
         1.0,
-        "Seed Rain",
+        "Incoming Seeds",
         "Factor on the seeds that arrive from beyond the ground; at 0, only the stand itself bears seeds",
         min=0.0,
         soft_max=10.0,
     )
-    least_height: float = setting(
+    min_height: float = setting(
         1.0, "Min Height", "Plants lower than this are not part of the result", min=0.0, soft_max=10.0, **LENGTH
     )
     cell: float = setting(
@@ -87,7 +87,9 @@ class StandSettings:
     )
 
 
-def grow(site: StandSite, guilds: Sequence[Guild], settings: StandSettings) -> Generator[Progress, object, Records]:
+def grow(
+    site: StandSite, species: Sequence[StandSpecies], settings: StandSettings
+) -> Generator[Progress, object, Records]:
     """Grow a stand; a job, which yields after each year and returns its records.
 
     These are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
@@ -98,17 +100,17 @@ def grow(site: StandSite, guilds: Sequence[Guild], settings: StandSettings) -> G
     TetFloraError
         A setting cannot be, or the ground is too large; names it.
     """
-    stand = begun(site, guilds, settings)
+    stand = begun(site, species, settings)
     for year in range(settings.years):
         yield Progress(year / settings.years, f"Growing the stand: year {year} of {settings.years}")
         stand.step(year)
     return stand.finished()
 
 
-def begun(site: StandSite, guilds: Sequence[Guild], settings: StandSettings) -> GrowingStand:
+def begun(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> GrowingStand:
     """A stand at its beginning, which whoever has it steps from year to year; see `grow`."""
     _check(settings)
-    return GrowingStand(site, Guilds(guilds), settings)
+    return GrowingStand(site, StandTraits(species), settings)
 
 
 def _check(settings: StandSettings) -> None:
@@ -117,8 +119,8 @@ def _check(settings: StandSettings) -> None:
         ("Interval", settings.interval, 0, 2000),
         ("Planted", settings.density, 0, 1e7),
         ("Seedlings", settings.recruits, 0, 1e6),
-        ("Seed Rain", settings.outside, 0, 1e6),
-        ("Min Height", settings.least_height, 0, 200),
+        ("Incoming Seeds", settings.outside, 0, 1e6),
+        ("Min Height", settings.min_height, 0, 200),
         ("Cell", settings.cell, 0.05, 50),
     ):
         if not low <= value <= high:  # false for NaN as well
@@ -135,8 +137,8 @@ class GrowingStand:
     dead : DeadPlants
     """
 
-    def __init__(self, site: StandSite, guilds: Guilds, settings: StandSettings) -> None:
-        self.site, self.guilds, self.settings = site, guilds, settings
+    def __init__(self, site: StandSite, traits: StandTraits, settings: StandSettings) -> None:
+        self.site, self.traits, self.settings = site, traits, settings
         width, depth = site.size
         margin = _MARGIN if settings.open_edges else 0.0
         rows, columns = (max(round((size + 2.0 * margin) / settings.cell), 3) for size in (depth, width))
@@ -147,16 +149,16 @@ class GrowingStand:
             x, y = np.meshgrid((np.arange(columns) + 0.5) * cell - margin, (np.arange(rows) + 0.5) * cell - margin)
             ground = site.ground(x.ravel(), y.ravel())
         self.light = LightGrid(rows, columns, cell, margin, ground)
-        suits = np.stack([site.suits(needs) for needs in guilds.needs])
-        if not suits.any():
+        suitability = np.stack([site.suitability(needs) for needs in traits.needs])
+        if not suitability.any():
             raise TetFloraError(
-                "None of the species can grow in this climate and on this soil; change Warmth, Winter or the species"
+                "None of the species can grow in this climate and soil; change Degree Days, Coldest Month or species"
             )
         self.slope = site.slope()
-        self.plants = planted(site, guilds, suits, settings.density, settings.seed)
-        if not len(self.plants) and settings.recruits * settings.outside * guilds.rain.sum() <= 0.0:
-            raise TetFloraError("Nothing is planted and no seeds come; raise Planted, or Seedlings and Seed Rain")
-        self.seeds = SeedRain(site, guilds, suits, settings.recruits, settings.outside)
+        self.plants = planted(site, traits, suitability, settings.density, settings.seed)
+        if not len(self.plants) and settings.recruits * settings.outside * traits.incoming_seeds.sum() <= 0.0:
+            raise TetFloraError("Nothing is planted and no seeds come; raise Planted, or Seedlings and Incoming Seeds")
+        self.seeds = SeedDispersal(site, traits, suitability, settings.recruits, settings.outside)
         self.count, self.dead, self.kept = len(self.plants), DeadPlants.empty(), []
 
     def step(self, year: int) -> None:
@@ -165,15 +167,15 @@ class GrowingStand:
         record = every > 0 and year % every == 0
         plants = self._recorded(year, record)
         self._decay(year, record)
-        crowns = plants.crowns(self.guilds)
+        crowns = plants.crowns(self.traits)
         strips = self.light.fill(crowns)
         taken = np.zeros(len(plants))
         for index, own in zip(strips, on_all_cores(self.light.taken, range(len(strips))), strict=True):
             taken[index] = own
 
         def changed(block: slice) -> tuple[Plants, Mask]:
-            after = grown(plants, crowns, taken, self.light, self.guilds, block)
-            return after, dying(after, self.guilds, year, slice(None))
+            after = grown(plants, crowns, taken, self.light, self.traits, block)
+            return after, dying(after, self.traits, year, slice(None))
 
         parts = list(on_all_cores(changed, blocks(len(plants), _BLOCK)))
         new = Plants.empty()
@@ -200,19 +202,19 @@ class GrowingStand:
         plants = self.plants
         if not self.settings.interval:
             return plants
-        tall = plants.height >= self.settings.least_height
+        tall = plants.height >= self.settings.min_height
         index = np.flatnonzero(tall if record else tall & ~plants.known)
         if len(index):
-            self.kept.append(plants.take(index).records(year, self.guilds, self.site))
+            self.kept.append(plants.take(index).records(year, self.traits, self.site))
             plants = replace(plants, known=plants.known | tall)
         return plants
 
     def _die(self, plants: Plants, year: int, record: bool) -> None:
         """Plants that do not see the next year."""
-        last = plants.records(year, self.guilds, self.site)
+        last = plants.records(year, self.traits, self.site)
         if self.settings.interval and not record:
             self.kept.append(last.take(np.flatnonzero(plants.known)))
-        tall = np.flatnonzero(plants.height >= self.settings.least_height)
+        tall = np.flatnonzero(plants.height >= self.settings.min_height)
         plants, last = plants.take(tall), last.take(tall)
         cells = self.site.cells(plants.x, plants.y)
         self.dead = DeadPlants.concatenate([self.dead, fallen(plants, last, self.slope, cells, year)])
@@ -230,8 +232,8 @@ class GrowingStand:
         """Records of the whole, with plants numbered from 0."""
         year = self.settings.years
         self._decay(year, False)
-        end = [self.plants.records(year, self.guilds, self.site), self.dead.records(year)]
-        tall = np.flatnonzero(end[0].height >= self.settings.least_height)
+        end = [self.plants.records(year, self.traits, self.site), self.dead.records(year)]
+        tall = np.flatnonzero(end[0].height >= self.settings.min_height)
         known = Records.concatenate([*self.kept, end[0].take(tall), end[1]])
         first = in_order(known)
         if not len(first):

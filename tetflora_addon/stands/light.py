@@ -126,9 +126,9 @@ def covered(x: Floats, y: Floats, radius: Floats) -> CrownCells:
     )  # fmt: skip
 
 
-#: Layers: the n-th begins at first × n + second × n² metres, finer near the ground, where small plants are.
+#: Layers: the n-th begins at first × n + second × n² meters, finer near the ground, where small plants are.
 _LAYERS = (0.5, 0.025)
-#: Leaves on the grid are whole numbers of this part of a square metre for each square metre and metre of height.
+#: Leaves on the grid are whole numbers of this part of a square meter for each square meter and meter of height.
 _UNIT = 1.0 / 65536.0
 #: Rows of a strip at least, and cells about; strips do not depend on anything but the grid.
 _STRIP_ROWS, _STRIP_CELLS = 16, 1 << 15
@@ -136,17 +136,17 @@ _STRIP_ROWS, _STRIP_CELLS = 16, 1 << 15
 _BAND_CELLS = 1 << 17
 #: Most numbers of the grid at once, 4 bytes each and twice.
 MOST_VOXELS = 400_000_000
-#: Square metres of sideways variance that light gains for a metre downwards, and the most of it that goes to each of
+#: Square meters of sideways variance that light gains for a meter downwards, and the most of it that goes to each of
 #: four sides at once.
 _SIDEWAYS, _MOST_SIDE = 1.0, 0.15
-#: Metres by which the ground below a crown counts at most as higher or lower than at its trunk.
+#: Meters by which the ground below a crown counts at most as higher or lower than at its trunk.
 _STEEP = 6.0
 #: Thinnest crown in a column, over its length.
 _THIN = 0.15
 
 
 def layer_edge(number: NDArray | int) -> Floats:
-    """Height at which layers begin, metres."""
+    """Height at which layers begin, meters."""
     return _LAYERS[0] * number + _LAYERS[1] * np.square(number)
 
 
@@ -161,7 +161,7 @@ def layer_of(height: Floats) -> tuple[Integers, Floats]:
 
 @dataclass
 class Crowns:
-    """What of plants takes light; arrays (n,) of metres from the corner of the grid, and m².
+    """What of plants takes light; arrays (n,) of meters from the corner of the grid, and m².
 
     Attributes
     ----------
@@ -203,13 +203,13 @@ class LightGrid:
     ----------
     rows, columns : int
     cell : float
-        Metres.
+        Meters.
     margin : float
-        Metres of open ground around that of the plants.
+        Meters of open ground around that of the plants.
     ground : (rows × columns,) float64, optional
         Altitudes; level where it is None.
     light : (layers + 1, rows × columns) float32
-        Light summed from above down to where each layer begins, metres of full light.
+        Light summed from above down to where each layer begins, meters of full light.
     """
 
     rows: int

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Keys, Mask, column, nested
 from ..growth.hashing import child_key, key_of_seed, uniform
-from .guilds import FULL, Guilds
 from .light import Crowns
 from .site import StandSite
+from .traits import FULL, StandTraits
 
 #: Tangent of the lean from which on a plant counts as lying.
 LYING = 20.0
@@ -25,7 +25,7 @@ LYING = 20.0
 
 @dataclass(frozen=True)
 class Records(Arrays):
-    """Plants at a year, one row each; all rows of a plant are neighbours, years ascending.
+    """Plants at a year, one row each; all rows of a plant are neighbors, years ascending.
 
     Attributes
     ----------
@@ -34,13 +34,13 @@ class Records(Arrays):
     year : (n,) float32
         Of the simulation.
     species : (n,) int32
-        Index into the guilds.
+        Index into the species.
     seed : (n,) int32
         From which it is drawn.
     position : (n, 3) float32
-        Foot of the trunk in the world, metres.
+        Foot of the trunk in the world, meters.
     height, diameter, crown_width, crown_base : (n,) float32
-        Metres; the diameter is that at 1.3 m, 0 for what is smaller, the width the mean of all directions, and the base
+        Meters; the diameter is that at 1.3 m, 0 for what is smaller, the width the mean of all directions, and the base
         the height of the lowest limb.
     offset : (n, 2) float32
         By which fraction limbs to the east and to the north are longer, and those opposite shorter.
@@ -109,7 +109,7 @@ class StandDraw(IntEnum):
     X = 1
     Y = 2
     PLANTABLE = 3
-    GUILD = 4
+    SPECIES = 4
     STRENGTH = 5
     SEED = 6
     DEATH = 7
@@ -130,15 +130,15 @@ class Plants(Arrays):
         In the order in which they came.
     key : (n,) uint64
         Of their random numbers.
-    guild : (n,) int64
+    species : (n,) int64
     x, y : (n,) float64
-        Metres from the corner of the site.
-    girth, height, base, radius : (n,) float64
-        Metres; girth as `guilds` has it.
+        Meters from the corner of the site.
+    basal, height, base, radius : (n,) float64
+        Meters; basal diameter as `traits` has it.
     east, north : (n,) float64
         Offset of the crown, as of `Records`.
-    vigour : (n,) float64
-        Growth of the last years over that of a free plant of the same girth.
+    vigor : (n,) float64
+        Growth of the last years over that of a free plant of the same basal diameter.
     quality : (n,) float64
         How well it grows where it is, 0 to 1.
     strength : (n,) float64
@@ -151,45 +151,45 @@ class Plants(Arrays):
 
     number: Integers = field(metadata=column(dtype=np.int64))
     key: Keys = field(metadata=column(dtype=np.uint64))
-    guild: Integers = field(metadata=column(dtype=np.int64))
+    species: Integers = field(metadata=column(dtype=np.int64))
     x: Floats
     y: Floats
-    girth: Floats
+    basal: Floats
     height: Floats
     base: Floats
     radius: Floats
     east: Floats
     north: Floats
-    vigour: Floats
+    vigor: Floats
     quality: Floats
     strength: Floats
     age: Floats
     known: Mask = field(metadata=column(dtype=bool))
 
-    def crowns(self, guilds: Guilds) -> Crowns:
+    def crowns(self, traits: StandTraits) -> Crowns:
         """What takes light."""
         part = (self.height - self.base) / (FULL * self.height)
         area = np.pi * self.radius**2 * np.minimum(part, 1.0)
-        leaves = area * np.take(guilds.leaves * guilds.extinction, self.guild)
+        leaves = area * np.take(traits.leaves * traits.extinction, self.species)
         x = self.x + _BESIDE * self.radius * self.east
         y = self.y + _BESIDE * self.radius * self.north
-        return Crowns(x, y, self.radius, self.base, self.height, leaves, np.take(guilds.top, self.guild))
+        return Crowns(x, y, self.radius, self.base, self.height, leaves, np.take(traits.crown_conicity, self.species))
 
-    def leaf_area(self, guilds: Guilds) -> Floats:
+    def leaf_area(self, traits: StandTraits) -> Floats:
         """Leaf area (n,), m²."""
-        return self.crowns(guilds).leaves / np.take(guilds.extinction, self.guild)
+        return self.crowns(traits).leaves / np.take(traits.extinction, self.species)
 
-    def records(self, year: float, guilds: Guilds, site: StandSite) -> Records:
+    def records(self, year: float, traits: StandTraits, site: StandSite) -> Records:
         """What they are now; ``plant`` is their number still."""
         number = len(self)
         return Records(
             self.number.astype(np.int32),
             np.full(number, year, np.float32),
-            self.guild.astype(np.int32),
+            self.species.astype(np.int32),
             (uniform(self.key, StandDraw.SEED) * 2.0**31).astype(np.int32),
             _positions(self.x, self.y, site),
             self.height.astype(np.float32),
-            guilds.diameters(self.guild, self.girth).astype(np.float32),
+            traits.diameters(self.species, self.basal).astype(np.float32),
             (2.0 * self.radius).astype(np.float32),
             self.base.astype(np.float32),
             np.stack([self.east, self.north], axis=1).astype(np.float32),
@@ -234,17 +234,17 @@ def _positions(x: NDArray, y: NDArray, site: StandSite) -> NDArray[np.float32]:
 
 
 def newcomers(
-    key: Keys, first: int, guild: NDArray, x: NDArray, y: NDArray, girth: NDArray, quality: NDArray,
-    age: float, guilds: Guilds
+    key: Keys, first: int, species: NDArray, x: NDArray, y: NDArray, basal: NDArray, quality: NDArray,
+    age: float, traits: StandTraits
 ) -> Plants:  # fmt: skip
-    """Young plants (n,) at places (n,) in metres from the corner; those of a girth stand as free ones do."""
+    """Young plants (n,) at places (n,) in meters from the corner; those of a basal diameter stand as free ones do."""
     number, none = len(key), np.zeros(len(key))
-    height = 0.8 * guilds.heights(guild, girth)
+    height = 0.8 * traits.heights(species, basal)
     # About normal, within half an inch of 1: the mean of two even numbers.
     strength = 1.0 + 0.3 * (uniform(key, StandDraw.STRENGTH) + uniform(child_key(key, 0), StandDraw.STRENGTH) - 1.0)
     return Plants(
-        np.arange(first, first + number), key, guild.astype(np.int64), x, y, girth, height, 0.1 * height,
-        0.8 * guilds.radii(guild, girth), none, none, np.full(number, 0.6), quality, strength, np.full(number, age),
+        np.arange(first, first + number), key, species.astype(np.int64), x, y, basal, height, 0.1 * height,
+        0.8 * traits.radii(species, basal), none, none, np.full(number, 0.6), quality, strength, np.full(number, age),
         np.zeros(number, bool),
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from ..arrays import Floats, Integers, bilinear
 from ..errors import TetFloraError
 from ..species.ecology import Ecology
 
-#: Kelvin by which it is colder for each metre of altitude, and degree days that a kelvin is worth: days of the season.
+#: Kelvin by which it is colder for each meter of altitude, and degree days that a kelvin is worth: days of the season.
 _LAPSE, _DAYS = 0.006, 165.0
 #: Degree days, beyond those that a species needs at least, that let it grow at two thirds of its rate.
 _WARM = 300.0
@@ -32,23 +32,23 @@ class StandSite:
     Attributes
     ----------
     west, south : float
-        Corner of the grid in the world, metres.
+        Corner of the grid in the world, meters.
     cell : float
-        Side of a cell, metres.
+        Side of a cell, meters.
     height : (h, w) float
-        Altitude, metres.
+        Altitude, meters.
     plantable : (h, w) float, optional
         Fraction of the ground where plants can be, 0 to 1; everywhere where it is None.
     moisture : (h, w) float, optional
         0 dry to 1 wet; 0.5, fresh, where it is None.
     fertility : (h, w) float, optional
         0 poor to 1 rich; 0.7 where it is None.
-    warmth : float
+    degree_days : float
         Sum of daily mean temperatures over 5 °C in a year (growing degree days), at the altitude ``altitude``.
-    winter : float
+    coldest_month : float
         Mean temperature of the coldest month there, °C.
     altitude : float
-        Metres at which warmth and winter are known; colder above by 0.6 K for 100 m.
+        Meters at which degree days and the coldest month are known; colder above by 0.6 K for 100 m.
     """
 
     west: float
@@ -58,8 +58,8 @@ class StandSite:
     plantable: NDArray | None = None
     moisture: NDArray | None = None
     fertility: NDArray | None = None
-    warmth: float = 1700.0
-    winter: float = -1.0
+    degree_days: float = 1700.0
+    coldest_month: float = -1.0
     altitude: float = 0.0
 
     def __post_init__(self) -> None:
@@ -84,46 +84,46 @@ class StandSite:
             if not np.isfinite(value).all():
                 raise TetFloraError(f"A site's {name} is not a number in some cells")
             object.__setattr__(self, name, value if name == "height" else np.clip(value, 0.0, 1.0))
-        for name, low, high in (("warmth", 0.0, 12000.0), ("winter", -80.0, 40.0)):
+        for name, low, high in (("degree_days", 0.0, 12000.0), ("coldest_month", -80.0, 40.0)):
             if not low <= getattr(self, name) <= high:
                 raise TetFloraError(f"A site's {name} must be from {low:g} to {high:g}, not {getattr(self, name):g}")
 
     @property
     def size(self) -> tuple[float, float]:
-        """Metres from west to east, and from south to north."""
+        """Meters from west to east, and from south to north."""
         rows, columns = self.height.shape
         return columns * self.cell, rows * self.cell
 
     @property
     def area(self) -> float:
-        """Square metres where plants can be."""
+        """Square meters where plants can be."""
         here = self.height.size if self.plantable is None else float(self.plantable.sum())
         return here * self.cell**2
 
     def cells(self, x: NDArray, y: NDArray) -> Integers:
-        """Index (n,) of the cell, row by row, at places (n,) in metres from the corner; the nearest of those beyond."""
+        """Index (n,) of the cell, row by row, at places (n,) in meters from the corner; the nearest of those beyond."""
         rows, columns = self.height.shape
         column = np.clip((np.asarray(x) / self.cell).astype(np.intp), 0, columns - 1)
         row = np.clip((np.asarray(y) / self.cell).astype(np.intp), 0, rows - 1)
         return row * columns + column
 
     def ground(self, x: NDArray, y: NDArray) -> Floats:
-        """Altitude (n,) at places (n,) in metres from the corner, bilinear between the middles of cells."""
+        """Altitude (n,) at places (n,) in meters from the corner, bilinear between the middles of cells."""
         return bilinear(self.height, np.stack([x, y], axis=1) / self.cell - 0.5)
 
-    def suits(self, ecology: Ecology) -> Floats:
+    def suitability(self, ecology: Ecology) -> Floats:
         """How well a species grows in each cell, over how it does where nothing is wanting: (h w,), 0 to 1."""
         colder = _LAPSE * (self.height.ravel() - self.altitude)
-        warm = self.warmth - _DAYS * colder - ecology.warmth
-        warmth = np.where(warm > 0, -np.expm1(-np.maximum(warm, 0.0) / _WARM), 0.0)
-        warmth = np.where(self.winter - colder < ecology.winter, 0.0, warmth)
+        warm = self.degree_days - _DAYS * colder - ecology.degree_days
+        degree_days = np.where(warm > 0, -np.expm1(-np.maximum(warm, 0.0) / _WARM), 0.0)
+        degree_days = np.where(self.coldest_month - colder < ecology.coldest_month, 0.0, degree_days)
         moisture = _of(self.moisture, 0.5, warm)
         dry = np.interp(ecology.drought, (0.0, 5.0), _DRY)
         wet = np.interp(ecology.waterlogging, (0.0, 5.0), _WET)
         water = _ramp((moisture - dry) / _DRY_WIDTH) * _ramp((wet - moisture) / _WET_WIDTH)
         food = _of(self.fertility, 0.7, warm)
         fed = _ramp(0.3 + 0.7 * (1.0 - np.maximum(ecology.fertility - food, 0.0) / max(ecology.fertility, 1e-9)))
-        return np.round(warmth * water * fed, _DIGITS)
+        return np.round(degree_days * water * fed, _DIGITS)
 
     def slope(self) -> tuple[Floats, Floats]:
         """Rise of the ground to the east and to the north in each cell: (h w,) each, tangents."""

@@ -62,7 +62,7 @@ def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings
     radius = radius_at(rows, some, t)
     sort = [species.bud for species in flora.species]
     table = np.array([(0.0, 0.0) if bud is None else (bud.length, bud.width) for bud in sort])
-    colour = np.array([(0.0, 0.0, 0.0) if bud is None else bud.colour for bud in sort])
+    color = np.array([(0.0, 0.0, 0.0) if bud is None else bud.color for bud in sort])
     species = rows["species"][some.row]
     varied = 1.0 + _VARIED * (2.0 * uniform(key, Draw.LENGTH) - 1.0)
     length = table[species, 0] * some.scale * varied * np.where(at_end, _AT_END, 1.0) * fine.weight[owner]
@@ -79,16 +79,16 @@ def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings
             base[side] += _SUNK * radius[side, None] * out
             along[side] = unit(along[side] + _LEAN * out)
         x = unit(x - dot(x, along) * along)
-        centre = base[:, None] + (length[:, None] * _ALONG)[..., None] * along[:, None]
+        center = base[:, None] + (length[:, None] * _ALONG)[..., None] * along[:, None]
         reach = np.stack([x, cross(along, x)])[:, :, None] * (thick[:, None] * _WIDTH)[None, :, :, None]
-        return centre.reshape(-1, 3), reach.reshape(2, -1, 3).transpose(0, 2, 1).astype(np.float32)
+        return center.reshape(-1, 3), reach.reshape(2, -1, 3).transpose(0, 2, 1).astype(np.float32)
 
-    centre, reach = placed(whole.lines, branches)
+    center, reach = placed(whole.lines, branches)
     later = None if whole.lines.later is None else placed(whole.lines.later, branches.moved())
     wood = replace(branches.take(owner), radius=np.maximum(thick, 1e-9), length=np.maximum(length, 1e-9), later=None)
     bud = np.repeat(np.arange(len(owner)), BUD_RINGS)
     goes_on = np.tile(np.arange(BUD_RINGS) < BUD_RINGS - 1, len(owner))
-    rings = Rings(wood, bud, np.tile(_ALONG, len(owner)), centre, reach, goes_on, later, None, colour[species])
+    rings = Rings(wood, bud, np.tile(_ALONG, len(owner)), center, reach, goes_on, later, None, color[species])
     return rings, owner
 
 

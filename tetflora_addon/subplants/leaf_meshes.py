@@ -21,7 +21,7 @@ from ..arrays import Floats, Integers, Keys, spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
-from ..growth.colours import leaf_colours
+from ..growth.colors import leaf_colors
 from ..growth.foliage import (
     in_wind,
     leaf_forms,
@@ -42,7 +42,7 @@ from ..leaves.levels import LeafLevel, chosen_level, leaf_levels
 from ..leaves.models import LeafModel
 from .pieces import chunks
 
-_ROWS_AT_ONCE = 4096
+_ROW_BATCH = 4096
 
 
 class LeafCopies:
@@ -65,7 +65,7 @@ class LeafCopies:
         self.transmission = transmission
         self.positions = np.zeros((number, 3 * len(model.positions)), np.float32)
         self.velocity = np.zeros_like(self.positions) if moving else None
-        self.colour = np.zeros((number, model.polygons, 3), np.float32)
+        self.color = np.zeros((number, model.polygons, 3), np.float32)
 
     def add(
         self,
@@ -73,7 +73,7 @@ class LeafCopies:
         position: Floats,
         frame: NDArray[np.float32],
         size: Floats,
-        colour: Floats,
+        color: Floats,
         motion: tuple[Floats, NDArray[np.float32]] | None = None,
     ) -> None:
         """Place the next n copies.
@@ -83,12 +83,12 @@ class LeafCopies:
         key : (n,) uint64
             Of the leaves.
         position : (n, 3) float64
-            Of the model's origin, metres.
+            Of the model's origin, meters.
         frame : (n, 3, 3) float32
             Columns are the model's axes.
         size : (n,) float64
-            Metres for one unit of the model.
-        colour : (n, 3) float64
+            Meters for one unit of the model.
+        color : (n, 3) float64
             Linear RGB.
         motion : (n, 3) float64 and (n, 3, 3) float32, optional
             How fast the origin moves and the columns change, a second.
@@ -99,7 +99,7 @@ class LeafCopies:
         self.positions[new] = _placed(shape, position, frame, size)
         if motion is not None:
             self.velocity[new] = _placed(shape, *motion, size)
-        self.colour[new] = colour[:, None]
+        self.color[new] = color[:, None]
 
     def _shapes(self, key: Keys, new: slice) -> NDArray[np.float32]:
         """Vertices (v, 3, n or 1) of copies with keys (n,) before they are placed."""
@@ -122,7 +122,7 @@ class LeafCopies:
             face_offsets=np.append(starts, np.int32(n * corners)),
             attributes={
                 "UVMap": ("CORNER", self._texture()),
-                "tf_colour": ("FACE", self.colour.reshape(-1, 3)),
+                "tf_color": ("FACE", self.color.reshape(-1, 3)),
                 "tf_transmission": ("FACE", np.full(n * model.polygons, self.transmission, np.float32)),
                 **materials,
                 **motion,
@@ -187,7 +187,7 @@ class LevelCopies(LeafCopies):
 
     def buffers(self) -> MeshBuffers:
         """The mesh, once all copies are placed."""
-        np.minimum(self.colour * self.tint, 1.0, out=self.colour)
+        np.minimum(self.color * self.tint, 1.0, out=self.color)
         return replace(super().buffers(), smooth=True)
 
 
@@ -215,14 +215,14 @@ def _stepped(pattern: NDArray, step: int, rows: int) -> NDArray:
     out[:1] = pattern
     done = 1
     while done < rows:
-        more = min(done, _ROWS_AT_ONCE, rows - done)  # a source of no more than so many rows stays in the cache
+        more = min(done, _ROW_BATCH, rows - done)  # a source of no more than so many rows stays in the cache
         np.add(out[:more], out.dtype.type(done * step), out=out[done : done + more])
         done += more
     return out.reshape(-1)
 
 
 #: Vertices of leaves that are worked on at a time: some ten megabytes.
-_VERTICES_AT_ONCE = 120_000
+_VERTEX_BATCH = 120_000
 #: The step of leaves that are kites; that of others is their level, 0 for the model of the species.
 _KITE = -1
 #: Leaves change their level at lengths from this fraction of that of the first ones on, each by its own number.
@@ -240,7 +240,7 @@ class LeafMesh:
     form : int
         Which of the species' forms of that kind.
     buffers : MeshBuffers
-        Faces with ``UVMap``, ``tf_colour`` and ``tf_transmission``.
+        Faces with ``UVMap``, ``tf_color`` and ``tf_transmission``.
     """
 
     kind: int
@@ -295,12 +295,12 @@ def _copies(model: LeafModel, step: int, number: int, transmission: float, movin
     return LeafCopies(model, number, transmission, moving)
 
 
-def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_Bearers]:
+def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_LeafBearers]:
     """Those of branches that bear leaves, row by row."""
     order = np.argsort(whole.branches.row, kind="stable")
     order = order[flora.rows["leaves"][whole.branches.row[order]].sum(axis=1) > 0]
     for row, own in _by_row(whole.branches.row[order]):
-        yield _Bearers(flora, row, whole.take(order[own]))
+        yield _LeafBearers(flora, row, whole.take(order[own]))
 
 
 def _by_row(rows: Integers) -> Iterator[tuple[int, slice]]:
@@ -311,7 +311,7 @@ def _by_row(rows: Integers) -> Iterator[tuple[int, slice]]:
             yield int(rows[start]), slice(int(start), int(stop))
 
 
-class _Bearers:
+class _LeafBearers:
     """Branches (n,) of one row, and which of their leaves are wanted.
 
     ``step`` says which: -1 kites, 0 models of the species, from 1 on their levels. ``fraction`` (n,) of the leaves is
@@ -335,15 +335,15 @@ class _Bearers:
         self.kind = int(flora.rows["leaf_kind"][row])
         self.forms = flora.forms[int(flora.rows["species"][row])][self.kind]
 
-    def parts(self, fraction: Floats, kites: Floats) -> Iterator[_Bearers]:
+    def parts(self, fraction: Floats, kites: Floats) -> Iterator[_LeafBearers]:
         """The branches some of whose leaves are wanted as they are, and those with leaves as kites."""
         for step, share in ((0, 1.0 - kites), (_KITE, kites)):
             own = np.flatnonzero((fraction > 0.0) & (share > 0.0))
             if len(own):
                 given = fraction[own], kites[own]
-                yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given)
+                yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given)
 
-    def levels(self, lengths: Floats) -> Iterator[_Bearers]:
+    def levels(self, lengths: Floats) -> Iterator[_LeafBearers]:
         """The branches by the levels that some of their leaves have; kites stay what they are."""
         if self.step == _KITE:
             yield self
@@ -355,7 +355,7 @@ class _Bearers:
             if len(own):
                 given = (None if of is None else of[own] for of in (self.fraction, self.kites))
                 mixed = lengths[own] if (low[own] < high[own]).any() else None
-                yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given, mixed)
+                yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given, mixed)
 
     def numbers(self) -> Integers:
         """How many leaves there are of each form."""
@@ -386,15 +386,15 @@ class _Bearers:
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
             if leaves.stages is not None:
                 places = (*(places or (None, None)), leaves.stages, np.take(bearers.branches.year[:, 1], owner))
-            colours = leaf_colours(rows, self.row, key, *places)
-            copies.add(key, leaves.position, frame, leaves.size, colours, motion)
+            colors = leaf_colors(rows, self.row, key, *places)
+            copies.add(key, leaves.position, frame, leaves.size, colors, motion)
 
     def _runs(self, form: int, vertices: int) -> Iterator[tuple[WholeBranches, *tuple[NDArray, ...]]]:
         """Branches and their counts; branch, number and key of some leaves of a form, which has a number of vertices.
 
         A single branch may bear a crown.
         """
-        most = max(_VERTICES_AT_ONCE // vertices, 1)
+        most = max(_VERTEX_BATCH // vertices, 1)
         for part in self._chunks(vertices):
             *leaves, forms = self._leaves(part)
             if len(self.forms) > 1:
@@ -406,7 +406,7 @@ class _Bearers:
 
     def _chunks(self, vertices: int) -> Iterator[slice]:
         """Runs of branches, for leaves of a number of vertices."""
-        for run in chunks(self.counts * vertices, _VERTICES_AT_ONCE):
+        for run in chunks(self.counts * vertices, _VERTEX_BATCH):
             if self.counts[run].any():
                 yield run
 

@@ -33,7 +33,7 @@ class Pieces(Arrays):
     t0, t1 : (n,) float64
         The part's ends as fractions of the branch's axis.
     start, end : (n, 3) float64
-        The same ends in space, metres.
+        The same ends in space, meters.
     """
 
     branches: Branches = field(metadata=nested(Branches))
@@ -77,21 +77,21 @@ def piece_leaf_integrals(flora: Flora, pieces: Pieces) -> tuple[Floats, Floats, 
     return own_leaf_integrals(*sizes, outward_ends(flora, pieces), along)
 
 
-def piece_leaf_colours(flora: Flora, pieces: Pieces) -> Floats:
+def piece_leaf_colors(flora: Flora, pieces: Pieces) -> Floats:
     """Mean linear RGB (n, 3) of the leaves that branches themselves bear on pieces, weighted by area."""
     row, rows = pieces.branches.row, flora.rows
-    colour = _summer_colours(flora, pieces)
-    return colour if flora.day is None else flora.day.own_colours(pieces.branches, rows["leaf_kind"][row], colour)
+    color = _summer_colors(flora, pieces)
+    return color if flora.day is None else flora.day.own_colors(pieces.branches, rows["leaf_kind"][row], color)
 
 
-def _summer_colours(flora: Flora, pieces: Pieces) -> Floats:
+def _summer_colors(flora: Flora, pieces: Pieces) -> Floats:
     row, rows = pieces.branches.row, flora.rows
-    inside = rows["leaf_colour"][row, 0]
+    inside = rows["leaf_color"][row, 0]
     if not rows["gradient"].any():
         return inside
     area, area_outward, area_young = piece_leaf_integrals(flora, pieces)
-    older = inside + (rows["leaf_colour_tip"][row] - inside) * (area_outward / area)[:, None]
-    return older + (rows["leaf_colour_young"][row] - inside) * (area_young / area)[:, None]
+    older = inside + (rows["leaf_color_tip"][row] - inside) * (area_outward / area)[:, None]
+    return older + (rows["leaf_color_young"][row] - inside) * (area_young / area)[:, None]
 
 
 def wood_areas(flora: Flora, pieces: Pieces) -> Floats:

@@ -25,7 +25,7 @@ from ..growth.hashing import Draw, child_key, uniform
 from ..growth.rows import FORK, ranged
 from .wood_detail import Curve, Fineness, Pixels, curve, parts, unit_of
 
-_SHORTEST = 1e-9  # metres of a branch that has just begun to grow
+_SHORTEST = 1e-9  # meters of a branch that has just begun to grow
 _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
 
 
@@ -40,41 +40,41 @@ class Rings:
         Rings of a branch follow one another.
     t : (r,) float64
         Fractions of the axes, for textures; below the base negative.
-    centre : (r, 3) float64
+    center : (r, 3) float64
     reach : (2, 3, r) float32
-        From the centre to the ring, along both axes across the branch.
+        From the center to the ring, along both axes across the branch.
     goes_on : (r,) bool
         Whether a tube leads from a ring to the next.
     later : tuple of (r, 3) float64 and (2, 3, r) float32, or None
-        Centre and reach a moment later, where it is asked how plants move.
+        Center and reach a moment later, where it is asked how plants move.
     swelling : (sides, r) float32 or None
         What multiplies the reach at each vertex.
-    colour : (k, 3) float64 or None
+    color : (k, 3) float64 or None
         Of what has not that of its branch.
     """
 
     branches: Branches
     branch: Integers
     t: Floats
-    centre: Floats
+    center: Floats
     reach: NDArray[np.float32]
     goes_on: Mask
     later: tuple[NDArray, NDArray] | None = None
     swelling: NDArray[np.float32] | None = None
-    colour: Floats | None = None
+    color: Floats | None = None
 
 
 def rings_of(flora: Flora, whole: WholeBranches) -> Rings:
     """Rings at the joints of branches, and some where a base is flared."""
     rows, branches = flora.rows, whole.branches
-    owner, t, centre = whole.knots(rows)
+    owner, t, center = whole.knots(rows)
     radius = radius_at(rows, without_places(branches, owner), t).astype(np.float32)
     later = None
     if whole.lines.later is not None:
         moved = WholeBranches(branches, whole.lines.later).knots(rows)[2]
         later = moved, radius * _ring_axes(whole.lines.later, owner, t)
     reach = radius * _ring_axes(whole.lines, owner, t)
-    return Rings(branches, owner, t, centre, reach, _goes_on(owner), later)
+    return Rings(branches, owner, t, center, reach, _goes_on(owner), later)
 
 
 def fine_numbers(flora: Flora, whole: WholeBranches, counts: Integers) -> tuple[Integers, Integers]:
@@ -145,17 +145,17 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integ
 
     def placed(lines: Axes) -> tuple[NDArray, NDArray]:
         bent = _curve(flora, replace(whole, lines=lines), fine.weight)
-        centre, across = bent.at(owner, segment, x, allowed)
-        centre += down
+        center, across = bent.at(owner, segment, x, allowed)
+        center += down
         tip = lines.frames[last, segments[last] - 1, :, 2]
-        centre[above] += high[:, None] * tip
+        center[above] += high[:, None] * tip
         reach = light * across.astype(np.float32)
         reach[0][:, above] += (slant[:, None] * tip).T.astype(np.float32)
-        return centre, reach
+        return center, reach
 
-    centre, reach = placed(whole.lines)
+    center, reach = placed(whole.lines)
     later = None if whole.lines.later is None else placed(whole.lines.later)
-    return Rings(branches, owner, t, centre, reach, _goes_on(owner), later, swollen)
+    return Rings(branches, owner, t, center, reach, _goes_on(owner), later, swollen)
 
 
 def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings, Integers] | None:
@@ -173,13 +173,13 @@ def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Ring
     aside = unit(np.cross(along, [0.0, 0.0, 1.0]) + [1e-9, 0.0, 0.0])
     axes = np.stack([aside, np.cross(along, aside)])
     turn = np.repeat(trunks.frame[which], places, axis=0)
-    centre = np.einsum("nij,nj->ni", turn, path.reshape(-1, 3)) + np.repeat(wood.position, places, axis=0)
+    center = np.einsum("nij,nj->ni", turn, path.reshape(-1, 3)) + np.repeat(wood.position, places, axis=0)
     axes = np.einsum("nij,anj->ain", turn, axes)
     owner = np.repeat(np.arange(many), places)
     t = -np.tile(np.linspace(0.0, 1.0, places), many)  # as deep as the foot, for materials: below the base
     reach = (width.ravel() * axes).astype(np.float32)
-    still = None if whole.lines.later is None else (centre, reach)
-    return Rings(wood, owner, t, centre, reach, _goes_on(owner), still), own[which]
+    still = None if whole.lines.later is None else (center, reach)
+    return Rings(wood, owner, t, center, reach, _goes_on(owner), still), own[which]
 
 
 def _curve(flora: Flora, whole: WholeBranches, weight: Floats) -> Curve:
@@ -214,7 +214,7 @@ def _goes_on(owner: Integers) -> Mask:
 def without_places(branches: Branches, index: Integers) -> Branches:
     """Selection of all that numbers and radii depend on; places and frames, which are most of the memory, are zero."""
     n = len(index)
-    names = ("row", "plant", "key", "length", "radius", "scale", "vigour", "outward")
+    names = ("row", "plant", "key", "length", "radius", "scale", "vigor", "outward")
     rest = {name: np.take(getattr(branches, name), index) for name in names}
     return Branches(position=np.broadcast_to(0.0, (n, 3)), frame=np.broadcast_to(0.0, (n, 3, 3)), **rest)
 
@@ -261,7 +261,7 @@ _CAP, _SPLINTERS = 3, 1.6
 
 
 def collars(rows: Table, branches: Branches) -> tuple[Floats, Floats]:
-    """How much thicker branches (n,) are at their base, over their radius, and over which length that falls, metres.
+    """How much thicker branches (n,) are at their base, over their radius, and over which length that falls, meters.
 
     The base lies on the axis of the parent: what is seen begins a radius of the parent further out.
     """
@@ -401,9 +401,9 @@ def roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Floats
     Returns
     -------
     path : (m, PLACES, 3) float64
-        In the frames of the trunks' bases, metres.
+        In the frames of the trunks' bases, meters.
     width : (m, PLACES) float64
-        Radii, metres.
+        Radii, meters.
     trunk : (m,) int64
     """
     angle, size = buttresses(trunks.key)

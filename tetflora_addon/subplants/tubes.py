@@ -14,7 +14,7 @@ from ..arrays import Floats, Integers
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
-from ..growth.colours import branch_colours
+from ..growth.colors import branch_colors
 from ..growth.growth import WholeBranches
 from ..growth.wind import moment
 from .buds import BUD_RINGS, bud_numbers, bud_rings, bud_sides
@@ -33,8 +33,8 @@ from .rings import (
 from .wood_detail import Fineness, Pixels, fineness
 
 #: Rings that are worked on at a time: some ten megabytes.
-_RINGS_AT_ONCE = 48_000
-#: How high stems beyond a fork begin, for materials, metres.
+_RING_BATCH = 48_000
+#: How high stems beyond a fork begin, for materials, meters.
 _ABOVE = 4.0
 
 
@@ -55,7 +55,7 @@ def tube_buffers(
     Returns
     -------
     MeshBuffers or None
-        Quads with ``UVMap``, ``tf_colour``, ``tf_transmission`` and ``tf_girth``; None without branches.
+        Quads with ``UVMap``, ``tf_color``, ``tf_transmission`` and ``tf_girth``; None without branches.
     """
     sorts = sorted(
         (sort for some in whole for sort in _sorts(flora, some, pixels, most_sides)), key=lambda sort: sort.sides
@@ -76,7 +76,7 @@ def tube_faces(flora: Flora, whole: WholeBranches, pixels: Pixels | None = None)
 
 
 @dataclass(frozen=True)
-class _Sort:
+class _TubeGroup:
     """Branches (n,) of one number of sides.
 
     ``rings`` (n,) are those of tubes, ``beside`` (n,) those of roots, `PLACES` to each, ``buds`` (n,) those of buds,
@@ -105,10 +105,10 @@ class _Sort:
     def made(self, flora: Flora) -> Iterator[tuple[Rings, int, WholeBranches | None]]:
         """Rings, how many vertices they have, and branches within whose bounds they have to stay."""
         if self.fine is None:
-            for some in chunks(self.rings, _RINGS_AT_ONCE):
+            for some in chunks(self.rings, _RING_BATCH):
                 yield rings_of(flora, self.whole.take(some)), self.sides, None
             return
-        for some in chunks(self.rings * self.sides, 8 * _RINGS_AT_ONCE):
+        for some in chunks(self.rings * self.sides, 8 * _RING_BATCH):
             whole, fine = self.whole.take(some), self.fine.take(some)
             yield fine_rings(flora, whole, fine, self.counts[some]), self.sides, whole
             if (foot := foot_rings(flora, whole, fine)) is not None:
@@ -117,7 +117,9 @@ class _Sort:
                 yield buds[0], bud_sides(self.sides), whole.take(buds[1])
 
 
-def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None, most_sides: int | None = None) -> Iterator[_Sort]:
+def _sorts(
+    flora: Flora, whole: WholeBranches, pixels: Pixels | None, most_sides: int | None = None
+) -> Iterator[_TubeGroup]:
     """Branches by their sides."""
     if not len(whole):
         return
@@ -131,13 +133,13 @@ def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None, most_sides
     rings = whole.lines.segments + flora.rows["rings"][whole.branches.row] + 1
     for k in np.unique(sides[far]):
         own = far[sides[far] == k]
-        yield _Sort(whole.take(own), int(k), rings[own])
+        yield _TubeGroup(whole.take(own), int(k), rings[own])
     near = np.flatnonzero(near)
     for k in np.unique(fine.sides[near]) if len(near) else ():
         own = near[fine.sides[near] == k]
         some, how = whole.take(own), fine.take(own)
         counts = fine_counts(flora, some, how, pixels)
-        yield _Sort(some, int(k), *fine_numbers(flora, some, counts), how, counts, bud_numbers(flora, some))
+        yield _TubeGroup(some, int(k), *fine_numbers(flora, some, counts), how, counts, bud_numbers(flora, some))
 
 
 class _Tubes:
@@ -153,7 +155,7 @@ class _Tubes:
         self.edge_verts = np.zeros((vertices + faces, 2), np.int32)
         self.corner_verts, self.corner_edges = np.zeros((2, faces, 4), np.int32)
         self.uv = np.zeros((faces, 8), np.float32)
-        self.colour = np.zeros((faces, 3), np.float32)
+        self.color = np.zeros((faces, 3), np.float32)
         self.girth = np.zeros(faces, np.float32)
 
     def buffers(self) -> MeshBuffers:
@@ -165,7 +167,7 @@ class _Tubes:
             corner_verts=self.corner_verts.reshape(-1),
             corner_edges=self.corner_edges.reshape(-1),
             face_offsets=np.arange(0, 4 * faces + 1, 4, dtype=np.int32),
-            attributes=wood_attributes(self.uv.reshape(-1, 2), self.colour, self.girth, self.velocity),
+            attributes=wood_attributes(self.uv.reshape(-1, 2), self.color, self.girth, self.velocity),
             smooth=True,
         )
 
@@ -173,25 +175,25 @@ class _Tubes:
         """Tubes of one number of sides; ``inside`` whose bounds they have to stay, if that is not certain."""
         branches, number = rings.branches, len(rings.t)
         lower = np.flatnonzero(rings.goes_on)
-        self._add_shape(self.positions, rings.centre.T.astype(np.float32), rings.reach, sides, rings.swelling)
+        self._add_shape(self.positions, rings.center.T.astype(np.float32), rings.reach, sides, rings.swelling)
         if inside is not None:
             own = self.positions[self.vertices : self.vertices + number * sides]
             keep_inside(flora, inside.branches, np.repeat(rings.branch, sides), own)
         if rings.later is not None:
             seconds = moment(flora.rows)
-            centre = ((rings.later[0] - rings.centre) / seconds).T.astype(np.float32)
+            center = ((rings.later[0] - rings.center) / seconds).T.astype(np.float32)
             moved = (rings.later[1] - rings.reach) / np.float32(seconds)
-            self._add_shape(self.velocity, centre, moved, sides, rings.swelling)
+            self._add_shape(self.velocity, center, moved, sides, rings.swelling)
         self._add_topology(lower.astype(np.int32), number, sides)
         # v counts lengths of the perimeter at the branch's base, so that a texture is as wide as it is high.
         girth = base_girth(branches)
         # Stems beyond a fork do not begin at the ground, where materials have moss.
         above = np.where(flora.rows["continues"][branches.row], _ABOVE, 0.0) / np.maximum(girth, 1e-9)
         v = rings.t * np.take(branches.length / np.maximum(girth, 1e-9), rings.branch) + above[rings.branch]
-        colour = branch_colours(flora.rows, branches.row, branches.key) if rings.colour is None else rings.colour
-        colour = colour.astype(np.float32)
-        colour = np.ascontiguousarray(colour)[np.take(rings.branch, lower)]
-        self._add_looks(v[lower], v[lower + 1], colour, sides)
+        color = branch_colors(flora.rows, branches.row, branches.key) if rings.color is None else rings.color
+        color = color.astype(np.float32)
+        color = np.ascontiguousarray(color)[np.take(rings.branch, lower)]
+        self._add_looks(v[lower], v[lower + 1], color, sides)
         every = slice(self.faces, self.faces + len(lower) * sides)
         self.girth[every] = np.repeat(np.take(girth, np.take(rings.branch, lower)), sides)
         self.vertices += number * sides
@@ -201,13 +203,13 @@ class _Tubes:
     def _add_shape(
         self,
         out: NDArray[np.float32],
-        centre: NDArray[np.float32],
+        center: NDArray[np.float32],
         reach: NDArray[np.float32],
         sides: int,
         swelling: NDArray[np.float32] | None,
     ) -> None:
-        """Vertices around centres (3, rings), along both axes (2, 3, rings) of each ring; or, as well, velocities."""
-        rings = centre.shape[1]
+        """Vertices around centers (3, rings), along both axes (2, 3, rings) of each ring; or, as well, velocities."""
+        rings = center.shape[1]
         angle = 2 * np.pi * np.arange(sides) / sides
         points = np.zeros((sides, 3, rings), np.float32)
         for k, (point, x, y) in enumerate(zip(points, np.cos(angle), np.sin(angle), strict=True)):  # a tube's sides
@@ -215,7 +217,7 @@ class _Tubes:
             point += reach[1] * np.float32(y)
             if swelling is not None:
                 point *= swelling[k]
-            point += centre
+            point += center
         new = out[self.vertices : self.vertices + rings * sides]
         new.reshape(rings, -1)[...] = points.reshape(-1, rings).T
 
@@ -238,8 +240,8 @@ class _Tubes:
         np.add(ring_edge[:, None], _interleaved(here, here + sides), out=new[:, ::2])
         np.add(long_edge[:, None], _interleaved(there, here), out=new[:, 1::2])
 
-    def _add_looks(self, low: NDArray, high: NDArray, colour: NDArray[np.float32], sides: int) -> None:
-        """Texture coordinates between the v (p,) at both ends of pieces, their colours (p, 3)."""
+    def _add_looks(self, low: NDArray, high: NDArray, color: NDArray[np.float32], sides: int) -> None:
+        """Texture coordinates between the v (p,) at both ends of pieces, their colors (p, 3)."""
         number = len(low) * sides
         new = self.uv[self.faces : self.faces + number].reshape(len(low), -1)
         u0, u1, zero = np.arange(sides) / sides, np.arange(1, sides + 1) / sides, np.zeros(sides)
@@ -249,20 +251,20 @@ class _Tubes:
         np.multiply(low.astype(np.float32)[:, None], at_low, out=new)
         new += high.astype(np.float32)[:, None] * at_high
         new += u
-        self.colour[self.faces : self.faces + number] = np.repeat(colour, sides, axis=0)
+        self.color[self.faces : self.faces + number] = np.repeat(color, sides, axis=0)
 
 
 def wood_attributes(
-    uv: NDArray[np.float32], colour: NDArray[np.float32], girth: NDArray[np.float32], velocity: NDArray | None
+    uv: NDArray[np.float32], color: NDArray[np.float32], girth: NDArray[np.float32], velocity: NDArray | None
 ) -> dict[str, tuple[str, NDArray]]:
     """Attributes of a mesh of wood: of its corners, of its faces, and of its vertices where these move."""
     motion = {} if velocity is None else {"velocity": ("POINT", velocity)}
-    faces = {"tf_colour": colour, "tf_transmission": np.zeros(len(colour), np.float32), "tf_girth": girth}
+    faces = {"tf_color": color, "tf_transmission": np.zeros(len(color), np.float32), "tf_girth": girth}
     return {"UVMap": ("CORNER", uv), **{name: ("FACE", values) for name, values in faces.items()}, **motion}
 
 
 def base_girth(branches: Branches) -> Floats:
-    """Length (n,) around branches at their base, without flare, metres: what v counts."""
+    """Length (n,) around branches at their base, without flare, meters: what v counts."""
     return 2 * np.pi * branches.radius
 
 

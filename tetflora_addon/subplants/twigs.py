@@ -15,7 +15,7 @@ from ..buffers import MeshBuffers, concatenate_buffers
 from ..compiled.flora import Flora
 from ..growth.axes import Axes
 from ..growth.branches import Branches
-from ..growth.colours import branch_colours
+from ..growth.colors import branch_colors
 from ..growth.growth import WholeBranches, radius_at
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
@@ -122,8 +122,8 @@ def _buffers(
 
     ``topology`` are the four arrays of `MeshBuffers`, in their order.
     """
-    colour, girth = branch_colours(flora.rows, branches.row, branches.key), base_girth(branches)
-    light = (None if of is None else of.astype(np.float32) for of in (uv, colour[owner], girth[owner], velocity))
+    color, girth = branch_colors(flora.rows, branches.row, branches.key), base_girth(branches)
+    light = (None if of is None else of.astype(np.float32) for of in (uv, color[owner], girth[owner], velocity))
     whole = (of.astype(np.int32) for of in topology)
     return MeshBuffers(corners.astype(np.float32), *whole, wood_attributes(*light), smooth=True)
 

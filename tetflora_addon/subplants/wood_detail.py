@@ -45,9 +45,9 @@ class Pixels:
     Attributes
     ----------
     extent : callable
-        Metres (n,) that a pixel spans at points (n, 3).
+        Meters (n,) that a pixel spans at points (n, 3).
     slope : float
-        By how much that falls at most with each metre that one comes nearer.
+        By how much that falls at most with each meter that one comes nearer.
     """
 
     extent: Callable[[Floats], Floats]
@@ -142,7 +142,7 @@ class Curve:
     across: Floats
 
     def deviation(self) -> Floats:
-        """How far the curve may be off each segment (n, S), metres."""
+        """How far the curve may be off each segment (n, S), meters."""
         return _HERMITE * (_norm(self.start) + _norm(self.end))
 
     def at(self, branch: Integers, segment: Integers, x: Floats, most: Floats) -> tuple[Floats, Floats]:
@@ -151,12 +151,12 @@ class Curve:
         chord, start, end = (some[branch, segment] for some in (self.chord, self.start, self.end))
         aside = x * (x - 1.0) ** 2 * start + x * x * (x - 1.0) * end
         aside *= np.minimum(1.0, most / np.maximum(_norm(aside), 1e-300))[:, None]
-        centre = self.lines.knot(branch, segment) + x * chord + aside
+        center = self.lines.knot(branch, segment) + x * chord + aside
         along = chord + (3.0 * x * x - 4.0 * x + 1.0) * start + (3.0 * x * x - 2.0 * x) * end
         along = unit(along)
         first = (1.0 - x) * self.across[branch, segment] + x * self.across[branch, segment + 1]
         first = unit(first - dot(first, along) * along)
-        return centre, np.stack([first.T, cross(along, first).T])
+        return center, np.stack([first.T, cross(along, first).T])
 
 
 def curve(lines: Axes, radius: Floats, weight: Floats) -> Curve:

@@ -24,19 +24,19 @@ def signed_volume(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra, metres.
+        Tetrahedra, meters.
 
     Returns
     -------
     (...) float64
-        det(v1 − v0, v2 − v0, v3 − v0) / 6, cubic metres.
+        det(v1 − v0, v2 − v0, v3 − v0) / 6, cubic meters.
     """
     a, b, c = (vertices[..., i, :] - vertices[..., 0, :] for i in (1, 2, 3))
     return np.sum(np.cross(a, b) * c, axis=-1) / 6.0
 
 
 def volume(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Absolute volume ``(...)`` of tetrahedra ``(..., 4, 3)``, cubic metres."""
+    """Absolute volume ``(...)`` of tetrahedra ``(..., 4, 3)``, cubic meters."""
     return np.abs(signed_volume(vertices))
 
 
@@ -55,7 +55,7 @@ def quality(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra, metres.
+        Tetrahedra, meters.
 
     Returns
     -------
@@ -76,12 +76,12 @@ def face_area_vectors(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra, metres.
+        Tetrahedra, meters.
 
     Returns
     -------
     (..., 4, 3) float64
-        Vector ``i`` belongs to the face opposite vertex ``i``; square metres. The four add up to zero. They point
+        Vector ``i`` belongs to the face opposite vertex ``i``; square meters. The four add up to zero. They point
         inwards where the orientation is negative.
     """
     a, b, c, d = (vertices[..., i, :] for i in range(4))
@@ -97,14 +97,14 @@ def projected_area(vertices: NDArray[np.float64], direction: NDArray[np.float64]
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra of either orientation, metres.
+        Tetrahedra of either orientation, meters.
     direction : (3,) or (..., 3) float64
         Unit viewing directions.
 
     Returns
     -------
     (...) float64
-        Square metres, measured across the direction.
+        Square meters, measured across the direction.
     """
     areas = face_area_vectors(vertices)
     return np.sum(np.abs(np.sum(areas * np.asarray(direction)[..., None, :], axis=-1)), axis=-1) / 2.0
@@ -116,7 +116,7 @@ def barycentric_gradients(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra of either orientation, metres.
+        Tetrahedra of either orientation, meters.
 
     Returns
     -------
@@ -134,9 +134,9 @@ def barycentric(vertices: NDArray[np.float64], points: NDArray[np.float64]) -> N
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra, metres.
+        Tetrahedra, meters.
     points : (..., 3) float64
-        Points, metres.
+        Points, meters.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def plane_through(points: NDArray[np.float64], negative: NDArray[np.float64]) ->
     Parameters
     ----------
     points : (..., 3, 3) float64
-        Three points of each plane, metres; not on one line.
+        Three points of each plane, meters; not on one line.
     negative : (..., 3) float64
         A point on side 0 of each plane.
 
@@ -174,6 +174,6 @@ def plane_through(points: NDArray[np.float64], negative: NDArray[np.float64]) ->
 
 
 def plane_distance(planes: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Signed distances ``(...)`` of points ``(..., 3)`` from planes ``(..., 4)``, metres; side 1 is ``>= 0``."""
+    """Signed distances ``(...)`` of points ``(..., 3)`` from planes ``(..., 4)``, meters; side 1 is ``>= 0``."""
     n, p = planes, points
     return n[..., 0] * p[..., 0] + n[..., 1] * p[..., 1] + n[..., 2] * p[..., 2] + n[..., 3]

@@ -10,7 +10,7 @@ Eight (fig. 2): midpoints of the six edges cut off four corners and leave an oct
 divides into four. With vertices a, b, c, d and the diagonal from the middle of ac to that of bd, the plane through the
 middles of ac, ad, bc and bd parts a and b from c and d; the plane through the diagonal and the middles of ab and cd
 parts a from b and c from d; the planes of the corners do the rest. Every child is three planes below its parent, as
-after three bisections. Faces are divided at the middles of their edges whatever the diagonal, so neighbours conform.
+after three bisections. Faces are divided at the middles of their edges whatever the diagonal, so neighbors conform.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def longest_edge(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
     Parameters
     ----------
     vertices : (n, 4, 3) float64
-        Tetrahedra, metres.
+        Tetrahedra, meters.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def bisect(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
     Parameters
     ----------
     vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, metres.
+        Positively oriented tetrahedra, meters.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def best_diagonal(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
     Parameters
     ----------
     vertices : (n, 4, 3) float64
-        Tetrahedra, metres.
+        Tetrahedra, meters.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def divide_in_eight(
     Parameters
     ----------
     vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, metres.
+        Positively oriented tetrahedra, meters.
     diagonal : (n,) int, optional
         Which diagonal of the inner octahedron to cut along; `best_diagonal` if None.
 
@@ -175,7 +175,7 @@ def divide_by_shape(
     Parameters
     ----------
     vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, metres.
+        Positively oriented tetrahedra, meters.
 
     Returns
     -------

@@ -15,7 +15,7 @@ from .geometry import plane_distance
 from .subdivision import bisect, divide_by_shape
 
 #: Points that `TetrahedralTree.locate` takes down the tree at a time; bounds its memory to some tens of megabytes.
-POINTS_AT_ONCE = 1 << 18
+POINT_BATCH = 1 << 18
 
 
 class TetrahedralTree:
@@ -28,7 +28,7 @@ class TetrahedralTree:
     Parameters
     ----------
     vertices : (4, 3) float64, optional
-        Tetrahedron of the root, positively oriented, metres. Without it the root is a region to be divided by
+        Tetrahedron of the root, positively oriented, meters. Without it the root is a region to be divided by
         `divide`.
     """
 
@@ -87,7 +87,7 @@ class TetrahedralTree:
         return sum(rows.nbytes for rows in self._rows.values())
 
     def vertices(self, nodes: ArrayLike) -> NDArray[np.float64]:
-        """Tetrahedra ``(n, 4, 3)`` float64 of nodes ``(n,)``, metres; NaN for regions without one."""
+        """Tetrahedra ``(n, 4, 3)`` float64 of nodes ``(n,)``, meters; NaN for regions without one."""
         return np.take(self._rows["vertices"][: self._size], nodes, axis=0)
 
     def planes(self, nodes: ArrayLike) -> NDArray[np.float64]:
@@ -178,7 +178,7 @@ class TetrahedralTree:
         return made
 
     def place(self, nodes: ArrayLike, vertices: ArrayLike) -> None:
-        """Give nodes ``(n,)`` that have none their tetrahedra ``(n, 4, 3)``, positively oriented, metres."""
+        """Give nodes ``(n,)`` that have none their tetrahedra ``(n, 4, 3)``, positively oriented, meters."""
         self._rows["vertices"][nodes] = vertices
         self._made += len(np.atleast_1d(nodes))
 
@@ -197,7 +197,7 @@ class TetrahedralTree:
         Parameters
         ----------
         eye : (3,) float64, optional
-            Where rays start, metres, world space.
+            Where rays start, meters, world space.
         direction : (3,) float64, optional
             Common direction of parallel rays; used if ``eye`` is None.
         back_to_front : bool
@@ -240,7 +240,7 @@ class TetrahedralTree:
         Parameters
         ----------
         points : (n, 3) float64
-            Metres, world space.
+            Meters, world space.
 
         Returns
         -------
@@ -249,8 +249,8 @@ class TetrahedralTree:
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
         found = np.zeros(len(points), np.int32)
-        for start in range(0, len(points), POINTS_AT_ONCE):
-            part = slice(start, start + POINTS_AT_ONCE)
+        for start in range(0, len(points), POINT_BATCH):
+            part = slice(start, start + POINT_BATCH)
             found[part] = self._descend(points[part])
         return found
 

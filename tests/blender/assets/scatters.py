@@ -53,7 +53,7 @@ class Nodes:
         return self.add("GeometryNodeCollectionInfo", Collection=datablock), "Instances"
 
     def scatter(self, source, count, scale=1.0, socket="Geometry"):
-        """Instances of a source on points along x, a metre apart."""
+        """Instances of a source on points along x, a meter apart."""
         points = self.add("GeometryNodePoints", Count=count)
         index, along = self.add("GeometryNodeInputIndex"), self.add("ShaderNodeCombineXYZ")
         self.link(index, along, "X")

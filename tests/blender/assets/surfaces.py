@@ -13,10 +13,10 @@ from tetflora_addon.blender.assets.parts import Target, read_source_steps
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
 
-def linear(colour):
+def linear(color):
     """sRGB as light."""
-    colour = np.asarray(colour, np.float64)
-    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+    color = np.asarray(color, np.float64)
+    return np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
 
 
 def image(pixels, name="picture", space="sRGB", **settings):
@@ -97,8 +97,8 @@ def read(datablock):
 
 
 def look(paint, uvs=(SQUARE,), **options):
-    """Colour, transmission and coverage of cards that wear a material."""
+    """Color, transmission and coverage of cards that wear a material."""
     source, warnings = read(cards([paint.material], uvs, **options))
     surface = source.surfaces[0]
-    found = (surface.colour, surface.transmission, surface.coverage)
+    found = (surface.color, surface.transmission, surface.coverage)
     return *(values.astype(np.float64) for values in found), warnings

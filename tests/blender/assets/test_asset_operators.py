@@ -88,7 +88,7 @@ def test_operators_take_collections_by_name_and_many_objects():
     scene().collection.objects.link(lamp)
     select(crown("two"), crown("three"), lamp)
     assert bpy.ops.tetflora.use_as_species() == {'FINISHED'}
-    assert sorted(info.name for i, info in edits.catalogue().items() if i in asset_species()) == [
+    assert sorted(info.name for i, info in edits.catalog().items() if i in asset_species()) == [
         "held",
         "three",
         "two",
@@ -169,7 +169,7 @@ def test_deleting_an_asset_can_be_undone():
     bpy.ops.object.delete()
     bpy.ops.ed.undo_push(message="Deleted")
     edits.look_again()
-    assert own not in edits.catalogue()
+    assert own not in edits.catalog()
     assert bpy.ops.ed.undo() == {'FINISHED'}
     edits.look_again()
-    assert own in edits.catalogue() and len(read()) == 1
+    assert own in edits.catalog() and len(read()) == 1

@@ -15,7 +15,7 @@ from tetflora_addon.blender.compat import shader_tree
 from tetflora_addon.blender.placing.distances import distance_of
 from tetflora_addon.blender.placing.plant_objects import add_plant as place_plant
 from tetflora_addon.blender.scene.crowns import crown_for, crown_to_draw
-from tetflora_addon.blender.species import catalogue, edits
+from tetflora_addon.blender.species import catalog, edits
 from tetflora_addon.blender.species.asset_species import PICTURE_SIDE, asset_of, find_asset, picture_of
 from tetflora_addon.blender.viewport import levels, state
 from tetflora_addon.errors import SceneError, SpeciesError
@@ -31,9 +31,9 @@ def test_an_object_is_a_species_in_all_menus_with_its_measures_and_a_picture():
     assert bpy.ops.tetflora.use_as_species() == {'FINISHED'}
     (entry,) = scene().tetflora.asset_species
     assert entry.identifier.startswith("asset-") and is_identifier(entry.identifier)
-    info = edits.catalogue()[entry.identifier]
+    info = edits.catalog()[entry.identifier]
     assert info.name == "Scots pine" and "10 m" in info.description
-    assert entry.identifier in [item[0] for item in catalogue.items_for()]
+    assert entry.identifier in [item[0] for item in catalog.items_for()]
     assert entry.identifier not in edits.grown()
     found = crown_for(scene(), entry.identifier)
     assert found == crown_to_draw(scene(), entry.identifier)
@@ -46,13 +46,13 @@ def test_an_object_is_a_species_in_all_menus_with_its_measures_and_a_picture():
     assert (picture[0, :, 3] == 0).all() and (picture[-1, :, 3] == 0).all()
 
 
-def test_the_picture_is_lit_and_in_the_colours_of_the_material():
+def test_the_picture_is_lit_and_in_the_colors_of_the_material():
     obj = crown()
     material = bpy.data.materials.new("red")
     shader_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.8, 0.05, 0.05, 1.0)
     obj.data.materials.append(material)
     entry = find_asset(scene(), species(obj))
-    assert tuple(entry.colour) == pytest.approx((0.8, 0.05, 0.05), abs=1e-3)
+    assert tuple(entry.color) == pytest.approx((0.8, 0.05, 0.05), abs=1e-3)
     picture = picture_of(entry)
     seen = picture[picture[..., 3] > 200]
     assert seen[:, 0].mean() > 2 * seen[:, 1].mean()
@@ -64,7 +64,7 @@ def test_broken_pictures_are_none():
     for text in ("", "no picture", "é", entry.picture[:40]):
         entry.picture = text
         assert picture_of(entry) is None
-        assert catalogue.icon_of(entry.identifier) == 0
+        assert catalog.icon_of(entry.identifier) == 0
 
 
 def test_the_identifier_is_kept_through_renaming_and_comes_again():
@@ -72,9 +72,9 @@ def test_the_identifier_is_kept_through_renaming_and_comes_again():
     own = species(obj)
     assert species(other) != own
     obj.name = "renamed"
-    assert species(obj) == own and edits.catalogue()[own].name == "renamed"
+    assert species(obj) == own and edits.catalog()[own].name == "renamed"
     obj.name = "crown"
-    assert marks.stop_using(obj) == 1 and own not in edits.catalogue()
+    assert marks.stop_using(obj) == 1 and own not in edits.catalog()
     assert species(obj) == own
 
 
@@ -236,7 +236,7 @@ def test_a_missing_asset_is_shown_as_such_in_menus():
     select(add_mesh("ground", size=20.0))
     bpy.data.objects.remove(obj)
     edits.look_again()
-    item = next(item for item in catalogue.items_for(own) if item[0] == own)
+    item = next(item for item in catalog.items_for(own) if item[0] == own)
     assert item[1] == "Rock (missing)" and item[3] == 'ERROR'
     with pytest.raises(RuntimeError, match='"Rock", which was used as a species, was deleted'):
         bpy.ops.tetflora.populate()
@@ -249,10 +249,10 @@ def test_species_are_saved_and_belong_to_their_file(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     edits.look_again()
-    assert own not in edits.catalogue()
+    assert own not in edits.catalog()
     bpy.ops.wm.open_mainfile(filepath=path)
     edits.look_again()
-    assert edits.catalogue()[own].name == "Rock" and picture_of(find_asset(None, own)) is not None
+    assert edits.catalog()[own].name == "Rock" and picture_of(find_asset(None, own)) is not None
     assert len(read()[0]) == 1
 
 

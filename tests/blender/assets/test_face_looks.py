@@ -18,7 +18,7 @@ QUARTERS = [[(x + 0.5 * u, y + 0.5 * v) for u, v in SQUARE] for y in (0, 0.5) fo
 
 
 def _leaves(side=1024, seed=1):
-    """Many round leaves of different colours, with holes between them."""
+    """Many round leaves of different colors, with holes between them."""
     rng = np.random.default_rng(seed)
     pixels = np.zeros((side, side, 4), np.float32)
     pixels[..., :3] = (0.9, 0.1, 0.7)  # what nobody must see
@@ -31,55 +31,55 @@ def _leaves(side=1024, seed=1):
 
 
 def _mean(pixels):
-    """Mean colour of what is not transparent, and coverage."""
+    """Mean color of what is not transparent, and coverage."""
     weight = pixels[..., 3:].astype(np.float64)
     stored = np.rint(pixels[..., :3] * 255) / 255
     return (linear(stored) * weight).sum(axis=(0, 1)) / weight.sum(), float(weight.mean())
 
 
 def _mean_between_texels(pixels):
-    """The same where colour and mask are two images: both are linear between texels, which shows what is masked."""
+    """The same where color and mask are two images: both are linear between texels, which shows what is masked."""
     shown = np.concatenate([linear(np.rint(pixels[..., :3] * 255) / 255), pixels[..., 3:]], axis=2)
     parts = (np.arange(8) + 0.5) / 8
-    colour, cover = np.zeros(3), 0.0
+    color, cover = np.zeros(3), 0.0
     for x in parts:
         along = (1 - x) * shown + x * np.roll(shown, -1, axis=1)
         for y in parts:
             texel = (1 - y) * along + y * np.roll(along, -1, axis=0)
-            colour += (texel[..., :3] * texel[..., 3:]).sum(axis=(0, 1))
+            color += (texel[..., :3] * texel[..., 3:]).sum(axis=(0, 1))
             cover += texel[..., 3].sum()
-    return colour / cover, cover / pixels[..., 3].size / 64
+    return color / cover, cover / pixels[..., 3].size / 64
 
 
 def test_card_of_a_whole_image_covers_as_much_as_the_image():
     paint, pixels = Paint(), _leaves()
     paint.texture(image(pixels), alpha=True)
-    colour, transmission, coverage, warnings = look(paint)
+    color, transmission, coverage, warnings = look(paint)
     expected, alpha = _mean(pixels)
     assert coverage[0] == pytest.approx(alpha, abs=0.003)
-    np.testing.assert_allclose(colour[0], expected, rtol=0.01)
+    np.testing.assert_allclose(color[0], expected, rtol=0.01)
     assert transmission[0] == 0
     assert warnings == ()
 
 
-def test_face_of_a_quarter_has_the_colour_of_that_quarter():
+def test_face_of_a_quarter_has_the_color_of_that_quarter():
     paint, pixels = Paint(), _leaves()
     paint.texture(image(pixels), alpha=True)
-    colour, _, coverage, _ = look(paint, QUARTERS)
+    color, _, coverage, _ = look(paint, QUARTERS)
     for i, (rows, columns) in enumerate((a, b) for a in (0, 512) for b in (0, 512)):
         expected, alpha = _mean(pixels[rows : rows + 512, columns : columns + 512])
         assert coverage[i] == pytest.approx(alpha, abs=0.004)
-        np.testing.assert_allclose(colour[i], expected, rtol=0.01)
+        np.testing.assert_allclose(color[i], expected, rtol=0.01)
 
 
 def test_opaque_image_of_odd_size_counts_all_pixels():
-    """Alpha that is not linked does not hide anything, and colours are those of light."""
+    """Alpha that is not linked does not hide anything, and colors are those of light."""
     rng = np.random.default_rng(0)
     pixels = rng.random((301, 150, 4)).astype(np.float32)
     paint = Paint()
     paint.texture(image(pixels))
-    colour, _, coverage, _ = look(paint)
-    np.testing.assert_allclose(colour[0], linear(np.rint(pixels[..., :3] * 255) / 255).mean(axis=(0, 1)), rtol=0.01)
+    color, _, coverage, _ = look(paint)
+    np.testing.assert_allclose(color[0], linear(np.rint(pixels[..., :3] * 255) / 255).mean(axis=(0, 1)), rtol=0.01)
     assert coverage[0] == 1
 
 
@@ -99,10 +99,10 @@ def test_threshold_of_alpha_cuts_at_the_texel_and_not_at_the_mean():
 @pytest.mark.parametrize("by", ["alpha", "lightness"])
 def test_mix_with_transparent_covers_where_the_mask_is_light(by):
     paint, pixels = Paint(), _leaves(256)
-    colour, mask = image(pixels), image(pixels)
+    color, mask = image(pixels), image(pixels)
     if by == "lightness":
         mask = image(np.repeat(pixels[..., 3:], 3, axis=2), space="Non-Color")
-    texture = paint.texture(colour)
+    texture = paint.texture(color)
     other = texture if by == "alpha" else paint.node("TexImage", image=mask)
     mix, hole = paint.node("MixShader"), paint.node("BsdfTransparent")
     paint.link(other.outputs["Alpha" if by == "alpha" else "Color"], mix.inputs[0])
@@ -119,22 +119,22 @@ def test_mix_with_transparent_covers_where_the_mask_is_light(by):
 
 
 @pytest.mark.parametrize(
-    ("kind", "first", "colours", "colour", "transmission"),
+    ("kind", "first", "colors", "color", "transmission"),
     [
         ("MixShader", 1, ((0.1, 0.2, 0.1), (0.1, 0.2, 0.1)), (0.1, 0.2, 0.1), 0.5),
         ("AddShader", 0, ((0.3, 0.3, 0.3), (0.1, 0.1, 0.1)), (0.4, 0.4, 0.4), 0.25),
     ],
 )
-def test_translucent_parts_let_their_light_through(kind, first, colours, colour, transmission):
+def test_translucent_parts_let_their_light_through(kind, first, colors, color, transmission):
     """Mixed by halves, or added."""
     paint = Paint()
     both, *sheets = (paint.node(name) for name in (kind, "BsdfDiffuse", "BsdfTranslucent"))
-    for sheet, own, socket in zip(sheets, colours, both.inputs[first : first + 2], strict=True):
+    for sheet, own, socket in zip(sheets, colors, both.inputs[first : first + 2], strict=True):
         sheet.inputs["Color"].default_value = (*own, 1)
         paint.link(sheet.outputs[0], socket)
     paint.link(both.outputs[0], paint.output.inputs["Surface"])
     found = look(paint)
-    np.testing.assert_allclose(found[0][0], colour, rtol=2e-3)
+    np.testing.assert_allclose(found[0][0], color, rtol=2e-3)
     assert (found[1][0], found[2][0]) == (pytest.approx(transmission, abs=1e-3), 1)
 
 
@@ -159,10 +159,10 @@ def test_beside_the_image_its_extension_counts(extension, place, expected, cover
     paint = Paint()
     paint.texture(_halves(), alpha=True, extension=extension)
     uv = [(place + 0.1 + 0.3 * u, 0.3 * v + 0.1) for u, v in SQUARE]
-    colour, _, coverage, _ = look(paint, [uv])
+    color, _, coverage, _ = look(paint, [uv])
     assert coverage[0] == pytest.approx(cover, abs=1e-3)
     if expected:
-        np.testing.assert_allclose(colour[0], expected, atol=0.01)
+        np.testing.assert_allclose(color[0], expected, atol=0.01)
 
 
 @pytest.mark.parametrize(
@@ -183,8 +183,8 @@ def test_mapping_moves_turns_and_scales(settings, expected):
     paint.link(place.outputs["UV"], mapping.inputs["Vector"])
     paint.link(mapping.outputs[0], texture.inputs["Vector"])
     uv = [(0.49 * u if "Scale" not in settings else u, v) for u, v in SQUARE]
-    colour, *_ = look(paint, [uv])
-    np.testing.assert_allclose(colour[0], expected, atol=0.03)
+    color, *_ = look(paint, [uv])
+    np.testing.assert_allclose(color[0], expected, atol=0.03)
 
 
 def test_uv_map_node_chooses_its_map():
@@ -194,16 +194,16 @@ def test_uv_map_node_chooses_its_map():
     obj = cards([paint.material], [[(0.4 * u, v) for u, v in SQUARE]])
     other = np.array([[(0.6 + 0.4 * u, v) for u, v in SQUARE]], np.float32)
     obj.data.uv_layers.new(name="Other").uv.foreach_set("vector", other.ravel())
-    np.testing.assert_allclose(read(obj)[0].surfaces[0].colour[0], (0, 1, 0), atol=1e-3)
+    np.testing.assert_allclose(read(obj)[0].surfaces[0].color[0], (0, 1, 0), atol=1e-3)
     node.uv_map = ""
-    np.testing.assert_allclose(read(obj)[0].surfaces[0].colour[0], (1, 0, 0), atol=1e-3)
+    np.testing.assert_allclose(read(obj)[0].surfaces[0].color[0], (1, 0, 0), atol=1e-3)
     obj.data.uv_layers["Other"].active_render = True
-    np.testing.assert_allclose(read(obj)[0].surfaces[0].colour[0], (0, 1, 0), atol=1e-3)
+    np.testing.assert_allclose(read(obj)[0].surfaces[0].color[0], (0, 1, 0), atol=1e-3)
 
 
 @pytest.mark.parametrize("domain", ['POINT', 'CORNER', 'FACE'])
 @pytest.mark.parametrize("kind", ["VertexColor", "Attribute"])
-def test_colour_attributes_colour_each_face(domain, kind):
+def test_color_attributes_color_each_face(domain, kind):
     paint = Paint()
     node = paint.node(kind)
     setattr(node, "layer_name" if kind == "VertexColor" else "attribute_name", "dye")
@@ -212,12 +212,12 @@ def test_colour_attributes_colour_each_face(domain, kind):
     dye = obj.data.attributes.new("dye", 'FLOAT_COLOR', domain)
     values = np.repeat(np.array([(0.1, 0.2, 0.3, 1), (0.4, 0.5, 0.6, 1), (0.7, 0, 0, 1)]), len(dye.data) // 3, axis=0)
     dye.data.foreach_set("color", values.astype(np.float32).ravel())
-    found = read(obj)[0].surfaces[0].colour
+    found = read(obj)[0].surfaces[0].color
     np.testing.assert_allclose(found, [(0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0, 0)], atol=1e-3)
 
 
 def test_groups_are_entered_with_what_feeds_them():
-    """The group holds the shader and a hole; colour and alpha come from outside, or from the group's own inputs."""
+    """The group holds the shader and a hole; color and alpha come from outside, or from the group's own inputs."""
     paint, pixels = Paint(), _leaves(128)
     tree = bpy.data.node_groups.new("leaf", "ShaderNodeTree")
     tree.interface.new_socket(name="Tint", in_out='INPUT', socket_type='NodeSocketColor')
@@ -230,28 +230,28 @@ def test_groups_are_entered_with_what_feeds_them():
     group = paint.node("Group", node_tree=tree)
     paint.link(group.outputs[0], paint.output.inputs["Surface"])
     group.inputs["Tint"].default_value, group.inputs["Alpha"].default_value = (0.1, 0.2, 0.3, 1), 0.25
-    colour, _, coverage, _ = look(paint)
-    np.testing.assert_allclose((*colour[0], coverage[0]), (0.1, 0.2, 0.3, 0.25), atol=1e-3)
+    color, _, coverage, _ = look(paint)
+    np.testing.assert_allclose((*color[0], coverage[0]), (0.1, 0.2, 0.3, 0.25), atol=1e-3)
     texture = paint.node("TexImage", image=image(pixels))
     paint.link(texture.outputs["Color"], group.inputs["Tint"])
     paint.link(texture.outputs["Alpha"], group.inputs["Alpha"])
-    colour, _, coverage, _ = look(paint)
+    color, _, coverage, _ = look(paint)
     expected, alpha = _mean(pixels)
     assert coverage[0] == pytest.approx(alpha, abs=0.005)
-    np.testing.assert_allclose(colour[0], expected, rtol=0.01)
+    np.testing.assert_allclose(color[0], expected, rtol=0.01)
 
 
-def test_each_slot_has_its_own_look_and_none_is_grey():
+def test_each_slot_has_its_own_look_and_none_is_gray():
     red, blue = Paint("red"), Paint("blue")
     red.shader.inputs["Base Color"].default_value = (0.5, 0, 0, 1)
     blue.texture(image(np.tile((0, 0, 0.5), (8, 8, 1)), space="Non-Color"))
     obj = cards([red.material, None, blue.material], [SQUARE] * 4, slots=[2, 1, 0, 2])
     surface = read(obj)[0].surfaces[0]
     expected = [(0, 0, 0.5), (0.8, 0.8, 0.8), (0.5, 0, 0), (0, 0, 0.5)]
-    np.testing.assert_allclose(surface.colour, expected, atol=0.003)
+    np.testing.assert_allclose(surface.color, expected, atol=0.003)
 
 
-def test_missing_images_and_surfaces_are_told_and_have_the_viewport_colour(tmp_path):
+def test_missing_images_and_surfaces_are_told_and_have_the_viewport_color(tmp_path):
     lost, bare, empty = Paint("lost"), Paint("bare"), Paint("empty")
     gone = bpy.data.images.new("gone", 4, 4)
     gone.source, gone.filepath = 'FILE', str(tmp_path / "gone.png")
@@ -261,8 +261,8 @@ def test_missing_images_and_surfaces_are_told_and_have_the_viewport_colour(tmp_p
         bare.tree.links.remove(link)
     for paint in (lost, bare, empty):
         paint.material.diffuse_color = (0.1, 0.2, 0.3, 1)
-        colour, transmission, coverage, warnings = look(paint)
-        np.testing.assert_allclose(colour[0], (0.1, 0.2, 0.3), atol=1e-3)
+        color, transmission, coverage, warnings = look(paint)
+        np.testing.assert_allclose(color[0], (0.1, 0.2, 0.3), atol=1e-3)
         assert coverage[0] == 1
         assert np.isnan(transmission[0]) == (paint is bare)
         (warning,) = warnings
@@ -277,10 +277,10 @@ def test_what_only_a_renderer_knows_has_its_middle_and_is_told():
     paint.link(noise.outputs["Color"], mix.inputs["Color1"])
     paint.link(texture.outputs["Color"], mix.inputs["Color2"])
     paint.link(mix.outputs[0], paint.shader.inputs["Base Color"])
-    colour, _, coverage, (warning,) = look(paint, QUARTERS)
+    color, _, coverage, (warning,) = look(paint, QUARTERS)
     assert "Bake" in warning
     assert '"noisy"' in warning
-    assert np.ptp(colour, axis=0).max() > 0.01  # the image that is mixed in keeps its pattern
+    assert np.ptp(color, axis=0).max() > 0.01  # the image that is mixed in keeps its pattern
     # What is understood counts all the same.
     assert coverage[0] == pytest.approx(_mean(pixels[:64, :64])[1], abs=0.01)
 
@@ -301,10 +301,10 @@ def test_small_faces_of_a_large_mesh_add_up_to_the_image():
     paint.texture(image(pixels), alpha=True)
     x, y = (a.ravel() / n for a in np.meshgrid(np.arange(n), np.arange(n)))
     uvs = np.stack([x, y], axis=1)[:, None] + np.array(SQUARE) / n
-    colour, _, coverage, _ = look(paint, uvs)
+    color, _, coverage, _ = look(paint, uvs)
     expected, alpha = _mean(pixels)
     assert coverage.mean() == pytest.approx(alpha, abs=0.001)
-    np.testing.assert_allclose((colour * coverage[:, None]).sum(axis=0) / coverage.sum(), expected, rtol=0.005)
+    np.testing.assert_allclose((color * coverage[:, None]).sum(axis=0) / coverage.sum(), expected, rtol=0.005)
     cells = pixels[:1000, :1000, 3]  # each face shows about five texels across
     shown = cells.reshape(n, 5, n, 5).mean(axis=(1, 3)).ravel()
     assert np.corrcoef(shown, coverage)[0, 1] > 0.5
@@ -317,17 +317,17 @@ def test_very_wide_images_are_read_at_half_their_size():
     pixels[:45, :, 3] = 1
     paint = Paint()
     paint.texture(image(pixels, space="Non-Color"), alpha=True)
-    colour, _, coverage, _ = look(paint, QUARTERS)
+    color, _, coverage, _ = look(paint, QUARTERS)
     np.testing.assert_allclose(coverage, [1, 1, 0, 0], atol=0.03)  # half a texel of 23
-    np.testing.assert_allclose(colour[:2, 0], [0.25, 0.75], rtol=0.01)
+    np.testing.assert_allclose(color[:2, 0], [0.25, 0.75], rtol=0.01)
 
 
 def test_pixels_of_floating_point_images_are_associated_with_their_alpha():
     picture = image(np.tile((0.2, 0.1, 0.4, 0.5), (8, 8, 1)), float_buffer=True, space="Non-Color")
     paint = Paint()
     paint.texture(picture, alpha=True)
-    colour, _, coverage, _ = look(paint)
-    np.testing.assert_allclose((*colour[0], coverage[0]), (0.4, 0.2, 0.8, 0.5), rtol=2e-3)
+    color, _, coverage, _ = look(paint)
+    np.testing.assert_allclose((*color[0], coverage[0]), (0.4, 0.2, 0.8, 0.5), rtol=2e-3)
 
 
 def test_tiled_images_are_told():
@@ -347,9 +347,9 @@ def test_two_images_meet_texel_by_texel():
     paint.texture(image(stripes, space="Non-Color"))
     other = paint.node("TexImage", image=image(mask, space="Non-Color"))
     paint.link(other.outputs["Color"], paint.shader.inputs["Alpha"])
-    colour, _, coverage, _ = look(paint)
+    color, _, coverage, _ = look(paint)
     assert coverage[0] == pytest.approx(0.5, abs=0.01)
-    np.testing.assert_allclose(colour[0], (1, 0.5, 0.25), rtol=0.03)
+    np.testing.assert_allclose(color[0], (1, 0.5, 0.25), rtol=0.03)
 
 
 def test_faces_without_area_and_coordinates_that_are_no_numbers_are_borne():
@@ -360,7 +360,7 @@ def test_faces_without_area_and_coordinates_that_are_no_numbers_are_borne():
         obj.data.vertices[vertex].co = (0, 0, 0)
     obj.data.uv_layers[0].uv[9].vector = (np.nan, np.inf)
     surface = read(obj)[0].surfaces[0]
-    np.testing.assert_allclose(surface.colour, 0.5, atol=0.003)
+    np.testing.assert_allclose(surface.color, 0.5, atol=0.003)
     np.testing.assert_allclose(surface.coverage, 1)
 
 

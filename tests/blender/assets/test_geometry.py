@@ -14,7 +14,7 @@ from tests.blender.scenes import add_mesh
 from tetflora_addon import errors
 from tetflora_addon.blender.assets.parts import Target, digest_of, read_source_steps
 from tetflora_addon.blender.scene.objects import references_of
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -180,7 +180,7 @@ def test_geometry_without_an_object_is_a_target():
     geometry = owner.evaluated_get(graph).evaluated_geometry()
     ((shown, _),) = references_of(geometry)
     target = Target(None, shown, owner, "grid")
-    source, _ = at_once(read_source_steps(target, graph))
+    source, _ = run_to_end(read_source_steps(target, graph))
     assert source.faces == 4
     assert digest_of(target, graph) == source.digest
     whole, _ = read(owner)
@@ -264,8 +264,8 @@ def test_materials_of_objects_and_not_only_of_meshes_count():
         group.objects.link(obj)
     source, _ = read(group)
     assert len(source.surfaces) == 2
-    colours = sorted(surface.colour[0].tolist() for surface in source.surfaces)
-    np.testing.assert_allclose(colours, [(0, 0, 0.5), (0.5, 0, 0)], atol=1e-3)
+    colors = sorted(surface.color[0].tolist() for surface in source.surfaces)
+    np.testing.assert_allclose(colors, [(0, 0, 0.5), (0.5, 0, 0)], atol=1e-3)
 
 
 def test_polygons_of_many_corners_are_one_face():

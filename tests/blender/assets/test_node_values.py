@@ -13,14 +13,14 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _through(paint, node, socket="Color", output=0):
-    """Put a node between the image and the base colour."""
+    """Put a node between the image and the base color."""
     texture = next(n for n in paint.tree.nodes if n.type == 'TEX_IMAGE')
     paint.link(texture.outputs["Color"], node.inputs[socket])
     paint.link(node.outputs[output], paint.shader.inputs["Base Color"])
     return node
 
 
-def test_nodes_that_change_colours_are_followed():
+def test_nodes_that_change_colors_are_followed():
     """An even image, so that each result is known exactly."""
     given = np.array((0.5, 0.25, 0.125))
     cases = {
@@ -54,7 +54,7 @@ def test_ramp_and_mix_are_followed():
     np.testing.assert_allclose(look(paint)[0][0], (0.25, 0, 0.375), atol=0.004)
 
 
-def test_nodes_that_are_switched_off_let_colours_pass():
+def test_nodes_that_are_switched_off_let_colors_pass():
     paint = Paint()
     paint.texture(image(np.tile((0.5, 0.25, 0.125), (4, 4, 1)), space="Non-Color"))
     node = _through(paint, paint.node("Invert"))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Biomes: shipped files are sound, what they say is planted, what is saved comes back, and neighbours blend."""
+"""Biomes: shipped files are sound, what they say is planted, what is saved comes back, and neighbors blend."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from tetflora_addon.blender.biomes import adding, files, ground, library
 from tetflora_addon.blender.file_library import as_text
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.preferences import preferences
-from tetflora_addon.blender.species.edits import catalogue
+from tetflora_addon.blender.species.edits import catalog
 from tetflora_addon.blender.stands.growing import keep_year
-from tetflora_addon.blender.worker import at_once
+from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.errors import SceneError, TetFloraError
 from tetflora_addon.species.litter import FALLEN, KIND
 
@@ -36,7 +36,7 @@ SMALL = {
     "description": "For tests",
     "ground": {"earth": [0.2, 0.1, 0.05], "turf_share": 0.25},
     "species": {
-        "blue_bush": {"of": "bush", "name": "Blue Bush", "every_order": {"leaf_colour": [[0.1, 0.1, 0.3], [0, 0, 0.1]]}}
+        "blue_bush": {"of": "bush", "name": "Blue Bush", "every_order": {"leaf_color": [[0.1, 0.1, 0.3], [0, 0, 0.1]]}}
     },
     "layers": [
         {
@@ -62,7 +62,7 @@ STAND = {
     "interval": 0,
     "density": 900.0,
     "slope_max": 35.0,
-    "species": [{"species": "birch", "planted": 2.0, "rain": 0.0}],
+    "species": [{"species": "birch", "planted": 2.0, "incoming_seeds": 0.0}],
 }
 
 
@@ -84,8 +84,8 @@ def small(**changes) -> files.Biome:
     return files.checked(copy.deepcopy({**SMALL, **changes}), "small")
 
 
-def add(biome: files.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.Added:
-    return at_once(adding.add_biome_steps(scene(), depsgraph(), biome, list(grounds), seed))
+def add(biome: files.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.BiomeResult:
+    return run_to_end(adding.add_biome_steps(scene(), depsgraph(), biome, list(grounds), seed))
 
 
 def places(uid: str) -> np.ndarray:
@@ -104,7 +104,7 @@ def places(uid: str) -> np.ndarray:
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_shipped_biomes_are_sound(path):
     """They pass the checks, need only species that there are, and have a small picture."""
-    biome, known = files.read_biome(path), catalogue()
+    biome, known = files.read_biome(path), catalog()
     pages = files.pages_of(scene(), biome)
     for layer in biome.layers:
         for part in layer["species"]:
@@ -208,7 +208,7 @@ def test_a_stand_is_a_layer():
     assert files.read_biome(path).layers[0] == STAND
     biome.vertex_group = "west"
     number = len(field.data.vertices)
-    at_once(adding.plant_biome_steps(scene(), depsgraph(), biome))
+    run_to_end(adding.plant_biome_steps(scene(), depsgraph(), biome))
     assert 0 < len(field.data.vertices) < number
     adding.remove_biome(scene(), scene().tetflora.biomes[0])
     assert [o for o in scene().objects if o.tetflora.is_field] == []
@@ -224,7 +224,7 @@ def test_stands_that_are_not_the_biomes_to_change_stay():
     mesh, foreign = field.data, field.copy()
     foreign.tetflora.stand.biome = "of another file"
     scene().collection.objects.link(foreign)
-    at_once(adding.plant_biome_steps(scene(), depsgraph(), biome))
+    run_to_end(adding.plant_biome_steps(scene(), depsgraph(), biome))
     assert field.data == mesh
     steps = adding.add_biome_steps(scene(), depsgraph(), small(), [land], 1)
     for _ in range(4):
@@ -249,7 +249,7 @@ def test_a_stand_that_cannot_grow_keeps_no_other_layer_from_its_plants():
     (field,) = files.stands_of(scene(), biome.uid)
     mesh = field.data
     field.tetflora.stand.grounds.clear()
-    updated = at_once(adding.plant_biome_steps(scene(), depsgraph(), biome))
+    updated = run_to_end(adding.plant_biome_steps(scene(), depsgraph(), biome))
     assert [name for name, _ in updated.layers] == ["Bushes"] and field.data == mesh
     (said,) = updated.bare
     assert "Birches" in said and "no ground" in said
@@ -262,7 +262,7 @@ def test_a_layer_without_a_place_is_told():
     assert [text[:19] for text in added.bare] == ["Rare: a density of "]
 
 
-def test_neighbours_blend():
+def test_neighbors_blend():
     """A biome with limits takes its part; one without leaves it, as much as the mask says; nothing else changes."""
     land = add_mesh("ground", size=10.0)
     group = land.vertex_groups.new(name="west")
@@ -271,7 +271,7 @@ def test_neighbours_blend():
     add(floor, land)
     meadow = scene().tetflora.biomes[0].uid
     before = places(meadow)
-    at_once(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), meadow)))
+    run_to_end(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), meadow)))
     assert np.array_equal(places(meadow), before), "planting again changes nothing"
     add(replace(floor, name="Other"), land)
     other = scene().tetflora.biomes[1]
@@ -280,12 +280,12 @@ def test_neighbours_blend():
 
     assert awaits_update(files.layers_of(scene(), meadow)[0]), "the mask of one is the other's limit"
     for uid in (meadow, other.uid):
-        at_once(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), uid)))
+        run_to_end(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), uid)))
     east, west = places(meadow), places(files.find_biome(scene(), scene().tetflora.biomes[1].uid).uid)
     assert abs(len(east) + len(west) - len(before)) < 5.0 * np.sqrt(len(before))
     assert east[:, 0].mean() > 2.0 and west[:, 0].mean() < -2.0
     files.find_biome(scene(), meadow).gives_way = False
-    at_once(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), meadow)))
+    run_to_end(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), meadow)))
     assert np.array_equal(places(meadow), before)
 
 
@@ -322,7 +322,7 @@ def _broken():
         (changed(species={"a": {"name": "A"}}), "missing"),
         (in_layer(kind="tree"), '"kind"'),
         (changed(layers=[{**STAND, "years": 0}]), '"years"'),
-        (changed(layers=[{**STAND, "species": [{"species": "birch", "rain": "some"}]}]), '"rain"'),
+        (changed(layers=[{**STAND, "species": [{"species": "birch", "incoming_seeds": "some"}]}]), '"incoming_seeds"'),
         (in_layer(density="many"), '"density"'),
         (in_layer(species=[]), 'no "species"'),
         (in_layer(species=[{"species": "bush", "weight": -1}]), '"weight"'),

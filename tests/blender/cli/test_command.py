@@ -49,11 +49,11 @@ def test_stats_changes_nothing(forest, capfd):
 
 def test_refine_saves_a_copy_with_the_result(forest, tmp_path, capfd):
     path = tmp_path / "refined.blend"
-    assert _run("refine", "--cutoff", 8, "--form", "shells", "--save", path, "--json") == 0
+    assert _run("refine", "--cutoff", 8, "--proxies", "shells", "--save", path, "--json") == 0
     figures = _figures(capfd)
     assert figures["plants"] == 2
     assert set(figures["seconds"]) >= {"read", "refine", "emit"}
-    assert (forest.tetflora.cutoff, forest.tetflora.proxy_form) == (8.0, 'SHELLS')
+    assert (forest.tetflora.cutoff, forest.tetflora.proxy_kind) == (8.0, 'SHELLS')
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert has_results(bpy.context.scene)
     assert refine.clear(bpy.context.scene) > 0
@@ -73,9 +73,11 @@ def test_light_is_baked_on_demand(forest, tmp_path, capfd):
     assert _run("refine", "--baked-light", "all", "--json") == 0
     assert "light" in _figures(capfd)["seconds"]
     assert forest.tetflora.baked_light == 'ALL'
-    assert _run("render", "--baked-light", "off", "--form", "shells", "--output", tmp_path / "lit.png", "--json") == 0
+    assert (
+        _run("render", "--baked-light", "off", "--proxies", "shells", "--output", tmp_path / "lit.png", "--json") == 0
+    )
     assert "light" not in _figures(capfd)["seconds"]
-    assert (forest.tetflora.baked_light, forest.tetflora.proxy_form) == ('OFF', 'SHELLS')
+    assert (forest.tetflora.baked_light, forest.tetflora.proxy_kind) == ('OFF', 'SHELLS')
 
 
 def test_render_writes_the_files_that_it_names(forest, tmp_path, capfd):
@@ -122,9 +124,9 @@ def test_frames_below_zero_are_rendered_though_no_range_of_blender_has_them(fore
 
 
 def test_a_file_that_blender_could_not_open_is_no_empty_scene(forest, monkeypatch, capfd):
-    monkeypatch.setattr("sys.argv", ["blender", "-b", "misspelt.blend", "--command", "tetflora", "stats"])
+    monkeypatch.setattr("sys.argv", ["blender", "-b", "misspelled.blend", "--command", "tetflora", "stats"])
     assert _run("stats") == 1
-    assert "misspelt.blend cannot be opened" in capfd.readouterr().err
+    assert "misspelled.blend cannot be opened" in capfd.readouterr().err
     monkeypatch.setattr("sys.argv", ["blender", "--command", "tetflora", "refine", "--save", "new.blend"])
     assert _run("stats") == 0
 
@@ -167,7 +169,7 @@ def test_a_folder_that_does_not_exist_is_said_before_the_work(forest, tmp_path, 
         ("grow",),
         ("refine", "--cutoff", "0"),
         ("refine", "--cutoff", "much"),
-        ("refine", "--form", "cubes"),
+        ("refine", "--proxies", "cubes"),
         ("render", "--frames", "9-2"),
         ("render", "--frame", "1", "--frames", "1-2"),
         ("render", "--samples", "0"),

@@ -183,7 +183,7 @@ def _files(folder: Path, *names: str, size: int = 3) -> None:
         (folder / name).write_bytes(b"x" * size)
 
 
-def _travelling(job: Path, shot: Path) -> set[str]:
+def _traveling(job: Path, shot: Path) -> set[str]:
     """Names, within the folder of the .blend, of the files that a job names beside it."""
     inputs = _read(job, "asset_references")["assetReferences"]["inputs"]
     assert inputs["directories"] == []
@@ -202,7 +202,7 @@ def test_tiles_and_sequences_are_those_that_blender_reads(shot, tmp_path):
         _image(name, 'TILED')
     _image("//t/p_09.jp2", 'SEQUENCE')
     assert _run(tmp_path / "job") == 0
-    assert _travelling(tmp_path / "job", shot) == {*tiles, *parts, *frames}
+    assert _traveling(tmp_path / "job", shot) == {*tiles, *parts, *frames}
 
 
 def test_only_files_that_blender_reads_travel(shot, tmp_path, capfd):
@@ -230,7 +230,7 @@ def test_caches_of_simulations_travel_without_what_else_lies_there(shot, tmp_pat
     kept = {"smoke/data/fluid_0001.vdb", "blendcache_shot/0_000001_00.bphys"}
     _files(shot.parent, *kept, "smoke/diary.txt", "blendcache_shot/.netrc")
     assert _run(tmp_path / "job") == 0
-    assert _travelling(tmp_path / "job", shot) == kept
+    assert _traveling(tmp_path / "job", shot) == kept
 
 
 def test_what_lies_outside_is_asked_for(shot, tmp_path, capfd):

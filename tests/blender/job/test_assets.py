@@ -14,7 +14,7 @@ from tests.blender.assets.scatters import Nodes, scattered, species
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
 from tests.engine.assets import trees
 from tetflora_addon import storage
-from tetflora_addon.assets import kept
+from tetflora_addon.assets import asset_cache
 from tetflora_addon.blender.compat import eevee_engine
 from tetflora_addon.blender.job import assets, refine
 from tetflora_addon.blender.results.collection import has_results
@@ -27,9 +27,9 @@ COUNT = 30
 
 @pytest.fixture
 def nothing_known():
-    kept.forget()
+    asset_cache.forget()
     yield
-    kept.forget()
+    asset_cache.forget()
 
 
 def birch(name="birch", count=500, **options):
@@ -48,7 +48,7 @@ def birch(name="birch", count=500, **options):
 
 
 def forest(engine='CYCLES', detail='REFINE', away=25.0, **options):
-    """Thirty of them by nodes, a metre apart, before a camera."""
+    """Thirty of them by nodes, a meter apart, before a camera."""
     tree = birch(**options)
     ground = scattered(tree, COUNT)
     ground.location.x = -COUNT / 2
@@ -81,7 +81,7 @@ def area(mesh):
 
 
 def drawn_area():
-    """Area of all instances, metres squared, were none of them scaled."""
+    """Area of all instances, meters squared, were none of them scaled."""
     return sum(area(mesh) for mesh, _ in shown())
 
 
@@ -162,16 +162,16 @@ def test_refining_again_replaces_and_compiles_nothing(monkeypatch):
 
 
 def test_another_session_finds_what_was_compiled(monkeypatch, tmp_path):
-    folder = storage.used()
-    storage.use(tmp_path / "cache")
+    folder = storage.current_folder()
+    storage.set_folder(tmp_path / "cache")
     try:
         scene, *_ = forest()
         first = run(scene)
-        kept.forget()
+        asset_cache.forget()
         monkeypatch.setattr(assets, "compile_steps", lambda source: pytest.fail(f"compiled {source.name} again"))
         assert run(scene).polygons_proxy == first.polygons_proxy
     finally:
-        storage.use(folder)
+        storage.set_folder(folder)
 
 
 def test_an_asset_that_changes_is_compiled_anew():
@@ -181,14 +181,14 @@ def test_an_asset_that_changes_is_compiled_anew():
         vertex.co *= 1.7
     tree.data.update()
     second = run(scene)
-    assert len(kept._known) == 2
+    assert len(asset_cache._known) == 2
     assert second.polygons_proxy != first.polygons_proxy
 
 
 def test_steps_give_what_is_made_at_once():
     scene, *_ = forest()
     found = []
-    for go in (lambda steps: deque(steps, maxlen=0), refine.at_once):
+    for go in (lambda steps: deque(steps, maxlen=0), refine.run_to_end):
         go(refine.refine_steps(scene, depsgraph()))
         found.append([(mesh.split(".")[0], matrix.tobytes()) for mesh, matrix in shown()])
     assert found[0] == found[1]
@@ -312,7 +312,7 @@ def test_two_scatterers_of_one_asset_are_both_replaced():
     statistics = run(scene)
     assert statistics.instances == COUNT + 7
     assert ground.hide_render and other.hide_render
-    assert len(kept._known) == 1
+    assert len(asset_cache._known) == 1
     refine.clear(scene)
     assert not ground.hide_render and not other.hide_render
 

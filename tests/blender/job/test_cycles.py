@@ -40,7 +40,7 @@ def test_cycles_of_refine_and_clear_leave_nothing_behind(clean_file, form):
     for n, species in enumerate(("bush", "fern")):
         add_plant(species, species, seed=n, location=(3.0 * n - 1.5, 0.0, 0.0))
     settings = scene.tetflora
-    settings.proxy_form, settings.leaf_limit, settings.cutoff, settings.visibility_resolution = form, 0.5, 8.0, 64
+    settings.proxy_kind, settings.leaf_limit, settings.cutoff, settings.visibility_resolution = form, 0.5, 8.0, 64
     depsgraph()
     before, memory, made = datablocks(), [], set()
     for cycle in range(CYCLES + 1):

@@ -18,7 +18,7 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results.output import KIND, PARENT
 from tetflora_addon.blender.scene.fields import read_field, upright, write_field
 from tetflora_addon.blender.viewport.levels import level_steps, read_shapes
-from tetflora_addon.blender.worker import at_once
+from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.camera.camera import GRID
 
 #: 1,000 km, where single precision has steps of 6 cm; places in the scene below are multiples of that.
@@ -72,8 +72,8 @@ def _taken(scene: bpy.types.Scene) -> dict[str, tuple[np.ndarray, dict[str, np.n
     "settings",
     [
         {},
-        {"proxy_form": 'SHELLS'},
-        {"proxy_form": 'MICROSPHERES', "anchored": True, "shadow_cutoff": 4.0},
+        {"proxy_kind": 'SHELLS'},
+        {"proxy_kind": 'MICROSPHERES', "anchored": True, "shadow_cutoff": 4.0},
         {"baked_light": 'PROXIES'},
         {"expand_everything": True},
     ],
@@ -82,7 +82,7 @@ def _taken(scene: bpy.types.Scene) -> dict[str, tuple[np.ndarray, dict[str, np.n
 def test_results_far_out_are_those_at_the_origin(scene: bpy.types.Scene, settings: dict) -> None:
     for name, value in settings.items():
         setattr(scene.tetflora, name, value)
-    if "baked_light" in settings:  # sheets of a square metre would take a hundred times as long
+    if "baked_light" in settings:  # sheets of a square meter would take a hundred times as long
         scene.render.resolution_percentage = 50
         for name in ("rock", "SUN"):
             bpy.data.objects.remove(scene.objects[name])
@@ -133,9 +133,9 @@ def _area(scene: bpy.types.Scene) -> float:
 
 def test_previews_far_out_are_those_at_the_origin(scene: bpy.types.Scene) -> None:
     scene.tetflora.preview.plants = 'LIGHT'
-    levels, shapes = at_once(level_steps(scene, depsgraph())), read_shapes(scene, depsgraph())
+    levels, shapes = run_to_end(level_steps(scene, depsgraph())), read_shapes(scene, depsgraph())
     _moved(scene, FAR)
-    far_levels, far_shapes = at_once(level_steps(scene, depsgraph())), read_shapes(scene, depsgraph())
+    far_levels, far_shapes = run_to_end(level_steps(scene, depsgraph())), read_shapes(scene, depsgraph())
     last, far_last = levels.levels[-1], far_levels.levels[-1]
     assert np.array_equal(levels.vertices(last), far_levels.vertices(far_last))
     assert np.array_equal(far_levels.camera.origin, FAR)
@@ -143,7 +143,7 @@ def test_previews_far_out_are_those_at_the_origin(scene: bpy.types.Scene) -> Non
     assert np.array_equal(far_shapes.origin, FAR)
 
 
-@pytest.mark.parametrize("settings", [{}, {"anchored": True}, {"proxy_form": 'SHELLS', "anchored": True}], ids=str)
+@pytest.mark.parametrize("settings", [{}, {"anchored": True}, {"proxy_kind": 'SHELLS', "anchored": True}], ids=str)
 def test_a_stray_changes_nothing_and_is_named(
     scene: bpy.types.Scene, capfd: pytest.CaptureFixture[str], settings: dict
 ) -> None:
@@ -161,7 +161,7 @@ def test_a_stray_changes_nothing_and_is_named(
         said = capfd.readouterr().out
         assert '"lost rock", "slipped"' in said
         assert f"{np.abs(place).max() / 1e3:,.0f} km from the camera" in said
-        assert set(json.loads(scene.tetflora.statistics)["strays"]) == {"lost rock", "slipped"}
+        assert set(json.loads(scene.tetflora.statistics)["outliers"]) == {"lost rock", "slipped"}
         with_stray = _taken(scene)
         assert alone.keys() == with_stray.keys()
         for name, (_, attributes) in with_stray.items():
@@ -186,11 +186,11 @@ def test_a_field_with_a_stray_is_named(scene: bpy.types.Scene) -> None:
     field = write_field("meadow", points, *rows, ["bush"])
     scene.collection.objects.link(field)
     statistics = refine.refine(scene, depsgraph())
-    assert statistics.strays == {"meadow": pytest.approx(5e5, rel=1e-3)}
+    assert statistics.outliers == {"meadow": pytest.approx(5e5, rel=1e-3)}
 
 
 def test_a_new_field_far_out_keeps_its_places(scene: bpy.types.Scene) -> None:
-    """In the world's coordinates single precision would move plants by centimetres."""
+    """In the world's coordinates single precision would move plants by centimeters."""
     points = np.array([[0.123, 12.456, 0.789], [3.21, 15.654, 0.987]]) + 1e6
     rows = upright(np.zeros(2)), np.ones(2), np.zeros(2, np.int32), np.arange(2, dtype=np.int32)
     field = write_field("meadow", points, *rows, ["bush"])

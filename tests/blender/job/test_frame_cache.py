@@ -83,7 +83,7 @@ def alone(scene, frame):
     return found
 
 
-def test_neighbouring_frames_share_and_each_is_the_frame_alone(animation, made):
+def test_neighboring_frames_share_and_each_is_the_frame_alone(animation, made):
     sequence = {n: at(animation, n) for n in range(1, FRAMES + 1)}
     cells = len({name for name, _ in sequence.values()})
     assert made[0] == 1
@@ -179,7 +179,7 @@ def test_what_changes_is_noticed(animation, made, change):
     elif change == "species":
         bpy.data.objects["one"].tetflora.species = "fern"
     elif change == "form":
-        animation.tetflora.proxy_form = 'MICROSPHERES'
+        animation.tetflora.proxy_kind = 'MICROSPHERES'
     elif change == "material":
         animation.tetflora.output.species.add().species = "bush"
         animation.tetflora.output.species[1].leaf = bpy.data.materials.new("mine")
@@ -325,7 +325,7 @@ def test_digests_tell_values_apart(one, other):
 
 
 def test_shells_that_come_back_are_shaded_as_they_were(animation, made):
-    animation.tetflora.proxy_form = 'SHELLS'
+    animation.tetflora.proxy_kind = 'SHELLS'
     first = at(animation, 1)
     animation.tetflora.shell_diffuse = 0.5
     assert at(animation, 1)[1]["materials"] != first[1]["materials"]

@@ -12,7 +12,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, sel
 from tetflora_addon import memory
 from tetflora_addon.blender.job import plant_mesh
 from tetflora_addon.blender.results.hiding import hide_originals
-from tetflora_addon.blender.worker import at_once
+from tetflora_addon.blender.worker import run_to_end
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -89,7 +89,7 @@ def test_it_looks_as_the_plant_does_to_renders():
     plant.light_linking.receiver_collection = lit
     select(plant)
     hide_originals(scene, 'VIEW', [plant])  # as results do, which is not the artist's doing
-    (made,) = at_once(plant_mesh.make_plant_mesh_steps(scene, depsgraph(), [plant]))
+    (made,) = run_to_end(plant_mesh.make_plant_mesh_steps(scene, depsgraph(), [plant]))
     names = ("is_holdout", "is_shadow_catcher", "visible_shadow", "visible_camera", "visible_glossy", "pass_index")
     for name in (*names, "lightgroup", "hide_render"):
         assert getattr(made, name) == getattr(plant, name), name

@@ -89,7 +89,7 @@ def test_statistics_say_what_is_in_the_scene():
 def test_the_result_fits_the_budget(form):
     """In the scene, not in expectation; and the statistics say how coarse the facets became."""
     scene = _forest()
-    free = _refine(scene, proxy_form=form, leaf_limit=0.2)
+    free = _refine(scene, proxy_kind=form, leaf_limit=0.2)
     whole = free.polygons_meshed + free.polygons_proxy
     for share in (0.5, 0.2):
         fitted = _refine(scene, max_polygons=int(share * whole))
@@ -179,7 +179,7 @@ def test_steps_give_what_is_made_at_once():
     """To the last bit, although one has a thread and the other has none."""
     scene = _forest()
     digests = []
-    for run in (lambda steps: deque(steps, maxlen=0), worker.at_once):
+    for run in (lambda steps: deque(steps, maxlen=0), worker.run_to_end):
         run(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get()))
         made = sorted(_made(scene), key=lambda o: o.name.split(".")[0])
         digests.append([(o.name.split(".")[0], read(o.data, "position").tobytes()) for o in made])
@@ -269,7 +269,7 @@ def test_the_refined_picture_is_that_of_the_plants():
     truth = blocks()
     assert np.ptp(truth) > 0.2  # the plants are seen at all
     for form, bound in (('MICROSURFACES', 0.03), ('MICROSPHERES', 0.04), ('SHELLS', 0.06)):
-        statistics = _refine(scene, expand_everything=False, leaf_limit=4.0, proxy_form=form)
+        statistics = _refine(scene, expand_everything=False, leaf_limit=4.0, proxy_kind=form)
         assert statistics.polygons_meshed < 0.3 * statistics.polygons_full, form
         assert np.sqrt(((blocks() - truth) ** 2).mean()) < bound, form
 
@@ -293,17 +293,17 @@ def test_a_job_that_is_told_to_stop_refining_makes_what_it_has():
     assert whole.passes > statistics.passes
 
 
-def test_materials_show_the_colours_of_their_species_in_solid_viewports():
-    """Once: a colour that an artist gives stays."""
+def test_materials_show_the_colors_of_their_species_in_solid_viewports():
+    """Once: a color that an artist gives stays."""
     add_camera(location=(0.0, -20.0, 4.0))
     for i, species in enumerate(("cherry_blossom", "cypress")):
         add_plant(species, seed=i, location=(6.0 * i - 3.0, 0.0, 0.0), species=species)
     scene = bpy.context.scene
     _refine(scene, expand_everything=True)
     shown = {o.data.materials[0].name: tuple(o.data.materials[0].diffuse_color) for o in _made(scene)}
-    leaves = [colour for name, colour in shown.items() if name.endswith("leaf")]
+    leaves = [color for name, color in shown.items() if name.endswith("leaf")]
     assert len(leaves) == len(set(leaves)) == 3
-    blossom = next(colour for name, colour in shown.items() if "blossom" in name)
+    blossom = next(color for name, color in shown.items() if "blossom" in name)
     assert blossom[0] > blossom[1]  # pink
     material = next(o.data.materials[0] for o in _made(scene) if o["tetflora_kind"] == "bark")
     material.diffuse_color = (0.0, 0.0, 1.0, 1.0)

@@ -15,7 +15,7 @@ from tetflora_addon import errors
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine, render
 from tetflora_addon.blender.materials import nodes
-from tetflora_addon.blender.results import collection, forms, hiding
+from tetflora_addon.blender.results import collection, hiding, proxy_kinds
 from tetflora_addon.blender.scene import plants
 from tetflora_addon.blender.scene.camera import read_camera
 
@@ -79,7 +79,7 @@ def stub(monkeypatch):
     return stub
 
 
-def _centre(path) -> float:
+def _center(path) -> float:
     """Mean of the middle of a picture: 0 where the square is, 1 where it is not."""
     image = bpy.data.images.load(str(path))
     try:
@@ -92,7 +92,7 @@ def _centre(path) -> float:
 def _still(scene, path):
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    return _centre(path)
+    return _center(path)
 
 
 def test_animations_are_refined_for_the_camera_and_plants_of_each_frame(stage, stub, tmp_path):
@@ -105,7 +105,7 @@ def test_animations_are_refined_for_the_camera_and_plants_of_each_frame(stage, s
     bpy.ops.render.render(animation=True)
     assert [c[0] for c in stub.cameras] == [0.0, 3.0, 6.0]
     assert [p[0][1] for p in stub.plants] == [0.0, 2.0, 4.0]
-    assert [_centre(tmp_path / f"frame_{n:04d}.png") for n in (1, 2, 3)] == [0.0] * 3
+    assert [_center(tmp_path / f"frame_{n:04d}.png") for n in (1, 2, 3)] == [0.0] * 3
     assert datablocks() == before
 
 
@@ -225,7 +225,7 @@ def test_bounces_of_each_scene_come_back(stage, stub):
     other.camera = stage.camera
     other.collection.objects.link(bpy.data.objects["plant"])
     for n, scene in enumerate((stage, other)):
-        scene.tetflora.proxy_form = 'SHELLS'
+        scene.tetflora.proxy_kind = 'SHELLS'
         scene.cycles.transparent_max_bounces = 10 + n
         render.on_render_pre(scene)
         assert scene.cycles.transparent_max_bounces > 100
@@ -265,7 +265,7 @@ def test_eevee_without_plants_is_as_the_artist_set_it(stage, stub):
 
 def test_a_scene_that_is_deleted_in_the_middle_of_a_render_stops_neither_saving_nor_its_end(stage, stub):
     stage.render.engine = 'CYCLES'
-    stage.tetflora.proxy_form = 'SHELLS'
+    stage.tetflora.proxy_kind = 'SHELLS'
     stage.cycles.transparent_max_bounces = 10
     other = bpy.data.scenes.new("other")
     render.on_render_pre(stage)
@@ -371,8 +371,8 @@ def test_shells_are_rendered_with_enough_transparent_bounces_and_the_settings_co
     """Baked shells need as many as others do."""
     scene = bpy.context.scene
     scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces = 8, 2
-    scene.tetflora.proxy_form, scene.tetflora.baked_light = 'SHELLS', baked
-    assert "renders shells black" in forms.few_bounces(scene)
+    scene.tetflora.proxy_kind, scene.tetflora.baked_light = 'SHELLS', baked
+    assert "renders shells black" in proxy_kinds.few_bounces(scene)
     seen = []
 
     def read(*_):
@@ -387,7 +387,7 @@ def test_shells_are_rendered_with_enough_transparent_bounces_and_the_settings_co
     assert seen == [(256, 256)]
     assert (scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces) == (8, 2)
     scene.cycles.transparent_max_bounces = 128
-    assert not forms.few_bounces(scene)
+    assert not proxy_kinds.few_bounces(scene)
 
 
 def test_baked_light_is_made_for_each_render_and_outlives_the_file(stage, tmp_path):
@@ -404,7 +404,7 @@ def test_baked_light_is_made_for_each_render_and_outlives_the_file(stage, tmp_pa
 
 def test_a_scene_that_is_renamed_in_the_middle_of_a_render_is_left_as_it_was(stage, stub):
     stage.render.engine = 'CYCLES'
-    stage.tetflora.proxy_form = 'SHELLS'
+    stage.tetflora.proxy_kind = 'SHELLS'
     stage.cycles.transparent_max_bounces = 10
     render.on_render_pre(stage)
     assert stage.cycles.transparent_max_bounces > 10

@@ -45,7 +45,7 @@ def test_half_a_result_is_in_no_file(scene, tmp_path, moment):
 
 
 def test_bounces_that_are_raised_for_a_render_are_not_saved(scene, tmp_path):
-    scene.tetflora.proxy_form = 'SHELLS'
+    scene.tetflora.proxy_kind = 'SHELLS'
     cycles = scene.cycles
     cycles.transparent_max_bounces, cycles.min_transparent_bounces = 8, 2
     path = tmp_path / "meanwhile.blend"

@@ -51,7 +51,7 @@ def at(scene, frame):
 
 
 def rooms(scene):
-    """How much room the cells of all frames have for their cameras, metres."""
+    """How much room the cells of all frames have for their cameras, meters."""
     found = []
     for frame in range(1, FRAMES + 1):
         scene.frame_set(frame)

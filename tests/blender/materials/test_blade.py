@@ -17,7 +17,7 @@ from tetflora_addon.subplants.leaf_meshes import LeafCopies
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
-COLOUR, TRANSMISSION = np.array([0.11, 0.2, 0.035]), 0.4
+COLOR, TRANSMISSION = np.array([0.11, 0.2, 0.035]), 0.4
 MODELS = {"palmate": "maple", "lobed": "lobed", "narrow": "lanceolate", "petal": "round", "plain": "deltoid"}
 ROWS = 6
 WIDTH = 2.0
@@ -35,7 +35,7 @@ def half_sky(below):
 
 
 def leaves(model, material, sides, rows=ROWS, spread=0.03):
-    """Rows of one leaf model, each copy of another colour; rows show one of the sides (1 upper, -1 lower) in turn."""
+    """Rows of one leaf model, each copy of another color; rows show one of the sides (1 upper, -1 lower) in turn."""
     number, step = rows * rows, WIDTH / rows
     copies = LeafCopies(model, number, TRANSMISSION)
     column, row = (a.ravel() for a in np.meshgrid(np.arange(rows), np.arange(rows)))
@@ -44,7 +44,7 @@ def leaves(model, material, sides, rows=ROWS, spread=0.03):
     frame = np.zeros((number, 3, 3), np.float32)
     frame[:, 0, 0], frame[:, 1, 1], frame[:, 2, 2] = side, 1.0, side
     tone = 1.0 + spread * np.linspace(-1, 1, number)
-    copies.add(np.arange(number, dtype=np.uint64), place, frame, np.full(number, 0.8 * step), COLOUR * tone[:, None])
+    copies.add(np.arange(number, dtype=np.uint64), place, frame, np.full(number, 0.8 * step), COLOR * tone[:, None])
     made = bpy.data.objects.new("leaves", meshes.write_mesh("leaves", copies.buffers(), [material]))
     bpy.context.scene.collection.objects.link(made)
 
@@ -107,8 +107,8 @@ def test_few_leaves_are_worn():
     assert 0.0 < brown.sum() / leaf.sum() < 0.08
 
 
-def test_leaves_of_one_colour_look_alike_at_any_place():
-    """Numbers of a leaf follow from its colour alone, so they do not flicker when a mesh is made anew."""
+def test_leaves_of_one_color_look_alike_at_any_place():
+    """Numbers of a leaf follow from its color alone, so they do not flicker when a mesh is made anew."""
     one, other = (seen(LEAF_MODELS["ovate"], materials.leaf_material("Oak"), (1,), False) for _ in range(2))
     np.testing.assert_allclose(one, other, atol=1e-6)
 

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 LIGHT = np.array([0.2126, 0.7152, 0.0722])
 
 
-def tube(radius, colour, material, turns=0, start=2):
+def tube(radius, color, material, turns=0, start=2):
     """A branch along x, seven perimeters long, in the middle of the view; u starts at `turns`, v at `start`."""
     sides, rings = 16, 8
     step, angle = np.arange(rings + 1) / rings, 2 * np.pi * np.arange(sides) / sides
@@ -42,7 +42,7 @@ def tube(radius, colour, material, turns=0, start=2):
         np.arange(0, 4 * len(corners) + 1, 4, dtype=np.int32),
         {
             "UVMap": ("CORNER", np.stack([u, v], axis=2).reshape(-1, 2).astype(np.float32)),
-            "tf_colour": ("FACE", np.tile(np.float32(colour), (len(corners), 1))),
+            "tf_color": ("FACE", np.tile(np.float32(color), (len(corners), 1))),
             "tf_transmission": ("FACE", np.zeros(len(corners), np.float32)),
             "tf_girth": ("FACE", np.full(len(corners), 2 * np.pi * radius, np.float32)),
         },
@@ -51,19 +51,19 @@ def tube(radius, colour, material, turns=0, start=2):
     return added("tube", polygons, material)
 
 
-def bark_seen(character, radius, engine="CYCLES", turns=0, colour=(0.4, 0.3, 0.2), start=2, material=None):
+def bark_seen(character, radius, engine="CYCLES", turns=0, color=(0.4, 0.3, 0.2), start=2, material=None):
     """Picture of the middle half of a branch, five perimeters of it, under an even sky of 1; no moss on such a one."""
     session.clean_file()
     engine = compat.eevee_engine() if engine == "EEVEE" else engine
     small_scene(sky=1.0, samples=16, size=96, engine=engine, width=4 * 2 * np.pi * radius)
-    tube(radius, colour, material() if material else materials.bark_material("Oak", character), turns, start)
+    tube(radius, color, material() if material else materials.bark_material("Oak", character), turns, start)
     seen = picture()
     tall = len(seen)
     reach = int(0.8 * tall / (8 * np.pi))  # from the axis, of the radius
     return seen[tall // 2 - reach : tall // 2 + reach]
 
 
-def sheet(colour, transmission, material):
+def sheet(color, transmission, material):
     """A square of 8 m across the view, facing up; the leaf's length is that of the view."""
     corners = np.array([[-4, -4, 0], [4, -4, 0], [4, 4, 0], [-4, 4, 0]], dtype=np.float32)
     polygons = buffers.MeshBuffers(
@@ -74,7 +74,7 @@ def sheet(colour, transmission, material):
         np.array([0, 4], dtype=np.int32),
         {
             "UVMap": ("CORNER", corners[:, :2] / 2 + np.float32(0.5)),
-            "tf_colour": ("FACE", np.array([colour], dtype=np.float32)),
+            "tf_color": ("FACE", np.array([color], dtype=np.float32)),
             "tf_transmission": ("FACE", np.array([transmission], dtype=np.float32)),
         },
     )
@@ -112,7 +112,7 @@ def test_a_white_leaf_in_a_white_world_returns_no_more_than_it_gets(transmission
 
 
 def test_a_leaf_lit_from_behind_shows_its_transmission_only():
-    """The sun from below, S = π W/m²: radiance is colour times tint times share, times what gloss leaves."""
+    """The sun from below, S = π W/m²: radiance is color times tint times share, times what gloss leaves."""
     small_scene(sky=0.0, samples=64, sun=180.0, size=32)
     sheet((0.2, 0.4, 0.1), 0.5, materials.leaf_material("Oak"))
     tint = np.array(microsphere.THROUGH_TINT[:3])
@@ -132,14 +132,14 @@ def test_needles_have_no_veins():
 @pytest.mark.parametrize(
     ("character", "engine"), [*((character, "CYCLES") for character in species.BARKS), ("ridged", "EEVEE")]
 )
-def test_bark_keeps_the_mean_colour(character, engine):
-    """Proxies have the flat colour; 4 % is what eyes pass over. High up a pine is orange, but as light."""
-    colour = np.array((0.2, 0.15, 0.1))  # as light as bark is
-    seen = bark_seen(character, 0.05 if character == "jointed" else 0.4, engine, colour=colour)
+def test_bark_keeps_the_mean_color(character, engine):
+    """Proxies have the flat color; 4 % is what eyes pass over. High up a pine is orange, but as light."""
+    color = np.array((0.2, 0.15, 0.1))  # as light as bark is
+    seen = bark_seen(character, 0.05 if character == "jointed" else 0.4, engine, color=color)
     if character == "papery":
-        np.testing.assert_allclose(seen.mean(axis=(0, 1)) @ LIGHT, colour @ LIGHT, rtol=0.04)
+        np.testing.assert_allclose(seen.mean(axis=(0, 1)) @ LIGHT, color @ LIGHT, rtol=0.04)
     else:
-        np.testing.assert_allclose(seen.mean(axis=(0, 1)), colour, rtol=0.04)
+        np.testing.assert_allclose(seen.mean(axis=(0, 1)), color, rtol=0.04)
     assert seen.std(axis=(0, 1))[0] > 0.005, "no pattern"
 
 
@@ -148,9 +148,9 @@ def flat_bark(character, **inputs):
 
     def build(graph, _material):
         group = bark.bark_group(character)
-        given = {"Colour": graph.attribute("tf_colour", "Color"), **inputs}
+        given = {"Color": graph.attribute("tf_color", "Color"), **inputs}
         looks = graph.node("ShaderNodeGroup", given, node_tree=group)
-        shine = graph.node("ShaderNodeEmission", {"Color": looks.outputs["Colour"], "Strength": 1.0})
+        shine = graph.node("ShaderNodeEmission", {"Color": looks.outputs["Color"], "Strength": 1.0})
         graph.node("ShaderNodeOutputMaterial", {"Surface": shine})
 
     return nodes.surface_material("flat bark", 1, build)
@@ -158,18 +158,18 @@ def flat_bark(character, **inputs):
 
 @pytest.mark.parametrize("radius", [0.15, 0.4])
 @pytest.mark.parametrize("character", species.BARKS)
-def test_mean_albedo_of_bark_is_the_colour_of_its_proxies(character, radius):
+def test_mean_albedo_of_bark_is_the_color_of_its_proxies(character, radius):
     """Moss too is as light as what it covers: within .01, at the foot, but for black ones of birches, and above it."""
     wanted = np.array([0.3, 0.24, 0.18])
     for start in (2,) if character in ("peeling", "pitted") else (-1, 2):
-        seen = bark_seen(character, radius, colour=wanted, start=start, material=lambda: flat_bark(character))
+        seen = bark_seen(character, radius, color=wanted, start=start, material=lambda: flat_bark(character))
         mean = seen.mean(axis=(0, 1))
         assert mean @ LIGHT == pytest.approx(wanted @ LIGHT, abs=0.01)
         if start > 0 and character != "papery":
             np.testing.assert_allclose(mean, wanted, atol=0.01)
 
 
-def test_papery_bark_is_orange_high_up_and_on_limbs_as_their_colour_says():
+def test_papery_bark_is_orange_high_up_and_on_limbs_as_their_color_says():
     def red(radius, start):
         seen = bark_seen("papery", radius, start=start, material=lambda: flat_bark("papery")).mean(axis=(0, 1))
         return seen[0] / seen[1]
@@ -192,7 +192,7 @@ def knots():
 
 
 def test_knots_are_sparse_and_ridges_give_way_around_them():
-    seen = np.stack([bark_seen("ridged", 0.4, colour=(c, 0.3, 0.2), material=knots)[..., 0] for c in (0.1, 0.2, 0.3)])
+    seen = np.stack([bark_seen("ridged", 0.4, color=(c, 0.3, 0.2), material=knots)[..., 0] for c in (0.1, 0.2, 0.3)])
     eyes, around = seen > 0.6, (seen > 0.05) & (seen < 0.6)
     assert 0.002 < eyes.mean() < 0.1
     assert 2 * eyes.mean() < around.mean() < 0.9
@@ -231,8 +231,8 @@ def test_bark_has_no_seam():
     np.testing.assert_allclose(bark_seen("plated", 0.4, turns=1), bark_seen("plated", 0.4), atol=0.02)
 
 
-def test_branches_of_other_colours_have_other_patterns():
-    one, other = (bark_seen("ridged", 0.4, colour=np.full(3, c))[..., 0] for c in (0.3, 0.36))
+def test_branches_of_other_colors_have_other_patterns():
+    one, other = (bark_seen("ridged", 0.4, color=np.full(3, c))[..., 0] for c in (0.3, 0.36))
     assert abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) < 0.5
 
 
@@ -257,14 +257,14 @@ def test_bark_lets_no_light_through():
 
 def test_microsurfaces_match_leaves_and_bark():
     """From afar all that is left of bark is its mean; so small a piece of it is a tenth off. Leaves have two sides."""
-    colour = (0.3, 0.2, 0.1)
+    color = (0.3, 0.2, 0.1)
     seen = {}
     for name, transmission in (("leaf", 0.4), ("bark", 0.0)):
         for kind in (name, "proxy"):
             session.clean_file()
             small_scene(sky=0.5, samples=64, sun=30.0)
             made = materials.proxy_material() if kind == "proxy" else getattr(materials, f"{name}_material")("Oak")
-            flat = sheet(colour, transmission, made)
+            flat = sheet(color, transmission, made)
             sides = [picture().mean(axis=(0, 1))]
             flat.rotation_euler = (0.0, np.pi, 0.0)
             seen[name, kind] = np.mean([*sides, picture().mean(axis=(0, 1))], axis=0)

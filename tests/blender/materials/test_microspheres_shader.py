@@ -24,7 +24,7 @@ def place(tilt=0.0, **inputs):
     tree.nodes.clear()
     group = tree.nodes.new("ShaderNodeGroup")
     group.node_tree = microsphere.microsphere_group()
-    given = {"Colour": (1.0, 1.0, 1.0, 1.0), "Through Tint": (1.0, 1.0, 1.0, 1.0), **inputs}
+    given = {"Color": (1.0, 1.0, 1.0, 1.0), "Through Tint": (1.0, 1.0, 1.0, 1.0), **inputs}
     for name, value in given.items():
         group.inputs[name].default_value = value
     # Not linked, EEVEE takes the object's extent for its thickness.
@@ -59,7 +59,7 @@ def test_a_white_cloud_vanishes_in_white_surroundings(plane, s, transmission, ti
 @pytest.mark.parametrize("transmission", [0.0, 0.5])
 @pytest.mark.parametrize("plane", [0.0, 1.0])
 def test_light_that_is_sampled_counts_as_light_that_is_hit(plane, transmission):
-    """The same sky with a texture of which all colours are one: Cycles then also picks directions in the sky."""
+    """The same sky with a texture of which all colors are one: Cycles then also picks directions in the sky."""
     small_scene(sky=1.0, samples=256, size=8, width=0.5)
     place(0.9, Plane=plane, s=0.0, Transmission=transmission, Normal=(0.3, 0.2, 0.9))
     tree = bpy.context.scene.world.node_tree
@@ -93,7 +93,7 @@ def test_light_from_behind_passes_through(name):
     """A sun below the square, seen from above: the share that is transmitted, times the tint."""
     small_scene(sky=0.0, size=8, sun=180.0, width=0.4, **engine_and_samples(name, 64))
     tint = (1.0, 0.5, 0.25, 1.0)
-    square = place(Transmission=0.4, Roundness=0.0, **{"Through Tint": tint, "Colour": (0.5, 0.5, 0.5, 1.0)})
+    square = place(Transmission=0.4, Roundness=0.0, **{"Through Tint": tint, "Color": (0.5, 0.5, 0.5, 1.0)})
     # In EEVEE's shadow map a sheet of no thickness shadows its own far side.
     square.visible_shadow = False
     assert bpy.context.scene.objects["sun"].rotation_euler[1] > 3.0
@@ -143,7 +143,7 @@ def test_haze_dims_it_and_adds_its_own_light():
 def test_every_socket_is_described_and_every_link_valid():
     group = microsphere.microsphere_group()
     sockets = [item for item in group.interface.items_tree if item.item_type == 'SOCKET']
-    assert {s.name for s in sockets if s.in_out == 'INPUT'} >= {"Colour", "Transmission", "Normal", "Plane", "p", "s"}
+    assert {s.name for s in sockets if s.in_out == 'INPUT'} >= {"Color", "Transmission", "Normal", "Plane", "p", "s"}
     assert all(s.description for s in sockets if s.in_out == 'INPUT')
     assert [s.name for s in sockets if s.in_out == 'OUTPUT'] == ["Cycles", "EEVEE"]
     assert all(link.is_valid for link in group.links)

@@ -25,13 +25,13 @@ ISOTROPIC = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def place(
-    vertices, extinction, colour=0.0, transmission=0.0, normal=(0.0, 0.0, 1.0), plane=0.0, stochastic=1.0, **sockets
+    vertices, extinction, color=0.0, transmission=0.0, normal=(0.0, 0.0, 1.0), plane=0.0, stochastic=1.0, **sockets
 ):
     """Link shells of the cells (n, 4, 3) with S (n, 6) to the scene."""
     count = len(vertices)
     buffers = shells.shell_buffers(
         vertices,
-        np.full((count, 3), colour),
+        np.full((count, 3), color),
         np.full(count, transmission),
         np.broadcast_to(extinction, (count, 6)),
         np.tile(normal, (count, 1)),
@@ -143,7 +143,7 @@ def test_extinction_depends_on_direction():
 
 
 def test_far_from_the_origin():
-    """Five kilometres away positions are rounded to half a millimetre, thickness is not."""
+    """Five kilometers away positions are rounded to half a millimeter, thickness is not."""
     away = np.array([4000.0, 3000.0, 0.0])
     prepare(64)
     bpy.context.scene.camera.location.x += away[0]
@@ -153,12 +153,12 @@ def test_far_from_the_origin():
     assert np.sqrt((difference**2).mean()) < 0.01
 
 
-def test_light_from_the_viewer_gives_the_colour():
+def test_light_from_the_viewer_gives_the_color():
     """Particles and planes that face both light and viewer: p cos φ = p cos α = p at φ = α = 0."""
     for plane in (0.0, 1.0):
         session.clean_file()
         small_scene(sky=0.0, samples=16, sun=0.0, size=SIZE, width=0.2)
-        place(REGULAR[None], ISOTROPIC * 1e8, colour=0.3, plane=plane)
+        place(REGULAR[None], ISOTROPIC * 1e8, color=0.3, plane=plane)
         # Besides the sun's light only what scatters inside the cell and comes out at its rim.
         np.testing.assert_allclose(picture(), 0.3, rtol=0.03)
         np.testing.assert_allclose(picture().mean(), 0.3, rtol=1e-3)
@@ -172,8 +172,8 @@ def test_one_output_for_each_engine():
     assert all(link.is_valid for link in material.node_tree.links)
 
 
-def at_centres(samples=1, **changes):
-    """Pixels that look through their centres only, as exact as the renderer's arithmetic."""
+def at_centers(samples=1, **changes):
+    """Pixels that look through their centers only, as exact as the renderer's arithmetic."""
     prepare(samples, **changes)
     scene = bpy.context.scene
     scene.cycles.pixel_filter_type = 'BLACKMAN_HARRIS'
@@ -187,10 +187,10 @@ def engine(name):
 
 
 @pytest.mark.parametrize("name", ["CYCLES", "EEVEE"])
-def test_stacks_are_exact_at_the_centres_of_pixels(name):
+def test_stacks_are_exact_at_the_centers_of_pixels(name):
     cells = stack(24) * [1.0, 1.0, 0.2]
     kappa = np.random.default_rng(6).uniform(0.1, 2.0, len(cells))
-    at_centres(engine=engine(name))
+    at_centers(engine=engine(name))
     place(cells, ISOTROPIC * kappa[:, None] ** 2, stochastic=0.0)
     wanted = np.exp(-np.einsum("nyxs,n->yx", thickness(cells, 1), kappa))
     assert np.sqrt(((picture()[..., 0] - wanted) ** 2).mean()) < 0.005
@@ -200,14 +200,14 @@ def test_stacks_are_exact_at_the_centres_of_pixels(name):
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
 def test_a_camera_inside_sees_what_is_left_of_the_way(name, kind):
     """From the middle of a cell, whose entry face is behind the camera, what counts is the way to the wall."""
-    at_centres(engine=engine(name))
+    at_centers(engine=engine(name))
     camera = bpy.context.scene.camera
     camera.location = (0.02, -0.03, 0.05)
     camera.data.type, camera.data.ortho_scale, camera.data.angle = kind, 0.3, 1.0
     camera.data.clip_start = 1e-3
     place(REGULAR[None], ISOTROPIC * 4.0, stochastic=0.0)
-    centre = (np.arange(SIZE) + 0.5) / SIZE - 0.5
-    x, y = np.meshgrid(centre, centre)
+    center = (np.arange(SIZE) + 0.5) / SIZE - 0.5
+    x, y = np.meshgrid(center, center)
     flat = np.stack([x, y, np.zeros_like(x)], axis=-1)
     if kind == 'ORTHO':
         start, direction = np.array(camera.location) + 0.3 * flat, np.zeros_like(flat) - [0.0, 0.0, 1.0]
@@ -248,12 +248,12 @@ def test_baked_light_follows_the_integral(name, count):
     rng = np.random.default_rng(8)
     cells = REGULAR @ np.linalg.qr(rng.normal(size=(count, 3, 3)))[0] + np.arange(count)[:, None, None] * [0, 0, 3.0]
     light, kappa = rng.uniform(0.0, 2.0, (count, 4)), rng.uniform(0.02, 1.5, count)
-    at_centres(engine=engine(name))
+    at_centers(engine=engine(name))
     baked(cells, light, kappa)
     steps = 400
     wanted = np.ones((SIZE, SIZE))
-    centre = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * WIDTH
-    x, y = np.meshgrid(centre, centre)
+    center = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * WIDTH
+    x, y = np.meshgrid(center, center)
     for cell, corners, k, length in zip(cells, light, kappa, thickness(cells, 1)[..., 0], strict=True):
         # Barycentric coordinates are linear: those of any point by one matrix.
         system = np.linalg.inv(np.vstack([cell.T, np.ones(4)]))
@@ -288,7 +288,7 @@ def test_cycles_casts_the_shadow_of_the_cloud():
     scene.camera.location.z = -20.0
     bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, 0.0, -30.0))
     place(cells, ISOTROPIC * kappa[:, None] ** 2, stochastic=0.0)
-    bare = 0.8  # of the new material's diffuse colour
+    bare = 0.8  # of the new material's diffuse color
     material = bpy.data.materials.new("ground")
     tree = compat.shader_tree(material)
     tree.nodes.clear()

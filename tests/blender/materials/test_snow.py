@@ -29,7 +29,7 @@ def _sheet(material, transmission=0.4, **attributes):
     """A square that fills the view and faces up."""
     size = np.float32(4.0)
     corners = size * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=np.float32)
-    every = {"tf_colour": np.array([GREEN], np.float32), "tf_transmission": np.array([transmission], np.float32)}
+    every = {"tf_color": np.array([GREEN], np.float32), "tf_transmission": np.array([transmission], np.float32)}
     every |= {name: np.array([value], np.float32) for name, value in attributes.items()}
     polygons = buffers.MeshBuffers(
         corners,
@@ -228,9 +228,9 @@ def test_clouds_are_white_from_above_and_not_from_below(plane):
 
     def build(graph, _material):
         cloud = graph.node(
-            "ShaderNodeGroup", {"Colour": (*GREEN, 1.0), "Transmission": 0.4}, node_tree=snow._cloud_group()
+            "ShaderNodeGroup", {"Color": (*GREEN, 1.0), "Transmission": 0.4}, node_tree=snow._cloud_group()
         )
-        emission = graph.node("ShaderNodeEmission", {"Color": cloud.outputs["Colour"]})
+        emission = graph.node("ShaderNodeEmission", {"Color": cloud.outputs["Color"]})
         graph.node("ShaderNodeOutputMaterial", {"Surface": emission})
 
     _sheet(nodes.surface_material("cloud", 1, build), tf_normal=(0.0, 0.0, -1.0), tf_plane=plane)

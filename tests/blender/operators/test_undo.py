@@ -23,8 +23,8 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, sel
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import rules
-from tetflora_addon.blender.species.catalogue import OWN_FILES
-from tetflora_addon.species import catalogue
+from tetflora_addon.blender.species.catalog import OWN_FILES
+from tetflora_addon.species import catalog
 
 # Populations of the cases below: they are small, and of species that are quick to compile.
 MIX = "bush:2, conifer"
@@ -161,7 +161,7 @@ CASES: list[Case] = [
     ("first_forest", lambda: None, "first_forest", {}),
     ("set_season", forest, "set_season", {"season": 'AUTUMN'}),
     ("drop_to_ground", forest, "drop_to_ground", {}),
-    ("use_as_form", edges, "use_as_form", {}),
+    ("use_as_skeleton", edges, "use_as_skeleton", {}),
     ("assign_species", forest, "assign_species", {"species": "fern"}),
     ("assign_species to a field", populated_as_field, "assign_species", {"species": "fern"}),
     ("reseed", forest, "reseed", {}),
@@ -297,7 +297,7 @@ def test_imported_places_can_be_undone(history, tmp_path, kind):
 
 def test_a_species_that_was_loaded_can_be_undone(history, tmp_path):
     path = tmp_path / "shrub.json"
-    shipped = Path(catalogue.__file__).parent.parent / "catalogue"
+    shipped = Path(catalog.__file__).parent.parent / "catalog"
     data = json.loads((shipped / "bush.json").read_text("utf-8"))
     path.write_text(json.dumps({**data, "name": "Shrub"}), "utf-8")
     forest()

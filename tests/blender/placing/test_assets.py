@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Thumbnails of species in menus, and the catalogue as an asset library."""
+"""Thumbnails of species in menus, and the catalog as an asset library."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from tetflora_addon.blender import preferences, saved_files
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.placing import assets
 from tetflora_addon.blender.settings import SEASONS
-from tetflora_addon.blender.species import catalogue
-from tetflora_addon.blender.species.catalogue import FALLBACK_ICON, icon_of, items_for, thumbnail_file
-from tetflora_addon.species.catalogue import builtin_folder, list_species
+from tetflora_addon.blender.species import catalog
+from tetflora_addon.blender.species.catalog import FALLBACK_ICON, icon_of, items_for, thumbnail_file
+from tetflora_addon.species.catalog import builtin_folder, list_species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -52,8 +52,8 @@ def test_thumbnails_are_small_squares_of_known_species():
         assert tuple(image.size) == (128, 128)
         pixels = np.zeros(len(image.pixels), np.float32)
         image.pixels.foreach_get(pixels)
-        colours = pixels.reshape(-1, 4)[:, :3]
-        plant = np.abs(colours - colours[-1]).max(axis=1) > 0.1  # the upper right corner is behind the plant
+        colors = pixels.reshape(-1, 4)[:, :3]
+        plant = np.abs(colors - colors[-1]).max(axis=1) > 0.1  # the upper right corner is behind the plant
         assert 0.01 < plant.mean() < 0.9, path.name
         bpy.data.images.remove(image)
 
@@ -61,7 +61,7 @@ def test_thumbnails_are_small_squares_of_known_species():
 def _loaded(identifier):
     """Names of the thumbnails that Blender has loaded for a species; their icons have numbers only in a window."""
     icon_of(identifier)
-    return [name for name in catalogue.thumbnails.loaded if Path(name.partition("|")[0]).stem == identifier]
+    return [name for name in catalog.thumbnails.loaded if Path(name.partition("|")[0]).stem == identifier]
 
 
 def test_a_species_without_a_picture_gets_an_icon(own_folder):
@@ -76,7 +76,7 @@ def test_a_picture_is_loaded_once_and_again_when_it_changes(own_folder):
     shutil.copy(thumbnail_file("bush"), thumbnail)
     assert thumbnail_file("mine") == thumbnail
     (first,) = _loaded("mine")
-    assert tuple(catalogue.thumbnails.loaded[first].image_size) == (128, 128)
+    assert tuple(catalog.thumbnails.loaded[first].image_size) == (128, 128)
     assert _loaded("mine") == [first]
     os.utime(thumbnail, ns=(0, 0))
     assert set(_loaded("mine")) > {first}
@@ -90,9 +90,9 @@ def test_a_season_has_a_picture_of_its_own_where_there_is_one(own_folder):
     names = {}
     for season in ('SUMMER', 'AUTUMN', 'WINTER'):
         bpy.ops.tetflora.set_season(season=season)
-        catalogue.thumbnails.loaded.clear()
+        catalog.thumbnails.loaded.clear()
         icon_of("mine")
-        names[season] = [Path(name.partition("|")[0]).name for name in catalogue.thumbnails.loaded]
+        names[season] = [Path(name.partition("|")[0]).name for name in catalog.thumbnails.loaded]
     assert names == {'SUMMER': ["mine.png"], 'AUTUMN': ["mine.autumn.png"], 'WINTER': ["mine.png"]}
     year.enabled = False
     assert thumbnail_file("mine", "autumn").name == "mine.autumn.png"
@@ -165,11 +165,11 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path):
     assert datablocks() == before
 
 
-def test_a_file_of_catalogues_that_is_no_text_is_said_and_stays(tmp_path):
-    catalogues = tmp_path / "blender_assets.cats.txt"
-    catalogues.write_bytes(b"VERSION 1\n# Geh\xf6lze\n")
+def test_a_file_of_catalogs_that_is_no_text_is_said_and_stays(tmp_path):
+    catalogs = tmp_path / "blender_assets.cats.txt"
+    catalogs.write_bytes(b"VERSION 1\n# Geh\xf6lze\n")
     before = datablocks()
     with pytest.raises(RuntimeError, match=r"blender_assets.cats.txt is not a UTF-8 text file"):
         bpy.ops.tetflora.create_asset_library(directory=str(tmp_path))
     assert datablocks() == before
-    assert catalogues.read_bytes() == b"VERSION 1\n# Geh\xf6lze\n"
+    assert catalogs.read_bytes() == b"VERSION 1\n# Geh\xf6lze\n"

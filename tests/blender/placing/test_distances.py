@@ -10,7 +10,7 @@ import pytest
 
 from tests.blender.scenes import add_mesh, select
 from tetflora_addon.blender.placing import brush, distances, rules
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -142,14 +142,14 @@ def test_species_that_cannot_be_compiled_have_a_distance_too():
 
 def test_the_first_species_is_offered_first_everywhere():
     scene = bpy.context.scene
-    assert next(iter(catalogue.list_species())) == catalogue.FIRST
-    names = [info.name.lower() for info in catalogue.list_species().values()]
+    assert next(iter(catalog.list_species())) == catalog.FIRST
+    names = [info.name.lower() for info in catalog.list_species().values()]
     assert names[1:] == sorted(names[1:])
     bpy.ops.tetflora.add_plant()
-    assert bpy.context.active_object.tetflora.species == catalogue.FIRST
+    assert bpy.context.active_object.tetflora.species == catalog.FIRST
     _ground()
     population = _populate(count=3)
-    assert [entry.species for entry in population.mix] == [catalogue.FIRST]
-    assert brush.brush_of(scene)[1] == (catalogue.FIRST,)
+    assert [entry.species for entry in population.mix] == [catalog.FIRST]
+    assert brush.brush_of(scene)[1] == (catalog.FIRST,)
     bpy.ops.tetflora.edit_list(owner="scene.tetflora", entries="leaf_objects", action='ADD')
-    assert scene.tetflora.leaf_objects[0].species == catalogue.FIRST
+    assert scene.tetflora.leaf_objects[0].species == catalog.FIRST

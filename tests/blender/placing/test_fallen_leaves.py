@@ -18,7 +18,7 @@ from tetflora_addon.blender.placing.terrain import MASKS, read_ground
 from tetflora_addon.blender.scene import fields, plants
 from tetflora_addon.blender.scene.crowns import crown_for
 from tetflora_addon.blender.species.edits import species_for
-from tetflora_addon.blender.worker import at_once
+from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.planting.canopy import Sheet
 from tetflora_addon.planting.cover import mapping
 from tetflora_addon.species.litter import shed_share
@@ -40,7 +40,7 @@ def test_what_the_trees_shed_lies_on_the_ground_in_the_same_amount():
     _cover()
     canopy, above = canopy_of(bpy.context.scene, depsgraph())
     triangles = read_ground([ground], depsgraph(), **dict.fromkeys(MASKS)).triangles
-    floor = at_once(mapping(Sheet.over(triangles.reshape(-1, 3)), canopy, len(above)))
+    floor = run_to_end(mapping(Sheet.over(triangles.reshape(-1, 3)), canopy, len(above)))
     (strewn,) = _strewn()
     for name in ("birch", "oak"):
         area = floor.fallen[above.index(name)].sum() * floor.sheet.cell**2  # the rest falls beside the ground

@@ -88,13 +88,13 @@ def test_the_untouched_startup_scene_is_used_and_its_cube_only_hidden():
     assert len(bpy.data.scenes) == 1
 
 
-@pytest.mark.parametrize("touched", ["moved", "modelled", "renamed", "more"])
+@pytest.mark.parametrize("touched", ["moved", "modeled", "renamed", "more"])
 def test_anything_else_keeps_its_scene(touched):
     scene = _startup()
     cube = scene.objects["Cube"]
     if touched == "moved":
         cube.location.x = 1.0
-    elif touched == "modelled":
+    elif touched == "modeled":
         cube.data.vertices[0].co.x = -3.0
     elif touched == "renamed":
         cube.name = "House"

@@ -30,11 +30,11 @@ def _hills(seed: int, n: int = 12) -> np.ndarray:
 
 
 def _place(triangles=SQUARE, **changes):
-    options = dict(count=50, seed=1, slope_limit=1.0, min_distance=0.0, scale_range=(0.5, 2.0))
+    options = dict(count=50, seed=1, slope_max=1.0, min_distance=0.0, scale_range=(0.5, 2.0))
     given = {**options, **changes}
     low, high = given.pop("scale_range")
     occupied = given.pop("occupied", None)
-    limits = rules.Rules(slope_max=given.pop("slope_limit"), scale_min=low, scale_max=high, **given)
+    limits = rules.Rules(slope_max=given.pop("slope_max"), scale_min=low, scale_max=high, **given)
     return places.place(terrain.Terrain(triangles), limits, occupied)
 
 
@@ -52,7 +52,7 @@ def _distances(points: np.ndarray) -> np.ndarray:
 )
 def test_plants_stand_on_flat_ground_and_keep_their_distance(seed, count, distance, slope):
     ground = _hills(seed % 7)
-    placed = _place(ground, seed=seed, count=count, min_distance=distance, slope_limit=slope)
+    placed = _place(ground, seed=seed, count=count, min_distance=distance, slope_max=slope)
     assert 1 <= len(placed) <= count
     assert bool(placed.reason) == (len(placed) < count)
     if len(placed) > 1 and distance > 1e-4:

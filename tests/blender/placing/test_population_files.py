@@ -113,7 +113,7 @@ def test_what_a_file_does_not_say_is_as_in_a_new_scene(tmp_path):
         (lambda d: d["populations"].append(3), "population 2 is int"),
         (lambda d: d["populations"][0].pop("name"), 'population 1 has no "name"'),
         (lambda d: d["populations"][0].update(name=5), '"name" is 5; it must be a string'),
-        (lambda d: d["populations"][0].update(colour=1), 'population 1 has an unknown key "colour"'),
+        (lambda d: d["populations"][0].update(color=1), 'population 1 has an unknown key "color"'),
         (lambda d: d["populations"][0].update(uid="a"), 'unknown key "uid"'),
         (lambda d: d["populations"][0].update(count=2.5), '"count" is 2.5; it must be a whole number'),
         (lambda d: d["populations"][0].update(count=0), '"count" is 0; it must be from 1 to'),

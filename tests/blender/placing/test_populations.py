@@ -188,7 +188,7 @@ def test_what_is_kind_of_storage_changes_with_the_setting():
 def test_renamed_copied_and_deleted_plants_do_not_confuse_a_population():
     _populate(count=10)
     own = _own()
-    own[0].name = "My favourite"
+    own[0].name = "My favorite"
     copy = own[1].copy()
     copy.location.x += 0.5
     bpy.context.collection.objects.link(copy)
@@ -199,7 +199,7 @@ def test_renamed_copied_and_deleted_plants_do_not_confuse_a_population():
     name = copy.name
     _ops().update_population()
     assert len(_own()) == 10
-    assert "My favourite" not in bpy.data.objects
+    assert "My favorite" not in bpy.data.objects
     assert bpy.data.objects[name].tetflora.population == ""
     assert _active().collection.name == "Bushes"
     assert len(_plants()) == 11

@@ -12,7 +12,7 @@ import pytest
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.runtime import GoneError
-from tetflora_addon.blender.worker import at_once
+from tetflora_addon.blender.worker import run_to_end
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -55,7 +55,7 @@ def test_all_steps_together_are_what_is_made_at_once() -> None:
 @pytest.mark.parametrize("number", [1, 2])
 def test_plants_that_were_there_stay(number: int) -> None:
     scene, population = populated(40, 'EMPTIES')
-    at_once(populations.make_plants_steps(scene, depsgraph(), population))
+    run_to_end(populations.make_plants_steps(scene, depsgraph(), population))
     population.count = 70
     before, places = datablocks(), [tuple(o.location) for o in populations.own_objects(scene, population)]
     assert stop_after(populations.make_plants_steps(scene, depsgraph(), population), number)

@@ -109,7 +109,7 @@ def test_plants_grow_where_the_image_is_bright():
         assert len(placed) == 200 and (dark if inverted else bright).all()
 
 
-def test_colours_count_by_their_luminance():
+def test_colors_count_by_their_luminance():
     ground = _with_uv(add_mesh("ground"))
     image = bpy.data.images.new("green", 2, 2, float_buffer=True, is_data=True)
     image.pixels.foreach_set(np.tile([0.0, 1.0, 0.0, 1.0], 4).astype(np.float32))

@@ -50,8 +50,8 @@ def irradiance_of_lights():
     found = lights.read_lights(depsgraph(), bpy.context.view_layer)
     total = np.zeros(3)
     for light in sources.split_areas(found):
-        towards, arriving = sources.arriving(light, np.zeros((1, 3)))
-        total += arriving[0] * max(towards[0, 2], 0.0)
+        toward, arriving = sources.arriving(light, np.zeros((1, 3)))
+        total += arriving[0] * max(toward[0, 2], 0.0)
     return total
 
 
@@ -127,7 +127,7 @@ def test_skies_give_ground_as_much_light_as_in_cycles():
         found = lights.read_world(bpy.context.scene)
         total = world_irradiance(found.world)[0]
         for sun in found.suns:
-            total = total + sun.colour * -sun.direction[2]
+            total = total + sun.color * -sun.direction[2]
         assert not found.note
         assert total == pytest.approx(picture().mean(axis=(0, 1)) * pi, rel=0.12)
 
@@ -140,10 +140,10 @@ def test_what_cannot_be_read_is_said():
     assert not found.world.dark
 
 
-def baked_square(front, back, colour=0.5):
+def baked_square(front, back, color=0.5):
     square = add_mesh(size=0.5, z=1.0)
     attributes = baked_attributes('FACE', np.array([front], np.float32), np.array([back], np.float32))
-    attributes = {**attributes, "tf_colour": ('FACE', np.full((1, 3), colour, np.float32))}
+    attributes = {**attributes, "tf_color": ('FACE', np.full((1, 3), color, np.float32))}
     for name, (domain, values) in attributes.items():
         square.data.attributes.new(name, 'FLOAT_VECTOR', domain).data.foreach_set("vector", values.ravel())
     square.data.materials.append(materials.baked_material())
@@ -168,7 +168,7 @@ def test_it_throws_a_shadow_and_lights_nothing():
     bpy.context.scene.camera.location = (0.0, 0.0, 0.6)
     white_plane()
     assert picture().mean() == pytest.approx(1.0, rel=0.02)
-    baked_square((50.0, 50.0, 50.0), (50.0, 50.0, 50.0), colour=0.0)
+    baked_square((50.0, 50.0, 50.0), (50.0, 50.0, 50.0), color=0.0)
     assert picture().mean() < 0.02
 
 
@@ -204,7 +204,7 @@ def results(scene, *kinds):
 def test_baked_proxies_are_as_bright_as_lit_ones(form, bound, engine):
     """Mean over the plant, told by what its darkness leaves of the sky; EEVEE lights shells and spheres its own way."""
     scene = bush_before_the_sky(engine)
-    lit = refined(scene, proxy_form=form)
+    lit = refined(scene, proxy_kind=form)
     assert lit.polygons_proxy > 200
     one = picture()
     baked = refined(scene, baked_light='PROXIES')
@@ -232,7 +232,7 @@ def test_baked_pictures_have_next_to_no_noise(form):
             pictures.append(picture())
         return np.median(np.abs(pictures[1] - pictures[0])[pictures[0].mean(axis=2) < 0.35])
 
-    refined(scene, proxy_form=form)
+    refined(scene, proxy_kind=form)
     lit = noise()
     refined(scene, baked_light='ALL')
     assert noise() < 0.1 * lit
@@ -242,7 +242,7 @@ def test_baked_pictures_have_next_to_no_noise(form):
 @pytest.mark.parametrize("baked", ['PROXIES', 'ALL'])
 def test_clear_and_esc_leave_nothing_of_baked_light(form, baked):
     scene = bush_before_the_sky()
-    scene.tetflora.proxy_form, scene.tetflora.baked_light = form, baked
+    scene.tetflora.proxy_kind, scene.tetflora.baked_light = form, baked
     before = datablocks()
     refined(scene)
     assert results(scene, "proxy")
@@ -298,12 +298,12 @@ def test_meshes_that_hide_plants_throw_shadows_and_light():
     tree = compat.shader_tree(material)
     principled = next(n for n in tree.nodes if n.type == 'BSDF_PRINCIPLED')
     ground.data.materials.append(material)
-    colours = {}
+    colors = {}
     for value in (0.0, 0.8):
         principled.inputs["Base Color"].default_value = (value, value, value, 1.0)
-        colours[value] = mean()
-    assert colours[0.0] == pytest.approx(free, rel=0.05)
-    assert colours[0.8] > 1.1 * free
+        colors[value] = mean()
+    assert colors[0.0] == pytest.approx(free, rel=0.05)
+    assert colors[0.8] > 1.1 * free
     ground.location.z = 4.0
     principled.inputs["Base Color"].default_value = (0.0, 0.0, 0.0, 1.0)
     assert mean() < 0.02 * free
@@ -311,7 +311,7 @@ def test_meshes_that_hide_plants_throw_shadows_and_light():
 
 def test_shells_follow_the_scene_and_old_groups_give_way():
     scene = bush_before_the_sky()
-    refined(scene, proxy_form='SHELLS', shell_diffuse=0.5, shell_spear=20.0, shell_roundness=0.25)
+    refined(scene, proxy_kind='SHELLS', shell_diffuse=0.5, shell_spear=20.0, shell_roundness=0.25)
 
     def group():
         material = results(scene, "proxy")[0].data.materials[0]

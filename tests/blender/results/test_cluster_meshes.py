@@ -16,7 +16,7 @@ from tetflora_addon.blender.attributes import face_offsets, members, read, value
 from tetflora_addon.blender.results.collection import Results
 from tetflora_addon.blender.results.instances import add_cluster, add_cluster_instances
 from tetflora_addon.blender.results.meshes import AssetMeshes, SurfaceArrays, cluster_mesh_steps, read_mesh
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 
 ENGINES = ["CYCLES", compat.eevee_engine()]
 #: What a material emits: node, output, properties.
@@ -89,7 +89,7 @@ def clusters_of(asset, number, seed=1):
     which = np.random.default_rng(seed).integers(0, number, len(part))
     meshes = []
     for n in range(number):
-        meshes.append(at_once(cluster_mesh_steps(asset, f"cluster {n}", part[which == n], face[which == n])))
+        meshes.append(run_to_end(cluster_mesh_steps(asset, f"cluster {n}", part[which == n], face[which == n])))
     return meshes
 
 
@@ -163,7 +163,7 @@ def test_all_faces_attributes_and_names_are_there(clean_file):
     mesh = obj.data
     asset = AssetMeshes([read_surface(obj.evaluated_get(depsgraph()))], np.zeros(1), np.eye(4))
     order = np.random.default_rng(3).permutation(len(mesh.polygons))
-    made = at_once(cluster_mesh_steps(asset, "all", np.zeros(len(order), int), order))
+    made = run_to_end(cluster_mesh_steps(asset, "all", np.zeros(len(order), int), order))
     assert not made.validate(verbose=True)
     assert len(made.vertices) == len(mesh.vertices) and len(made.edges) == len(mesh.edges)
     assert [layer.name for layer in made.uv_layers if layer.active_render] == ["first"]
@@ -190,7 +190,7 @@ def test_generated_coordinates_are_those_of_the_part(clean_file, stretch):
     matrix = np.diag([*stretch, 1.0])
     matrix[:3, 3] = 1.0, 2.0, 3.0
     asset = AssetMeshes([read_surface(obj.evaluated_get(depsgraph()))], np.zeros(1), matrix)
-    made = at_once(cluster_mesh_steps(asset, "some", np.zeros(9, int), np.arange(100, 109)))
+    made = run_to_end(cluster_mesh_steps(asset, "some", np.zeros(9, int), np.arange(100, 109)))
     inside = (read(made, "position") - np.array(made.texspace_location)) / np.array(made.texspace_size)
     local = (read(made, "position") - matrix[:3, 3]) / np.diag(matrix)[:3]
     own = (local - np.array(obj.data.texspace_location)) / np.array(obj.data.texspace_size)
@@ -201,7 +201,7 @@ def test_an_empty_cluster_and_one_that_is_stopped_leave_nothing(clean_file):
     obj = ball()
     asset = AssetMeshes([read_surface(obj.evaluated_get(depsgraph()))], np.zeros(1), np.eye(4))
     none = np.zeros(0, int)
-    assert len(at_once(cluster_mesh_steps(asset, "none", none, none)).polygons) == 0
+    assert len(run_to_end(cluster_mesh_steps(asset, "none", none, none)).polygons) == 0
     before = len(bpy.data.meshes)
     steps = cluster_mesh_steps(asset, "some", np.zeros(9, int), np.arange(9))
     for number in range(30):

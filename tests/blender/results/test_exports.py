@@ -3,7 +3,7 @@
 """What Refine made goes through Blender's own exporters, and its importers bring back the same faces in the same place.
 
 Formats differ in what they hold. All four hold faces, UV maps and places; USD, OBJ and glTF the names of materials; USD
-attributes, so the colour of each leaf. glTF holds triangles, and a vertex for each normal that meets in it. Points,
+attributes, so the color of each leaf. glTF holds triangles, and a vertex for each normal that meets in it. Points,
 which microspheres are made of, come back from USD alone, and only where Blender lets add-ons fill point clouds.
 """
 
@@ -92,7 +92,7 @@ def refined(form: str):
     scene.render.resolution_x = scene.render.resolution_y = 48
     for n, species in enumerate(("bush", "conifer")):
         add_plant(species, species, seed=n, location=(3.0 * n - 1.5, 0.0, 0.0))
-    scene.tetflora.proxy_form, scene.tetflora.leaf_limit = form, 0.3
+    scene.tetflora.proxy_kind, scene.tetflora.leaf_limit = form, 0.3
     refine.refine(scene, depsgraph())
     bpy.context.view_layer.update()
     return scene
@@ -186,7 +186,7 @@ def test_what_was_refined_comes_back(exported, suffix):
             np.testing.assert_allclose(np.sort(after.uv, 0)[[0, -1]], np.sort(before.uv, 0)[[0, -1]], atol=1e-5)
 
 
-def test_usd_holds_the_colour_of_each_leaf(blender, tmp_path):
+def test_usd_holds_the_color_of_each_leaf(blender, tmp_path):
     if is_absent("usdc"):
         return
     refined('MICROSURFACES')
@@ -195,20 +195,20 @@ def test_usd_holds_the_colour_of_each_leaf(blender, tmp_path):
     read_back(tmp_path / "forest.usdc")
     for name, after in surfaces().items():
         before = expected[name].attributes
-        assert {"tf_colour", "tf_transmission"} <= set(before)
+        assert {"tf_color", "tf_transmission"} <= set(before)
         for key, values in before.items():
             np.testing.assert_array_equal(after.attributes[key], values, err_msg=f"{name} {key}")
 
 
-def test_obj_holds_the_viewport_colour_of_each_material(blender, tmp_path):
+def test_obj_holds_the_viewport_color_of_each_material(blender, tmp_path):
     refined('MICROSURFACES')
-    colours = {plain(m.name): tuple(m.diffuse_color)[:3] for m in bpy.data.materials}
+    colors = {plain(m.name): tuple(m.diffuse_color)[:3] for m in bpy.data.materials}
     export(tmp_path / "forest.obj")
     read_back(tmp_path / "forest.obj")
     read = {plain(m.name): tuple(m.diffuse_color)[:3] for m in bpy.data.materials}
     assert read
-    for name, colour in read.items():
-        assert colour == pytest.approx(colours[name], abs=1e-3), name
+    for name, color in read.items():
+        assert color == pytest.approx(colors[name], abs=1e-3), name
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -228,7 +228,7 @@ def test_microspheres_come_back_from_usd_alone(blender, tmp_path, suffix):
     assert found == (points if by_usd else 0)
     assert set(surfaces()) == set(expected)  # the rest is there all the same
     if by_usd:
-        assert all({"radius", "tf_colour", "tf_transmission"} <= set(o.data.attributes.keys()) for o in read)
+        assert all({"radius", "tf_color", "tf_transmission"} <= set(o.data.attributes.keys()) for o in read)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

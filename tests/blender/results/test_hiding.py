@@ -199,12 +199,12 @@ def scattered(ground, tree, realized=False):
 
 
 def forest():
-    """A ground of two colours that nodes and a modifier change, with trees on it; (ground, tree)."""
+    """A ground of two colors that nodes and a modifier change, with trees on it; (ground, tree)."""
     ground, tree = add_mesh("ground"), add_mesh("tree", size=0.2, z=0.3)
     bpy.context.scene.collection.objects.unlink(tree)
-    for colour, obj in (((0.7, 0.2, 0.1, 1.0), ground), ((0.1, 0.6, 0.2, 1.0), tree)):
+    for color, obj in (((0.7, 0.2, 0.1, 1.0), ground), ((0.1, 0.6, 0.2, 1.0), tree)):
         made = bpy.data.materials.new("paint")
-        compat.shader_tree(made).nodes["Principled BSDF"].inputs["Base Color"].default_value = colour
+        compat.shader_tree(made).nodes["Principled BSDF"].inputs["Base Color"].default_value = color
         obj.data.materials.append(made)
     ground.modifiers.new("grid", 'SUBSURF').levels = 2
     ground.location, ground.rotation_euler = (0.1, 0.2, 0.0), (0.2, 0.1, 0.5)

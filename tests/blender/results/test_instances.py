@@ -39,22 +39,22 @@ def matrices():
     return every
 
 
-def coloured(colour):
+def colored(color):
     made = bpy.data.materials.new("paint")
     nodes = compat.shader_tree(made).nodes
-    nodes["Principled BSDF"].inputs["Base Color"].default_value = (*colour, 1.0)
+    nodes["Principled BSDF"].inputs["Base Color"].default_value = (*color, 1.0)
     nodes["Principled BSDF"].inputs["Roughness"].default_value = 1.0
     return made
 
 
-def mesh_of(name, corners, colours=((0.8, 0.1, 0.1), (0.1, 0.7, 0.2))):
-    """One or several kites of two triangles, each in two colours."""
+def mesh_of(name, corners, colors=((0.8, 0.1, 0.1), (0.1, 0.7, 0.2))):
+    """One or several kites of two triangles, each in two colors."""
     mesh = bpy.data.meshes.new(name)
     corners = np.asarray(corners).reshape(-1, 4, 3)
     faces = [tuple(4 * n + v for v in face) for n in range(len(corners)) for face in FACES]
     mesh.from_pydata(corners.reshape(-1, 3).tolist(), [], faces)
-    for colour in colours:
-        mesh.materials.append(coloured(colour))
+    for color in colors:
+        mesh.materials.append(colored(color))
     mesh.polygons.foreach_set("material_index", np.tile([0, 1], len(corners)).astype(np.int32))
     mesh.polygons.foreach_set("use_smooth", np.zeros(len(mesh.polygons), bool))
     return mesh
@@ -234,7 +234,7 @@ class Bare:
 def sources(clean_file):
     add_mesh("tree")
     bare = add_mesh("bare")
-    bare.data.materials.append(coloured((0.5, 0.5, 0.5)))
+    bare.data.materials.append(colored((0.5, 0.5, 0.5)))
     return bpy.context.scene
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from tetflora_addon.blender.results import leaf_objects
 from tetflora_addon.leaves import compounds, models, outlines
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -34,20 +34,20 @@ SHIPPED = {
 
 @pytest.mark.parametrize("identifier", list(SHIPPED))
 def test_shipped_species(identifier):
-    species = catalogue.load_species(identifier)
+    species = catalog.load_species(identifier)
     assert leaf_objects.blade_kind(species.leaf[0], species.leaf_transmission) == SHIPPED[identifier]
 
 
 @pytest.mark.parametrize("identifier", ["oak", "maple", "beech", "birch", "willow"])
 def test_outlines_and_far_polygons_agree(identifier):
-    species = catalogue.load_species(identifier)
+    species = catalog.load_species(identifier)
     far = replace(species.leaf[0], shape=None)
     assert leaf_objects.blade_kind(far, species.leaf_transmission) == SHIPPED[identifier]
 
 
 def test_compound_leaves_have_the_blade_of_their_leaflets():
     shape = compounds.Compound(leaflet=outlines.Blade(width=0.4))
-    model = replace(catalogue.load_species("rowan").leaf[0], shape=shape)
+    model = replace(catalog.load_species("rowan").leaf[0], shape=shape)
     assert leaf_objects.blade_kind(model, 0.4) == "pinnate"
 
 
@@ -67,7 +67,7 @@ def test_a_finely_toothed_leaf_is_not_lobed():
 
 
 def test_the_material_knows_the_length_of_leaves_and_parallel_veins_their_width():
-    grass = catalogue.load_species("grass")
+    grass = catalog.load_species("grass")
     made = leaf_objects.species_leaf_material(grass, "leaf")
     group = next(n for n in made.node_tree.nodes if n.type == 'GROUP' and "Leaf Length" in n.inputs)
     assert group.inputs["Leaf Length"].default_value == pytest.approx(0.42, rel=0.01)
@@ -77,7 +77,7 @@ def test_the_material_knows_the_length_of_leaves_and_parallel_veins_their_width(
 
 def test_leaflets_have_their_own_length():
     """The relief of a leaflet is measured by the leaflet, whose UV map it has to itself."""
-    rowan = catalogue.load_species("rowan")
+    rowan = catalog.load_species("rowan")
     made = leaf_objects.species_leaf_material(rowan, "leaf")
     group = next(n for n in made.node_tree.nodes if n.type == 'GROUP' and "Leaf Length" in n.inputs)
     # Rowan leaves, pinnate, are 10 to 22 cm long, and most of a species' are in the sun.
@@ -86,5 +86,5 @@ def test_leaflets_have_their_own_length():
 
 @pytest.mark.parametrize("identifier", ["fern", "rowan"])
 def test_many_short_parts_without_an_outline_are_plain(identifier):
-    far = replace(catalogue.load_species(identifier).leaf[0], shape=None)
+    far = replace(catalog.load_species(identifier).leaf[0], shape=None)
     assert leaf_objects.blade_kind(far, 0.4) == "plain"

@@ -40,7 +40,7 @@ def prism():
         face_offsets=np.array([0, 3, 6, 10, 14, 18], dtype=np.int32),
         attributes={
             "UVMap": ("CORNER", rng.random((18, 2), dtype=np.float32)),
-            "tf_colour": ("FACE", rng.random((5, 3), dtype=np.float32)),
+            "tf_color": ("FACE", rng.random((5, 3), dtype=np.float32)),
             "tf_transmission": ("FACE", rng.random(5, dtype=np.float32)),
             "tf_bary": ("POINT", rng.random((6, 3), dtype=np.float32)),
             "material_index": ("FACE", np.array([0, 0, 1, 1, 1], dtype=np.int32)),
@@ -71,14 +71,14 @@ def test_attributes_have_the_domains_and_types_of_the_contract():
     mesh = write_mesh("prism", buffers)
     kinds = {a.name: (a.domain, a.data_type) for a in mesh.attributes}
     assert kinds["UVMap"] == ("CORNER", "FLOAT2")
-    assert kinds["tf_colour"] == ("FACE", "FLOAT_VECTOR")
+    assert kinds["tf_color"] == ("FACE", "FLOAT_VECTOR")
     assert kinds["tf_transmission"] == ("FACE", "FLOAT")
     assert kinds["tf_bary"] == ("POINT", "FLOAT_VECTOR")
     assert mesh.uv_layers.active.name == "UVMap"
     assert [p.material_index for p in mesh.polygons] == [0, 0, 1, 1, 1]
     values = np.zeros(15, dtype=np.float32)
-    mesh.attributes["tf_colour"].data.foreach_get("vector", values)
-    np.testing.assert_array_equal(values.reshape(5, 3), buffers.attributes["tf_colour"][1])
+    mesh.attributes["tf_color"].data.foreach_get("vector", values)
+    np.testing.assert_array_equal(values.reshape(5, 3), buffers.attributes["tf_color"][1])
 
 
 def test_normals_point_outwards():
@@ -112,7 +112,7 @@ def test_an_empty_mesh():
             none,
             np.zeros(1, dtype=np.int32),
             {
-                "tf_colour": ("FACE", np.zeros((0, 3), dtype=np.float32)),
+                "tf_color": ("FACE", np.zeros((0, 3), dtype=np.float32)),
                 "UVMap": ("CORNER", np.zeros((0, 2), np.float32)),
             },
         ),

@@ -31,7 +31,7 @@ def _points(made):
     geometry = evaluated.evaluated_geometry()  # keeps the cloud alive
     cloud = geometry.pointcloud
     found = {}
-    for name, size in (("position", 3), ("radius", 1), ("tf_colour", 3), ("tf_transmission", 1)):
+    for name, size in (("position", 3), ("radius", 1), ("tf_color", 3), ("tf_transmission", 1)):
         values = np.zeros((len(cloud.points), size), np.float32)
         cloud.attributes[name].data.foreach_get("vector" if size == 3 else "value", values.reshape(-1))
         found[name] = values if size == 3 else values[:, 0]
@@ -42,12 +42,12 @@ def test_spheres_take_the_places_of_facets_and_clear_removes_them():
     scene = _forest()
     scene.render.engine = 'CYCLES'
     before = datablocks()
-    facets = _refine(scene, proxy_form='MICROSURFACES')
+    facets = _refine(scene, proxy_kind='MICROSURFACES')
     mesh = _proxies(scene)[0].data
     places = np.zeros((len(mesh.vertices), 3), np.float32)
     mesh.attributes["position"].data.foreach_get("vector", places.reshape(-1))
     places = places.reshape(-1, 3, 3).mean(axis=1)
-    spheres = _refine(scene, proxy_form='MICROSPHERES')
+    spheres = _refine(scene, proxy_kind='MICROSPHERES')
     assert spheres.polygons_proxy == facets.polygons_proxy == len(places)
     assert spheres.facet_pixels == facets.facet_pixels
     assert spheres.memory_mb < facets.memory_mb
@@ -56,7 +56,7 @@ def test_spheres_take_the_places_of_facets_and_clear_removes_them():
     assert materials == ["TetFlora microsphere"]
     assert points["position"] == pytest.approx(places, abs=1e-4)
     assert points["radius"].min() > 0
-    assert 0 <= points["tf_colour"].min() <= points["tf_colour"].max() <= 1
+    assert 0 <= points["tf_color"].min() <= points["tf_color"].max() <= 1
     assert len(np.unique(points["tf_transmission"])) == 2  # wood and leaves
     scene.render.engine = compat.eevee_engine()  # which draws less of a sphere
     _refine(scene)
@@ -72,7 +72,7 @@ def test_refine_at_render_takes_spheres_back():
 
     scene = _forest()
     tiny_render(size=160)
-    scene.tetflora.proxy_form, scene.tetflora.refine_at_render = 'MICROSPHERES', True
+    scene.tetflora.proxy_kind, scene.tetflora.refine_at_render = 'MICROSPHERES', True
     before = datablocks()
     bpy.ops.render.render()
     assert json.loads(scene.tetflora.statistics)["polygons_proxy"] > 0
@@ -82,9 +82,9 @@ def test_refine_at_render_takes_spheres_back():
 def test_the_group_for_vertices_makes_the_same_points(monkeypatch):
     """What versions without `PointCloud.resize` use works on all."""
     random = np.random.default_rng(1)
-    colour, radius = random.random((5, 3), np.float32), random.random(5, np.float32)
+    color, radius = random.random((5, 3), np.float32), random.random(5, np.float32)
     buffers = meshes.PointBuffers(
-        random.random((5, 3), np.float32), radius, {"tf_colour": colour, "tf_transmission": radius / 2}
+        random.random((5, 3), np.float32), radius, {"tf_color": color, "tf_transmission": radius / 2}
     )
     material = materials.sphere_material()
     for by_nodes in {True, not compat.can_resize_point_clouds()}:
@@ -95,7 +95,7 @@ def test_the_group_for_vertices_makes_the_same_points(monkeypatch):
         assert names == [material.name]
         assert (points["position"] == buffers.positions).all()
         assert (points["radius"] == radius).all()
-        assert (points["tf_colour"] == colour).all()
+        assert (points["tf_color"] == color).all()
         assert (points["tf_transmission"] == radius / 2).all()
 
 
@@ -113,7 +113,7 @@ def test_white_spheres_vanish_before_a_white_sky(transmission):
     """What falls on a sphere comes back from it, through it or from its surface, and nothing else does."""
 
     small_scene(sky=1.0, samples=64)
-    white = {"tf_colour": np.ones((1, 3), np.float32), "tf_transmission": np.full(1, transmission, np.float32)}
+    white = {"tf_color": np.ones((1, 3), np.float32), "tf_transmission": np.full(1, transmission, np.float32)}
     buffers = meshes.PointBuffers(np.zeros((1, 3), np.float32), np.full(1, 1.5, np.float32), white)
     made = meshes.point_object("sphere", buffers, materials.sphere_material())
     bpy.context.collection.objects.link(made)

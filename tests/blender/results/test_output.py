@@ -111,7 +111,7 @@ def test_hidden_results_are_hidden(scene):
 @pytest.mark.parametrize("form", ['AUTOMATIC', 'MICROSURFACES', 'MICROSPHERES'])
 def test_every_object_has_one_species_and_its_parent(scene, form):
     """Cryptomatte's assets are parents: one for each species, with its name."""
-    scene.tetflora.proxy_form = form
+    scene.tetflora.proxy_kind = form
     scene.tetflora.leaf_limit = 4.0
     made = refined(scene)
     assert {o["tetflora_species"] for o in made} == {"bush", "conifer"}

@@ -162,12 +162,12 @@ def test_longitudes_and_latitudes_are_those_of_cycles():
     for longitude, latitude in ((0.9, 0.3), (-0.5, -0.6)):
         depsgraph().update()
         camera = _read()
-        towards = [
+        toward = [
             math.cos(latitude) * math.sin(longitude),
             math.sin(latitude),
             -math.cos(latitude) * math.cos(longitude),
         ]
-        square.location = camera.position + 4.0 * camera.frame @ towards
+        square.location = camera.position + 4.0 * camera.frame @ toward
         square.rotation_euler = obj.rotation_euler
         depsgraph().update()
         rows, columns = np.nonzero(renders.picture().mean(axis=2) < 0.4)

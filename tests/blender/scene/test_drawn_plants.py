@@ -12,7 +12,7 @@ from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender.job import plant_mesh, refine
 from tetflora_addon.blender.scene import plants
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -40,7 +40,7 @@ def test_a_plant_with_a_form_is_refined_along_it():
     scene = bpy.context.scene
     add_camera()
     plant = add_plant("tree", "bush", 3, (0.0, 5.0, 0.0))
-    plant.tetflora.form = _form()
+    plant.tetflora.skeleton = _form()
     scene.tetflora.expand_everything = True
     refine.refine(scene, depsgraph())
     bark = [o for o in scene.objects if o.get("tetflora_kind") == "bark"]
@@ -54,7 +54,7 @@ def test_plants_of_one_species_with_and_without_a_form():
     scene = bpy.context.scene
     add_camera()
     add_plant("grown", "bush", 1, (0.0, 5.0, 0.0))
-    add_plant("drawn", "bush", 1, (3.0, 5.0, 0.0)).tetflora.form = _form()
+    add_plant("drawn", "bush", 1, (3.0, 5.0, 0.0)).tetflora.skeleton = _form()
     seeds = plants.read_plants(scene, depsgraph(), bpy.context.view_layer)[0]
     assert len(seeds.identifiers) == 2
     statistics = refine.refine(scene, depsgraph())
@@ -65,8 +65,8 @@ def test_plants_of_one_species_with_and_without_a_form():
 
 def test_a_drawn_plant_as_a_real_mesh():
     plant = add_plant("tree", "bush", 3, (1.0, 2.0, 0.0))
-    plant.tetflora.form = _form()
-    (made,) = at_once(plant_mesh.make_plant_mesh_steps(bpy.context.scene, depsgraph(), [plant]))
+    plant.tetflora.skeleton = _form()
+    (made,) = run_to_end(plant_mesh.make_plant_mesh_steps(bpy.context.scene, depsgraph(), [plant]))
     points = _positions(made)
     assert np.linalg.norm(points - [0.5, 0.0, 2.0], axis=1).min() < 0.3
     assert [m.name for m in made.data.materials] == ["TetFlora Bush bark", "TetFlora Bush leaf"]
@@ -76,6 +76,6 @@ def test_a_form_without_edges_is_named():
     empty = bpy.data.objects.new("nothing drawn", bpy.data.meshes.new("nothing drawn"))
     bpy.context.scene.collection.objects.link(empty)
     add_camera()
-    add_plant("tree", "bush", 3).tetflora.form = empty
+    add_plant("tree", "bush", 3).tetflora.skeleton = empty
     with pytest.raises(errors.SpeciesError, match="nothing drawn"):
         refine.refine(bpy.context.scene, depsgraph())

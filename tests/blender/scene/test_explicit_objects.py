@@ -20,11 +20,11 @@ from tetflora_addon.blender.species import edits
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
-def _material(name="paint", colour=(0.2, 0.5, 0.1, 1.0), image=None):
+def _material(name="paint", color=(0.2, 0.5, 0.1, 1.0), image=None):
     material = bpy.data.materials.new(name)
     tree = compat.shader_tree(material)
     principled = next(n for n in tree.nodes if n.type == 'BSDF_PRINCIPLED')
-    principled.inputs["Base Color"].default_value = colour
+    principled.inputs["Base Color"].default_value = color
     if image is not None:
         texture = tree.nodes.new("ShaderNodeTexImage")
         texture.image = image
@@ -86,7 +86,7 @@ def test_near_meshes_come_out_as_they_are_without_any_plant():
     scene = _scene()
     leaves = _leaves()
     broken = scene.tetflora.species_edits.add()  # none of the scene's business
-    broken.identifier, broken.text = min(edits.catalogue()), "{"
+    broken.identifier, broken.text = min(edits.catalog()), "{"
     statistics = _refine(scene)
     made = _made(scene)
     assert sum(len(o.data.polygons) for o in made) == 400 == statistics.polygons_meshed == statistics.polygons_full
@@ -101,7 +101,7 @@ def test_near_meshes_come_out_as_they_are_without_any_plant():
     assert statistics.plants == 0
 
 
-def test_far_meshes_become_proxies_of_their_colour():
+def test_far_meshes_become_proxies_of_their_color():
     scene = _scene()
     leaves = _leaves(size=0.02, count=4_000)
     leaves.location.y = 500.0
@@ -110,9 +110,9 @@ def test_far_meshes_become_proxies_of_their_colour():
     (proxies,) = _made(scene, "proxy")
     assert 0 < len(proxies.data.polygons) == statistics.polygons_proxy < 2_000
     assert _area([proxies]) == pytest.approx(_area([leaves]), rel=4 * statistics.polygons_proxy**-0.5)
-    colour = np.zeros((len(proxies.data.polygons), 3), np.float32)
-    proxies.data.attributes["tf_colour"].data.foreach_get("vector", colour.ravel())
-    np.testing.assert_allclose(colour, np.tile([0.2, 0.5, 0.1], (len(colour), 1)), atol=1e-6)
+    color = np.zeros((len(proxies.data.polygons), 3), np.float32)
+    proxies.data.attributes["tf_color"].data.foreach_get("vector", color.ravel())
+    np.testing.assert_allclose(color, np.tile([0.2, 0.5, 0.1], (len(color), 1)), atol=1e-6)
     assert _points([proxies])[:, 1].min() > 490
 
 
@@ -177,7 +177,7 @@ def test_results_for_a_render_and_those_of_the_artist_do_not_meet():
 
 
 def test_a_render_refines_a_scene_that_has_meshes_alone():
-    """Refine at Render needs no plant; afterwards the original is as it was."""
+    """Refine at Render needs no plant; afterward the original is as it was."""
     scene = _scene()
     leaves = _leaves()
     assert scene.tetflora.refine_at_render
@@ -233,24 +233,24 @@ def test_modifiers_and_curves_count():
     assert explicit.meshes.solid[-faces["stem"] :].all() or explicit.meshes.solid[: faces["stem"]].all()
 
 
-def test_colours_come_from_materials_images_and_attributes():
+def test_colors_come_from_materials_images_and_attributes():
     looks = face_looks.Looks()
     image = bpy.data.images.new("picture", 8, 8, alpha=True)
     pixels = np.zeros((8, 8, 4), np.float32)
     pixels[:4] = (1.0, 0.5, 0.0, 1.0)  # the other half is transparent, and counts for nothing
     image.pixels.foreach_set(pixels.ravel())
     look = looks.of(_material(image=image), {})
-    np.testing.assert_allclose(look.colour, (1.0, 0.214, 0.0), atol=2e-3)
+    np.testing.assert_allclose(look.color, (1.0, 0.214, 0.0), atol=2e-3)
     assert look.coverage == pytest.approx(0.5)
     assert look.transmission == 0
-    np.testing.assert_allclose(looks.of(_material(), {}).colour, (0.2, 0.5, 0.1), atol=1e-6)
-    assert looks.of(None, {}).colour == (0.8, 0.8, 0.8)
+    np.testing.assert_allclose(looks.of(_material(), {}).color, (0.2, 0.5, 0.1), atol=1e-6)
+    assert looks.of(None, {}).color == (0.8, 0.8, 0.8)
     image = bpy.data.images.new("broken", 4, 4, alpha=True, float_buffer=True)
     pixels = np.full((16, 4), (0.5, 0.25, 0.0, 1.0), np.float32)
     pixels[3, 1], pixels[5, 3] = np.nan, np.inf
     image.pixels.foreach_set(pixels.ravel())
     look = looks.of(_material("broken", image=image), {})
-    np.testing.assert_allclose(look.colour, (0.5, 0.25, 0.0), atol=1e-6)
+    np.testing.assert_allclose(look.color, (0.5, 0.25, 0.0), atol=1e-6)
     assert look.coverage == pytest.approx(14 / 16)
     painted = _material("painted")
     tree = painted.node_tree
@@ -258,16 +258,16 @@ def test_colours_come_from_materials_images_and_attributes():
     node.layer_name = "Paint"
     tree.links.new(node.outputs["Color"], next(n for n in tree.nodes if n.type == 'BSDF_PRINCIPLED').inputs[0])
     found = looks.of(painted, {"Paint": np.array([[0, 0.2, 0.4], [0.2, 0.2, 0.0]], np.float32)})
-    np.testing.assert_allclose(found.colour, (0.1, 0.2, 0.2), atol=1e-6)
+    np.testing.assert_allclose(found.color, (0.1, 0.2, 0.2), atol=1e-6)
 
 
 def test_nodes_that_are_switched_off_have_no_say():
-    material = _material(colour=(0.2, 0.5, 0.1, 1.0))
+    material = _material(color=(0.2, 0.5, 0.1, 1.0))
     material.diffuse_color = (0.7, 0.1, 0.3, 1.0)
     if bpy.app.version < (5, 0, 0):  # from then on nodes cannot be switched off
         material.use_nodes = False
     expected = (0.7, 0.1, 0.3) if bpy.app.version < (5, 0, 0) else (0.2, 0.5, 0.1)
-    np.testing.assert_allclose(face_looks.Looks().of(material, {}).colour, expected, atol=1e-6)
+    np.testing.assert_allclose(face_looks.Looks().of(material, {}).color, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("what", ["faces", "numbers"])

@@ -20,9 +20,9 @@ from tetflora_addon.blender.scene.skeletons import age_of, dead_of
 from tetflora_addon.blender.species.asset_species import asset_species
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.measured import measured
-from tetflora_addon.growth.crown_forms import BASE, EAST
+from tetflora_addon.growth.crown_shapes import BASE, EAST
 from tetflora_addon.growth.growth import radius_at, trunks
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -30,7 +30,7 @@ KEYS = {'INT': "value", 'FLOAT': "value", 'FLOAT_VECTOR': "vector"}
 
 
 def field_of(number, kinds=("birch",), places=None, **attributes):
-    """A field of points a metre apart; attributes are (type, values)."""
+    """A field of points a meter apart; attributes are (type, values)."""
     mesh = bpy.data.meshes.new("field")
     mesh.vertices.add(number)
     places = np.arange(number)[:, None] * [1.0, 0.0, 0.0] if places is None else places

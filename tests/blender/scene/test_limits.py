@@ -15,7 +15,7 @@ from tetflora_addon import errors
 from tetflora_addon.blender import settings
 from tetflora_addon.blender.job import contents, forecast, refine
 from tetflora_addon.blender.placing import brush, populations
-from tetflora_addon.blender.worker import at_once
+from tetflora_addon.blender.worker import run_to_end
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -120,7 +120,7 @@ def test_wind_populations_and_brush_have_limits_too(scene):
         good = getattr(group, name)
         _store(group, name, -5 if name == "count" else math.nan)
         with pytest.raises(errors.SceneError, match=r'"Population": .* is (nan|-5); it must be '):
-            at_once(populations.make_plants_steps(scene, depsgraph(), population))
+            run_to_end(populations.make_plants_steps(scene, depsgraph(), population))
         setattr(group, name, good)
     _store(scene.tetflora.brush, "radius", math.nan)
     with pytest.raises(errors.SceneError, match="Brush: Radius is nan; it must be"):
@@ -136,7 +136,7 @@ def test_erased_places_that_cannot_be_read_are_said(scene, text):
     population.mix.add().species = "bush"
     population.erased = text
     with pytest.raises(errors.SceneError, match='"Population": its erased places cannot be read; click Clear Erased'):
-        at_once(populations.make_plants_steps(scene, depsgraph(), population))
+        run_to_end(populations.make_plants_steps(scene, depsgraph(), population))
 
 
 def test_an_orthographic_scale_of_nothing_is_said(scene):
@@ -166,7 +166,7 @@ def test_a_field_that_can_have_no_points_is_named(scene, kind):
     population.mix.add().species = "bush"
     for do in (
         lambda: refine.refine(scene, depsgraph()),
-        lambda: at_once(populations.make_plants_steps(scene, depsgraph(), population)),
+        lambda: run_to_end(populations.make_plants_steps(scene, depsgraph(), population)),
         lambda: brush.Standing(scene, depsgraph(), covers=True),
     ):
         with pytest.raises(errors.SceneError, match=r'"odd" is no mesh or point cloud .*turn off Field of Plants'):

@@ -15,7 +15,7 @@ from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.scene.plants import read_plants
 
-PACE, TURN, RATE = 2.0, 0.4, 24.0  # metres and radians a frame
+PACE, TURN, RATE = 2.0, 0.4, 24.0  # meters and radians a frame
 
 
 @pytest.fixture

@@ -23,8 +23,8 @@ from tetflora_addon.blender.results.output import result_collections
 from tetflora_addon.blender.scene import ages, fields, own_ages, skeletons
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.viewport import levels
-from tetflora_addon.jobs import at_once
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.jobs import run_to_end
+from tetflora_addon.species.catalog import load_species
 
 SPECIES = "conifer"
 
@@ -68,9 +68,13 @@ def test_forms_and_ages_do_not_get_into_each_others_way(scene):
     form = bpy.data.objects.new("form", mesh)
     scene.collection.objects.link(form)
     (plant,) = row_of_plants([7.0])
-    plant.tetflora.form = form
+    plant.tetflora.skeleton = form
     (kind,) = seeds(scene).identifiers
-    assert (skeletons.species_of(kind), skeletons.form_of(kind), skeletons.age_of(kind)) == (SPECIES, form, 7.0)
+    assert (skeletons.species_of(kind), skeletons.skeleton_object_of(kind), skeletons.age_of(kind)) == (
+        SPECIES,
+        form,
+        7.0,
+    )
     assert contents.estimate(scene, depsgraph()).polygons_full > 0
 
 
@@ -190,7 +194,7 @@ def populated(scene, **settings):
     population.min_distance = 0.5
     for name, value in settings.items():
         setattr(population, name, value)
-    return population, at_once(populations.make_plants_steps(scene, depsgraph(), population))
+    return population, run_to_end(populations.make_plants_steps(scene, depsgraph(), population))
 
 
 def test_young_plants_are_placed_closer(scene):
@@ -215,7 +219,7 @@ def test_a_population_has_the_ages_of_its_rule(scene, store):
     assert not rules.is_outdated(population)
     population.age_spread = 0.0
     assert rules.is_outdated(population)
-    at_once(populations.make_plants_steps(scene, depsgraph(), population))
+    run_to_end(populations.make_plants_steps(scene, depsgraph(), population))
     assert {skeletons.age_of(kind) for kind in seeds(scene).identifiers} == {40.0}
 
 
@@ -238,7 +242,7 @@ def test_young_plants_are_small_in_all_that_knows_them(scene):
         forecast._counted.stand = None
         stand = forecast._stand_of(scene, bpy.context.view_layer)
         above = canopy.canopy_of(scene, depsgraph())[0]
-        (mesh,) = at_once(plant_mesh.make_plant_mesh_steps(scene, depsgraph(), [plant]))
+        (mesh,) = run_to_end(plant_mesh.make_plant_mesh_steps(scene, depsgraph(), [plant]))
         tall = mesh.dimensions.z
         bpy.data.objects.remove(mesh)
         plant.tetflora.enabled = True

@@ -149,7 +149,7 @@ def test_shape_keys_and_switched_off_curves():
     np.testing.assert_allclose(read(obj).points[-1], [1, 0, 8])
     obj.hide_render = True
     np.testing.assert_allclose(read(obj).points[-1], [1, 0, 8])
-    obj.hide_viewport = True  # not evaluated then: as it was modelled
+    obj.hide_viewport = True  # not evaluated then: as it was modeled
     assert len(read(obj).points) == 3
 
 
@@ -218,9 +218,9 @@ def test_the_button_makes_a_plant_in_the_forms_place():
     form.location, form.rotation_euler = (3, 4, 5), (0.2, 0, 0.7)
     bpy.context.scene.tetflora.species_editor.species = "oak"
     select(form)
-    assert bpy.ops.tetflora.use_as_form() == {'FINISHED'}
+    assert bpy.ops.tetflora.use_as_skeleton() == {'FINISHED'}
     plant = bpy.context.active_object
-    assert plant.tetflora.is_plant and plant.tetflora.form == form and plant.tetflora.species == "oak"
+    assert plant.tetflora.is_plant and plant.tetflora.skeleton == form and plant.tetflora.species == "oak"
     assert form.hide_render and bpy.context.selected_objects == [plant]
     # Plant and skeleton together are where the form is.
     bpy.context.view_layer.update()
@@ -234,8 +234,8 @@ def test_the_button_gives_selected_plants_their_form():
     form, plants = add_edges(), [add_plant(str(i)) for i in range(2)]
     other = add_plant("other")
     select(form, *plants)
-    assert bpy.ops.tetflora.use_as_form() == {'FINISHED'}
-    assert [p.tetflora.form for p in (*plants, other)] == [form, form, None]
+    assert bpy.ops.tetflora.use_as_skeleton() == {'FINISHED'}
+    assert [p.tetflora.skeleton for p in (*plants, other)] == [form, form, None]
     assert sorted(o.name for o in bpy.context.selected_objects) == ["0", "1"]
 
 
@@ -243,16 +243,16 @@ def test_the_button_refuses_and_changes_nothing():
     cube = add_mesh("Cube")
     select(cube)
     with pytest.raises(RuntimeError, match=r"Cube.*has faces"):
-        bpy.ops.tetflora.use_as_form()
+        bpy.ops.tetflora.use_as_skeleton()
     assert not cube.hide_render and list(bpy.data.objects) == [cube]
     select(add_plant())
-    assert not bpy.ops.tetflora.use_as_form.poll()
+    assert not bpy.ops.tetflora.use_as_skeleton.poll()
 
 
 def test_only_what_can_be_a_form_is_offered():
     """A plant keeps its form through copies and lets it go when it is deleted."""
     form, plant = add_edges(), add_plant()
-    plant.tetflora.form = form
-    assert plant.copy().tetflora.form == form
+    plant.tetflora.skeleton = form
+    assert plant.copy().tetflora.skeleton == form
     bpy.data.objects.remove(form)
-    assert plant.tetflora.form is None
+    assert plant.tetflora.skeleton is None

@@ -47,7 +47,7 @@ def test_the_matrices_of_a_camera_give_that_camera(angles, place, lens, shift, k
 
 @pytest.fixture
 def region_3d():
-    """Of the only viewport; as it was afterwards."""
+    """Of the only viewport; as it was afterward."""
     space, _ = viewport_of(bpy.context.scene)
     own = space.region_3d
     before = own.view_perspective

@@ -172,8 +172,8 @@ def blurred_render(scene, path, size=128, samples=64):
 
 
 @pytest.mark.parametrize("fps", [24, 48])
-def test_cycles_takes_velocities_for_metres_a_second(clean_file, tmp_path, fps):
-    """A square of a metre at 12 m/s is smeared by the way that it goes while the shutter is open."""
+def test_cycles_takes_velocities_for_meters_a_second(clean_file, tmp_path, fps):
+    """A square of a meter at 12 m/s is smeared by the way that it goes while the shutter is open."""
     square = buffers.MeshBuffers(
         positions=np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]], np.float32),
         edge_verts=np.array([[0, 1], [1, 2], [2, 3], [3, 0]], np.int32),

@@ -21,7 +21,7 @@ from tetflora_addon.blender.job import contents, forecast, frame_cache, plant_me
 from tetflora_addon.blender.results.output import result_collections
 from tetflora_addon.blender.species import edits
 from tetflora_addon.blender.viewport import auto, levels
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 
 LEAF = {"appear": 118, "growth": 28, "turn": 280, "fall": 296, "fresh": [0.2, 0.4, 0.02], "autumn": [[0.6, 0.3, 0.02]]}
 WINTER, SPRING, SUMMER, AUTUMN = 15.0, 125.0, 200.0, 285.0
@@ -61,7 +61,7 @@ def test_without_seasons_it_is_summer_whatever_the_day(scene):
 def test_winter_is_bare_in_all_that_is_made(scene):
     def made(day):
         scene.tetflora.year.day = day
-        (mesh,) = at_once(plant_mesh.make_plant_mesh_steps(scene, depsgraph(), [bpy.data.objects["plant"]]))
+        (mesh,) = run_to_end(plant_mesh.make_plant_mesh_steps(scene, depsgraph(), [bpy.data.objects["plant"]]))
         number = len(mesh.data.polygons)
         bpy.data.objects.remove(mesh)
         bpy.data.objects["plant"].tetflora.enabled = True
@@ -89,8 +89,8 @@ def test_previews_have_the_colors_of_the_day(scene):
 
     def redness(day):
         scene.tetflora.year.day = day
-        colour = levels.read_shapes(scene, depsgraph()).colours.astype(float)
-        return float((colour[:, 0] / np.maximum(colour[:, 1], 1e-6)).mean())
+        color = levels.read_shapes(scene, depsgraph()).colors.astype(float)
+        return float((color[:, 0] / np.maximum(color[:, 1], 1e-6)).mean())
 
     assert redness(AUTUMN + 8.0) > 1.2 * redness(SUMMER)
 
@@ -209,7 +209,7 @@ def test_bare_plants_are_thin_and_brown_in_previews(scene):
     def shown(day):
         scene.tetflora.year.day = day
         shapes = levels.read_shapes(scene, depsgraph())
-        return np.ptp(shapes.positions[:, 0]), shapes.colours.astype(float)
+        return np.ptp(shapes.positions[:, 0]), shapes.colors.astype(float)
 
     (bare, brown), (full, green) = shown(WINTER), shown(SUMMER)
     assert bare < 0.7 * full

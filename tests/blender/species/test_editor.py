@@ -16,8 +16,8 @@ from tetflora_addon import errors
 from tetflora_addon.blender import preferences
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.species import edits
-from tetflora_addon.blender.species.catalogue import OWN_FILES, load_species_file
-from tetflora_addon.species import catalogue, schema, skeletons
+from tetflora_addon.blender.species.catalog import OWN_FILES, load_species_file
+from tetflora_addon.species import catalog, schema, skeletons
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -33,7 +33,7 @@ def _edited(identifier="bush"):
 
 
 def _shipped(identifier="bush"):
-    return catalogue.load_species(identifier)
+    return catalog.load_species(identifier)
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_every_key_of_an_order_has_its_sliders_with_limits_and_tooltip():
     for name, key in keys.items():
         assert name in properties, name
         assert key.meaning[1:] in properties[name].description
-        assert (name + "_variation" in properties) == (key.kind in {"range", "colour"})
+        assert (name + "_variation" in properties) == (key.kind in {"range", "color"})
         if key.kind in {"range", "number", "integer"}:
             scale = math.pi / 180.0 if key.unit == "degrees" else 1.0
             assert properties[name].hard_min == pytest.approx(key.low * scale, rel=1e-6)
@@ -66,7 +66,7 @@ def test_sliders_show_what_the_species_has(identifier):
             shown, value = getattr(editor, name), getattr(order, name)
             if key.kind == "range":
                 shown, value = (shown, getattr(editor, name + "_variation")), tuple(value)
-            elif key.kind == "colour":
+            elif key.kind == "color":
                 shown = (*shown, *getattr(editor, name + "_variation"))
                 value = (*value.mean, *value.variation)
             if key.unit == "degrees":
@@ -101,7 +101,7 @@ def test_every_slider_changes_its_own_value_and_no_other():
         elif key.kind == "integer":
             meant = int(key.low) + 1
             setattr(editor, name, meant)
-        elif key.kind in {"colour", "rgb"}:
+        elif key.kind in {"color", "rgb"}:
             meant = (0.5, 0.25, 0.125)
             setattr(editor, name, meant)
         else:
@@ -121,7 +121,7 @@ def test_every_slider_changes_its_own_value_and_no_other():
     assert _edited() == _shipped()
 
 
-def test_edits_live_in_the_file_and_override_the_catalogue(tmp_path):
+def test_edits_live_in_the_file_and_override_the_catalog(tmp_path):
     editor = _editor("bush", 2)
     editor.leaf_size = 0.2
     editor.leaf_form, editor.leaf_transmission = "kite", 0.1
@@ -131,7 +131,7 @@ def test_edits_live_in_the_file_and_override_the_catalogue(tmp_path):
     species = _edited()
     assert species.orders[2].leaf_size.mean == pytest.approx(0.2)
     assert (species.leaf[0].polygons, species.leaf_transmission, species.name) == (1, 0.1, "Broad Bush")
-    assert edits.catalogue()["bush"].name == "Broad Bush"
+    assert edits.catalog()["bush"].name == "Broad Bush"
     assert _shipped().name == "Bush"
     session.clean_file()
     assert _edited() == _shipped()
@@ -183,7 +183,7 @@ def test_a_broken_text_breaks_no_panel(text):
     for prop in editor.bl_rna.properties:
         getattr(editor, prop.identifier)
     assert edits.problem_of(bpy.context.scene, "bush")
-    assert "bush" in edits.catalogue()
+    assert "bush" in edits.catalog()
 
 
 def test_duplicate_revert_and_orders():
@@ -206,8 +206,8 @@ def test_duplicate_revert_and_orders():
         assert len(_edited("bush_2_2").orders) == number
     assert number == 1
     bpy.ops.tetflora.revert_species()
-    assert "bush_2_2" not in edits.catalogue()
-    assert "bush_2" in edits.catalogue()
+    assert "bush_2_2" not in edits.catalog()
+    assert "bush_2" in edits.catalog()
     assert not bpy.ops.tetflora.revert_species.poll()
 
 
@@ -224,7 +224,7 @@ def test_saved_species_come_back_as_they_were(own_folder, tmp_path):
     _editor(identifier)
     assert bpy.ops.tetflora.delete_species.poll()
     bpy.ops.tetflora.delete_species()
-    assert identifier not in edits.catalogue()
+    assert identifier not in edits.catalog()
     assert bpy.ops.tetflora.load_species(filepath=str(tmp_path / "given.json")) == {'FINISHED'}
     given = _edited("given")
     assert (given.orders, given.leaf, given.name) == (species.orders, species.leaf, "Łąka fir")
@@ -297,15 +297,15 @@ def test_panels_look_at_folders_once_in_a_while_and_see_own_changes_at_once(monk
     monkeypatch.setattr(edits, "_TRUSTED", 1000.0)
     edits.look_again()
     for _ in range(50):
-        edits.catalogue()
+        edits.catalog()
         edits.species_data(None, "oak")
     assert len(looked) == 1
     edits.tell_listeners()
-    edits.catalogue()
+    edits.catalog()
     assert len(looked) == 2
     monkeypatch.setattr(edits, "_TRUSTED", 0.0)
-    edits.catalogue()
-    edits.catalogue()
+    edits.catalog()
+    edits.catalog()
     assert len(looked) == 4
 
 

@@ -17,7 +17,7 @@ from tests.attack import material
 from tests.blender.scenes import add_plant
 from tetflora_addon import errors, files
 from tetflora_addon.blender import file_library, preferences
-from tetflora_addon.blender.species import catalogue as menus
+from tetflora_addon.blender.species import catalog as menus
 from tetflora_addon.blender.species import edits
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -62,7 +62,7 @@ def test_identifiers_from_a_file_lead_nowhere(own_folder, tmp_path, way):
     before = _contents(tmp_path)
     identifier = way.format(tmp_path)
     _carried(identifier)
-    assert identifier not in edits.catalogue()
+    assert identifier not in edits.catalog()
     assert not bpy.ops.tetflora.save_species.poll()
     assert not bpy.ops.tetflora.delete_species.poll()
     _press_everything()
@@ -96,7 +96,7 @@ def test_attack_on_identifiers_of_a_file(own_folder, tmp_path):
     for _ in range(60):
         identifier = material.identifier(rng, tmp_path).encode(errors="replace").decode().replace("\0", "?")
         _carried(identifier)
-        taken += identifier in edits.catalogue()
+        taken += identifier in edits.catalog()
         menus.items_for(identifier)
         _press_everything()
         bpy.context.scene.tetflora.species_edits.clear()

@@ -15,7 +15,7 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing.plant_objects import link_field, write_field
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.species.edits import (
-    catalogue,
+    catalog,
     change_species,
     revert_species,
     species_data,
@@ -46,7 +46,7 @@ def library(tmp_path):
     path = str(tmp_path / "library.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert "bush_litter" not in catalogue()
+    assert "bush_litter" not in catalog()
     return path
 
 
@@ -109,7 +109,7 @@ def test_what_is_reverted_does_not_come_back(library):
     bring(library, link=False)
     revert_species("bush_litter")
     revert_species("conifer")
-    assert "bush_litter" not in catalogue()
+    assert "bush_litter" not in catalog()
     assert species_for(bpy.context.scene, "conifer").name != "Blue Conifer"
 
 
@@ -128,4 +128,4 @@ def test_pages_that_are_no_species_are_passed_over(library):
     collection = bring(library, link=False)
     for text in ("{", "[]", json.dumps({"../x": "{}", "y": 3}), "\0"):
         collection["tetflora_pages"] = text
-        assert {"y", "../x"}.isdisjoint(catalogue())
+        assert {"y", "../x"}.isdisjoint(catalog())

@@ -129,7 +129,11 @@ def test_the_brush_leaves_histories_alone():
 
 @pytest.mark.parametrize(
     ("settings", "message"),
-    [({"warmth": 0.0}, "climate"), ({"density": 0.0, "recruits": 0.0}, "planted"), ({"slope_max": 0.0}, "steeper")],
+    [
+        ({"degree_days": 0.0}, "climate"),
+        ({"density": 0.0, "recruits": 0.0}, "planted"),
+        ({"slope_max": 0.0}, "steeper"),
+    ],
 )
 def test_what_cannot_grow_is_told_and_changes_nothing(settings, message):
     ground = add_mesh("ground", size=10.0)

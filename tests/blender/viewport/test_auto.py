@@ -90,7 +90,7 @@ def test_what_changes_is_refined_again(scene, monkeypatch, change):
     elif change == "seed":
         plant.tetflora.seed += 1
     elif change == "form":
-        scene.tetflora.proxy_form = 'MICROSURFACES'
+        scene.tetflora.proxy_kind = 'MICROSURFACES'
     else:
         add_plant("another", seed=9, location=(0.0, 5.0, 0.0))
     bpy.context.view_layer.update()

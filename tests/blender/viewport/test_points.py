@@ -41,7 +41,7 @@ def test_dots_stand_where_plants_will():
     own = [o for o in bpy.context.scene.objects if o.tetflora.is_plant]
     places = np.array([tuple(o.location) for o in own])
     assert np.allclose(np.sort(dots.position[:, :2], axis=0), np.sort(places[:, :2], axis=0), atol=1e-4)
-    assert len(np.unique(dots.colour, axis=0)) == len({o.tetflora.species for o in own})
+    assert len(np.unique(dots.color, axis=0)) == len({o.tetflora.species for o in own})
 
 
 def test_without_a_population_dots_stand_on_what_is_selected():

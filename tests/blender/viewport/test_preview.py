@@ -52,7 +52,7 @@ def test_levels_are_those_of_refinement_and_leave_no_trace():
 def test_shells_are_refined_as_refine_does():
     scene, _, _ = scene_of_plants()
     coarse = len(compute().levels.levels[-1])
-    scene.tetflora.proxy_form = 'SHELLS'
+    scene.tetflora.proxy_kind = 'SHELLS'
     fine = compute().levels.levels[-1]
     _, refinement = refine.partition(scene, depsgraph())
     assert fine.nodes.tolist() == refinement.nodes.tolist()
@@ -190,9 +190,9 @@ def test_figures_say_what_is_shown():
     assert "changed" in overlay.lines_of(scene, preview)[-1][0]
     settings.freeze = True
     assert "frozen" in overlay.lines_of(scene, preview)[-1][0]
-    colours = {colour for _, colour in overlay.lines_of(scene, preview)}
-    settings.colour = 'VISIBILITY'
-    assert {colour for _, colour in overlay.lines_of(scene, preview)} < colours
+    colors = {color for _, color in overlay.lines_of(scene, preview)}
+    settings.color = 'VISIBILITY'
+    assert {color for _, color in overlay.lines_of(scene, preview)} < colors
 
 
 def test_undo_keeps_levels_and_lets_go_of_what_was_frozen():
@@ -218,13 +218,13 @@ def test_settings_survive_the_file_and_what_is_shown_does_not(tmp_path):
     scene, _, _ = scene_of_plants()
     settings = scene.tetflora.preview
     compute()
-    settings.plants, settings.colour, settings.forms, settings.freeze = 'BOUNDS', 'LEVEL', {'PROXY'}, True
+    settings.plants, settings.color, settings.forms, settings.freeze = 'BOUNDS', 'LEVEL', {'PROXY'}, True
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     assert state.find(scene).levels is not None
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     scene = bpy.context.scene
     settings = scene.tetflora.preview
-    assert (settings.plants, settings.colour, set(settings.forms), settings.freeze) == (
+    assert (settings.plants, settings.color, set(settings.forms), settings.freeze) == (
         'BOUNDS',
         'LEVEL',
         {'PROXY'},

@@ -14,9 +14,9 @@ from tetflora_addon.assets.clusters import GENERATIONS, SMALL, Hierarchy, hierar
 
 def patches(seed: int, count: int, kinds: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
-    centre = rng.integers(0, 8, (count, 3)) * rng.choice([0.0, 1e-3, 1.0, 1e5])
+    center = rng.integers(0, 8, (count, 3)) * rng.choice([0.0, 1e-3, 1.0, 1e5])
     most = rng.choice([1, 40, 3 * SMALL])
-    return centre.astype(np.float32), rng.integers(1, most + 1, count), rng.integers(0, kinds, count).astype(np.int8)
+    return center.astype(np.float32), rng.integers(1, most + 1, count), rng.integers(0, kinds, count).astype(np.int8)
 
 
 def check(found: Hierarchy, triangles: np.ndarray, kind: np.ndarray) -> None:
@@ -43,8 +43,8 @@ def check(found: Hierarchy, triangles: np.ndarray, kind: np.ndarray) -> None:
 
 @given(st.integers(0, 2**31), st.integers(1, 300), st.integers(1, 3))
 def test_any_patches(seed: int, count: int, kinds: int) -> None:
-    centre, triangles, kind = patches(seed, count, kinds)
-    check(hierarchy_of(centre, triangles, kind), triangles, kind)
+    center, triangles, kind = patches(seed, count, kinds)
+    check(hierarchy_of(center, triangles, kind), triangles, kind)
 
 
 @given(st.integers(0, 2**31))
@@ -59,11 +59,11 @@ def test_the_same_patches_make_the_same_clusters(seed: int) -> None:
 def test_clusters_are_balanced_and_compact(count: int) -> None:
     """No smallest cluster is much smaller than half of what it may be, and those of one are boxes side by side."""
     rng = np.random.default_rng(1)
-    centre = rng.random((count, 3)).astype(np.float32)
-    found = hierarchy_of(centre, np.ones(count, np.int32), np.zeros(count, np.int8))
+    center = rng.random((count, 3)).astype(np.float32)
+    found = hierarchy_of(center, np.ones(count, np.int32), np.zeros(count, np.int8))
     check(found, np.ones(count, np.int32), np.zeros(count, np.int8))
     size = (found.last - found.first)[found.children == 0]
     assert size.min() >= min(SMALL // 2 - 2, count)
-    boxes = [centre[found.order[a:b]] for a, b in zip(found.first, found.last, strict=True)]
+    boxes = [center[found.order[a:b]] for a, b in zip(found.first, found.last, strict=True)]
     volume = np.array([np.prod(np.ptp(box, axis=0)) for box in boxes])
     assert volume[found.children == 0].sum() <= 1.0

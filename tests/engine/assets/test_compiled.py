@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiled assets are their triangles: all area, faces and colour are somewhere, within bounds, at every level."""
+"""Compiled assets are their triangles: all area, faces and color are somewhere, within bounds, at every level."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ def check(source: AssetSource, asset: Asset) -> None:
         part, face = asset.faces_of(cluster)
         assert len(part) == len(face) == number
     every = clusters.children > 0
-    for name in ("leaf_area", "wood_area", "body_area", "faces", "leaves", "optical_area", "leaf_optical"):
+    for name in ("leaf_area", "wood_area", "closed_leaf_area", "faces", "leaves", "optical_area", "leaf_optical"):
         whole = getattr(clusters, name)
         below = np.bincount(clusters.parent[1:], whole[1:], len(clusters))
         assert below[every] == pytest.approx(whole[every], rel=1e-6, abs=1e-12)
-    assert (clusters.body_area <= clusters.wood_area).all()
+    assert (clusters.closed_leaf_area <= clusters.wood_area).all()
     for f in vars(clusters).values():
         assert np.isfinite(f).all()
     filled = clusters.optical_area > 0
@@ -60,7 +60,7 @@ def check(source: AssetSource, asset: Asset) -> None:
     assert (clusters.width[filled] > 0).all()
     assert (clusters.width >= 0).all() and (clusters.one_leaf >= 0).all()
     # Means of parents are those of children, by optical area.
-    for name in ("colour", "transmission", "moment", "width"):
+    for name in ("color", "transmission", "moment", "width"):
         value = getattr(clusters, name).reshape(len(clusters), -1) * clusters.optical_area[:, None]
         for k in range(value.shape[1]):
             below = np.bincount(clusters.parent[1:], value[1:, k], len(clusters))
@@ -73,7 +73,7 @@ def check_samples(asset: Asset) -> None:
     assert ((clusters.leaf_samples + clusters.wood_samples)[filled] > 0).all()
     runs = ((clusters.leaf_sample, clusters.leaf_samples), (clusters.wood_sample, clusters.wood_samples))
     for leafy, (first, number) in zip((True, False), runs, strict=True):
-        optical = clusters.leaf_optical if leafy else (clusters.wood_area - clusters.body_area) / 2
+        optical = clusters.leaf_optical if leafy else (clusters.wood_area - clusters.closed_leaf_area) / 2
         assert (number[optical > 1e-9 * clusters.optical_area[0]] > 0).all()
         for cluster in np.flatnonzero(number).tolist():
             own = samples.position[int(first[cluster]) : int(first[cluster] + number[cluster])]
@@ -154,19 +154,19 @@ def test_means_over_samples_are_those_of_the_cluster(kind: str) -> None:
     assert np.abs(wrong.mean(axis=0)).max() < 4 / np.sqrt(32 * len(wrong))
 
 
-def test_moments_and_colours_are_those_of_faces() -> None:
+def test_moments_and_colors_are_those_of_faces() -> None:
     flat = trees.surface(trees.QUAD * [1, 1, 0], [(0, 1, 2, 3)], (0.2, 0.4, 0.6), 0.25)
     one = compile_asset(trees.source_of(flat)).clusters
     assert one.moment[0] == pytest.approx([0, 0, 1, 0, 0, 0], abs=1e-7)
-    assert one.colour[0] == pytest.approx([0.2, 0.4, 0.6], abs=1e-3)
+    assert one.color[0] == pytest.approx([0.2, 0.4, 0.6], abs=1e-3)
     assert one.transmission[0] == pytest.approx(0.25, abs=1e-3)
     whole = trees.compiled("varied").clusters
     corners, part, face, coverage = trees.triangles_of(trees.source("varied"))
     area = trees.areas_of(corners) * coverage
     solid = face < 88  # the trunk
     area = np.where(solid, area / 2, area)
-    colour = trees.source("varied").surfaces[0].colour[face].astype(float)
-    assert whole.colour[0] == pytest.approx((area[:, None] * colour).sum(axis=0) / area.sum(), rel=1e-4)
+    color = trees.source("varied").surfaces[0].color[face].astype(float)
+    assert whole.color[0] == pytest.approx((area[:, None] * color).sum(axis=0) / area.sum(), rel=1e-4)
     assert not part.any()
 
 
@@ -186,33 +186,33 @@ def test_closed_leaves_are_bodies_and_trunks_are_wood() -> None:
     whole = asset.clusters
     assert whole.leaf_area[0] == 0.0
     assert whole.wood_area[0] == pytest.approx(area.sum(), rel=1e-6)
-    assert whole.body_area[0] == pytest.approx(area[face >= 88].sum(), rel=1e-6)
+    assert whole.closed_leaf_area[0] == pytest.approx(area[face >= 88].sum(), rel=1e-6)
     assert whole.leaf_optical[0] == pytest.approx(area[face >= 88].sum() / 2, rel=1e-6)
     assert whole.leaves[0] == len(asset.leaves) == 800
     kinds = whole.take(whole.parent == 0)
-    assert len(kinds) == 2 and ((kinds.body_area == 0) ^ (kinds.body_area == kinds.wood_area)).all()
-    assert not asset.leaves_of(int(np.flatnonzero((whole.parent == 0) & (whole.body_area == 0))[0]))
+    assert len(kinds) == 2 and ((kinds.closed_leaf_area == 0) ^ (kinds.closed_leaf_area == kinds.wood_area)).all()
+    assert not asset.leaves_of(int(np.flatnonzero((whole.parent == 0) & (whole.closed_leaf_area == 0))[0]))
 
 
 def test_closed_leaves_are_as_dark_as_both_of_their_sides_together() -> None:
     """A facet in their place is one sheet: light that passes has met two walls, and walls swallow some each time."""
     whole = trees.compiled("closed").clusters
-    leaves = whole.take((whole.parent == 0) & (whole.body_area > 0))
+    leaves = whole.take((whole.parent == 0) & (whole.closed_leaf_area > 0))
     wall = np.array(trees.GREEN)
     back, through = 0.6 * wall, 0.4 * wall
     inner = 1.0 / (1.0 - back**2)
     passed = through**2 * inner
     sheet = back + through**2 * back * inner + passed
-    assert leaves.colour[0] == pytest.approx(sheet, rel=2e-3)
+    assert leaves.color[0] == pytest.approx(sheet, rel=2e-3)
     assert leaves.transmission[0] == pytest.approx(passed.sum() / sheet.sum(), rel=2e-3)
-    trunk = whole.take((whole.parent == 0) & (whole.body_area == 0))
-    assert trunk.colour[0] == pytest.approx(trees.BROWN, rel=2e-3)
+    trunk = whole.take((whole.parent == 0) & (whole.closed_leaf_area == 0))
+    assert trunk.color[0] == pytest.approx(trees.BROWN, rel=2e-3)
 
 
 @given(st.floats(0, 1), st.floats(0, 1))
 def test_light_through_both_sides_is_the_sum_of_all_ways(albedo: float, through: float) -> None:
     """Nothing is gained, and the series is summed by hand."""
-    colour, out = through_both_sides(np.full((1, 3), albedo), np.array([through]))
+    color, out = through_both_sides(np.full((1, 3), albedo), np.array([through]))
     r, t = albedo * (1 - through), albedo * through
     back, passed, light = r, 0.0, t
     for _ in range(400):
@@ -220,9 +220,9 @@ def test_light_through_both_sides_is_the_sum_of_all_ways(albedo: float, through:
         light *= r
         back += light * t
         light *= r
-    assert colour[0] == pytest.approx(back + passed, abs=1e-3)
-    assert (out * colour[:, 0])[0] == pytest.approx(passed, abs=1e-3)
-    assert 0.0 <= colour[0, 0] <= 1.0 + 1e-6 and 0.0 <= out[0] <= 1.0 + 1e-6
+    assert color[0] == pytest.approx(back + passed, abs=1e-3)
+    assert (out * color[:, 0])[0] == pytest.approx(passed, abs=1e-3)
+    assert 0.0 <= color[0, 0] <= 1.0 + 1e-6 and 0.0 <= out[0] <= 1.0 + 1e-6
 
 
 @given(st.integers(0, 2**31))
@@ -263,7 +263,7 @@ def test_meshes_of_leaves_have_no_wood_in_them() -> None:
     for kind in KINDS:
         clusters = trees.compiled(kind).clusters
         own = clusters.take(clusters.meshes)
-        bark = (own.wood_area - own.body_area) / 2
+        bark = (own.wood_area - own.closed_leaf_area) / 2
         mixed = (own.leaf_optical > 1e-9 * own.optical_area) & (bark > 1e-9 * own.optical_area)
         assert not mixed.any(), kind
 

@@ -33,14 +33,14 @@ def test_kites_are_where_leaves_are(kind: str) -> None:
     asset = trees.compiled(kind)
     for cluster in np.flatnonzero(asset.clusters.children == 0).tolist():
         own = asset.leaves_of(cluster)
-        assert (own.centre >= asset.clusters.low[cluster] - 1e-5).all()
-        assert (own.centre <= asset.clusters.high[cluster] + 1e-5).all()
+        assert (own.center >= asset.clusters.low[cluster] - 1e-5).all()
+        assert (own.center <= asset.clusters.high[cluster] + 1e-5).all()
 
 
 def test_a_kite_of_a_flat_leaf_is_in_its_plane_and_along_it() -> None:
     source = trees.source_of(trees.surface([[0, 0, 2], [3, -0.4, 2], [6, 0, 2], [3, 0.4, 2]], [(0, 1, 2, 3)]))
     leaf = trees.compile_asset(source).leaves
-    assert leaf.centre[0] == pytest.approx([3, 0, 2], abs=1e-5)
+    assert leaf.center[0] == pytest.approx([3, 0, 2], abs=1e-5)
     assert abs(leaf.along[0, 0]) == pytest.approx(np.linalg.norm(leaf.along[0]), rel=1e-5)
     assert np.cross(leaf.along[0], leaf.across[0])[:2] == pytest.approx(0.0, abs=1e-6)
     assert 2.0 < 2 * np.linalg.norm(leaf.along[0]) < 8.0
@@ -60,7 +60,7 @@ def test_kites_show_the_same_area_from_everywhere_as_leaves_do() -> None:
         assert found[[0, 0, 1], [1, 2, 2]] == pytest.approx(wanted[3:], abs=0.05)
 
 
-def test_colours_of_kites_are_those_of_their_leaves() -> None:
+def test_colors_of_kites_are_those_of_their_leaves() -> None:
     asset, surface = trees.compiled("varied"), trees.source("varied").surfaces[0]
     corners = surface.positions[surface.triangles].astype(float)
     area = trees.areas_of(corners)
@@ -68,7 +68,7 @@ def test_colours_of_kites_are_those_of_their_leaves() -> None:
     middle /= np.bincount(surface.face, area)[:, None]
     some = np.flatnonzero(np.linalg.norm(asset.leaves.along.astype(float), axis=1) > 0.02)[:100]
     for leaf in some.tolist():
-        face = np.linalg.norm(middle - asset.leaves.centre[leaf], axis=1).argmin()
+        face = np.linalg.norm(middle - asset.leaves.center[leaf], axis=1).argmin()
         assert face >= 88
-        assert asset.leaves.colour[leaf].astype(float) == pytest.approx(surface.colour[face].astype(float), abs=2e-3)
+        assert asset.leaves.color[leaf].astype(float) == pytest.approx(surface.color[face].astype(float), abs=2e-3)
         assert asset.leaves.transmission[leaf] == pytest.approx(float(surface.transmission[face]), abs=2e-3)

@@ -35,13 +35,13 @@ def check(one: AssetSurface) -> Patches:
     for i, number, pieces in zip(of.tolist(), found.faces.tolist(), found.pieces.tolist(), strict=True):
         assert pieces == -(-counts[i] // MOST_FACES)
         assert pieces > 1 or number == counts[i]
-    for name in ("width", "centre", "island"):
+    for name in ("width", "center", "island"):
         assert np.isfinite(getattr(found, name)).all()
     corners = one.positions[one.triangles].astype(float)
     area = np.bincount(islands(one), trees.areas_of(corners))
     assert found.island == pytest.approx(area[of], rel=1e-5, abs=1e-9)
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    assert ((found.centre >= low - 1e-5) & (found.centre <= high + 1e-5)).all()
+    assert ((found.center >= low - 1e-5) & (found.center <= high + 1e-5)).all()
     return found
 
 

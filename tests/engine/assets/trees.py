@@ -19,7 +19,7 @@ GREEN, BROWN = (0.1, 0.3, 0.05), (0.2, 0.12, 0.08)
 def surface(
     positions: ArrayLike,
     faces: Sequence[Sequence[int]],
-    colour: ArrayLike = GREEN,
+    color: ArrayLike = GREEN,
     transmission: ArrayLike = np.nan,
     coverage: ArrayLike = 1.0,
     name: str = "surface",
@@ -32,7 +32,7 @@ def surface(
         np.asarray(positions, np.float32).reshape(-1, 3),
         np.array(triangles, np.int32).reshape(-1, 3),
         owner.astype(np.int32),
-        np.broadcast_to(np.asarray(colour, np.float16), (len(faces), 3)).copy(),
+        np.broadcast_to(np.asarray(color, np.float16), (len(faces), 3)).copy(),
         np.broadcast_to(np.asarray(transmission, np.float16), len(faces)).copy(),
         np.broadcast_to(np.asarray(coverage, np.float16), len(faces)).copy(),
     )
@@ -47,7 +47,7 @@ def joined(*some: AssetSurface, name: str = "tree") -> AssetSurface:
         np.concatenate([s.positions for s in some]),
         np.concatenate([s.triangles + np.int32(v) for s, v in zip(some, vertices, strict=False)]),
         np.concatenate([s.face + np.int32(f) for s, f in zip(some, faces, strict=False)]),
-        *(np.concatenate([getattr(s, name) for s in some]) for name in ("colour", "transmission", "coverage")),
+        *(np.concatenate([getattr(s, name) for s in some]) for name in ("color", "transmission", "coverage")),
     )
 
 
@@ -106,7 +106,7 @@ CLOSED_FACES = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5)
 def leaves(
     seed: int = 1, count: int = 400, size: float = 0.15, closed: bool = False, varied: bool = False, radius: float = 1.2
 ) -> AssetSurface:
-    """Leaves in a crown, each an island of its own; ``varied``: of many colours and coverages."""
+    """Leaves in a crown, each an island of its own; ``varied``: of many colors and coverages."""
     rng = np.random.default_rng(seed)
     form, own = (CLOSED, CLOSED_FACES) if closed else (QUAD, [(0, 1, 2, 3)])
     place = crown(rng, count, radius=radius)

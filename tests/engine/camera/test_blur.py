@@ -45,19 +45,19 @@ def test_circles_are_those_of_rays_through_the_lens(
 def test_what_the_open_lens_sees_is_in_the_wider_view(seed: int, focus: float) -> None:
     rng = np.random.default_rng(seed)
     camera = replace(CAMERA, lens_radius=0.03, focus=focus)
-    centre = rng.uniform([-20, 2, -20], [20, 60, 20], (30, 3))
+    center = rng.uniform([-20, 2, -20], [20, 60, 20], (30, 3))
     reach = rng.uniform(0.1, 2.0, 30)
-    wide = camera.widened(*blur_margins(camera, centre, reach))
-    points = centre + reach[:, None] * rng.normal(size=(30, 3)) / 4
+    wide = camera.widened(*blur_margins(camera, center, reach))
+    points = center + reach[:, None] * rng.normal(size=(30, 3)) / 4
     # A point is blurred over a disc of the window; where that meets the image, the point must be in the wider one.
     x, y, depth = camera.to_camera_space(points).T
     left, right, bottom, top = camera.window
     disc = circle_of_confusion(camera, depth)
     into = (depth > camera.near) & (x / depth > left - disc) & (x / depth < right + disc)
     into &= (y / depth > bottom - disc) & (y / depth < top + disc)
-    into &= np.linalg.norm(points - centre, axis=1) <= reach
+    into &= np.linalg.norm(points - center, axis=1) <= reach
     pixel = 0.51 * camera.pixel_size * depth  # margins are whole pixels
-    assert (wide.clearance(points)[into] <= pixel[into]).all()
+    assert (wide.distance_to_view(points)[into] <= pixel[into]).all()
 
 
 @given(st.integers(0, 2**31))
@@ -68,17 +68,17 @@ def test_what_a_moving_camera_sees_is_in_the_wider_view(seed: int) -> None:
     turned = CAMERA.frame @ np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
     other = replace(CAMERA, position=rng.uniform(-0.3, 0.3, 3), frame=turned)
     camera = replace(CAMERA, shutter=(other,))
-    centre, reach = rng.uniform([-3, 8, -3], [3, 60, 3], (30, 3)), rng.uniform(0.1, 2.0, 30)
-    margins = blur_margins(camera, centre, reach)
+    center, reach = rng.uniform([-3, 8, -3], [3, 60, 3], (30, 3)), rng.uniform(0.1, 2.0, 30)
+    margins = blur_margins(camera, center, reach)
     assert 0 < max(margins) < MOST
     wide = camera.widened(*margins)
-    inside = other.clearance(centre) < 0
-    pixel = 0.51 * camera.pixel_size * np.linalg.norm(centre, axis=1)
+    inside = other.distance_to_view(center) < 0
+    pixel = 0.51 * camera.pixel_size * np.linalg.norm(center, axis=1)
     # Only what the camera itself sees sets the range of depths.
-    depth = camera.to_camera_space(centre)[:, 2]
-    seen = camera.clearance(centre) < reach
+    depth = camera.to_camera_space(center)[:, 2]
+    seen = camera.distance_to_view(center) < reach
     inside &= (depth >= (depth - reach)[seen].min()) & (depth <= (depth + reach)[seen].max()) if seen.any() else False
-    assert (wide.clearance(centre)[inside] <= pixel[inside]).all()
+    assert (wide.distance_to_view(center)[inside] <= pixel[inside]).all()
 
 
 def test_a_camera_that_turns_fast_gets_no_more_than_the_most() -> None:

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.proxies.drawn import facet_mesh
-from tetflora_addon.proxies.microsurfaces import Facets, kept_out_of_view
+from tetflora_addon.proxies.microsurfaces import Facets, pushed_outside_view
+from tetflora_addon.proxies.primitives import facet_mesh
 
 KINDS = ("PERSP", "ORTHO")
 
@@ -35,19 +35,19 @@ def test_clearance_is_the_distance_from_the_view(kind):
     depth = random.uniform(0.5, 20, 500)
     scale = depth if kind == "PERSP" else np.ones(500)
     x, y = random.uniform(-0.4, 0.6, 500) * scale, random.uniform(-0.3, 0.2, 500) * scale
-    assert (camera.clearance(_world(camera, x, y, depth)) <= 1e-9).all()
+    assert (camera.distance_to_view(_world(camera, x, y, depth)) <= 1e-9).all()
     # Points beside one wall, at a distance along that wall's normal.
     away = random.uniform(0.1, 3, 500)
     slope = 0.6 if kind == "PERSP" else 0.0
     normal = np.array([1.0, -slope]) / np.hypot(1.0, slope)
     beside = _world(camera, 0.6 * scale + away * normal[0], np.zeros(500), depth + away * normal[1])
-    assert camera.clearance(beside) == pytest.approx(away)
+    assert camera.distance_to_view(beside) == pytest.approx(away)
 
 
 def test_what_is_behind_the_eye_is_out_of_view():
     camera = _camera("PERSP")
     behind = _world(camera, np.zeros(5), np.zeros(5), -np.arange(1.0, 6.0))
-    assert (camera.clearance(behind) > 0).all()
+    assert (camera.distance_to_view(behind) > 0).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -67,13 +67,13 @@ def test_facets_beside_the_view_do_not_reach_into_it():
     n = 300
     depth = random.uniform(1, 20, n)
     # The middles of some are in the view, however they got there.
-    centre = _world(camera, (0.6 + random.uniform(-0.3, 0.5, n)) * depth, np.zeros(n), depth)
+    center = _world(camera, (0.6 + random.uniform(-0.3, 0.5, n)) * depth, np.zeros(n), depth)
     a, b = np.linalg.qr(random.normal(size=(n, 3, 2)))[0].transpose(2, 0, 1)
-    facets = Facets(centre, a, b, random.uniform(0.5, 4, n), np.zeros((n, 3)), np.zeros(n))
-    shrunk = facet_mesh(kept_out_of_view(facets, camera.clearance))
-    assert camera.clearance(facet_mesh(facets).positions.astype(float)).min() < -0.1  # they did reach in
-    assert camera.clearance(shrunk.positions.astype(float)).min() > -1e-4
-    same = kept_out_of_view(facets, lambda points: np.full(len(points), np.inf))
+    facets = Facets(center, a, b, random.uniform(0.5, 4, n), np.zeros((n, 3)), np.zeros(n))
+    shrunk = facet_mesh(pushed_outside_view(facets, camera.distance_to_view))
+    assert camera.distance_to_view(facet_mesh(facets).positions.astype(float)).min() < -0.1  # they did reach in
+    assert camera.distance_to_view(shrunk.positions.astype(float)).min() > -1e-4
+    same = pushed_outside_view(facets, lambda points: np.full(len(points), np.inf))
     assert (same.side == facets.side).all()
 
 

@@ -62,7 +62,7 @@ def same(a: Camera, b: Camera) -> bool:
     return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(Camera))
 
 
-def neighbour(rng: np.random.Generator, camera: Camera, step: float = 0.3) -> Camera:
+def neighbor(rng: np.random.Generator, camera: Camera, step: float = 0.3) -> Camera:
     """A camera near another one."""
     return replace(
         camera,
@@ -80,7 +80,7 @@ def test_the_cells_camera_sees_all_that_any_of_its_cameras_sees(rng, kind):
         assert max(np.abs(camera.window)) > 1.0  # wider than 90 degrees
         return
     points = points_in_image(rng, camera)
-    assert (cell.clearance(points) <= 1e-9).all()
+    assert (cell.distance_to_view(points) <= 1e-9).all()
     depth = cell.to_camera_space(points)[:, 2]
     assert (depth >= cell.near - 1e-9).all()
     assert (depth <= cell.far + 1e-9).all()
@@ -97,26 +97,26 @@ def test_it_sees_what_the_other_eye_sees_through_a_shifted_window(rng):
     if cell is None:
         assert max(np.abs((*camera.window, *other.window))) > 1.0
         return
-    assert (cell.clearance(points_in_image(rng, camera)) <= 1e-9).all()
-    assert (cell.clearance(points_in_image(rng, other)) <= 0.01).all()  # a 64th of a pixel at most
+    assert (cell.distance_to_view(points_in_image(rng, camera)) <= 1e-9).all()
+    assert (cell.distance_to_view(points_in_image(rng, other)) <= 0.01).all()  # a 64th of a pixel at most
 
 
 @given(RANDOM)
 def test_blur_reaches_as_far_into_its_picture_as_into_that_of_any_of_its_cameras(rng):
     camera = drawn(rng)
-    centre, reach = points_in_image(rng, camera, 1), np.full(1, 0.01)
-    away = np.linalg.norm(centre - camera.position)
+    center, reach = points_in_image(rng, camera, 1), np.full(1, 0.01)
+    away = np.linalg.norm(center - camera.position)
     # Nearer than a third of the way to what is sharp: nearly sharp, it is a matter of how wide cells of focus are.
     camera = replace(camera, lens_radius=rng.uniform(0.005, 0.05), focus=rng.uniform(3.0, 30.0) * away)
     cell = cell_camera(camera, CELLS)
     assume(cell is not None)
     assume(away > 1.5 * cell.cell_radius)
     margins = [
-        np.array(blur_margins(viewer, centre, reach))
+        np.array(blur_margins(viewer, center, reach))
         * (viewer.window[1] - viewer.window[0], viewer.window[3] - viewer.window[2])
         for viewer in (camera, cell)
     ]
-    assert (margins[1] >= 0.9 * margins[0]).all() or max(blur_margins(cell, centre, reach)) == MOST
+    assert (margins[1] >= 0.9 * margins[0]).all() or max(blur_margins(cell, center, reach)) == MOST
 
 
 @given(RANDOM)
@@ -126,7 +126,7 @@ def test_it_takes_nothing_to_be_farther_away_than_any_of_its_cameras(rng):
     assume(cell is not None)
     points = points_in_image(rng, camera)
     points = points[np.linalg.norm(points - camera.position, axis=1) > 4.0 * cell.cell_radius]
-    # Towards the border of a wide image depth changes with the direction as well.
+    # Toward the border of a wide image depth changes with the direction as well.
     border = 1.0 + np.tan(CELLS.turn) * 2.0 * np.abs(camera.window).max()
     assert (cell.extent_around(points) <= camera.extent_around(points) * border).all()
     assert (cell.pixel_extent(points) <= camera.pixel_extent(points) * border).all()
@@ -159,7 +159,7 @@ def test_pixels_are_those_that_the_nearest_camera_sees(rng):
 @given(RANDOM)
 def test_all_cameras_of_a_cell_get_the_same_one_to_the_last_bit(rng):
     camera = drawn(rng)
-    others = [neighbour(rng, camera) for _ in range(8)]
+    others = [neighbor(rng, camera) for _ in range(8)]
     cells = [cell_camera(c, CELLS) for c in (camera, *others)]
     known = [c for c in cells if c is not None]
     distinct = [c for n, c in enumerate(known) if not any(same(c, d) for d in known[:n])]
@@ -221,13 +221,13 @@ def test_all_cameras_of_a_larger_cell_get_the_same_one_and_things_stay_clear_of_
     camera = drawn(rng)
     if kind == "PANO":
         camera = replace(camera, kind=kind, window=(-np.pi, np.pi, -np.pi / 2, np.pi / 2))
-    centres, radii = rng.normal(size=(20, 3)) * 300.0, rng.uniform(0.0, 10.0, 20)
-    around = Around(centres, radii)
+    centers, radii = rng.normal(size=(20, 3)) * 300.0, rng.uniform(0.0, 10.0, 20)
+    around = Around(centers, radii)
     cell = cell_camera(camera, CELLS, around)
     assume(cell is not None)
     small = cell_camera(camera, CELLS)
     if cell.cell_radius > small.cell_radius:
-        away = np.linalg.norm(centres - cell.eye, axis=1) - radii
+        away = np.linalg.norm(centers - cell.eye, axis=1) - radii
         assert (away >= CLEAR * cell.cell_radius * (1.0 - 1e-9)).all()
     assert np.linalg.norm(camera.position - cell.eye) <= cell.cell_radius * (1.0 + 1e-9)
     assert float(np.log2(cell.cell_radius / small.cell_radius)).is_integer()

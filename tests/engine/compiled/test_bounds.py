@@ -15,7 +15,7 @@ from tests.engine import support
 from tetflora_addon.compiled.bounds import ring_stretch, unit_bounds, widest_radii
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
-from tetflora_addon.refinement.contents import bounding_bodies
+from tetflora_addon.refinement.contents import bounding_capsules
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 from tetflora_addon.subplants.pieces import expand, open_subplants
 from tetflora_addon.subplants.tubes import tube_buffers
@@ -36,14 +36,14 @@ def vertices(flora: Flora, subplant: Branches) -> np.ndarray:
 def outside(flora: Flora, subplants: Branches) -> float:
     """How far the farthest vertex of any sub-plant lies outside its body, as a fraction of the body's size."""
     worst = -1.0
-    bodies = bounding_bodies(flora, subplants)
+    bodies = bounding_capsules(flora, subplants)
     for i, (*_, radius, half, pad) in enumerate(bodies.T):
-        centre, axis = bodies[:3, i], bodies[3:6, i]
-        points = vertices(flora, subplants.take(np.array([i]))) - centre
+        center, axis = bodies[:3, i], bodies[3:6, i]
+        points = vertices(flora, subplants.take(np.array([i]))) - center
         along = points @ axis
         across = np.linalg.norm(points - along[:, None] * axis, axis=1)
         beyond = np.hypot(np.maximum(np.abs(along) - half, 0), np.maximum(across - radius, 0)) - pad
-        worst = max(worst, beyond.max() / (radius + half + pad + np.abs(centre).max()))
+        worst = max(worst, beyond.max() / (radius + half + pad + np.abs(center).max()))
     return worst
 
 
@@ -231,7 +231,7 @@ def test_samples_are_inside_the_bound(species: int) -> None:
     level = support.trunks(flora.rows, support.plants([1, 2, 3], species))
     while len(level):
         some = level.take(np.s_[:: max(1, len(level) // 40)])
-        tight, body = flora.sampled_bound[some.row], bounding_bodies(flora, some)
+        tight, body = flora.sampled_bound[some.row], bounding_capsules(flora, some)
         for points in (flora.samples.leaves, flora.samples.wood):
             first, number = points.runs(some)
             for i in np.flatnonzero(number):

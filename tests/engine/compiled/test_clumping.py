@@ -16,11 +16,11 @@ from tests.engine import support
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.clumping import LEAST, MOST, Clumping, factors
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.compiled.rays import basis, cell_numbers, covered, path_lengths, things_of
+from tetflora_addon.compiled.rays import basis, cell_numbers, covered, elements_of, path_lengths
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarise
-from tetflora_addon.refinement.contents import Contents, Held, subplant_totals
+from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarize
+from tetflora_addon.refinement.contents import Contents, InCells, subplant_totals
 
 seeds = st.integers(0, 2**31)
 
@@ -33,7 +33,7 @@ def direction_of(rng: np.random.Generator) -> NDArray[np.float64]:
 def whole_plants(flora: Flora, seeds: Seeds) -> Contents:
     """Plants that are not opened, all in one tetrahedron."""
     whole = trunks(flora.rows, seeds)
-    return Contents(Held(whole, np.zeros(len(whole), np.int32), subplant_totals(flora, whole)))
+    return Contents(InCells(whole, np.zeros(len(whole), np.int32), subplant_totals(flora, whole)))
 
 
 def crossings(mesh: MeshBuffers, direction: NDArray[np.float64], spacing: float) -> float:
@@ -128,7 +128,7 @@ def test_outlines_show_what_meshes_show() -> None:
     whole, pieces = support.grown(flora, support.plants(4))
     tubes, leaves = support.meshes(flora, pieces)
     length = np.ones(len(flora.rows))
-    things = things_of(flora.rows, flora.forms[0], whole, np.arange(len(flora.rows)), 0, length)
+    things = elements_of(flora.rows, flora.forms[0], whole, np.arange(len(flora.rows)), 0, length)
     for _ in range(3):
         direction = direction_of(rng)
         shown = sum(p.shown(direction).sum() for p in things.parts)
@@ -199,7 +199,7 @@ def test_summaries_weigh_factors_by_area() -> None:
     """Half of two equal plants' summary is either plant's; extinction takes the factor, the area stays as it is."""
     flora = support.small_flora()
     contents = whole_plants(flora, support.plants([1, 2]))
-    both = summarise(flora, contents, np.zeros(1, np.int64), 1)
+    both = summarize(flora, contents, np.zeros(1, np.int64), 1)
     volumes = np.array([8.0])
     found = flora.clumping.coefficients(contents.subplants.items, flora.clumping.whole)
     totals = contents.subplants.totals
@@ -216,7 +216,7 @@ def test_light_goes_through_the_leaves_alone() -> None:
     flora = support.small_flora()
     tubes, leaves = support.meshes(flora, support.grown(flora, support.grove(100, 2.0))[1])
     leaf, wood = (sum(support.face_areas(m).sum() for m in meshes) for meshes in (leaves, tubes))
-    summary = summarise(flora, whole_plants(flora, support.grove(100, 2.0)), np.zeros(1, np.int64), 1)
+    summary = summarize(flora, whole_plants(flora, support.grove(100, 2.0)), np.zeros(1, np.int64), 1)
     expected = flora.transmission[0] * leaf / (leaf + wood / 2)
     assert summary.transmission[0] == pytest.approx(expected, rel=0.03)
 

@@ -106,7 +106,7 @@ def test_dense_stands_and_lower_qualities() -> None:
         ("dead", {"orders": [{"length": 0.1, "thickness": 0.1, "leaves": [3, 0]}]}, "dead.orders[0].leaves"),
         ("bud", {"size": 1}, "bud.size"),
         ("bud", {"length": 3}, "bud.length"),
-        ("bud", {"colour": [2, 0, 0]}, "bud.colour"),
+        ("bud", {"color": [2, 0, 0]}, "bud.color"),
     ],
 )
 def test_mistakes_are_named(key: str, value: Any, name: str) -> None:

@@ -88,19 +88,19 @@ def test_a_species_without_variation_is_known_exactly() -> None:
     assert wood_areas(flora, pieces).sum() == pytest.approx(subplant_totals(flora, trunk).wood_area.sum(), rel=0.01)
 
 
-def test_colours_are_means_weighted_by_area() -> None:
-    """Large pale leaves on order 1, small dark ones on order 2: the faces' colours, weighted, are the compiled one."""
+def test_colors_are_means_weighted_by_area() -> None:
+    """Large pale leaves on order 1, small dark ones on order 2: the faces' colors, weighted, are the compiled one."""
     data = support.small(
-        order1={"leaves": [4, 0], "leaf_size": [0.3, 0], "leaf_colour": [[0.8, 0.7, 0.2], [0.1, 0.1, 0.1]]},
-        order2={"leaf_colour": [[0.1, 0.2, 0.1], [0.05, 0.05, 0.05]], "branch_colour": [[0.5, 0.4, 0.3], [0, 0, 0]]},
+        order1={"leaves": [4, 0], "leaf_size": [0.3, 0], "leaf_color": [[0.8, 0.7, 0.2], [0.1, 0.1, 0.1]]},
+        order2={"leaf_color": [[0.1, 0.2, 0.1], [0.05, 0.05, 0.05]], "branch_color": [[0.5, 0.4, 0.3], [0, 0, 0]]},
     )
     flora = support.compiled(data)
     trunk, pieces = support.grown(flora, support.plants(np.arange(80)))
     tubes, leaves = support.meshes(flora, pieces)
-    for meshes, expected in ((leaves, flora.leaf_colours(trunk)[0]), (tubes, flora.wood_colour[0])):
+    for meshes, expected in ((leaves, flora.leaf_colors(trunk)[0]), (tubes, flora.wood_color[0])):
         areas = np.concatenate([support.face_areas(m) for m in meshes])
-        colours = np.concatenate([m.attributes["tf_colour"][1] for m in meshes])
-        np.testing.assert_allclose(areas @ colours / areas.sum(), expected, rtol=0.03)
+        colors = np.concatenate([m.attributes["tf_color"][1] for m in meshes])
+        np.testing.assert_allclose(areas @ colors / areas.sum(), expected, rtol=0.03)
 
 
 @pytest.mark.parametrize("species", [support.SPECIES.index(name) for name in support.DENSE], ids=support.DENSE)
@@ -198,11 +198,11 @@ def test_sample_points_lie_where_leaves_and_wood_are(species: int) -> None:
             assert sampled.std() == pytest.approx(spread, abs=tolerance)
 
 
-def test_compiling_does_not_depend_on_neighbours() -> None:
+def test_compiling_does_not_depend_on_neighbors() -> None:
     """A species compiled alone and among others: the same numbers, with rows moved."""
     alone, among = support.small_flora(), support.compiled(support.shipped("bush"), support.SMALL)
     first = among.first_row[1]
-    for name in ("bound", "leaf_count", "area_nodes", "colour_nodes", "full_wood", "polygons", "wood_colour"):
+    for name in ("bound", "leaf_count", "area_nodes", "color_nodes", "full_wood", "polygons", "wood_color"):
         assert (getattr(alone, name) == getattr(among, name)[first:]).all(), name
     for name in ("leaves", "own_leaves", "wood"):
         assert (getattr(alone.orientation, name) == getattr(among.orientation, name)[first:]).all(), name

@@ -19,12 +19,12 @@ from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.growth.foliage import YOUTH, leaf_lights, leaf_sizes, youth
 from tetflora_addon.proxies.microsurfaces import subplant_facets
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
-from tetflora_addon.subplants.pieces import Pieces, piece_leaf_colours
+from tetflora_addon.subplants.pieces import Pieces, piece_leaf_colors
 
 AGES: dict[str, Any] = {
     "leaf_size_tip": 0.7, "leaf_size_young": 0.3, "leaf_light": 0.1, "leaf_light_tip": 0.9,
-    "leaf_colour": [[0.1, 0.2, 0.1], [0, 0, 0]], "leaf_colour_tip": [0.1, 0.4, 0.1],
-    "leaf_colour_young": [0.5, 0.2, 0.1],
+    "leaf_color": [[0.1, 0.2, 0.1], [0, 0, 0]], "leaf_color_tip": [0.1, 0.4, 0.1],
+    "leaf_color_young": [0.5, 0.2, 0.1],
 }  # fmt: skip
 UNIT = st.floats(0, 1)
 FACTOR = st.sampled_from([1.0, 0.05, 0.4, 2.0, 5.0])
@@ -49,24 +49,24 @@ def test_integrals_over_a_branch(tip: float, young: float, low: float, high: flo
     np.testing.assert_allclose(np.ravel(found), expected, rtol=1e-6, atol=1e-8)
 
 
-def test_area_and_colour_of_grown_plants() -> None:
+def test_area_and_color_of_grown_plants() -> None:
     """Compiled against 150 plants grown to the last leaf, and against their pieces."""
     flora = aged()
     trunk, pieces = support.grown(flora, support.plants(np.arange(150)))
     _, blades = support.meshes(flora, pieces)
     area = sum(support.face_areas(m).sum() for m in blades)
-    colour = sum(support.face_areas(m) @ m.attributes["tf_colour"][1] for m in blades) / area
+    color = sum(support.face_areas(m) @ m.attributes["tf_color"][1] for m in blades) / area
     own = piece_totals(flora, pieces).leaf_area
     assert area == pytest.approx(subplant_totals(flora, trunk).leaf_area.sum(), rel=0.03)
     assert area == pytest.approx(own.sum(), rel=0.03)
-    np.testing.assert_allclose(colour, flora.leaf_colours(trunk)[0], rtol=0.03)
-    np.testing.assert_allclose(colour, own @ piece_leaf_colours(flora, pieces) / own.sum(), rtol=0.03)
+    np.testing.assert_allclose(color, flora.leaf_colors(trunk)[0], rtol=0.03)
+    np.testing.assert_allclose(color, own @ piece_leaf_colors(flora, pieces) / own.sum(), rtol=0.03)
 
 
 @given(st.integers(0, 10**6), st.floats(0.01, 0.99))
 @settings(deadline=None, max_examples=10)
 def test_pieces_add_up(seed: int, cut: float) -> None:
-    """Area and colour of the leaves on a branch do not depend on where it is cut."""
+    """Area and color of the leaves on a branch do not depend on where it is cut."""
     flora = aged()
     _, whole = support.grown(flora, support.plants(seed))
     middle = whole.t0 + cut * (whole.t1 - whole.t0)
@@ -76,17 +76,17 @@ def test_pieces_add_up(seed: int, cut: float) -> None:
     sums = []
     for pieces in (whole, Pieces.concatenate(halves)):
         area = piece_totals(flora, pieces).leaf_area
-        sums.append([area.sum(), *(area @ piece_leaf_colours(flora, pieces))])
+        sums.append([area.sum(), *(area @ piece_leaf_colors(flora, pieces))])
     np.testing.assert_allclose(*sums, rtol=1e-9)
 
 
-def test_facets_have_the_colour_of_leaves_of_all_ages() -> None:
+def test_facets_have_the_color_of_leaves_of_all_ages() -> None:
     flora = aged()
     trunk, _ = support.grown(flora, support.plants(np.arange(20)))
     facets = subplant_facets(flora, trunk, np.full(20, 0.05))
     leaves = facets.transmission > 0
-    mean = np.average(facets.colour[leaves], axis=0, weights=facets.side[leaves] ** 2)
-    np.testing.assert_allclose(mean, flora.leaf_colours(trunk)[0], rtol=0.05)
+    mean = np.average(facets.color[leaves], axis=0, weights=facets.side[leaves] ** 2)
+    np.testing.assert_allclose(mean, flora.leaf_colors(trunk)[0], rtol=0.05)
 
 
 def test_leaves_outside_turn_to_the_sky_and_the_compiled_orientation_knows() -> None:
@@ -115,14 +115,14 @@ def test_along_one_branch() -> None:
 def test_species_without_these_keys_are_what_they_were() -> None:
     """The values that keys have where a file does not give them change nothing, nor does the fingerprint."""
     plain = support.compiled(support.small())
-    colour = support.small()["orders"][2].get("leaf_colour", [[0.08, 0.19, 0.03]])[0]
+    color = support.small()["orders"][2].get("leaf_color", [[0.08, 0.19, 0.03]])[0]
     given = support.compiled(
-        support.small(order2={"leaf_light_tip": 0.6, "leaf_size_young": 1, "leaf_colour_young": colour})
+        support.small(order2={"leaf_light_tip": 0.6, "leaf_size_young": 1, "leaf_color_young": color})
     )
     assert plain.rows.tobytes() == given.rows.tobytes()
     assert not plain.rows["gradient"].any()
     assert fingerprint(plain.rows, plain.forms[0], 1) == fingerprint(given.rows, given.forms[0], 1)
     marks = {fingerprint(aged(**{name: value}).rows, plain.forms[0], 1) for name, value in AGES.items()}
     assert marks == {fingerprint(aged().rows, plain.forms[0], 1)}
-    for name, value in (("leaf_light_tip", 0.2), ("leaf_size_young", 0.9), ("leaf_colour_young", [0.5, 0.2, 0.2])):
+    for name, value in (("leaf_light_tip", 0.2), ("leaf_size_young", 0.9), ("leaf_color_young", [0.5, 0.2, 0.2])):
         assert fingerprint(aged(**{name: value}).rows, plain.forms[0], 1) not in marks

@@ -50,7 +50,7 @@ def trunk_of(seeds: Any, **order0: Any) -> tuple[Flora, Branches]:
 
 
 def test_averages_of_everything_at_once() -> None:
-    """Leaves, their area and colour, wood, faces: compiled against 300 plants grown to the last leaf."""
+    """Leaves, their area and color, wood, faces: compiled against 300 plants grown to the last leaf."""
     flora = rich()
     trunk, pieces = support.grown(flora, support.plants(np.arange(300)))
     tubes, blades = support.meshes(flora, pieces)
@@ -59,9 +59,9 @@ def test_averages_of_everything_at_once() -> None:
     totals = subplant_totals(flora, trunk)
     assert sum(a.sum() for a in areas) == pytest.approx(totals.leaf_area.sum(), rel=0.03)
     assert wood_areas(flora, pieces).sum() == pytest.approx(totals.wood_area.sum(), rel=0.03)
-    colour = sum(a @ m.attributes["tf_colour"][1] for a, m in zip(areas, blades, strict=True))
-    expected = flora.leaf_colours(trunk)[0]
-    np.testing.assert_allclose(colour / sum(a.sum() for a in areas), expected, rtol=0.02)
+    color = sum(a @ m.attributes["tf_color"][1] for a, m in zip(areas, blades, strict=True))
+    expected = flora.leaf_colors(trunk)[0]
+    np.testing.assert_allclose(color / sum(a.sum() for a in areas), expected, rtol=0.02)
 
 
 @pytest.mark.parametrize("level", [1, 2, 3])
@@ -291,8 +291,8 @@ def test_spurs_do_not_depend_on_the_length_of_their_branch() -> None:
     assert spurs.length.max() <= 0.16
 
 
-def test_colour_and_size_go_from_the_inside_to_the_outside() -> None:
-    """Leaves near the ends of limbs have the outer colour; the gradient follows the limb, not the twig."""
+def test_color_and_size_go_from_the_inside_to_the_outside() -> None:
+    """Leaves near the ends of limbs have the outer color; the gradient follows the limb, not the twig."""
     flora = rich()
     pieces = support.grown(flora, support.plants(np.arange(60)))[1]
     twigs = pieces.take((flora.rows["order"][pieces.branches.row] == 2) & (pieces.t0 == 0)).branches
@@ -327,7 +327,7 @@ def test_children_of_each_sort_have_keys_of_their_own() -> None:
 
 
 def test_limbs_that_fork_are_as_long_as_those_that_do_not() -> None:
-    """All vigours: a limb's stems go on with what is left of its own length, which follows the crown already."""
+    """All vigors: a limb's stems go on with what is left of its own length, which follows the crown already."""
     forked = support.compiled(support.small(order1={"forks": [1, 0], "fork_at": 0.5, "length": [0.4, 0]}))
     plain = support.compiled(support.small(order1={"length": [0.4, 0]}))
     seeds = support.plants(np.arange(30))

@@ -33,7 +33,7 @@ def test_what_is_kept_fits_and_shows_most_for_its_memory() -> None:
     own = costs(rng.integers(1, 2_000_000, 60).tolist(), rng.integers(1, 500, 60).tolist(), rng.uniform(0, 1e6, 60))
     memory = 290.0 * own.triangles + (1_670.0 + 160.0) * own.instances
     for left in (0.0, 1e9, 4e9, 1e12, np.inf):
-        found = own.keeping(True, left)
+        found = own.originals(True, left)
         assert found.fraction > 1.0 and found.shared and found.kites
         assert memory[found.always].sum() <= SAFE * left
         assert found.always.all() == (left >= 1e12)
@@ -42,19 +42,19 @@ def test_what_is_kept_fits_and_shows_most_for_its_memory() -> None:
             # None of the others would still fit, and of those that do the one that is worth most is there.
             assert (memory[~found.always] > SAFE / 2 * left - memory[found.always].sum()).all()
             assert found.always[np.argmax(np.where(memory <= SAFE / 2 * left, worth, -1.0))]
-    assert not own.keeping(True, 0.0).always.any()
+    assert not own.originals(True, 0.0).always.any()
 
 
 def test_what_is_refined_whatever_it_costs_is_never_always_the_original() -> None:
     own = costs([1000, 2000], [50, 60])
     assert own.plain(True, 8e9)
-    found = own.keeping(True, 8e9, always=False)
+    found = own.originals(True, 8e9, always=False)
     assert not found.always.any() and found.fraction == CYCLES_WHOLE and found.shared and not found.kites
-    found = own.keeping(True, 1e5, always=False)
+    found = own.originals(True, 1e5, always=False)
     assert not found.always.any() and found.fraction == NEVER and found.shared
 
 
 def test_eevee_keeps_nothing_for_its_own_sake() -> None:
     for always in (False, True):
-        found = costs([1, 10**6], [10**6, 1]).keeping(False, np.inf, always)
+        found = costs([1, 10**6], [10**6, 1]).originals(False, np.inf, always)
         assert not found.always.any() and 0.0 < found.fraction < 1.0 and not found.shared

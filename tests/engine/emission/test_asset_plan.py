@@ -24,7 +24,7 @@ from tetflora_addon.emission.asset_plan import (
     ASSETS,
     AssetPlan,
     ClusterRows,
-    Keeping,
+    OriginalPolicy,
     PlacedClusters,
     explicit_plan,
 )
@@ -62,8 +62,8 @@ def scene() -> tuple[Camera, Refinement]:
     return camera, run(own, camera)
 
 
-def keeping(fraction: float = NEVER, *always: bool, **options: bool) -> Keeping:
-    return Keeping(np.array(always or (False,) * 4), fraction, **options)
+def originals(fraction: float = NEVER, *always: bool, **options: bool) -> OriginalPolicy:
+    return OriginalPolicy(np.array(always or (False,) * 4), fraction, **options)
 
 
 def patchwork(seed: int) -> Refinement:
@@ -75,13 +75,13 @@ def patchwork(seed: int) -> Refinement:
 
 
 def drawn(
-    result: Refinement, camera: Camera, limit: float, keeping: Keeping, facet: float = 1.0, **options: object
+    result: Refinement, camera: Camera, limit: float, originals: OriginalPolicy, facet: float = 1.0, **options: object
 ) -> tuple[AssetPlan, Facets, Facets]:
     """What is drawn as it is, facets that are seen, and those that are not."""
     placed = result.assets.placed
-    clusters = PlacedClusters(placed, camera, keeping, limit, np.full(len(placed), ""))
+    clusters = PlacedClusters(placed, camera, originals, limit, np.full(len(placed), ""))
     scene = support.refined(support.small_flora(), result, camera, facet, 1e9, assets=clusters, **options)
-    scene = replace(scene, keeping=keeping)
+    scene = replace(scene, originals=originals)
     assert not list(scene.mesh_blocks())
     made: dict[bool, list[Facets]] = {True: [], False: []}
     for parts in scene.facet_parts():
@@ -95,9 +95,9 @@ def drawn(
 def check_plan(placed: PlacedAssets, plan: AssetPlan) -> None:
     """No face is in two meshes, and kites stand for leaves alone."""
     clusters = placed.assets.clusters
-    assert len(np.unique(plan.whole)) == len(plan.whole)
+    assert len(np.unique(plan.originals)) == len(plan.originals)
     both = AssetParts.concatenate([plan.meshes, plan.kites])
-    assert not np.isin(both.instance, plan.whole).any()
+    assert not np.isin(both.instance, plan.originals).any()
     assert len(np.unique(both.instance.astype(np.int64) * len(clusters) + both.cluster)) == len(both)
     for own in (plan.meshes, plan.kites):
         assert clusters.meshes[own.cluster].all()
@@ -108,7 +108,7 @@ def check_plan(placed: PlacedAssets, plan: AssetPlan) -> None:
 
 def optical(placed: PlacedAssets, plan: AssetPlan) -> float:
     """Area that is drawn as it is, m²."""
-    whole = placed.wholes().totals.optical_area[plan.whole].sum()
+    whole = placed.wholes().totals.optical_area[plan.originals].sum()
     return float(whole + plan.meshes.totals.optical_area.sum() + plan.kites.totals.optical_area.sum())
 
 
@@ -123,11 +123,11 @@ def test_every_part_is_drawn_once(limit: float, fraction: float, monkeypatch: py
     monkeypatch.setattr(asset_facets, "asset_weights", lambda _placed, parts, _number: np.ones(len(parts)))
     camera, result = scene()
     placed = result.assets.placed
-    plan, seen, unseen = drawn(result, camera, limit, keeping(fraction))
+    plan, seen, unseen = drawn(result, camera, limit, originals(fraction))
     check_plan(placed, plan)
     assert len(seen) and len(unseen)
     assert limit > 0.2 or (len(plan.meshes) and len(plan.kites))
-    assert fraction <= 1.0 or not len(plan.whole)
+    assert fraction <= 1.0 or not len(plan.originals)
     whole = placed.wholes().totals.optical_area.sum()
     assert optical(placed, plan) + area(seen) < 1.01 * whole
     assert 0.5 * whole < optical(placed, plan) + area(seen, unseen) < 1.02 * whole
@@ -136,14 +136,14 @@ def test_every_part_is_drawn_once(limit: float, fraction: float, monkeypatch: py
 def test_assets_that_are_always_originals_are_in_every_place() -> None:
     camera, result = scene()
     asset = result.assets.placed.instances.asset
-    plan, seen, _ = drawn(result, camera, 1e6, keeping(NEVER, True, False, True, True))
-    assert plan.whole.tolist() == np.flatnonzero(asset != 1).tolist()
+    plan, seen, _ = drawn(result, camera, 1e6, originals(NEVER, True, False, True, True))
+    assert plan.originals.tolist() == np.flatnonzero(asset != 1).tolist()
     assert not len(plan.meshes) and not len(plan.kites)
-    everything, *facets = drawn(result, camera, 1e6, keeping(NEVER, True, True, True, True))
-    assert everything.whole.tolist() == list(range(COUNT)) and not sum(map(len, facets))
+    everything, *facets = drawn(result, camera, 1e6, originals(NEVER, True, True, True, True))
+    assert everything.originals.tolist() == list(range(COUNT)) and not sum(map(len, facets))
     # They hide what is behind all the same.
     alone = result.assets.placed.take(asset == 1)
-    assert len(seen) < 0.8 * len(drawn(run(alone, camera), camera, 1e6, keeping())[1])
+    assert len(seen) < 0.8 * len(drawn(run(alone, camera), camera, 1e6, originals())[1])
 
 
 def real(placed: PlacedAssets, plan: AssetPlan, kites: bool = False) -> set[tuple[int, int]]:
@@ -151,7 +151,7 @@ def real(placed: PlacedAssets, plan: AssetPlan, kites: bool = False) -> set[tupl
     own = [plan.meshes, plan.kites] if kites else [plan.meshes]
     found = {pair for parts in own for pair in zip(parts.instance.tolist(), parts.cluster.tolist(), strict=True)}
     root, meshes = placed.assets.root, placed.assets.clusters.meshes
-    for instance in plan.whole.tolist():
+    for instance in plan.originals.tolist():
         asset = placed.instances.asset[instance]
         found |= {(instance, c) for c in np.flatnonzero(meshes[: root[asset + 1]]).tolist() if c >= root[asset]}
     return found
@@ -167,7 +167,7 @@ def test_what_is_real_stays_real_as_the_camera_comes_closer(fraction: float, sha
         own, limit = support.camera((0, -60.0 + 12 * step, 2), (0, 60, 2.0), pixels=200, view=1.0), 1.0
         if sharper == "lower limit":
             own, limit = support.camera((0, -20.0, 2), (0, 60, 2.0), pixels=400, view=1.0), 4.0 / 1.7**step
-        plan, *_ = drawn(run(placed, own), own, limit, keeping(fraction))
+        plan, *_ = drawn(run(placed, own), own, limit, originals(fraction))
         check_plan(placed, plan)
         now = real(placed, plan), real(placed, plan, kites=True)
         assert before[0] <= now[0] and before[1] <= now[1]
@@ -181,10 +181,10 @@ def test_the_order_of_instances_does_not_matter() -> None:
     order = np.random.default_rng(2).permutation(COUNT)
     found = []
     for placed in (result.assets.placed, result.assets.placed.take(order)):
-        plan, *facets = drawn(run(placed, camera), camera, 1.0, keeping(0.6))
+        plan, *facets = drawn(run(placed, camera), camera, 1.0, originals(0.6))
         keys = [np.sort(placed.keys(parts)) for parts in (plan.meshes, plan.kites)]
-        places = [np.sort(own, axis=0) for one in facets for own in (one.centre, one.side, one.colour)]
-        found.append([np.sort(placed.instances.key[plan.whole]), *keys, *places])
+        places = [np.sort(own, axis=0) for one in facets for own in (one.center, one.side, one.color)]
+        found.append([np.sort(placed.instances.key[plan.originals]), *keys, *places])
     for one, other in zip(*found, strict=True):
         assert np.array_equal(one, other)
 
@@ -195,12 +195,12 @@ def test_where_shells_stand_for_all_else_what_is_explicit_is_drawn(seed: int, fr
     _, result = scene()
     placed = result.assets.placed
     for decision in (PROXY, HIDDEN):
-        plan = explicit_plan(with_decision(result, decision), keeping(fraction))
-        assert not any(map(len, (plan.whole, plan.meshes, plan.kites)))
-    assert len(explicit_plan(with_decision(result, EXPLICIT), keeping(min(fraction, 1.0))).whole) == COUNT
-    every = explicit_plan(with_decision(result, EXPLICIT), keeping())
+        plan = explicit_plan(with_decision(result, decision), originals(fraction))
+        assert not any(map(len, (plan.originals, plan.meshes, plan.kites)))
+    assert len(explicit_plan(with_decision(result, EXPLICIT), originals(min(fraction, 1.0))).originals) == COUNT
+    every = explicit_plan(with_decision(result, EXPLICIT), originals())
     check_cover(placed, every.meshes)
-    mixed = explicit_plan(patchwork(seed), keeping(fraction))
+    mixed = explicit_plan(patchwork(seed), originals(fraction))
     check_plan(placed, mixed)
     part = np.bincount(mixed.meshes.instance, mixed.meshes.totals.polygons, COUNT)
     assert (part < fraction * placed.wholes().totals.polygons).all()
@@ -212,19 +212,19 @@ def test_what_is_behind_a_wall_is_few_large_facets_wherever_it_is() -> None:
     placed = result.assets.placed
     result = run(placed.take(placed.instances.position[:, 1] > 10.0), camera)
     wall = np.array([[[-40.0, -5.5, -20], [40, -5.5, -20], [0, -5.5, 60]]])
-    open_, walled = (drawn(result, camera, 0.2, keeping(), occluders=own) for own in (None, wall))
+    open_, walled = (drawn(result, camera, 0.2, originals(), occluders=own) for own in (None, wall))
     plan, seen, unseen = walled
-    assert not any(map(len, (plan.whole, plan.meshes, plan.kites, seen)))
+    assert not any(map(len, (plan.originals, plan.meshes, plan.kites, seen)))
     assert len(open_[0].meshes) > 10 and 0 < len(unseen) < 0.2 * len(open_[1])
 
 
 def test_nothing_at_all_makes_nothing() -> None:
     camera, _ = scene()
     placed = placed_of(trees.compiled("tree"), at=[(0, -50.0, 0), (0, 30, 0)])
-    plan, seen, unseen = drawn(run(placed, camera), camera, 1e6, Keeping(np.zeros(1, bool), NEVER))
-    assert not any(map(len, (plan.whole, plan.meshes, plan.kites)))
+    plan, seen, unseen = drawn(run(placed, camera), camera, 1e6, OriginalPolicy(np.zeros(1, bool), NEVER))
+    assert not any(map(len, (plan.originals, plan.meshes, plan.kites)))
     assert len(seen) and len(unseen)
-    none = PlacedClusters(PlacedAssets.none(), camera, Keeping(np.zeros(0, bool)), 1.0, np.zeros(0, str))
+    none = PlacedClusters(PlacedAssets.none(), camera, OriginalPolicy(np.zeros(0, bool)), 1.0, np.zeros(0, str))
     assert not len(none.everything()) and not list(none.unseen(ClusterRows.empty(), np.zeros(0), np.zeros(0), []))
 
 
@@ -254,7 +254,7 @@ def by_chance(facets: Facets) -> float:
 def test_facets_have_the_weights_of_their_clusters() -> None:
     placed = placed_of(big(), at=[(0, 40.0 + 4 * i, 0) for i in range(200)])
     camera = support.camera((0, -7, 2), (0, 60, 1.0), pixels=160, view=1.0)
-    clusters = PlacedClusters(placed, camera, Keeping(np.zeros(1, bool), NEVER), 1e6, np.full(200, ""))
+    clusters = PlacedClusters(placed, camera, OriginalPolicy(np.zeros(1, bool), NEVER), 1e6, np.full(200, ""))
     rows = clusters.everything()
     for side in (0.3, 1.0, 3.0):
         sides = np.full(len(rows), side)
@@ -269,7 +269,7 @@ def test_facets_of_stretched_and_mirrored_instances_face_as_their_faces() -> Non
     for stretch in ((1, 1, 3), (-1, 1, 1), (-2, 0.5, 1)):
         linear = np.diag(stretch).astype(float)
         placed, camera = free(at=[(0, 30.0, 0)], linear=linear[None])
-        _, *made = drawn(run(placed, camera), camera, 1e6, Keeping(np.zeros(1, bool), NEVER), 0.5)
+        _, *made = drawn(run(placed, camera), camera, 1e6, OriginalPolicy(np.zeros(1, bool), NEVER), 0.5)
         normal, size = (
             np.concatenate([of for of in own]) for own in zip(*((f.normal, f.side**2) for f in made), strict=True)
         )
@@ -280,24 +280,24 @@ def test_facets_of_stretched_and_mirrored_instances_face_as_their_faces() -> Non
         blocked = np.where(np.arange(len(size)) < 176, 0.5, 1.0) * size
         unit = vector / size[:, None]
         assert found == pytest.approx((unit * blocked[:, None]).T @ unit / blocked.sum(), abs=0.06)
-        centre = np.concatenate([f.centre for f in made])
+        center = np.concatenate([f.center for f in made])
         world = corners.reshape(-1, 3) @ linear.T + placed.instances.position[0]
-        assert (centre >= world.min(axis=0) - 0.1).all() and (centre <= world.max(axis=0) + 0.1).all()
+        assert (center >= world.min(axis=0) - 0.1).all() and (center <= world.max(axis=0) + 0.1).all()
 
 
-def test_colours_of_facets_are_those_of_faces() -> None:
+def test_colors_of_facets_are_those_of_faces() -> None:
     placed, camera = free(at=[(x, 30.0, 0) for x in range(20)], kind="card")
-    _, seen, unseen = drawn(run(placed, camera), camera, 1e6, Keeping(np.zeros(1, bool), NEVER))
+    _, seen, unseen = drawn(run(placed, camera), camera, 1e6, OriginalPolicy(np.zeros(1, bool), NEVER))
     assert len(seen)
-    colours = np.concatenate([own.colour for own in (seen, unseen) if len(own)])
-    assert colours.mean(axis=0) == pytest.approx(trees.GREEN, rel=0.1)
+    colors = np.concatenate([own.color for own in (seen, unseen) if len(own)])
+    assert colors.mean(axis=0) == pytest.approx(trees.GREEN, rel=0.1)
 
 
 def test_finer_facets_are_more_and_fewer_are_real_beyond_a_higher_limit() -> None:
     camera, result = scene()
-    numbers = [len(drawn(result, camera, 1e6, keeping(), pixels)[1]) for pixels in (0.5, 1.0, 2.0, 4.0)]
+    numbers = [len(drawn(result, camera, 1e6, originals(), pixels)[1]) for pixels in (0.5, 1.0, 2.0, 4.0)]
     assert all(a > b for a, b in pairwise(numbers))
     faces = [
-        drawn(result, camera, limit, keeping())[0].meshes.totals.polygons.sum() for limit in (0.05, 0.5, 5.0, 50.0)
+        drawn(result, camera, limit, originals())[0].meshes.totals.polygons.sum() for limit in (0.05, 0.5, 5.0, 50.0)
     ]
     assert all(a >= b for a, b in pairwise(faces)) and faces[0] > faces[-1]

@@ -42,25 +42,25 @@ def test_behind_a_wall_all_is_hidden_and_before_it_nothing(kind: str) -> None:
     random = np.random.default_rng(1)
     depth = random.uniform(1.0, 60.0, 500)
     spread = 0.3 * (depth if kind == "PERSP" else 15.0)
-    centre = np.stack([random.uniform(-1, 1, 500) * spread, depth, random.uniform(-1, 1, 500) * spread], axis=1)
+    center = np.stack([random.uniform(-1, 1, 500) * spread, depth, random.uniform(-1, 1, 500) * spread], axis=1)
     radius = random.uniform(0.01, 0.6, 500)
-    hidden = made.hidden(made.of_spheres(centre, radius))
+    hidden = made.hidden(made.of_spheres(center, radius))
     assert (hidden == (depth - radius > 20.0)).all()
 
 
 @settings(max_examples=40)
 @given(st.integers(0, 2**31))
 def test_what_is_hidden_is_hidden_from_every_pixel(seed: int) -> None:
-    """Rays through centres of pixels meet what covers them before they come to a sphere that is called hidden."""
+    """Rays through centers of pixels meet what covers them before they come to a sphere that is called hidden."""
     random = np.random.default_rng(seed)
     view = camera()
     corners = random.uniform(-4, 4, (60, 1, 3)) * [1, 0, 1] + [0, 12, 0] + random.normal(0, 1.5, (60, 3, 3))
     made = filled(view, corners)
-    centre = random.uniform(-6, 6, (300, 3)) * [1, 0.5, 1] + [0, 18, 0]
+    center = random.uniform(-6, 6, (300, 3)) * [1, 0.5, 1] + [0, 18, 0]
     radius = random.uniform(0.05, 0.8, 300)
-    prints = made.of_spheres(centre, radius)
+    prints = made.of_spheres(center, radius)
     hidden = np.flatnonzero(made.hidden(prints) & ~made.outside(prints))
-    column, row, depth = made.project(centre)
+    column, row, depth = made.project(center)
     rows, columns = np.mgrid[: made.height, : made.width] + 0.5
     for one in hidden:
         reach = radius[one] / (depth[one] - radius[one]) * made.width / (view.window[1] - view.window[0])
@@ -72,11 +72,11 @@ def test_what_is_hidden_is_hidden_from_every_pixel(seed: int) -> None:
 def test_spheres_touch_no_pixel_beyond_their_rectangle(kind: str) -> None:
     view = camera(kind)
     made, random = Coverage(view), np.random.default_rng(2)
-    centre = random.uniform(-5, 5, (200, 3)) + [0, 12, 0]
+    center = random.uniform(-5, 5, (200, 3)) + [0, 12, 0]
     radius = random.uniform(0.1, 1.5, 200)
-    prints = made.of_spheres(centre, radius)
+    prints = made.of_spheres(center, radius)
     way = random.normal(size=(200, 64, 3))
-    points = centre[:, None] + radius[:, None, None] * way / np.linalg.norm(way, axis=2, keepdims=True)
+    points = center[:, None] + radius[:, None, None] * way / np.linalg.norm(way, axis=2, keepdims=True)
     column, row, depth = (v.reshape(200, 64) for v in made.project(points.reshape(-1, 3)))
     slack = 1e-3
     assert (column >= prints.low[:, :1] - slack).all()
@@ -88,13 +88,13 @@ def test_spheres_touch_no_pixel_beyond_their_rectangle(kind: str) -> None:
 
 def test_what_surrounds_the_eye_is_never_hidden_and_what_is_beside_is_outside() -> None:
     made = filled(camera(), wall(1.0))
-    centre, radius = np.array([[0.0, 0.2, 0.0], [0.0, -9.0, 0.0], [80.0, 5.0, 0.0]]), np.array([1.0, 1.0, 1.0])
-    prints = made.of_spheres(centre, radius)
+    center, radius = np.array([[0.0, 0.2, 0.0], [0.0, -9.0, 0.0], [80.0, 5.0, 0.0]]), np.array([1.0, 1.0, 1.0])
+    prints = made.of_spheres(center, radius)
     assert made.outside(prints).tolist() == [False, True, True]
     assert made.hidden(prints).tolist() == [False, True, True]
 
 
-def test_pixels_are_full_where_their_centres_are_covered() -> None:
+def test_pixels_are_full_where_their_centers_are_covered() -> None:
     """As many as the triangles' area has, on average over many."""
     view, random = camera("ORTHO"), np.random.default_rng(3)
     corners = np.concatenate([random.uniform(-9, 9, (400, 1, 3)) * [1, 0, 0.7]] * 3, axis=1)
@@ -113,8 +113,8 @@ def test_a_tile_hides_nothing_beyond_what_it_knows() -> None:
     tile.draw(*tile.of_corners(wall(10.0))[1:])
     assert tile.depth.shape == (64 + 2 * MARGIN, 40)
     whole = filled(view, wall(10.0))
-    centre = np.stack([np.linspace(-11, 11, 60), np.full(60, 20.0), np.zeros(60)], axis=1)
-    prints = whole.of_spheres(centre, np.full(60, 0.4))
+    center = np.stack([np.linspace(-11, 11, 60), np.full(60, 20.0), np.zeros(60)], axis=1)
+    prints = whole.of_spheres(center, np.full(60, 0.4))
     inside = (prints.high[:, 0] <= 40) & ~whole.outside(prints)
     assert whole.hidden(prints).all()
     assert (tile.hidden(prints) == (inside | whole.outside(prints))).all()
@@ -125,12 +125,12 @@ def test_other_eyes_see_behind() -> None:
     narrow = np.array(
         [[[-1.0, 10, -40], [1.0, 10, -40], [1.0, 10, 40]], [[-1.0, 10, -40], [1.0, 10, 40], [-1.0, 10, 40]]]
     )
-    centre, radius = np.array([[0.0, 20.0, 0.0]]), np.array([0.8])
-    assert filled(camera(), narrow).hidden(Coverage(camera()).of_spheres(centre, radius)).all()
+    center, radius = np.array([[0.0, 20.0, 0.0]]), np.array([0.8])
+    assert filled(camera(), narrow).hidden(Coverage(camera()).of_spheres(center, radius)).all()
     other = replace(camera(), position=np.array([3.0, 0.0, 0.0]))
     for view in (camera(shutter=(other,)), camera(lens_radius=2.5, focus=10.0), camera(cell_radius=3.0)):
         made = filled(view, narrow)
-        assert not made.hidden(made.of_spheres(centre, radius)).any()
+        assert not made.hidden(made.of_spheres(center, radius)).any()
 
 
 def test_panoramas_are_known_across_their_seam() -> None:

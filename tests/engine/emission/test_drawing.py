@@ -16,13 +16,13 @@ from tests.engine.emission.test_emission import scene
 from tests.engine.refinement.test_loop import run
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission import drawing as subject
-from tetflora_addon.emission.budget import afford
+from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.coverage import MARGIN, Coverage
-from tetflora_addon.emission.forms import as_triangles, facet_blocks
+from tetflora_addon.emission.emitters import as_triangles, facet_blocks
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.emission.shade import Shade
-from tetflora_addon.proxies.drawn import triangle_corners
 from tetflora_addon.proxies.microsurfaces import Facets
+from tetflora_addon.proxies.primitives import triangle_corners
 from tetflora_addon.refinement.contents import PlantParts
 from tetflora_addon.refinement.lights import Light
 from tetflora_addon.refinement.settings import RefinementSettings
@@ -51,7 +51,7 @@ def drawn_wood() -> tuple:
 
 
 def pixels_of(facets: Facets, camera: Camera) -> np.ndarray:
-    return facets.side / camera.extent_around(facets.centre)
+    return facets.side / camera.extent_around(facets.center)
 
 
 def coverage_of(blocks: list, facets: Facets, seen: np.ndarray, camera: Camera) -> Coverage:
@@ -197,7 +197,7 @@ def digest(made: tuple) -> list:
         b"".join([b.buffers.positions.tobytes(), *(v.tobytes() for _, v in b.buffers.attributes.values())])
         for b in blocks
     ]
-    return [*meshes, facets.centre.tobytes(), facets.side.tobytes(), seen.tobytes()]
+    return [*meshes, facets.center.tobytes(), facets.side.tobytes(), seen.tobytes()]
 
 
 def test_the_order_of_plants_changes_nothing() -> None:
@@ -236,7 +236,7 @@ def number_of(most: int | None = None) -> int:
     """Primitives of the wood, as many as it has or as somebody allows."""
     flora, _, camera, result = wood()
     settings = RefinementSettings() if most is None else RefinementSettings(max_polygons=most)
-    detail = afford(result, camera, settings)
+    detail = fit_to_budget(result, camera, settings)
     options = {"hidden": detail.coarser, "most": detail.most}
     blocks, facets, _ = support.drawn(flora, result, camera, detail.facet, detail.leaf_limit, **options)
     return sum(b.buffers.polygons for b in blocks) + len(facets)
@@ -252,7 +252,9 @@ def test_a_budget_holds(share: float) -> None:
 def test_less_memory_is_coarser_everywhere() -> None:
     """Error grows evenly: facets grow with the root of what is missing."""
     _, _, camera, result = wood()
-    sides = [afford(result, camera, RefinementSettings(max_polygons=most)).facet for most in (100_000, 25_000, 6_000)]
+    sides = [
+        fit_to_budget(result, camera, RefinementSettings(max_polygons=most)).facet for most in (100_000, 25_000, 6_000)
+    ]
     assert sides == sorted(sides)
     assert sides[2] / sides[1] == pytest.approx(2.0, rel=0.5)
 
@@ -266,7 +268,7 @@ def test_qualities_are_in_order() -> None:
     for name in ("FINAL", "PREVIEW", "DRAFT"):
         quality = QUALITIES[name]
         settings = RefinementSettings(facet=quality["facet"], leaf_limit=quality["leaf_limit"])
-        sides.append(afford(result, camera, settings).facet)
+        sides.append(fit_to_budget(result, camera, settings).facet)
     assert sides == sorted(sides)
 
 

@@ -19,7 +19,7 @@ from tetflora_addon.emission import plants
 from tetflora_addon.emission.plants import expanded_blocks, explicit_blocks
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.summaries import summarise
+from tetflora_addon.proxies.summaries import summarize
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.tetrahedra.geometry import volume
@@ -115,13 +115,13 @@ def test_shells_hold_what_explicit_does_not() -> None:
     whole = sum(by_kind(list(expanded_blocks(flora, seeds)), "leaf", species) for species in (0, 1))
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        # Neighbours have one decision, as those of the loop do.
+        # Neighbors have one decision, as those of the loop do.
         near = result.tree.vertices(result.nodes)[:, :, 1].mean(axis=1) < rng.uniform(5, 60)
         one = with_decision(result, np.where(near, Decision.EXPLICIT, Decision.HIDDEN), rng.random(len(near)))
         real = sum(by_kind(list(explicit_blocks(flora, one, camera)), "leaf", species) for species in (0, 1))
         index = np.where(one.chosen(Decision.HIDDEN), 0, -1)
         held = one.totals.leaf_area[one.decision == Decision.HIDDEN].sum()
-        shell = summarise(flora, one.contents, index, 1).optical_area[0]
+        shell = summarize(flora, one.contents, index, 1).optical_area[0]
         assert 0 < held <= shell
         assert 0.05 * whole < real < whole
         assert real + held == pytest.approx(whole, rel=0.05)
@@ -137,11 +137,11 @@ def test_shells_are_the_cells_of_proxies() -> None:
     volumes = volume(result.tree.vertices(result.nodes[cells]))
     index = np.full(len(result.tree), -1)
     index[result.nodes[cells]] = np.arange(cells.sum())
-    area = summarise(flora, result.contents, index, int(cells.sum())).effective_area(volumes)
+    area = summarize(flora, result.contents, index, int(cells.sum())).effective_area(volumes)
     # Half of the area as the mean over all directions, whatever the orientation, within what the form of κ allows.
     np.testing.assert_allclose(kappa, (area / 2 / volumes)[np.argsort(-result.rank[cells])], rtol=0.08)
-    assert mesh.attributes["tf_colour"][1].min() >= 0
-    assert mesh.attributes["tf_colour"][1].max() <= 1
+    assert mesh.attributes["tf_color"][1].min() >= 0
+    assert mesh.attributes["tf_color"][1].max() <= 1
 
 
 def test_all_proxies_leave_no_block_and_all_explicit_no_shell() -> None:

@@ -14,13 +14,13 @@ from tests.engine.refinement.test_loop import run
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora, compile_species
-from tetflora_addon.emission.budget import afford
+from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.leaf_detail import LeafDetail
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import WholeBranches
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.members import expected_polygons
 from tetflora_addon.species.quality import with_quality
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
@@ -128,7 +128,7 @@ def test_limits_hold_up_close() -> None:
     result = run(flora, seeds, camera)[1]
 
     def number(settings: RefinementSettings) -> int:
-        detail = afford(result, camera, settings)
+        detail = fit_to_budget(result, camera, settings)
         given = support.refined(
             flora, result, camera, detail.facet, detail.leaf_limit, weighted=False, most=detail.most
         )

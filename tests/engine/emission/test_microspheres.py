@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Microspheres stand for facets: one each, in the same place, covering as much of the image, in the same colours."""
+"""Microspheres stand for facets: one each, in the same place, covering as much of the image, in the same colors."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from tests.engine.emission.test_emission import scene
 from tetflora_addon.arrays import unit
 from tetflora_addon.buffers import MeshBuffers, PointBuffers
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.emission.forms import AsSpheres, as_triangles, facet_blocks
-from tetflora_addon.proxies.drawn import LEAST_COVER, facet_mesh, facing, joined, sphere_points, spheres_of
+from tetflora_addon.emission.emitters import AsSpheres, as_triangles, facet_blocks
 from tetflora_addon.proxies.microsurfaces import Facets
+from tetflora_addon.proxies.primitives import LEAST_COVER, facet_mesh, facing, joined, sphere_points, spheres_of
 
 EYE = np.array([2.0, -30.0, 4.0])
 
 
 def squares(n: int = 20_000) -> Facets:
-    """Facets turned at random, of several sizes and colours, in a box of two metres."""
+    """Facets turned at random, of several sizes and colors, in a box of two meters."""
     random = np.random.default_rng(3)
     across, along = np.linalg.qr(random.normal(size=(n, 3, 2)))[0].transpose(2, 0, 1)
-    centre, side = random.uniform(-1, 1, (n, 3)), random.uniform(0.01, 0.05, n)
-    return Facets(centre, across, along, side, random.random((n, 3)), random.random(n))
+    center, side = random.uniform(-1, 1, (n, 3)), random.uniform(0.01, 0.05, n)
+    return Facets(center, across, along, side, random.random((n, 3)), random.random(n))
 
 
 def camera(kind: str = "PERSP") -> Camera:
@@ -42,7 +42,7 @@ def test_what_a_facet_covers_for_the_camera_its_sphere_covers(kind: str) -> None
     facets, view = squares(), camera(kind)
     made = sphere_points(spheres_of(facets, view))
     vectors = support.face_vectors(facet_mesh(facets))
-    sight = np.array([0.0, 1.0, 0.0]) if kind == "ORTHO" else unit(facets.centre - EYE)
+    sight = np.array([0.0, 1.0, 0.0]) if kind == "ORTHO" else unit(facets.center - EYE)
     shown = np.abs((vectors * sight).sum(axis=1))
     edge = facing(facets, view) < LEAST_COVER
     assert discs(made.radius)[~edge] == pytest.approx(shown[~edge], rel=1e-3, abs=1e-7)
@@ -64,7 +64,7 @@ def test_places_and_looks_are_those_of_the_facets() -> None:
     some, others = squares(50), squares(30)
     made = sphere_points(joined([spheres_of(some, camera()), spheres_of(others, None)]))
     assert made.polygons == 80
-    for values, name in ((made.positions, "centre"), *((v, k.removeprefix("tf_")) for k, v in made.attributes.items())):
+    for values, name in ((made.positions, "center"), *((v, k.removeprefix("tf_")) for k, v in made.attributes.items())):
         expected = np.concatenate([getattr(part, name) for part in (some, others)])
         assert (values == expected.astype(np.float32)).all()
 

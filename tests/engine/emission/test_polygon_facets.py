@@ -25,7 +25,7 @@ def test_facets_do_not_depend_on_what_else_is_held(seed: int, side: float) -> No
 
     def facets_of(some: np.ndarray) -> set[tuple]:
         made = chosen_facets(polygons.take(some), optical[some], sides[some])
-        return set(map(tuple, np.concatenate([made.centre, made.along], axis=1).round(9)))
+        return set(map(tuple, np.concatenate([made.center, made.along], axis=1).round(9)))
 
     every, gone = rng.permutation(len(polygons)), rng.integers(len(polygons))
     whole, rest, alone = facets_of(every), facets_of(np.delete(np.arange(len(polygons)), gone)), facets_of([gone])

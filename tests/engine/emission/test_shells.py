@@ -17,7 +17,7 @@ def cells(seed: int, count: int = 20, origin: float = 0.0) -> np.ndarray:
 def build(vertices: np.ndarray, **changes):
     count = len(vertices)
     values = {
-        "colour": np.full((count, 3), 0.2),
+        "color": np.full((count, 3), 0.2),
         "transmission": np.full(count, 0.3),
         "S": np.tile([4.0, 1.0, 9.0, 0.0, 0.0, 0.0], (count, 1)),
         "normal": np.tile([0.0, 0.0, 2.0], (count, 1)),
@@ -61,7 +61,7 @@ def test_exit_distance_from_the_attributes_is_the_true_one(seed, origin):
     local = buffers.positions.astype(np.float64).reshape(-1, 4, 3)
     weights = rng.dirichlet([1.0, 1.0, 1.0], size=8)
     inside = rng.dirichlet([2.0, 2.0, 2.0, 2.0], size=8)
-    # Enter through the face opposite vertex 0, towards an inner point.
+    # Enter through the face opposite vertex 0, toward an inner point.
     entry_weights = np.concatenate([np.zeros((8, 1)), weights], axis=1)
     # Undo the rounding of positions: thickness must not depend on where the cell is.
     exact = np.where(
@@ -125,9 +125,9 @@ def test_rank_writes_cells_back_to_front():
     vertices = cells(5, 30)
     rank = np.random.default_rng(6).permutation(30)
     light = np.random.default_rng(7).random((30, 4, 3))
-    colour = np.random.default_rng(8).random((30, 3))
-    plain = build(vertices, colour=colour, light=light)
-    ranked = build(vertices, colour=colour, light=light, rank=rank)
+    color = np.random.default_rng(8).random((30, 3))
+    plain = build(vertices, color=color, light=light)
+    ranked = build(vertices, color=color, light=light, rank=rank)
     order = np.argsort(-rank)
     for name, (domain, values) in plain.attributes.items():
         moved = values.reshape(30, 4, *values.shape[1:])[order].reshape(values.shape)

@@ -15,7 +15,7 @@ from tests.engine import support
 from tests.engine.refinement.test_loop import run
 from tetflora_addon.emission.plants import Transition, expanded_blocks
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.refinement.decisions import BAND, real_fraction
+from tetflora_addon.refinement.decisions import BAND, explicit_fraction
 
 
 def scene():
@@ -33,7 +33,7 @@ def widths(flora, camera) -> np.ndarray:
 @given(st.floats(0.01, 100.0), st.floats(0.01, 100.0), st.floats(0.1, 4.0))
 def test_fractions_grow_with_the_width(a: float, b: float, limit: float) -> None:
     """None up to the limit, all beyond the band, monotonous between."""
-    fraction = real_fraction(np.array([a, b]), limit)
+    fraction = explicit_fraction(np.array([a, b]), limit)
     assert ((fraction >= 0) & (fraction <= 1)).all()
     for one, pixels in zip(fraction, (a, b), strict=True):
         if pixels <= limit:
@@ -85,7 +85,7 @@ def test_facets_do_not_depend_on_how_space_is_divided() -> None:
     for cutoff in (2.0, 4.0):
         result = run(flora, support.grove(6, 3.0), camera, cutoff=cutoff)[1]
         _, facets, seen = support.drawn(flora, result, camera, 0.5)
-        made.append({tuple(c) for c in facets.centre[seen].round(5)})
+        made.append({tuple(c) for c in facets.center[seen].round(5)})
     assert len(made[0] & made[1]) > 0.8 * len(made[0] | made[1])
 
 

@@ -36,7 +36,7 @@ def form() -> Skeleton:
 
 def flora(**changes: object) -> Flora:
     species = species_from_dict(support.small(order1={"branches": [6, 1]}, order2={"branches": [0, 0]}), "s", "s.json")
-    return compile_species([replace(species, **{"form": form(), **changes})])
+    return compile_species([replace(species, **{"skeleton": form(), **changes})])
 
 
 def test_drawn_branches_are_where_they_were_drawn() -> None:
@@ -70,7 +70,7 @@ def test_the_computer_fills_in_what_is_not_drawn() -> None:
     """A trunk alone: its limbs are those of the species, and differ from seed to seed; the trunk does not."""
     line = skeleton_from_edges(POINTS[:4], RADIUS[:4], EDGES[:3], "a pole")
     species = species_from_dict(support.small(), "s", "s.json")
-    one = compile_species([replace(species, form=line)])
+    one = compile_species([replace(species, skeleton=line)])
     trunk = support.trunks(one.rows, support.plants([1, 2]))
     grown, owner, pieces, plant = open_subplants(one, trunk)
     number = np.bincount(owner)
@@ -96,14 +96,14 @@ def test_everything_is_inside_the_bound(drawn: int) -> None:
     """The whole drawing, and its trunk alone, on which much grows."""
     edges = EDGES[: drawn - 1]
     line = skeleton_from_edges(POINTS[:drawn], RADIUS[:drawn], edges, "a tree")
-    one = flora(form=line)
+    one = flora(skeleton=line)
     trunk = support.trunks(one.rows, support.plants(np.arange(20), scale=1.5))
-    centre, radius, half = bounding_cylinders(one, trunk)
+    center, radius, half = bounding_cylinders(one, trunk)
     for i in range(20):
         pieces = support.expanded(one, trunk.take(np.array([i])))
         axis = trunk.frame[i, :, 2]
         for mesh in chain(*support.meshes(one, pieces)):
-            way = mesh.positions - centre[i]
+            way = mesh.positions - center[i]
             along = way @ axis
             assert np.abs(along).max() <= half[i] * (1 + 1e-5)
             assert np.linalg.norm(way - along[:, None] * axis, axis=1).max() <= radius[i] * (1 + 1e-5)

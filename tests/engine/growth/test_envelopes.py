@@ -23,7 +23,7 @@ from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves, settled
 from tetflora_addon.growth.growth import leaf_counts, trunks
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies.facet_weights import facet_weights, fitting
 from tetflora_addon.refinement.shares import SharedPlants
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
@@ -175,7 +175,7 @@ def test_all_area_is_drawn_at_any_size(name: str, pixels: int) -> None:
     expected = flora.leaf_areas(whole).sum()
     assert area == pytest.approx(expected + flora.wood_areas(whole).sum() / 2, rel=0.03)
     if pixels >= 8 and len(made):
-        beside = made.centre - [0.0, 0.0, 2.0]
+        beside = made.center - [0.0, 0.0, 2.0]
         away = np.abs(beside[:, None, :2] - seeds.position[None, :, :2]).max(axis=2).min(axis=1)
         assert away.max() < RADIUS * 4 + 0.2
 
@@ -189,14 +189,14 @@ def test_points_of_a_solid_are_all_different_and_even() -> None:
     place = points.position[points.leaf > 0].astype(float)
     assert len(np.unique(place, axis=0)) == len(place) > 3_000
     assert points.leaf.sum() == pytest.approx(flora.leaf_areas(trunks(flora.rows, seeds))[0], rel=1e-5)
-    centre = [0.0, 0.0, 4 * (BARE + 1) / 2]
-    relative = (place - centre) / np.array([4 * RADIUS, 4 * RADIUS, 2 * (1 - BARE)])
+    center = [0.0, 0.0, 4 * (BARE + 1) / 2]
+    relative = (place - center) / np.array([4 * RADIUS, 4 * RADIUS, 2 * (1 - BARE)])
     assert (relative**2).sum(axis=1).mean() == pytest.approx(0.6, abs=0.02)
 
 
 def test_weights_of_solids_are_whole_where_facets_are_as_small_as_leaves() -> None:
     flora = support.compiled(one_order("sphere", 30_000, leaf_size=0.03, leaf_start=0))
-    found = at_once(fitting(flora, 0, 6_000.0))
+    found = run_to_end(fitting(flora, 0, 6_000.0))
     assert np.isfinite(found).all()
     assert (np.diff(found[1, 0, 2:]) > -0.03).all()
     assert found[1, 0, 0] < 0.8

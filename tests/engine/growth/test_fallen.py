@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.growth.seasons import Season, is_gone
-from tetflora_addon.species.catalogue import builtin_folder, load_species
+from tetflora_addon.species.catalog import builtin_folder, load_species
 from tetflora_addon.species.litter import leaves_page
 from tetflora_addon.species.schema import species_from_dict
 

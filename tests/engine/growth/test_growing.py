@@ -25,7 +25,7 @@ from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.species.species import Species
 from tetflora_addon.subplants.pieces import wood_areas
 
-AGE = {"full": 40, "height": [0.04, 1.2], "girth": [0.03, 1.3], "lifespan": 160, "flowers": 8}
+AGE = {"full": 40, "height": [0.04, 1.2], "diameter": [0.03, 1.3], "lifespan": 160, "flowers": 8}
 FORKED = {"forks": [2.3, 0.4], "fork_at": 0.3, "fork_levels": 2}
 
 

@@ -62,7 +62,7 @@ def test_small_integer_types_hold_the_same_seed() -> None:
 
 
 def test_numbers_are_even() -> None:
-    """χ² over 64 bins and the mean of products with neighbours: for seeds, siblings and draws in a row."""
+    """χ² over 64 bins and the mean of products with neighbors: for seeds, siblings and draws in a row."""
     n = 64_000
     siblings = uniform(child_key(key_of_seed(5), np.arange(n)), Draw.LENGTH)
     seeds = uniform(key_of_seed(np.arange(n)), Draw.LENGTH)
@@ -72,9 +72,9 @@ def test_numbers_are_even() -> None:
         bins = np.bincount((numbers * 64).astype(int), minlength=64)
         chi2 = ((bins - n / 64) ** 2 / (n / 64)).sum()
         assert chi2 < 63 + 5 * np.sqrt(2 * 63)
-        centred = numbers - 0.5
+        centered = numbers - 0.5
         for step in (1, 2, 64):
-            assert abs((centred[step:] * centred[:-step]).mean()) < 5 / 12 / np.sqrt(n)
+            assert abs((centered[step:] * centered[:-step]).mean()) < 5 / 12 / np.sqrt(n)
 
 
 def test_attributes_children_and_parents_are_independent() -> None:

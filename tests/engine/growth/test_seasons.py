@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import TetFloraError
-from tetflora_addon.growth.colours import leaf_colours_at
+from tetflora_addon.growth.colors import leaf_colors_at
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.growth.seasons import (
     AREA,
@@ -66,14 +66,14 @@ def with_year(leaf: LeafYear = LEAF, blossom: LeafYear | None = None, **changes:
 
 
 def leaves_of(flora: Flora, plants: int) -> tuple[float, int, np.ndarray]:
-    """Area of the leaves of some plants, their faces, and their mean colour."""
+    """Area of the leaves of some plants, their faces, and their mean color."""
     seeds = support.plants(np.arange(plants))
-    area, faces, colour = 0.0, 0, np.zeros(3)
+    area, faces, color = 0.0, 0, np.zeros(3)
     for mesh in leaf_meshes(flora, 0, list(expand(flora, support.trunks(flora.rows, seeds)))):
         own = support.face_areas(mesh.buffers)
         area, faces = area + own.sum(), faces + len(own)
-        colour = colour + own @ mesh.buffers.attributes["tf_colour"][1]
-    return area, faces, colour / max(area, 1e-12)
+        color = color + own @ mesh.buffers.attributes["tf_color"][1]
+    return area, faces, color / max(area, 1e-12)
 
 
 def test_without_a_year_and_in_summer_a_flora_is_itself() -> None:
@@ -122,14 +122,14 @@ def test_tables_are_means_of_leaves(leaf: LeafYear, day: float) -> None:
 def test_plants_are_what_is_expected_of_them(leaf: LeafYear, day: float) -> None:
     flora = compile_species([with_year(leaf)]).in_year(Season(day))
     summer = leaves_of(flora.in_leaf, 40)
-    area, faces, colour = leaves_of(flora, 40)
+    area, faces, color = leaves_of(flora, 40)
     plants = support.trunks(flora.rows, support.plants(np.arange(40)))
     wanted = flora.leaf_areas(plants)
     assert area == pytest.approx(wanted.sum(), abs=0.1 * summer[0])
     assert faces == pytest.approx((flora.face_counts(plants) - flora.branch_faces(plants)).sum(), abs=0.1 * summer[1])
     if area > 0.2 * summer[0]:
-        mean = wanted @ flora.leaf_colours(plants) / wanted.sum()
-        np.testing.assert_allclose(colour, mean, atol=0.03)
+        mean = wanted @ flora.leaf_colors(plants) / wanted.sum()
+        np.testing.assert_allclose(color, mean, atol=0.03)
 
 
 @settings(deadline=None, max_examples=25)
@@ -199,7 +199,7 @@ def test_blossoms_have_a_year_of_their_own() -> None:
             assert (0 in kinds) == leaf or LEAF.kept > 0
 
 
-def test_hues_of_plants_mix_the_colours_of_autumn_as_expected() -> None:
+def test_hues_of_plants_mix_the_colors_of_autumn_as_expected() -> None:
     flora = compile_species([with_year(replace(LEAF, turn=200, fall=330, kept=0.0))]).in_year(Season(270.0, spread=0.0))
     rows, row = flora.rows, np.flatnonzero(flora.rows["leaves"][:, 0] > 0)[:1]
     key = key_of_seed(np.arange(20_000))
@@ -207,10 +207,10 @@ def test_hues_of_plants_mix_the_colours_of_autumn_as_expected() -> None:
         stages = leaf_stages(rows, row, key, np.full(len(key), 270.0))
         assert stages.there.all()
         hues = np.full(len(key), hue)
-        mean = leaf_colours_at(rows, row, np.full((len(key), 3), 0.5), stages, hues).mean(axis=0)
+        mean = leaf_colors_at(rows, row, np.full((len(key), 3), 0.5), stages, hues).mean(axis=0)
         trunk = support.trunks(rows, support.plants(0))
         year = np.array([[270.0, hue]])
-        np.testing.assert_allclose(mean, flora.leaf_colours(replace(trunk, year=year))[0], atol=0.01)
+        np.testing.assert_allclose(mean, flora.leaf_colors(replace(trunk, year=year))[0], atol=0.01)
 
 
 @pytest.mark.parametrize("wrong", [{"day": np.nan}, {"latitude": 91.0}, {"spread": -1.0}, {"snow": 2.0}])

@@ -23,10 +23,10 @@ from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves, settled
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts
 from tetflora_addon.growth.rows import ROW_DTYPE
-from tetflora_addon.growth.wind import Wind, gusts, leant, sway, widest_sway
-from tetflora_addon.proxies.drawn import facet_mesh, joined, sphere_points, spheres_of
+from tetflora_addon.growth.wind import Wind, gusts, leaned, sway, widest_sway
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets, piece_facets, subplant_facets
+from tetflora_addon.proxies.primitives import facet_mesh, joined, sphere_points, spheres_of
 from tetflora_addon.subplants.pieces import expand, open_subplants
 
 _FLOAT32 = 1e-6
@@ -142,7 +142,7 @@ def test_within_a_loop_nothing_stands_still() -> None:
 @given(st.floats(0, 100), st.floats(1, 25), st.sampled_from([0.0, 3.0]))
 @settings(deadline=None, max_examples=20)
 def test_movement_is_continuous(time: float, speed: float, loop: float) -> None:
-    """In a thousandth of a second nothing moves by more than a tip at ten metres a second would."""
+    """In a thousandth of a second nothing moves by more than a tip at ten meters a second would."""
     flora = support.small_flora()
     first, second = (vertices(flora.in_wind(Wind(speed, 0.5, 1.0, t, loop))) for t in (time, time + 1e-3))
     for one, other in zip(first, second, strict=True):
@@ -301,7 +301,7 @@ def test_facets_move_with_what_bears_them(kind: str) -> None:
 
     for now, low, high in zip(facets(5.0, True), facets(5.0 - step), facets(5.0 + step), strict=True):
         assert low.velocity is None
-        way = (high.centre - low.centre) / (2 * step)
+        way = (high.center - low.center) / (2 * step)
         error = np.linalg.norm(now.velocity - way, axis=1)
         # Leaves turn to the light as well while their branches turn, by little.
         assert np.median(error) < 0.03 * np.linalg.norm(way, axis=1).max()
@@ -317,7 +317,7 @@ def test_facets_move_with_what_bears_them(kind: str) -> None:
 @pytest.mark.parametrize("height", [0.0, 2.0, 9.0])
 def test_an_upright_line_leans_to_an_arc_of_its_length(height: float) -> None:
     line = np.linspace(0, height, 400)[:, None] * [0.0, 0.0, 1.0]
-    arc = leant(line[None], np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.1, 0.0]]))[0]
+    arc = leaned(line[None], np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.1, 0.0]]))[0]
     assert np.linalg.norm(np.diff(arc, axis=0), axis=1).sum() == pytest.approx(height, rel=1e-5)
     assert arc[-1, 0] == pytest.approx((1 - np.cos(0.1 * height)) / 0.1)  # to +x, about +y
 

@@ -12,7 +12,7 @@ import pytest
 from tetflora_addon.leaves.bodies import closed_parts, rounded
 from tetflora_addon.leaves.levels import coarse_error, leaf_levels, level_errors
 from tetflora_addon.leaves.models import LeafModel, leaf_model
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 CORNERS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
 SIDES = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
@@ -58,7 +58,7 @@ def test_points_stay() -> None:
 
 
 def test_levels_of_fruit_are_finer_and_finer() -> None:
-    fruit = catalogue.load_species("rowan").blossom[0]
+    fruit = catalog.load_species("rowan").blossom[0]
     assert (np.diff(level_errors(fruit)) < 0).all() and len(leaf_levels(fruit)) >= 2
     for level in leaf_levels(fruit):
         assert level.model.area == pytest.approx(fruit.area, rel=0.01)

@@ -104,17 +104,17 @@ def test_of_flat_leaves_the_centroid_is_kept(name: str) -> None:
     model = LEAF_MODELS[name]
     kites = leaf_kites(model)
     points = model.positions[model.corner_verts]
-    centre, area = np.zeros(3), 0.0
+    center, area = np.zeros(3), 0.0
     for face in range(model.polygons):
         a, *rest = points[model.face_offsets[face] : model.face_offsets[face + 1]]
         for b, c in pairwise(rest):
             part = np.linalg.norm(np.cross(b - a, c - a)) / 2
-            centre, area = centre + part * (a + b + c) / 3, area + part
+            center, area = center + part * (a + b + c) / 3, area + part
     share = np.diff(kites.share, prepend=0.0)
-    mean = sum(weight * kite_centre(corners) for weight, corners in zip(share, kites.positions, strict=True))
-    np.testing.assert_allclose(mean, centre / area, atol=0.03 * model.reach)
+    mean = sum(weight * kite_center(corners) for weight, corners in zip(share, kites.positions, strict=True))
+    np.testing.assert_allclose(mean, center / area, atol=0.03 * model.reach)
 
 
-def kite_centre(corners: np.ndarray) -> np.ndarray:
+def kite_center(corners: np.ndarray) -> np.ndarray:
     a, b, c, d = corners
     return ((a + b + c) + (a + c + d)) / 6  # halves are equal

@@ -26,7 +26,7 @@ from tetflora_addon.leaves.levels import (
 from tetflora_addon.leaves.models import _COARSE, LEAF_MODELS, LeafModel, mean_silhouette
 from tetflora_addon.leaves.needles import SPARSE, Needles
 from tetflora_addon.leaves.outlines import distance_to_links
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 #: Polygons that no level has.
 MOST = 4000
@@ -65,7 +65,7 @@ def test_levels_have_the_area_of_their_model(name: str) -> None:
 @pytest.mark.parametrize("species", ["conifer", "juniper", "larch", "scots_pine", "silver_fir", "spruce", "stone_pine"])
 def test_needles_hide_as_much_as_the_polygons_that_stand_for_them(species: str) -> None:
     """From any side on average, though needles hide each other: a shoot is no denser from afar."""
-    (model,) = catalogue.load_species(species).leaf
+    (model,) = catalog.load_species(species).leaf
     for level in leaf_levels(model)[:2]:
         assert 2.0 * mean_silhouette(level.model) == pytest.approx(model.area, rel=0.03)
         assert level.model.area > 1.1 * model.area
@@ -168,6 +168,6 @@ def test_levels_are_made_as_far_as_they_are_asked_for(name: str) -> None:
 
 def test_leaflets_that_close_up_are_one_surface_from_afar() -> None:
     """A frond of moss is its outline until gaps between leaflets can be seen, though they are deeper than wide."""
-    model = catalogue.load_species("moss").leaf[0]
+    model = catalog.load_species("moss").leaf[0]
     gap = (model.shape.last - model.shape.first) / (model.shape.pairs - 1)
     assert coarse_error(model) < 1.3 * gap

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tetflora_addon.light.scattering import scattered_fractions
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 
 ROOT = Path(__file__).resolve().parents[3]
 MEASURED = json.loads((ROOT / "tests/data/leaf_optics.json").read_text())["leaves"]
@@ -20,10 +20,10 @@ SINGLE = [pair for pair in PAIRS if pair[1] != "conifer"]
 
 def shipped(identifier):
     """Reflected and transmitted fractions (3,), (3,) of leaves half way between inside and outside of the crown."""
-    species = catalogue.load_species(identifier)
+    species = catalog.load_species(identifier)
     order = [o for o in species.orders if o.leaf_kind == "leaf" and o.leaves.mean > 0][-1]
-    colour = (np.array(order.leaf_colour.mean) + order.leaf_colour_tip) / 2
-    back, through, gloss = scattered_fractions(colour[None], np.array([species.leaf_transmission]))
+    color = (np.array(order.leaf_color.mean) + order.leaf_color_tip) / 2
+    back, through, gloss = scattered_fractions(color[None], np.array([species.leaf_transmission]))
     return back[0] + gloss[0], through[0]
 
 

@@ -13,7 +13,7 @@ from tests.engine import support
 from tests.engine.leaves.test_bodies import CORNERS, SIDES
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.leaves.levels import leaf_levels
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import catalog
 from tetflora_addon.species.schema import species_from_dict
 
 BODY = {"vertices": (CORNERS * [0.3, 0.5, 0.2] + [0, 0.5, 0]).tolist(), "faces": SIDES}
@@ -42,7 +42,7 @@ def test_only_the_finest_level_has_spines() -> None:
 
 def test_spines_stand_out_and_apart() -> None:
     """Tips lie off the pad by about their length, none beyond what bounds know; areoles keep their distance."""
-    model = catalogue.load_species("prickly_pear").leaf[0]
+    model = catalog.load_species("prickly_pear").leaf[0]
     last = leaf_levels(model)[-1]
     assert last.model.reach <= model.reach * (1 + 1e-9)
     faces = last.model.corner_verts.reshape(-1, 3)
@@ -57,7 +57,7 @@ def test_spines_stand_out_and_apart() -> None:
 
 @pytest.mark.parametrize("number", [2, 3, 5])
 def test_spines_of_an_areole_stand_all_around_it(number: int) -> None:
-    """No gap between neighbours is much wider than if they were spread evenly."""
+    """No gap between neighbors is much wider than if they were spread evenly."""
     model = species(**BODY, spines={"number": number, "length": 0.02}).leaf[0]
     last = leaf_levels(model)[-1]
     faces = last.model.positions[

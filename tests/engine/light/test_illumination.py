@@ -16,7 +16,7 @@ from tetflora_addon.emission.light import shadow_steps
 from tetflora_addon.emission.shells import set_apart
 from tetflora_addon.light import buffers
 from tetflora_addon.light.illumination import Illumination
-from tetflora_addon.light.receivers import Clouds, Sheets
+from tetflora_addon.light.receivers import MediumCells, SurfaceElements
 from tetflora_addon.light.scattering import (
     DIRECTIONS,
     SOLID_ANGLE,
@@ -32,7 +32,7 @@ from tetflora_addon.tetrahedra.geometry import signed_volume
 
 DARK = World.plain((0, 0, 0))
 DOWN = np.array([0.0, 0.0, -1.0])
-SUN = Light("SUN", np.zeros(3), DOWN, colour=np.array([3.0, 2.0, 1.0]))
+SUN = Light("SUN", np.zeros(3), DOWN, color=np.array([3.0, 2.0, 1.0]))
 # Kuhn's division of a cube.
 _KUHN = [(1, 3, 7), (1, 5, 7), (2, 3, 7), (2, 6, 7), (4, 5, 7), (4, 6, 7)]
 
@@ -47,7 +47,7 @@ def shadow_pass(*arguments, **options) -> Illumination:
             return stop.value
 
 
-def box(kappa: float, cells: int = 4, size: float = 4.0, colour: float = 0.0, transmission: float = 0.0) -> Clouds:
+def box(kappa: float, cells: int = 4, size: float = 4.0, color: float = 0.0, transmission: float = 0.0) -> MediumCells:
     """A cube of even density with its top at z = 0, divided into 6 × cells³ tetrahedra."""
     corner = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)], float)
     cube = corner[np.array([(0, *rest) for rest in _KUHN])]
@@ -55,22 +55,22 @@ def box(kappa: float, cells: int = 4, size: float = 4.0, colour: float = 0.0, tr
     vertices = ((cube + at) / cells * size).reshape(-1, 4, 3) - [size / 2, size / 2, size]
     turned = signed_volume(vertices) < 0
     vertices[turned] = vertices[turned][:, [0, 2, 1, 3]]
-    return clouds(vertices, kappa, colour, transmission)
+    return clouds(vertices, kappa, color, transmission)
 
 
-def clouds(vertices: np.ndarray, kappa: float, colour: float, transmission: float) -> Clouds:
+def clouds(vertices: np.ndarray, kappa: float, color: float, transmission: float) -> MediumCells:
     n = len(vertices)
-    return Clouds(
+    return MediumCells(
         vertices,
         np.tile([kappa**2] * 3 + [0.0] * 3, (n, 1)),
-        np.full((n, 3), colour),
+        np.full((n, 3), color),
         np.full(n, transmission),
         np.tile([0.0, 0.0, 1.0], (n, 1)),
         np.zeros(n),
     )
 
 
-def inside(seed: int, count: int, cloud: Clouds) -> tuple[np.ndarray, np.ndarray]:
+def inside(seed: int, count: int, cloud: MediumCells) -> tuple[np.ndarray, np.ndarray]:
     """Random points and their cells."""
     rng = np.random.default_rng(seed)
     cells = rng.integers(len(cloud), size=count)
@@ -92,11 +92,11 @@ def test_a_slab_lets_through_what_it_must(kappa: float, cells: int) -> None:
     keep = np.abs(points[:, :2]).max(axis=1) < 1.9
     points, owner = points[keep], owner[keep]
     found = shadow_pass(cloud, [SUN], DARK, resolution=96)
-    wanted = np.exp(kappa * points[:, 2])[:, None] * SUN.colour
+    wanted = np.exp(kappa * points[:, 2])[:, None] * SUN.color
     assert only(found, points, owner) == pytest.approx(wanted, abs=0.02 * 3.0)
     below = np.array([[0.3, -0.4, -9.0], [1.0, 1.0, -4.1]])
     behind = only(found, below, np.full(2, -1))
-    assert behind == pytest.approx(np.tile(np.exp(-4.0 * kappa) * SUN.colour, (2, 1)), rel=0.02)
+    assert behind == pytest.approx(np.tile(np.exp(-4.0 * kappa) * SUN.color, (2, 1)), rel=0.02)
 
 
 @pytest.mark.parametrize("kind", ["POINT", "SPOT", "AREA"])
@@ -150,7 +150,7 @@ def test_lights_add_and_those_without_shadow_pass_through() -> None:
 
 
 def test_the_order_of_tetrahedra_and_lights_does_not_matter() -> None:
-    cloud = box(0.5, 2, colour=0.5)
+    cloud = box(0.5, 2, color=0.5)
     turn = np.random.default_rng(6).permutation(len(cloud))
     turned = clouds(cloud.vertices[turn], 0.5, 0.5, 0.0)
     lights = [SUN, Light("POINT", np.array([5.0, 0.0, 1.0]), DOWN)]
@@ -189,7 +189,7 @@ def test_points_of_an_area_add_up_to_it() -> None:
     for ellipse in (False, True):
         area = Light("AREA", np.zeros(3), DOWN, span=span, ellipse=ellipse)
         parts = split_areas((area,))
-        assert sum(p.colour for p in parts) == pytest.approx(area.colour)
+        assert sum(p.color for p in parts) == pytest.approx(area.color)
         assert np.mean([p.position for p in parts], axis=0) == pytest.approx(np.zeros(3), abs=0.3)
         point = np.array([[0.0, 0.0, -20.0]])
         far = sum(arriving(p, point)[1] for p in parts)
@@ -227,7 +227,7 @@ def test_white_facets_under_an_even_sky_are_white(transmission: float, seed: int
     camera = support.camera((20, 3, 1), (0, 0, -2))
     for view in (None, camera):
         sides = found.facet_radiance(points, normal, np.ones((8, 3)), np.full(8, transmission), cells, view)
-        # White stays white in each colour where nothing tints it on its way through.
+        # White stays white in each color where nothing tints it on its way through.
         assert np.array(sides)[..., :2] == pytest.approx(1.0, abs=0.01)
     seen = found.cloud_radiance(
         points, np.ones((8, 3)), np.full(8, transmission), cells, camera, normal, np.full(8, 0.4)
@@ -238,20 +238,20 @@ def test_white_facets_under_an_even_sky_are_white(transmission: float, seed: int
 @pytest.mark.parametrize("kappa", [0.2, 2.0])
 def test_a_white_cloud_under_an_even_sky_is_white(kappa: float) -> None:
     """What is scattered makes up for what is hidden."""
-    found = shadow_pass(box(kappa, 2, colour=1.0), [], World.plain((1, 1, 1)), resolution=400, orders=16)
+    found = shadow_pass(box(kappa, 2, color=1.0), [], World.plain((1, 1, 1)), resolution=400, orders=16)
     assert found.cell_sources(support.camera((20, 3, 1), (0, 0, -2))) == pytest.approx(1.0, abs=0.04)
 
 
 def test_more_orders_change_little() -> None:
     """The geometric series stands for those that are left out."""
-    cloud = box(1.0, 3, colour=0.5)
+    cloud = box(1.0, 3, color=0.5)
     few, many = (shadow_pass(cloud, [SUN], DARK, resolution=64, orders=n).ambient[:, :, 0] for n in (2, 8))
     assert few.mean() == pytest.approx(many.mean(), rel=0.02)
     assert shadow_pass(cloud, [SUN], DARK, resolution=64, orders=1).ambient[:, :, 0].mean() < 0.9 * many.mean()
 
 
 def test_crowns_are_darker_inside_and_below() -> None:
-    found = shadow_pass(box(0.6, 6, colour=0.2), [], World.of(lambda d: np.maximum(d[:, 2:], 0.0)), resolution=128)
+    found = shadow_pass(box(0.6, 6, color=0.2), [], World.of(lambda d: np.maximum(d[:, 2:], 0.0)), resolution=128)
     height = found.clouds.key_points[..., 2]
     light = found.ambient[:, :, 0, 0]
     layers = [light[(height < top) & (height >= top - 1.0)].mean() for top in (0.0, -1.0, -2.0, -3.0)]
@@ -268,7 +268,7 @@ def test_ground_lights_from_below() -> None:
     )
     assert dark == pytest.approx(0.0, abs=0.01)
     # Half of the sun's light comes back from a plane without end.
-    assert bright == pytest.approx(0.5 * SUN.colour[None], rel=0.15)
+    assert bright == pytest.approx(0.5 * SUN.color[None], rel=0.15)
 
 
 def test_phases_keep_all_light() -> None:
@@ -285,7 +285,7 @@ def test_nothing_to_light() -> None:
     """No tetrahedra, and points beside them."""
     found = shadow_pass(clouds(np.zeros((0, 4, 3)), 1.0, 0.5, 0.0), [SUN], World.plain((1, 1, 1)))
     up = np.array([[0.0, 0.0, 1.0]])
-    assert found.irradiance(np.zeros((1, 3)), up) == pytest.approx(SUN.colour[None] + np.pi, rel=1e-3)
+    assert found.irradiance(np.zeros((1, 3)), up) == pytest.approx(SUN.color[None] + np.pi, rel=1e-3)
     assert found.cell_sources(support.camera((9, 0, 2), (0, 0, -2))).shape == (0, 4, 3)
 
 
@@ -301,7 +301,7 @@ def random_sheets(seed: int, count: int, side: float) -> tuple[np.ndarray, np.nd
 def test_sheets_shadow_those_below_and_not_themselves() -> None:
     """As rays find it: a sheet is lit as far as none lies above its middle."""
     corners, cell = random_sheets(9, 120, 0.4)
-    sheets = Sheets.of(corners, cell, 6)
+    sheets = SurfaceElements.of(corners, cell, 6)
     found = shadow_pass(box(5.0, 1), [SUN], DARK, resolution=128, sheets=sheets)
     middle, every = corners.mean(axis=1), np.arange(120)
     light = next(found.direct(middle, cell, every))[1][:, 0] / 3.0
@@ -318,7 +318,7 @@ def test_however_many_sheets_are_drawn_few_points_are_held_at_once(monkeypatch: 
     """Small ones and large ones, which are cut into many parts; the light is the same to the last digit."""
     parts = [random_sheets(seed, 60, side) for seed, side in ((1, 0.01), (2, 0.1), (3, 0.6))]
     corners, cell = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    sheets, held = Sheets.of(corners, cell, 6), []
+    sheets, held = SurfaceElements.of(corners, cell, 6), []
 
     def light() -> np.ndarray:
         found = shadow_pass(box(5.0, 1), [SUN], DARK, resolution=128, sheets=sheets)
@@ -331,7 +331,7 @@ def test_however_many_sheets_are_drawn_few_points_are_held_at_once(monkeypatch: 
         return inner(buffer, points)
 
     monkeypatch.setattr(buffers.LightBuffer, "_taps", counted)
-    monkeypatch.setattr(buffers, "POINTS_AT_ONCE", 5_000)
+    monkeypatch.setattr(buffers, "POINT_BATCH", 5_000)
     assert np.array_equal(light(), once)
     assert sum(held) > 50_000
     assert max(held) <= 5_000
@@ -340,7 +340,7 @@ def test_however_many_sheets_are_drawn_few_points_are_held_at_once(monkeypatch: 
 def test_samples_stand_for_their_key_points() -> None:
     corners, cell = random_sheets(10, 40, 0.2)
     cloud = box(1.0, 1)
-    points, cells, sheets, keys = Sheets.of(corners, np.where(cell == 2, 3, cell), 6).samples(cloud)
+    points, cells, sheets, keys = SurfaceElements.of(corners, np.where(cell == 2, 3, cell), 6).samples(cloud)
     assert (sheets[cells == 2] == -1).all()
     assert len(points[cells == 2]) == 4
     assert keys.means(np.ones((len(points), 2))) == pytest.approx(1.0)
@@ -355,7 +355,7 @@ def test_fewer_sheets_have_the_area_of_all(seed, count, most):
     rng = np.random.default_rng(seed)
     corners = rng.normal(size=(count, 1, 3)) + rng.normal(scale=0.1, size=(1, 4, 3))
     cells = rng.integers(0, 5, count)
-    fewer, number = Sheets.of(corners, cells, 5).thinned(most)
+    fewer, number = SurfaceElements.of(corners, cells, 5).thinned(most)
     assert len(fewer) <= max(most, 1)
     assert sorted(number[number >= 0]) == list(range(len(fewer)))
     if len(fewer):
@@ -373,8 +373,8 @@ def test_a_view_of_what_is_near_gives_the_light_of_the_whole():
     """Cells, and ground beneath: the shadow at points that both views see is the same, but for the pixels' size."""
     cloud = box(0.3)
     points, cells = inside(3, 200, cloud)
-    whole = buffers_of(SUN, cloud, Sheets.none(len(cloud)), None, 256)
-    both = buffers_of(SUN, cloud, Sheets.none(len(cloud)), None, 256, Near(np.array([1.0, 1.0, 0.0]), (0.8,)))
+    whole = buffers_of(SUN, cloud, SurfaceElements.none(len(cloud)), None, 256)
+    both = buffers_of(SUN, cloud, SurfaceElements.none(len(cloud)), None, 256, Near(np.array([1.0, 1.0, 0.0]), (0.8,)))
     assert len(whole) == 1
     assert len(both) == 2
     own = cloud.own_depth(points, cells, np.array([0.0, 0.0, 1.0]))

@@ -12,7 +12,7 @@ from tetflora_addon.compiled.crowns import crown_of
 from tetflora_addon.planting.places import place
 from tetflora_addon.planting.rules import CROWN_RADII, Rules, suggested_distance
 from tetflora_addon.planting.terrain import Terrain
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 
 
 def _distance(identifier: str) -> float:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.planting.canopy import CLUSTERED, DIRECTIONS, FACING, Canopy, Sheet, fallen_on, light_on
 from tetflora_addon.planting.cover import FULL, Floor, Habitat, Stratum, covered, mapping, tinted
 from tetflora_addon.planting.places import place
@@ -37,13 +37,13 @@ def _wood(seed: int = 1, kinds: int = 2) -> Canopy:
 
 
 def _floor(canopy: Canopy, kinds: int = 2) -> Floor:
-    return at_once(mapping(SHEET, canopy, kinds))
+    return run_to_end(mapping(SHEET, canopy, kinds))
 
 
 def test_light_in_the_middle_under_one_crown_is_that_of_beer_and_lambert():
     radius, base, top, area = 3.0, 3.0, 11.0, 90.0
     half, height = (top - base) / 2, (top + base) / 2
-    light = at_once(light_on(SHEET, _canopy([SIDE / 2, SIDE / 2], radius, base, top, area)))
+    light = run_to_end(light_on(SHEET, _canopy([SIDE / 2, SIDE / 2], radius, base, top, area)))
     thick = FACING * CLUSTERED * area / (4 / 3 * np.pi * radius**2 * half)
     expected = 0.0
     for degrees, number, weight in DIRECTIONS:
@@ -61,15 +61,15 @@ def test_light_in_the_middle_under_one_crown_is_that_of_beer_and_lambert():
 
 
 def test_more_leaves_leave_less_light_and_open_ground_has_all():
-    sparse, dense = (at_once(light_on(SHEET, _canopy([20, 20], area=a))) for a in (30.0, 120.0))
+    sparse, dense = (run_to_end(light_on(SHEET, _canopy([20, 20], area=a))) for a in (30.0, 120.0))
     assert (dense <= sparse + 1e-12).all()
     assert dense.min() < sparse.min() < 1.0
-    assert at_once(light_on(SHEET, _canopy([]))) == pytest.approx(1.0)
+    assert run_to_end(light_on(SHEET, _canopy([]))) == pytest.approx(1.0)
 
 
 def test_all_leaves_fall_somewhere_and_most_near_the_trunk():
     canopy = _canopy([[15, 20], [25, 20]], area=[80.0, 120.0], species=[0, 1])
-    fallen = at_once(fallen_on(SHEET, canopy, 2))
+    fallen = run_to_end(fallen_on(SHEET, canopy, 2))
     assert fallen.sum(axis=1) * SHEET.cell**2 == pytest.approx([80.0, 120.0], rel=0.02)
     far = np.hypot(*(SHEET.middles() - (15, 20)).T)
     assert fallen[0, far < 1.0].min() > fallen[0, (far > 3.0) & (far < 3.5)].max() > 0.0
@@ -183,13 +183,13 @@ def test_habitats_keep_the_patches_that_they_had():
 
 
 def test_soil_takes_the_colors_of_what_hides_it():
-    soil, brown, grey = np.array([0.04, 0.03, 0.02]), np.array([0.2, 0.1, 0.05]), np.array([0.1, 0.1, 0.1])
+    soil, brown, gray = np.array([0.04, 0.03, 0.02]), np.array([0.2, 0.1, 0.05]), np.array([0.1, 0.1, 0.1])
     suits = np.array([0.0, 1.0, 1.0])
-    layers = [Stratum(suits, 5.0, 0.2, brown), Stratum(suits * [0, 0, 1], 5.0, 0.2, grey)]
-    colour = tinted(layers, soil, 3)
+    layers = [Stratum(suits, 5.0, 0.2, brown), Stratum(suits * [0, 0, 1], 5.0, 0.2, gray)]
+    color = tinted(layers, soil, 3)
     hidden = covered(layers, 3)
     assert hidden == pytest.approx(1.0 - np.exp([0.0, -1.0, -2.0]))
-    assert colour[0] == pytest.approx(soil)
-    assert colour[1] == pytest.approx(hidden[1] * brown + (1 - hidden[1]) * soil)
-    assert colour[2] == pytest.approx(hidden[2] * (brown + grey) / 2 + (1 - hidden[2]) * soil)
+    assert color[0] == pytest.approx(soil)
+    assert color[1] == pytest.approx(hidden[1] * brown + (1 - hidden[1]) * soil)
+    assert color[2] == pytest.approx(hidden[2] * (brown + gray) / 2 + (1 - hidden[2]) * soil)
     assert (tinted([], soil, 2) == soil).all()

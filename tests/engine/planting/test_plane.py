@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 
 from tests.engine.planting.test_planting import SIZE, _gaps, _hills, _inside, _least_gap
 from tetflora_addon.planting import plane
-from tetflora_addon.planting.plane import Neighbours, Spacing
+from tetflora_addon.planting.plane import Neighbors, Spacing
 from tetflora_addon.planting.terrain import border_of
 
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10**6), distance=st.floats(0.05, 4.0), least=st.integers(1, 3))
-def test_neighbours_are_those_of_brute_force(seed, distance, least):
+def test_neighbors_are_those_of_brute_force(seed, distance, least):
     rng = np.random.default_rng(seed)
     points, others = rng.uniform(-5, 5, (80, 2)), rng.uniform(-5, 5, (60, 2)) * rng.random((60, 1))
     expected = (_gaps(points, others) < distance).sum(axis=1) >= least
-    assert np.array_equal(Neighbours(others, distance).near(points, least), expected)
+    assert np.array_equal(Neighbors(others, distance).near(points, least), expected)
     kept = points[Spacing(distance, others).admit(points, 50)]
     assert (_gaps(kept, others) >= distance).all() and _least_gap(kept) >= distance
 

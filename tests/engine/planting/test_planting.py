@@ -204,16 +204,16 @@ def test_arrangements_stay_what_they_were():
 
 
 @settings(max_examples=15, deadline=None)
-@given(seed=st.integers(0, 10**6), density=st.floats(5.0, 40.0), grey=st.floats(0.1, 1.0))
-def test_density_is_plants_for_each_suitable_square_metre(seed, density, grey):
-    ground = Terrain(SQUARE, weight=np.full((2, 3), grey))
+@given(seed=st.integers(0, 10**6), density=st.floats(5.0, 40.0), gray=st.floats(0.1, 1.0))
+def test_density_is_plants_for_each_suitable_square_meter(seed, density, gray):
+    ground = Terrain(SQUARE, weight=np.full((2, 3), gray))
     placed = place(ground, Rules(by_density=True, density=density, seed=seed))
-    expected = density * 100.0 * grey
+    expected = density * 100.0 * gray
     assert abs(len(placed) - expected) < 5.0 * np.sqrt(expected) + 1.0
     assert placed.wanted == len(placed)
 
 
-def test_masks_thin_by_their_grey():
+def test_masks_thin_by_their_gray():
     weight = SQUARE[..., 0] / 10.0
     by_weight = place(Terrain(SQUARE, weight=weight), Rules(count=20_000)).position
     image = np.linspace(0.0, 1.0, 257, dtype=np.float32)[None]
@@ -238,7 +238,7 @@ def test_images_repeat_and_their_borders_do_not_mix():
     assert np.allclose(sampled(image, places), [0.0, 0.5, 1.5, 1.0, 0.0, 2.0])
 
 
-def test_plants_become_rarer_towards_the_border_and_the_limits():
+def test_plants_become_rarer_toward_the_border_and_the_limits():
     placed = place(Terrain(SQUARE), Rules(count=20_000, edge_falloff=4.0)).position
     gap = np.minimum(placed[:, :2], 10.0 - placed[:, :2]).min(axis=1)
     # ∫ of gap / 4 over the frame 4 m wide is 40·4/2 − 8·16/3 = 37.33, inside lie 4 m².

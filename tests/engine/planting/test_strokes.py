@@ -20,10 +20,10 @@ def _gaps(places: np.ndarray) -> np.ndarray:
     return gap[np.triu_indices(len(places), 1)]
 
 
-def _painted(brush: Brush, centres, standing=NONE, seed=1):
+def _painted(brush: Brush, centers, standing=NONE, seed=1):
     key = strokes.stroke_key(seed, 0)
-    for dab, centre in enumerate(centres):
-        places, _ = strokes.paint(brush, centre, standing, key, dab)
+    for dab, center in enumerate(centers):
+        places, _ = strokes.paint(brush, center, standing, key, dab)
         standing = np.concatenate([standing, places])
     return standing
 
@@ -35,16 +35,16 @@ brushes = st.builds(
     strength=st.floats(0.1, 1.0),
     min_distance=st.floats(0.0, 3.0),
 )
-centres = st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
+centers = st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
 
 
 @settings(max_examples=60, deadline=None)
-@given(brush=brushes, centre=centres, seed=st.integers(-(2**31), 2**31), number=st.integers(0, 60))
-def test_what_is_painted_lies_in_the_circle_and_keeps_its_distance(brush, centre, seed, number):
-    standing = np.random.default_rng(number).uniform(-15.0, 15.0, (number, 2)) + centre
-    places, keys = strokes.paint(brush, centre, standing, strokes.stroke_key(seed, 0), 0)
+@given(brush=brushes, center=centers, seed=st.integers(-(2**31), 2**31), number=st.integers(0, 60))
+def test_what_is_painted_lies_in_the_circle_and_keeps_its_distance(brush, center, seed, number):
+    standing = np.random.default_rng(number).uniform(-15.0, 15.0, (number, 2)) + center
+    places, keys = strokes.paint(brush, center, standing, strokes.stroke_key(seed, 0), 0)
     assert len(places) == len(keys)
-    assert strokes.within(places, centre, brush.radius).all()
+    assert strokes.within(places, center, brush.radius).all()
     if brush.min_distance > 0.0 and len(places):
         if number:
             assert np.linalg.norm(places[:, None] - standing[None], axis=-1).min() >= brush.min_distance * (1 - 1e-9)
@@ -96,12 +96,12 @@ def test_strength_is_the_share_that_one_dab_sets():
 
 
 @settings(max_examples=60, deadline=None)
-@given(brush=brushes, centre=st.tuples(st.floats(-20, 20), st.floats(-20, 20)), seed=st.integers(0, 99))
-def test_erase_and_thin_take_nothing_outside_of_the_circle(brush, centre, seed):
+@given(brush=brushes, center=st.tuples(st.floats(-20, 20), st.floats(-20, 20)), seed=st.integers(0, 99))
+def test_erase_and_thin_take_nothing_outside_of_the_circle(brush, center, seed):
     standing = np.random.default_rng(seed).uniform(-20.0, 20.0, (300, 2))
     key = strokes.stroke_key(seed, 0)
-    erased, thinned = (f(brush, centre, standing, key, 0) for f in (strokes.erase, strokes.thin))
-    inside = set(np.flatnonzero(strokes.within(standing, centre, brush.radius)).tolist())
+    erased, thinned = (f(brush, center, standing, key, 0) for f in (strokes.erase, strokes.thin))
+    inside = set(np.flatnonzero(strokes.within(standing, center, brush.radius)).tolist())
     assert set(erased.tolist()) <= inside
     assert set(thinned.tolist()) <= inside
     if brush.strength == 1.0:

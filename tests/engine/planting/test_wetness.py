@@ -80,7 +80,7 @@ def test_no_water_is_lost(seed):
     around = np.where(np.isnan(around), -np.inf, around)
     rows, columns = height.shape
     others = [around[1 + i : 1 + i + rows, 1 + j : 1 + j + columns] for i, j, _ in wet._AROUND]
-    assert (np.min(others, axis=0)[there] < surface[there]).all(), "each cell has a lower neighbour or a border"
+    assert (np.min(others, axis=0)[there] < surface[there]).all(), "each cell has a lower neighbor or a border"
     area = wet.catchment(surface, 2.0)
     inner = [np.where(np.isneginf(o), np.inf, o) for o in others]
     outlets = there & ~(np.min(inner, axis=0) < surface)

@@ -66,7 +66,7 @@ def test_impossible_wetness_is_refused():
 
 @given(st.floats(0, 1), st.floats(0, 1), st.floats(0, 0.5))
 @settings(max_examples=30, deadline=None)
-def test_neighbours_along_a_limit_make_one(value, limit, softness):
+def test_neighbors_along_a_limit_make_one(value, limit, softness):
     """What ends at a limit and what begins there add up to 1, but for the limit itself where it is sharp."""
     at = np.array([value])
     both = soft_between(at, -9, limit, softness, -9, 9) + soft_between(at, limit, 9, softness, -9, 9)

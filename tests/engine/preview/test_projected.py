@@ -197,7 +197,7 @@ def test_levels_are_the_states_of_the_loop(gathered: levels.Levels) -> None:
         assert gathered.vertices(level).shape == (len(level), 4, 3)
         assert ((level.visibility >= 0) & (level.visibility <= 1.001)).all()
         assert (level.extinction > 0).all()
-        assert ((level.colour > 0) & (level.colour < 1)).all()
+        assert ((level.color > 0) & (level.color < 1)).all()
     assert not (gathered.levels[-1].decision == Decision.SPLIT).any()
     # What is there is spread, and not lost: Σ κ V is half of the leaves and a quarter of the wood at every level, but
     # what a plant is expected to hold and what it holds once it is opened are not quite the same.
@@ -242,21 +242,21 @@ def test_too_many_levels_are_thinned(monkeypatch: pytest.MonkeyPatch, gathered: 
     assert level.nbytes < 60 * len(level)
 
 
-def test_colours_tell_tetrahedra_apart(gathered: levels.Levels) -> None:
+def test_colors_tell_tetrahedra_apart(gathered: levels.Levels) -> None:
     level = gathered.levels[-1]
     for mode in ("LEVEL", "VISIBILITY", "FORM", "CONTRIBUTION"):
-        shown = levels.colours_of(level, mode, int(level.depth.max()))
+        shown = levels.colors_of(level, mode, int(level.depth.max()))
         assert shown.shape == (len(level), 3)
         assert shown.dtype == np.float32
         assert ((shown >= 0) & (shown <= 1)).all()
         assert len(np.unique(shown, axis=0)) > 1
-    forms = levels.colours_of(level, "FORM", 1)
-    for decision, colour in levels.FORMS.items():
-        assert np.allclose(forms[level.decision == decision], colour)
+    forms = levels.colors_of(level, "FORM", 1)
+    for decision, color in levels.FORMS.items():
+        assert np.allclose(forms[level.decision == decision], color)
     shades = levels.ramp(np.linspace(0, 1, 9)) @ [0.3, 0.6, 0.1]
     assert (np.diff(shades) > 0).all()
     with pytest.raises(ValueError, match="FORM"):
-        levels.colours_of(level, "MOOD", 1)
+        levels.colors_of(level, "MOOD", 1)
     np.testing.assert_allclose(levels.as_shown(np.array([0.0, 0.21404, 1.0])), [0, 0.5, 1], atol=1e-4)
 
 
@@ -268,7 +268,7 @@ def test_a_tree_that_was_not_divided_has_an_order() -> None:
 
 @pytest.mark.parametrize("species", ["birch", "conifer", "bush"])
 def test_light_plants_stand_where_plants_do(species: str) -> None:
-    """Few triangles, within the plant's bound, about as tall as its leaves reach, in the species' colour."""
+    """Few triangles, within the plant's bound, about as tall as its leaves reach, in the species' color."""
     number = support.SPECIES.index(species)
     flora, count = support.flora(), 5
     positions = np.random.default_rng(1).uniform(-30, 30, (count, 3))
@@ -284,9 +284,9 @@ def test_light_plants_stand_where_plants_do(species: str) -> None:
     assert (points[..., 2] <= high[:, None] + 1e-3).all()
     assert (points[..., 2] >= low[:, None] - 0.02 * stems.length[:, None]).all()  # trunks lean
     assert (points[..., 2].max(axis=1) > 0.7 * high).all()
-    crown = shapes.colours.reshape(count, -1, 3)[:, 1]
+    crown = shapes.colors.reshape(count, -1, 3)[:, 1]
     hue = crown / crown.max(axis=1, keepdims=True)
-    leaf = levels.as_shown(flora.leaf_colours(stems))
+    leaf = levels.as_shown(flora.leaf_colors(stems))
     np.testing.assert_allclose(hue, leaf / leaf.max(axis=1, keepdims=True), atol=0.15)
     boxes = light_plants.bounds_of_plants(flora, seeds)
     corners = boxes.positions.reshape(count, 8, 3) - stems.position[:, None]

@@ -36,7 +36,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     pool.stop()
     pool.resume()
     yield texts
-    pool.use(float("inf"))
+    pool.set_memory_limit(float("inf"))
     pool.stop()
     pool.resume()
 
@@ -149,10 +149,10 @@ def test_they_keep_to_a_part_of_the_memory(monkeypatch: pytest.MonkeyPatch) -> N
         assert pool.share(limit) <= limit / 4
         assert pool.share(limit) == pool.number(limit) * pool._pool.largest
     assert pool.share(1e9) == 0.0
-    pool.use(2e9)
+    pool.set_memory_limit(2e9)
     list(in_processes(in_child.after_a_while, 0.02, range(12)))
     assert len(pool._pool.children) == pool.number() == 2
-    pool.use(1e9)
+    pool.set_memory_limit(1e9)
     assert not pool._pool.children
 
 

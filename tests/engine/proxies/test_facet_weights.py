@@ -14,13 +14,13 @@ from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import facet_weights as subject
-from tetflora_addon.proxies.drawn import facet_mesh
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, piece_facets, subplant_facets
+from tetflora_addon.proxies.primitives import facet_mesh
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
-from tetflora_addon.refinement.rasterise import occluder_depth
-from tetflora_addon.species.catalogue import list_species, load_species
+from tetflora_addon.refinement.rasterize import occluder_depth
+from tetflora_addon.species.catalog import list_species, load_species
 from tetflora_addon.subplants.pieces import open_subplants
 
 
@@ -85,7 +85,7 @@ def test_tables_of_shipped_species_are_those_of_today() -> None:
     """Run ``python -m devtools.facet_tables`` and raise `_METHOD` after changes of species or of facets."""
     flora = compile_species([load_species("birch")])
     known = subject.shipped()[subject.digest(flora, 0)]
-    whole, own = at_once(subject.fitting(flora, 0))
+    whole, own = run_to_end(subject.fitting(flora, 0))
     np.testing.assert_allclose([whole, own], known, atol=0.02)
 
 
@@ -114,17 +114,17 @@ def test_the_least_weight_with_which_a_triangle_reaches_a_ray() -> None:
     )
     one = replace(
         facets,
-        centre=np.zeros((1, 3)),
+        center=np.zeros((1, 3)),
         across=np.array([[1.0, 0.0, 0.0]]),
         along=np.array([[0.0, 1.0, 0.0]]),
         side=np.array([1.0 / CIRCUMRADIUS]),
-        colour=np.ones((1, 3)),
+        color=np.ones((1, 3)),
         transmission=np.zeros(1),
     )
     for point, expected in (((0.0, 0.0), 0.0), ((0.0, -0.5), 1.0), ((0.0, 1.0), 1.0), ((0.0, -0.25), 0.25)):
-        moved = replace(one, centre=np.array([[-point[0] * 1.0, -point[1] * 1.0, 0.0]]))
+        moved = replace(one, center=np.array([[-point[0] * 1.0, -point[1] * 1.0, 0.0]]))
         view = subject.View(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), 1000.0)
-        far = replace(moved, centre=moved.centre + 0.0)
+        far = replace(moved, center=moved.center + 0.0)
         least = subject.least_weights(view, far)
         assert len(least) == 1
         assert least[0] == pytest.approx(expected, abs=1e-9)

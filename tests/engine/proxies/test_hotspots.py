@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.proxies.hotspots import balance, balanced_colours, light_ratios, mean_overlap, overlap
+from tetflora_addon.proxies.hotspots import balance, balanced_colors, light_ratios, mean_overlap, overlap
 from tetflora_addon.refinement.lights import Light
 
 EXTINCTION = st.floats(0.01, 20.0)
@@ -60,18 +60,20 @@ def test_near_the_shadow_of_the_eye_large_facets_are_dimmed_and_far_from_it_ligh
 
 
 @given(st.floats(0.01, 1.0), st.floats(0.8, 1.2))
-def test_colours_stay_colours_and_white_is_changed_least(colour: float, once: float) -> None:
-    given_, white = np.array([[colour] * 3]), np.ones((1, 3))
-    out = balanced_colours(given_, np.array([once]))
+def test_colors_stay_colors_and_white_is_changed_least(color: float, hotspot_factor: float) -> None:
+    given_, white = np.array([[color] * 3]), np.ones((1, 3))
+    out = balanced_colors(given_, np.array([hotspot_factor]))
     assert ((out >= 0.0) & (out <= 1.0)).all()
-    if once < 1.0:
-        assert (out / given_ <= balanced_colours(white, np.array([once])) + 1e-12).all()
-    assert balanced_colours(given_, np.ones(1)) == pytest.approx(given_)
+    if hotspot_factor < 1.0:
+        assert (out / given_ <= balanced_colors(white, np.array([hotspot_factor])) + 1e-12).all()
+    assert balanced_colors(given_, np.ones(1)) == pytest.approx(given_)
 
 
-def test_colours_beyond_white_are_changed_as_white_is() -> None:
-    once = np.array([0.3])
-    assert balanced_colours(np.full((1, 3), 1.2), once) == pytest.approx(1.2 * balanced_colours(np.ones((1, 3)), once))
+def test_colors_beyond_white_are_changed_as_white_is() -> None:
+    hotspot_factor = np.array([0.3])
+    assert balanced_colors(np.full((1, 3), 1.2), hotspot_factor) == pytest.approx(
+        1.2 * balanced_colors(np.ones((1, 3)), hotspot_factor)
+    )
 
 
 def test_mean_overlap_lies_between() -> None:

@@ -12,7 +12,7 @@ from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.proxies.microsurfaces import leaf_planes, subplant_facets
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 
 SPECIES = ("beech", "oak", "palm", "willow", "spruce")
 

@@ -15,8 +15,8 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.proxies.drawn import facet_mesh
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, STRETCH, subplant_facets
+from tetflora_addon.proxies.primitives import facet_mesh
 from tetflora_addon.refinement.contents import bounding_cylinders, subplant_totals
 
 
@@ -62,7 +62,7 @@ def test_small_numbers_are_met_on_average_and_from_all_samples() -> None:
     mesh = facet_mesh(subplant_facets(flora, plants, side))
     leaves = part(mesh, True)
     assert leaves.sum() == pytest.approx(n / 10, abs=4 * np.sqrt(n * 0.09))
-    heights = support.face_centres(mesh)[leaves][:, 2]
+    heights = support.face_centers(mesh)[leaves][:, 2]
     assert len(np.unique(np.round(heights, 5))) > 500  # each height is that of one sample
     totals = subplant_totals(flora, plants)
     total = support.face_areas(mesh)[leaves].sum()
@@ -83,31 +83,31 @@ def test_orientation_and_place_are_those_of_the_plant(name: str) -> None:
         # A facet is flat where a leaf may be bent or of several blades.
         np.testing.assert_allclose(moment_of(mesh, chosen), support.moment(*meshes), atol=0.12 if is_leaf else 0.05)
         areas = np.concatenate([support.face_areas(real) for real in meshes])
-        places = np.concatenate([support.face_centres(real) for real in meshes])
+        places = np.concatenate([support.face_centers(real) for real in meshes])
         for axis in (0, 1, 2):
-            centre, other = support.face_centres(mesh)[chosen][:, axis], places[:, axis]
+            center, other = support.face_centers(mesh)[chosen][:, axis], places[:, axis]
             mean = np.average(other, weights=areas)
             spread = np.sqrt(np.average((other - mean) ** 2, weights=areas))
-            assert centre.mean() == pytest.approx(mean, abs=0.15 * max(spread, 0.1 * height))
-            assert centre.std() == pytest.approx(spread, rel=0.15, abs=0.02 * height)
+            assert center.mean() == pytest.approx(mean, abs=0.15 * max(spread, 0.1 * height))
+            assert center.std() == pytest.approx(spread, rel=0.15, abs=0.02 * height)
 
 
 @given(st.integers(-(2**63), 2**63 - 1), st.floats(0.02, 2), st.floats(0.1, 10))
 @settings(deadline=None, max_examples=20)
 def test_facets_stay_by_their_plant(seed: int, side: float, scale: float) -> None:
-    """Centres within the bound, but for half a leaf; corners half a diagonal further."""
+    """Centers within the bound, but for half a leaf; corners half a diagonal further."""
     flora = support.small_flora()
     plant = trunks(flora.rows, support.plants(seed, scale=scale, position=(3, 4, 5)))
     mesh = facet_mesh(subplant_facets(flora, plant, np.array([side * scale])))
     assume(mesh.polygons)
-    centre, radius, half_height = bounding_cylinders(flora, plant)
-    offset = support.face_centres(mesh) - centre
+    center, radius, half_height = bounding_cylinders(flora, plant)
+    offset = support.face_centers(mesh) - center
     along = offset @ plant.frame[0, :, 2]
     across = np.linalg.norm(offset - along[:, None] * plant.frame[0, :, 2], axis=1)
     assert np.abs(along).max() <= half_height[0] * (1 + 1e-5)
     assert across.max() <= radius[0] * (1 + 1e-5)
-    colour, weight = (mesh.attributes[n][1] for n in ("tf_colour", "tf_transmission"))
-    assert 0 <= colour.min() <= colour.max() <= 1
+    color, weight = (mesh.attributes[n][1] for n in ("tf_color", "tf_transmission"))
+    assert 0 <= color.min() <= color.max() <= 1
     assert set(np.unique(weight)) <= {np.float32(0), np.float32(flora.transmission[0])}
     assert support.face_areas(mesh).min() > 0
 
@@ -143,7 +143,7 @@ def test_a_fraction_of_the_area_is_that_and_darkens_as_a_cluster_does() -> None:
     whole = subplant_facets(flora, plant, side)
     part_of = subplant_facets(flora, plant, side, weight=np.full(5, 0.5))
     np.testing.assert_allclose(part_of.side**2, 0.5 * whole.side**2)
-    c = whole.colour
+    c = whole.color
     assert (whole.transmission == 0).any()  # of wood as well as of leaves
-    np.testing.assert_allclose(part_of.colour, c * 0.5 / (1 - 0.5 * c))
-    assert (part_of.colour <= whole.colour + 1e-12).all()
+    np.testing.assert_allclose(part_of.color, c * 0.5 / (1 - 0.5 * c))
+    assert (part_of.color <= whole.color + 1e-12).all()

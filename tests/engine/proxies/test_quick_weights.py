@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from tetflora_addon.compiled.flora import compile_species
-from tetflora_addon.jobs import at_once
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import facet_weights as subject
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.species import Range, Species
 
 #: What the quick weights may differ by from those of all rays, as a fraction of the area.
@@ -37,7 +37,7 @@ def edited(identifier: str, **factors: float) -> Species:
 def test_quick_weights_of_shipped_species_are_those_of_the_tables(identifier: str) -> None:
     flora = compile_species([load_species(identifier)])
     known = subject.shipped()[subject.digest(flora, 0)]
-    whole, own = at_once(subject.fitting(flora, 0, subject.RAYS))
+    whole, own = run_to_end(subject.fitting(flora, 0, subject.RAYS))
     np.testing.assert_allclose([whole, own], known, atol=MOST)
 
 
@@ -47,7 +47,7 @@ def test_quick_weights_of_shipped_species_are_those_of_the_tables(identifier: st
 )
 def test_quick_weights_of_edited_species_are_those_of_all_rays(identifier: str, factors: dict) -> None:
     flora = compile_species([edited(identifier, **factors)])
-    quick, full = (at_once(subject.fitting(flora, 0, rays)) for rays in (subject.RAYS, np.inf))
+    quick, full = (run_to_end(subject.fitting(flora, 0, rays)) for rays in (subject.RAYS, np.inf))
     np.testing.assert_allclose(quick, full, atol=MOST)
 
 
@@ -62,6 +62,6 @@ def test_weights_are_measured_in_steps_and_what_is_stopped_leaves_nothing(monkey
     assert next(steps)[0] == flora.species[0].name
     steps.close()
     assert subject.unmeasured(flora) == [0]
-    at_once(subject.measuring(flora, [0]))
+    run_to_end(subject.measuring(flora, [0]))
     assert subject.unmeasured(flora) == []
     assert list(subject.measuring(flora, [0])) == []

@@ -15,13 +15,13 @@ from tests.engine.refinement.test_loop import run
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarise
-from tetflora_addon.refinement.contents import Contents, Held, as_pieces, piece_totals, subplant_totals
+from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarize
+from tetflora_addon.refinement.contents import Contents, InCells, as_pieces, piece_totals, subplant_totals
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 
 
 def of_everything(flora: Flora, contents: Contents, nodes: int) -> Summaries:
-    return summarise(flora, contents, np.zeros(nodes, np.int64), 1)
+    return summarize(flora, contents, np.zeros(nodes, np.int64), 1)
 
 
 def as_summaries(moment: NDArray[np.float64], area: float = 1.0) -> Summaries:
@@ -76,7 +76,7 @@ def test_extinction_is_close_to_that_of_real_flakes(seed: int, order: float) -> 
 def whole(flora: Flora, seeds: Seeds) -> Contents:
     """Plants that are not divided, in one node."""
     plants = trunks(flora.rows, seeds)
-    return Contents(Held(plants, np.zeros(len(plants), np.int32), subplant_totals(flora, plants)))
+    return Contents(InCells(plants, np.zeros(len(plants), np.int32), subplant_totals(flora, plants)))
 
 
 def divided(
@@ -99,14 +99,14 @@ def divided(
 @given(st.integers(0, 2**31), st.sampled_from(["PERSP", "ORTHO"]))
 @settings(deadline=None, max_examples=12)
 def test_summaries_of_any_division(seed: int, kind: str) -> None:
-    """Means are means: colours within those of the species, moments of trace 1, areas those of the contents."""
+    """Means are means: colors within those of the species, moments of trace 1, areas those of the contents."""
     flora = support.small_flora()
     tree, contents = divided(flora, support.grove(4, 2.0), seed, kind)
     nodes = np.unique(np.concatenate([contents.subplants.cell, contents.pieces.cell]))
     assert len(nodes) > 4
     index = np.full(len(tree), -1)
     index[nodes] = np.arange(len(nodes))
-    each = summarise(flora, contents, index, len(nodes))
+    each = summarize(flora, contents, index, len(nodes))
     held = [
         np.bincount(kind.cell, kind.totals.optical_area, len(tree)) for kind in (contents.subplants, contents.pieces)
     ]
@@ -119,31 +119,31 @@ def test_summaries_of_any_division(seed: int, kind: str) -> None:
     np.testing.assert_allclose(np.trace(each.moment[held], axis1=1, axis2=2), 1)
     assert np.linalg.eigvalsh(each.moment[held]).min() > -1e-9
     np.testing.assert_allclose(each.moment, each.moment.transpose(0, 2, 1), atol=1e-12)
-    colours = np.concatenate([flora.rows[n][:, 0] for n in ("leaf_colour", "branch_colour")])
-    assert (each.colour[held] >= colours.min(axis=0) - 1e-9).all()
-    assert (each.colour[held] <= colours.max(axis=0) + 1e-9).all()
+    colors = np.concatenate([flora.rows[n][:, 0] for n in ("leaf_color", "branch_color")])
+    assert (each.color[held] >= colors.min(axis=0) - 1e-9).all()
+    assert (each.color[held] <= colors.max(axis=0) + 1e-9).all()
     assert ((each.transmission >= 0) & (each.transmission <= flora.transmission[0] + 1e-12)).all()
-    weighted = each.optical_area @ each.colour / each.optical_area.sum()
-    np.testing.assert_allclose(weighted, everything.colour[0], rtol=1e-9)
+    weighted = each.optical_area @ each.color / each.optical_area.sum()
+    np.testing.assert_allclose(weighted, everything.color[0], rtol=1e-9)
 
 
 def test_sums_do_not_depend_on_how_contents_are_opened() -> None:
-    """Many plants held whole, or opened to all branches alone: area, colour, transmission and moment stay."""
+    """Many plants held whole, or opened to all branches alone: area, color, transmission and moment stay."""
     data = support.small(
-        order1={"leaf_colour": [[0.6, 0.5, 0.1], [0, 0, 0]], "branch_colour": [[0.1, 0.1, 0.1], [0, 0, 0]]},
-        order2={"leaf_colour": [[0.1, 0.3, 0.1], [0, 0, 0]], "branch_colour": [[0.4, 0.2, 0.1], [0, 0, 0]]},
+        order1={"leaf_color": [[0.6, 0.5, 0.1], [0, 0, 0]], "branch_color": [[0.1, 0.1, 0.1], [0, 0, 0]]},
+        order2={"leaf_color": [[0.1, 0.3, 0.1], [0, 0, 0]], "branch_color": [[0.4, 0.2, 0.1], [0, 0, 0]]},
     )
     flora = support.compiled(data)
     seeds = support.grove(250, 1.5)
     one = of_everything(flora, whole(flora, seeds), 1)
     _, every = support.grown(flora, seeds)
     alone = as_pieces(every.branches.take(np.flatnonzero(every.t0 == 0)))
-    opened = Contents(pieces=Held(alone, np.zeros(len(alone), np.int32), piece_totals(flora, alone)))
+    opened = Contents(pieces=InCells(alone, np.zeros(len(alone), np.int32), piece_totals(flora, alone)))
     tree, contents = divided(flora, seeds, 5, rounds=1)
     assert min(len(contents.pieces), len(contents.subplants)) > 200
     for other in (of_everything(flora, opened, 1), of_everything(flora, contents, len(tree))):
         assert other.optical_area[0] == pytest.approx(one.optical_area[0], rel=0.03)
-        np.testing.assert_allclose(other.colour, one.colour, rtol=0.03)
+        np.testing.assert_allclose(other.color, one.color, rtol=0.03)
         np.testing.assert_allclose(other.transmission, one.transmission, rtol=0.03)
         np.testing.assert_allclose(other.moment, one.moment, atol=0.03)
 
@@ -158,14 +158,14 @@ def test_summaries_against_the_polygons_that_would_be_made() -> None:
     assert summary.optical_area[0] == pytest.approx(area, rel=0.03)
     moment = sum(w * support.face_areas(m).sum() * support.moment(m) for m, w in faces) / area
     np.testing.assert_allclose(summary.moment[0], moment, atol=0.03)
-    colour = sum(w * support.face_areas(m) @ m.attributes["tf_colour"][1] for m, w in faces) / area
-    np.testing.assert_allclose(summary.colour[0], colour, rtol=0.03)
+    color = sum(w * support.face_areas(m) @ m.attributes["tf_color"][1] for m, w in faces) / area
+    np.testing.assert_allclose(summary.color[0], color, rtol=0.03)
 
 
 def test_contents_of_other_nodes_are_passed_over() -> None:
     flora = support.small_flora()
     contents = whole(flora, support.grove(3, 2.0))
-    nothing = summarise(flora, contents, np.array([-1]), 2)
+    nothing = summarize(flora, contents, np.array([-1]), 2)
     assert (nothing.optical_area == 0).all()
     assert np.isfinite(nothing.moment).all()
     packed, _, _ = extinction_matrices(nothing, np.ones(2))

@@ -141,7 +141,7 @@ def check(placed: PlacedAssets, shared: SharedAssets, tree: TetrahedralTree, eve
         assert getattr(of_held, name) == pytest.approx(getattr(found, name), rel=1e-6, abs=1e-9)
         if even:
             assert getattr(found, name).sum() == pytest.approx(getattr(wholes, name).sum(), rel=1e-5)
-    away = np.linalg.norm(points.position - parts.centre[points.part], axis=1)
+    away = np.linalg.norm(points.position - parts.center[points.part], axis=1)
     assert (away <= parts.reach[points.part] * (1 + 1e-5) + 1e-5).all()
 
 
@@ -173,7 +173,7 @@ def test_children_are_all_of_their_parent(seed: int) -> None:
         assert area[even] == pytest.approx(left.totals.area[even], rel=1e-6)
         assert area[~even] == pytest.approx(left.totals.area[~even], rel=0.35)
         assert np.array_equal(np.bincount(of, new.totals.polygons, len(left)), left.totals.polygons)
-        away = np.linalg.norm(new.centre - left.centre[of], axis=1)
+        away = np.linalg.norm(new.center - left.center[of], axis=1)
         assert (away <= left.reach[of] * (1 + 1e-9)).all()
         left = new
 
@@ -194,7 +194,7 @@ def test_areas_and_bounds_are_those_of_real_triangles(seed: int) -> None:
         own = parts.take(parts.instance == i)
         assert own.totals.area.sum() == pytest.approx(true, rel=0.03 if placed.stretched[i] else 1e-6)
         assert wholes.totals.area[i] == pytest.approx(true, rel=0.12 if placed.stretched[i] else 1e-6)
-        away = np.linalg.norm(world.reshape(-1, 3) - wholes.centre[i], axis=1)
+        away = np.linalg.norm(world.reshape(-1, 3) - wholes.center[i], axis=1)
         assert away.max() <= wholes.reach[i] * (1 + 1e-9)
 
 
@@ -341,8 +341,8 @@ def test_strays_are_left_out_and_named() -> None:
     far[7] = (0, 2e6, 0)
     placed = PlacedAssets(placed.assets, replace(placed.instances, position=far))
     result = run(placed, support.camera((0, -14, 3), (0, 0, 2)))
-    assert result.strays.assets.tolist() == [7] and len(result.strays.plants) == 0
-    assert result.strays.away == pytest.approx(2e6, rel=0.01)
+    assert result.outliers.assets.tolist() == [7] and len(result.outliers.plants) == 0
+    assert result.outliers.away == pytest.approx(2e6, rel=0.01)
     assert len(result.assets.placed) == 19
     check_result(result.assets.placed, result)
 

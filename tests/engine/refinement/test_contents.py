@@ -41,7 +41,7 @@ def test_totals_of_a_branch_alone_are_those_of_its_pieces() -> None:
     flora = support.compiled(support.RICH)
     trunk, pieces = support.grown(flora, support.plants([1, 2]))
     whole = [some.branches for some in expand(flora, trunk)]
-    alone = [PlantParts.of_bodies(flora, branches).totals for branches in whole]
+    alone = [PlantParts.of_branches(flora, branches).totals for branches in whole]
     for name in ("leaf_area", "wood_area"):
         one, other = sum(getattr(t, name).sum() for t in alone), getattr(piece_totals(flora, pieces), name).sum()
         assert one == pytest.approx(other, rel=1e-9)

@@ -177,6 +177,6 @@ def test_the_last_few_cells_are_not_worth_a_pass() -> None:
 )
 def test_how_finely_space_is_divided_does_not_tell_leaves_from_facets(side: float, seen: float, width: float) -> None:
     """Else what is seen of all the others would be known better, or worse, from where on the first leaves are real."""
-    width *= SETTINGS.leaf_limit  # a pixel is a metre wide there
+    width *= SETTINGS.leaf_limit  # a pixel is a meter wide there
     divided = become(side**2, seen, width=width) == Decision.SPLIT
     assert divided == (side > SETTINGS.block)

@@ -14,7 +14,7 @@ from tetflora_addon.compiled.crowns import Crown, crown_of
 from tetflora_addon.refinement import estimate as model
 from tetflora_addon.refinement.estimate import Stand, estimate, seen
 from tetflora_addon.refinement.settings import QUALITIES, RefinementSettings
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 
 SETTINGS = RefinementSettings()
 

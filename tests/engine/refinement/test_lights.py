@@ -62,7 +62,7 @@ def test_shadows_that_fall_into_the_image_are_refined(kind: str, anchored: bool)
     points = result.plants.points
     way = LOW if kind == "sun" else points.position - LIGHTS[kind].position
     ground = points.position - way * (points.position[:, 2] / way[..., 2])[:, None]
-    shown = points.optical_area * (CAMERA.clearance(ground) < 0) * (points.position[:, 0] < 20)
+    shown = points.optical_area * (CAMERA.distance_to_view(ground) < 0) * (points.position[:, 0] < 20)
     made = result.chosen(Decision.EXPLICIT, Decision.PROXY)[points.cell]
     assert shown[made].sum() > 0.5 * shown.sum() > 0
     # A piece of space with few polygons may reach from one to the other.
@@ -108,7 +108,7 @@ def test_a_limit_leaves_shadows_coarse(limit: int) -> None:
 def test_ground_is_where_rays_meet_it() -> None:
     points = seen_ground(CAMERA, None, 0.5)
     assert points[:, 2] == pytest.approx(0.5)
-    assert (CAMERA.clearance(points) < 1e-9).all()
+    assert (CAMERA.distance_to_view(points) < 1e-9).all()
     wall = np.array([[(-50, 5, -50), (50, 5, -50), (0, 5, 90)]], float)
     before = seen_ground(CAMERA, wall, 0.0)
     assert (before[:, 1] <= 5 + 1e-9).all()

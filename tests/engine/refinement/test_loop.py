@@ -239,7 +239,7 @@ def test_what_stands_behind_a_wall_is_hidden() -> None:
 
 
 def test_dense_plants_hide_those_behind() -> None:
-    """Two rows of bushes: the fraction that is hidden grows towards the back."""
+    """Two rows of bushes: the fraction that is hidden grows toward the back."""
     flora = support.flora()
     species = support.SPECIES.index("bush")
     rows = np.repeat([0.0, 30.0], 12)

@@ -38,8 +38,8 @@ def test_faces_that_cross_each_other_everywhere_are_not_cut_without_end(monkeypa
     free = refined(meshes, camera)
     monkeypatch.setattr(loop, "MOST_FRAGMENTS", 5_000)
     bound = refined(meshes, camera)
-    assert len(free.holdings) > 40_000
-    assert len(bound.holdings) < 20_000
+    assert len(free.cell_polygons) > 40_000
+    assert len(bound.cell_polygons) < 20_000
     whole = Polygons.everything(meshes).areas().sum()
-    assert bound.holdings.polygons.items.areas().sum() == pytest.approx(whole, rel=1e-9)
+    assert bound.cell_polygons.polygons.items.areas().sum() == pytest.approx(whole, rel=1e-9)
     assert sum(len(b.buffers.corner_verts) for b in polygon_blocks(kept_polygons(bound))) > 0

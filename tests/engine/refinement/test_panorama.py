@@ -13,7 +13,7 @@ from tests.engine.refinement.test_loop import check, run
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.camera.silhouette import expected_pixels
 from tetflora_addon.refinement.decisions import Decision
-from tetflora_addon.refinement.rasterise import pixel_rays
+from tetflora_addon.refinement.rasterize import pixel_rays
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.views import PanoramaBuffer, face_cameras, pixels_per_solid_angle
 from tetflora_addon.tetrahedra.roots import world_root
@@ -93,15 +93,15 @@ def test_pixels_are_those_of_the_image(window: tuple[float, ...]) -> None:
     """Six faces fill the sphere once, and what their pixels are worth is all of the image."""
     camera = panorama(window)
     side = 200
-    solid, worth = 0.0, 0.0
+    solid, pixel_weight = 0.0, 0.0
     for face in face_cameras(camera, side):
         directions = pixel_rays(face, side, side)[1]
         angle = (2 / side) ** 2 * (directions @ -face.frame[:, 2]) ** 3
         solid += angle.sum()
-        worth += (angle * pixels_per_solid_angle(camera, directions)).sum()
+        pixel_weight += (angle * pixels_per_solid_angle(camera, directions)).sum()
         assert np.linalg.det(face.frame) == pytest.approx(1.0)
     assert solid == pytest.approx(4 * np.pi, rel=1e-3)
-    assert worth == pytest.approx(camera.width * camera.height, rel=0.04)
+    assert pixel_weight == pytest.approx(camera.width * camera.height, rel=0.04)
 
 
 def test_clearance_is_positive_beside_the_image_only() -> None:
@@ -109,13 +109,13 @@ def test_clearance_is_positive_beside_the_image_only() -> None:
     points = EYE + np.random.default_rng(3).normal(size=(2000, 3)) * 5
     longitude, latitude = camera.longitude_latitude(camera.to_camera_space(points))
     inside = (longitude > -1.3) & (longitude < 0.4) & (latitude > -0.3) & (latitude < 0.8)
-    assert np.array_equal(camera.clearance(points) < 0, inside)
+    assert np.array_equal(camera.distance_to_view(points) < 0, inside)
     # Never more than the distance from a point in the image.
     shown = EYE + rays(camera)[::37] * 6
     beside = points[~inside]
     distance = np.linalg.norm(beside[:, None] - shown, axis=-1).min(axis=1)
-    assert (camera.clearance(beside) <= distance + 1e-9).all()
-    assert (panorama().clearance(points) < 0).all()
+    assert (camera.distance_to_view(beside) <= distance + 1e-9).all()
+    assert (panorama().distance_to_view(points) < 0).all()
 
 
 def test_widened_panoramas_end_at_the_poles() -> None:
@@ -159,4 +159,4 @@ def test_a_grove_all_around(window: tuple[float, ...]) -> None:
     assert explicit.any()
     if window == PART:
         many = result.totals.polygons > RefinementSettings().few_polygons
-        assert (result.decision[many & (camera.clearance(middle) > 3.0)] == Decision.HIDDEN).all()
+        assert (result.decision[many & (camera.distance_to_view(middle) > 3.0)] == Decision.HIDDEN).all()

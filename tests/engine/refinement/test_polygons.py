@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Explicit polygons: whatever cuts them, area, colours, directions and texture coordinates stay what they were."""
+"""Explicit polygons: whatever cuts them, area, colors, directions and texture coordinates stay what they were."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.assets.mesh_features import mesh_features
 from tetflora_addon.buffers import MeshBuffers
-from tetflora_addon.emission.budget import afford
+from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.polygons import PolygonBlock, kept_polygons, mended, polygon_blocks, polygon_buffers
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.proxies.microsurfaces import Facets
-from tetflora_addon.proxies.summaries import summarise
-from tetflora_addon.refinement.contents import Contents, Held, cut, in_the_root, push_down
+from tetflora_addon.proxies.summaries import summarize
+from tetflora_addon.refinement.contents import Contents, InCells, cut, in_the_root, sort_into_children
 from tetflora_addon.refinement.contents import sums as sums_by_node
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement, refine
@@ -51,7 +51,7 @@ def surface(positions: np.ndarray, faces: list[list[int]], **changes: object) ->
         "face_offsets": offsets.astype(np.int32),
         "triangles": np.array(triangles, np.int32),
         "material": (np.arange(len(faces)) % 2).astype(np.int32),
-        "colours": np.array([[0.1, 0.4, 0.05], [0.3, 0.2, 0.1]]),
+        "colors": np.array([[0.1, 0.4, 0.05], [0.3, 0.2, 0.1]]),
         "transmission": np.array([0.3, 0.0]),
         "coverage": np.ones(2),
         "solid": solid,
@@ -89,31 +89,31 @@ def placed(one: Surface, seed: int, number: int = 3) -> Meshes:
 
 
 def sums(polygons: Polygons) -> np.ndarray:
-    """Area, colour, transmission, orientation moment, all as sums."""
+    """Area, color, transmission, orientation moment, all as sums."""
     nothing = np.zeros(1, np.int64)
-    summary = summarise(support.small_flora(), Contents(polygons=in_the_root(polygons)), nothing, 1)
-    return np.concatenate([[1], summary.colour[0], summary.transmission, summary.moment.ravel()]) * summary.optical_area
+    summary = summarize(support.small_flora(), Contents(polygons=in_the_root(polygons)), nothing, 1)
+    return np.concatenate([[1], summary.color[0], summary.transmission, summary.moment.ravel()]) * summary.optical_area
 
 
-def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4) -> tuple[TetrahedralTree, Held]:
+def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4) -> tuple[TetrahedralTree, InCells]:
     """Polygons in a tree that a camera roots and random choices divide."""
     rng = np.random.default_rng(seed)
     camera = support.camera(rng.uniform(-9, 9, 3), rng.uniform(-3, 3, 3))
     tree = view_root(camera, polygons.bounding_box())
     loose = None if slack is None else lambda points: np.full(len(points), slack)
-    held = push_down(tree, in_the_root(polygons), loose)
+    held = sort_into_children(tree, in_the_root(polygons), loose)
     for _ in range(rounds):
         nodes = np.unique(held.cell)
         nodes = nodes[rng.random(len(nodes)) < 0.7]
         for _ in range(2):
             nodes = tree.split(nodes).ravel()
-        held = push_down(tree, held, loose)
+        held = sort_into_children(tree, held, loose)
     return tree, held
 
 
 @given(SEEDS, st.sampled_from([None, 0.02, 0.5]))
 @settings(deadline=None, max_examples=25)
-def test_area_colour_and_moment_are_exact_under_any_cuts(seed: int, slack: float | None) -> None:
+def test_area_color_and_moment_are_exact_under_any_cuts(seed: int, slack: float | None) -> None:
     """To 1e-6, as sums over all tetrahedra; totals are those of the fragments, and all is in terminal nodes."""
     polygons = Polygons.everything(placed(thicket(seed), seed))
     tree, held = divided(polygons, seed, slack)
@@ -201,7 +201,7 @@ def test_whole_faces_share_vertices_and_mirrored_ones_are_turned() -> None:
     normal = support.face_vectors(mesh) / support.face_areas(mesh)[:, None]
     np.testing.assert_allclose(np.repeat(normal, 4, axis=0), mesh.attributes["custom_normal"][1], atol=1e-6)
     middle = np.repeat([[0.5, 0.5, 0.5], [-1.0, 0.5, 0.5]], 6, axis=0)
-    assert (np.einsum("ni,ni->n", normal, support.face_centres(mesh) - middle) > 0).all()
+    assert (np.einsum("ni,ni->n", normal, support.face_centers(mesh) - middle) > 0).all()
     assert (mesh.attributes["material_index"][1] == np.tile(np.arange(6) % 2, 2)).all()
 
 
@@ -261,7 +261,7 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
     meshes, camera = grove()
     result = refined(meshes, camera, anchored=anchored)
     whole = Polygons.everything(meshes)
-    assert result.holdings.polygons.items.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
+    assert result.cell_polygons.polygons.items.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
     assert {Decision.PROXY, Decision.EXPLICIT} <= set(result.decision.tolist())
     blocks, facets = emitted(result, camera, 0.4)
     kept = sum(support.face_areas(b.buffers).sum() for b in blocks)
@@ -270,11 +270,11 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
     assert chance < 0.1 * drawn
     assert 0.1 < kept / (kept + drawn) < 0.95
     # Facets beside the view may have been made smaller, so that they do not reach into it.
-    loss = 0.5 * whole.areas()[camera.clearance(whole.centre) > 0.0].sum()
+    loss = 0.5 * whole.areas()[camera.distance_to_view(whole.center) > 0.0].sum()
     assert whole.areas().sum() - loss - chance <= kept + drawn <= whole.areas().sum() + chance
     assert sum(b.buffers.polygons for b in blocks) + len(facets) < 0.7 * len(whole)
-    near = whole.take(np.linalg.norm(whole.centre - camera.position, axis=1) < 7)
-    inside = camera.clearance(near.centre) < -0.5
+    near = whole.take(np.linalg.norm(whole.center - camera.position, axis=1) < 7)
+    inside = camera.distance_to_view(near.center) < -0.5
     points = np.concatenate([b.buffers.positions for b in blocks])
     away = np.abs(points[None] - meshes.corners(meshes.face_triangle[near.face], near.instance)[inside][:60, :1]).max(2)
     assert away.min(axis=1).max() < 1e-5
@@ -295,14 +295,14 @@ def test_faces_behind_a_wall_are_few_and_the_wall_stays() -> None:
     ]
     assert behind[0] > 20 * max(behind[1], 1)
     assert any(b.surface == 0 and b.buffers.polygons == 1 for b in hidden[0])
-    away = [(facets.centre[:, 1] > 11.0).sum() for _, facets in (seen, hidden)]
+    away = [(facets.center[:, 1] > 11.0).sum() for _, facets in (seen, hidden)]
     assert away[1] < 0.5 * (away[0] + behind[0] / 4)
 
 
 def test_explicit_everywhere_is_the_original() -> None:
     meshes, camera = grove(6)
     result = refined(meshes, camera, leaf_limit=1e-6, hidden=-1.0, cutoff=1e-3, few_polygons=100)
-    seen = result.tree.inside[result.holdings.polygons.cell]
+    seen = result.tree.inside[result.cell_polygons.polygons.cell]
     assert np.isin(result.decision, [Decision.EXPLICIT, Decision.HIDDEN]).all()
     blocks = list(polygon_blocks(kept_polygons(result)))
     assert sum(b.buffers.polygons for b in blocks) == len(Polygons.everything(meshes))
@@ -361,5 +361,5 @@ def test_a_budget_leaves_polygons_their_place() -> None:
     """What your own meshes have is taken off first."""
     meshes, camera = grove()
     result = refined(meshes, camera)
-    number = len(result.holdings.polygons)
-    assert afford(result, camera, RefinementSettings(max_polygons=2 * number)).most < 2 * number - number + 1
+    number = len(result.cell_polygons.polygons)
+    assert fit_to_budget(result, camera, RefinementSettings(max_polygons=2 * number)).most < 2 * number - number + 1

@@ -77,10 +77,10 @@ def shared(
     tree = view_root(camera, bounding_box(flora, plants.parts.branches))
     root = np.arange(len(tree)) == 0
     plants.update(tree, root, np.where(root, np.inf, 0.0))
-    at_once = plants.parts.alone.sum()  # thick wood in view is opened before anything is divided
+    opened_first = plants.parts.branch_only.sum()  # thick wood in view is opened before anything is divided
     closed = plants.parts.can_open(flora).any()  # not where the camera is that near to all of them
     while rounds > 0:
-        rounds -= bool(plants.parts.alone.sum() > at_once or not closed)
+        rounds -= bool(plants.parts.branch_only.sum() > opened_first or not closed)
         nodes = np.unique(plants.points.cell)
         divide(tree, plants, nodes[rng.random(len(nodes)) < 0.7])
     return tree, plants
@@ -95,9 +95,9 @@ def names(*some: Branches) -> NDArray[np.uint64]:
 def check_whole(flora: Flora, seeds: Seeds, plants: SharedPlants) -> None:
     """Each branch of the plants, grown whole, is in one part; nothing is lost or held twice."""
     parts = plants.parts
-    closed = parts.branches.take(np.flatnonzero(~parts.alone))
+    closed = parts.branches.take(np.flatnonzero(~parts.branch_only))
     grown = [some.branches for some in expand(flora, closed)]
-    found = names(parts.branches.take(np.flatnonzero(parts.alone)), *grown)
+    found = names(parts.branches.take(np.flatnonzero(parts.branch_only)), *grown)
     wanted = names(*(some.branches for some in expand(flora, trunks(flora.rows, seeds))))
     np.testing.assert_array_equal(found, wanted)
 
@@ -122,7 +122,7 @@ def test_nothing_is_lost_or_held_twice(kind: str, view: tuple[int, str]) -> None
     """Every branch is in one part; points carry all area, each in the tetrahedron that contains it."""
     flora, seeds = FLORAS[kind](), support.grove(4, 2.5)
     tree, plants = shared(flora, seeds, *view)
-    assert plants.parts.alone.any()
+    assert plants.parts.branch_only.any()
     check_whole(flora, seeds, plants)
     check_points(tree, plants)
 
@@ -161,7 +161,7 @@ def test_opening_keeps_areas_on_average() -> None:
     flora, seeds = support.small_flora(), support.grove(300, 1.5)
     whole = subplant_totals(flora, trunks(flora.rows, seeds))
     _, plants = shared(flora, seeds, 3)
-    assert plants.parts.alone.mean() > 0.05
+    assert plants.parts.branch_only.mean() > 0.05
     for name in ("leaf_area", "wood_area"):
         assert getattr(plants.parts.totals, name).sum() == pytest.approx(getattr(whole, name).sum(), rel=0.03)
 
@@ -189,8 +189,8 @@ def test_only_what_is_large_beside_its_tetrahedron_is_opened(view: tuple[int, st
         large = np.bincount(points.part[beside], minlength=len(parts)) > 0
         before = sums(*plants.totals(np.ones(len(tree), bool)), len(tree))
         changed = divide(tree, plants, nodes)
-        kept = np.isin(parts.branches.key, plants.parts.branches.key[~plants.parts.alone]) & ~parts.alone
-        np.testing.assert_array_equal(kept, ~parts.alone & ~(large & parts.can_open(flora)))
+        kept = np.isin(parts.branches.key, plants.parts.branches.key[~plants.parts.branch_only]) & ~parts.branch_only
+        np.testing.assert_array_equal(kept, ~parts.branch_only & ~(large & parts.can_open(flora)))
         assert changed[nodes].all()
         after = sums(*plants.totals(np.ones(len(tree), bool)), len(tree))
         same = np.flatnonzero(~changed[: len(before.area)])
@@ -285,7 +285,7 @@ def test_what_is_asked_on_the_way_changes_nothing(view: tuple[int, str], asked: 
     root = np.arange(len(tree)) == 0
     for plants in (one, other):
         plants.update(tree, root, np.where(root, np.inf, 0.0))
-    at_once, rounds = one.numbers[1], 0
+    opened_first, rounds = one.numbers[1], 0
     for _ in range(len(asked) + 7):  # where the camera sees little, nothing is opened at all
         if rounds == len(asked):
             break
@@ -297,7 +297,7 @@ def test_what_is_asked_on_the_way_changes_nothing(view: tuple[int, str], asked: 
         edge[nodes] = longest
         changed = [plants.update(tree, edge > 0.0, edge) for plants in (one, other)]
         np.testing.assert_array_equal(*changed)
-        if one.numbers[1] == at_once:
+        if one.numbers[1] == opened_first:
             continue  # nothing is opened so far
         questions, rounds = asked[rounds], rounds + 1
         for question in questions:
@@ -311,7 +311,7 @@ def test_what_is_asked_on_the_way_changes_nothing(view: tuple[int, str], asked: 
             np.testing.assert_array_equal(a, b)
         assert one.numbers == other.numbers
     every, _ = one.totals(np.ones(len(tree), bool))
-    assert one.numbers == ((~one.parts.alone).sum(), one.parts.alone.sum())
+    assert one.numbers == ((~one.parts.branch_only).sum(), one.parts.branch_only.sum())
     for name in ("leaf_area", "wood_area", "polygons"):
         assert getattr(every, name).sum(dtype=float) == pytest.approx(getattr(one.parts.totals, name).sum(), rel=1e-6)
     check_same(one, other)
@@ -337,7 +337,7 @@ def test_what_is_asked_of_a_state_of_the_loop_changes_nothing() -> None:
             if asking:
                 check_whole(flora, seeds, state.plants)
                 check_points(state.tree, state.plants)
-                assert step.pieces == state.plants.parts.alone.sum()
+                assert step.pieces == state.plants.parts.branch_only.sum()
                 assert step.subplants + step.pieces == len(state.plants.parts)
     one, other = results
     assert len(pieces) > 2  # some are opened more than once

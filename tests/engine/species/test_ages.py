@@ -17,7 +17,7 @@ from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.species.ages import STAGES, ages_of, stage, with_age
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.growing import grown
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.species.schema import species_from_dict
@@ -150,7 +150,7 @@ def test_what_has_no_wood_only_grows_in_size() -> None:
         ({}, "age.full"),
         ({"full": 0}, "age.full"),
         ({"full": 40, "height": 3}, "age.height"),
-        ({"full": 40, "girth": [1, 2, 3]}, "age.girth"),
+        ({"full": 40, "diameter": [1, 2, 3]}, "age.diameter"),
         ({"full": 40, "lifespan": "long"}, "age.lifespan"),
         ({"full": 40, "years": 3}, "years"),
     ],

@@ -16,7 +16,7 @@ from devtools import forms
 from tests.engine import support
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import SpeciesError
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.habit import with_habit
 from tetflora_addon.species.schema import ORDER_KEYS, species_from_dict
 from tetflora_addon.species.species import Range
@@ -56,7 +56,7 @@ def test_each_step_into_the_stand_is_barer_slimmer_and_narrower() -> None:
 
 
 def test_twigs_keep_their_size_and_density() -> None:
-    """Lengths in metres of branches of the second order, and their number on a metre of limb."""
+    """Lengths in meters of branches of the second order, and their number on a meter of limb."""
     free = load_species("oak")
     stand = with_habit(free, 1.0)
     shorter = stand.orders[1].length.mean / free.orders[1].length.mean

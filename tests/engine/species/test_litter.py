@@ -17,7 +17,7 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.species.catalogue import builtin_folder, load_species
+from tetflora_addon.species.catalog import builtin_folder, load_species
 from tetflora_addon.species.litter import FALLEN, leaves_page, shed_share
 from tetflora_addon.species.members import expected_polygons
 from tetflora_addon.species.schema import species_from_dict
@@ -71,7 +71,7 @@ def test_litter_has_the_leaf_and_bark_of_its_species_and_is_brown():
     assert {replace(form.shape, **outline) for form in fallen.leaf} == {replace(living.leaf[0].shape, **outline)}
     assert len({form.shape for form in fallen.leaf}) == len(fallen.leaf) >= 2
     assert fallen.bark == living.bark
-    red, green, blue = fallen.orders[1].leaf_colour.mean
+    red, green, blue = fallen.orders[1].leaf_color.mean
     assert red > 1.5 * green > 1.5 * blue
     assert fallen.orders[1].leaf_size.mean == pytest.approx(
         0.95 * max(o.leaf_size.mean for o in living.orders if o.leaves.mean), rel=0.01
@@ -118,7 +118,7 @@ def _on_day(species, day: float) -> tuple[float, np.ndarray]:
     seeds = Seeds(("one",), np.zeros(many, np.int32), np.arange(many), np.zeros((many, 3)), frames, np.ones(many))
     plants = trunks(flora.rows, seeds)
     areas = flora.leaf_areas(plants)
-    return float(areas.mean()), np.average(flora.leaf_colours(plants), axis=0, weights=areas + 1e-12)
+    return float(areas.mean()), np.average(flora.leaf_colors(plants), axis=0, weights=areas + 1e-12)
 
 
 @pytest.mark.parametrize("name", support.SPECIES)
@@ -142,10 +142,10 @@ def test_what_is_no_longer_on_the_trees_is_on_the_ground(name, day):
 @pytest.mark.parametrize("name", ["oak", "birch", "maple", "larch", "beech"])
 def test_fallen_leaves_have_the_colors_of_autumn_and_turn_brown_and_are_gone_before_summer(name):
     living, fallen = load_species(name), _leaves(name)
-    colours = np.array(living.year.leaf.autumn)
+    colors = np.array(living.year.leaf.autumn)
     first, late = (_on_day(fallen, day)[1] for day in (living.year.leaf.fall - 5, living.year.leaf.fall + 90))
-    assert (first > 0.5 * colours.min(axis=0)).all() and (first < colours.max(axis=0)).all()
-    litter = np.array(_species(name, "litter").orders[1].leaf_colour.mean)
+    assert (first > 0.5 * colors.min(axis=0)).all() and (first < colors.max(axis=0)).all()
+    litter = np.array(_species(name, "litter").orders[1].leaf_color.mean)
     if name != "larch":  # whose needles are darker than leaves
         np.testing.assert_allclose(late, litter, atol=0.02)
     for day in (152, 196, 250):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Species against published figures: tables of Weber and Penn, and forms as foresters and botanists measure them.
 
-``tests/data/published.json`` holds the figures with their sources, and for each species of the catalogue which of them
+``tests/data/published.json`` holds the figures with their sources, and for each species of the catalog which of them
 exist. What a table asks for is worked out here from the rules of the paper, not from the engine; what plants measure,
 ``devtools.forms`` works out.
 """
@@ -37,7 +37,7 @@ SHAPE_RATIO: dict[int, Callable[[NDArray], NDArray]] = {
 
 @dataclass(frozen=True)
 class Expected:
-    """Means that a table asks for: number, length and base radius (metres) of branches by level, and all leaves."""
+    """Means that a table asks for: number, length and base radius (meters) of branches by level, and all leaves."""
 
     counts: list[float]
     lengths: list[float]
@@ -70,15 +70,15 @@ def expected(table: dict[str, float]) -> Expected:
     trunk = table["Scale"] * table["0Length"]
     counts, lengths, radii = [1.0], [trunk], [trunk * table["Ratio"]]
     # Sums over the branches of a level, each weighted with the factor on its own number of children.
-    number, metres, radius = 1.0, trunk, trunk * table["Ratio"]
+    number, meters, radius = 1.0, trunk, trunk * table["Ratio"]
     for level in range(1, int(table["Levels"])):
         length, ratio, full = children(table, level)
         each = table[f"{level}Branches"]
         counts.append(number * each)
-        lengths.append(metres / number * length.mean())
+        lengths.append(meters / number * length.mean())
         radii.append(radius / number * ratio.mean())
         number *= each * full.mean()
-        metres *= each * (length * full).mean()
+        meters *= each * (length * full).mean()
         radius *= each * (ratio * full).mean()
     return Expected(counts, lengths, radii, number * table["Leaves"])
 

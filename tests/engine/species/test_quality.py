@@ -18,7 +18,7 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.rows import build_rows
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.species.quality import with_quality
 from tetflora_addon.species.schema import ORDER_KEYS, species_from_dict
@@ -113,10 +113,10 @@ def extents(name: str, quality: float) -> list[float]:
     """Height and distance from the trunk within which 90 % of the surface of two plants lies."""
     flora = compile_species([with_quality(kind(name), quality)])
     tubes, leaves = support.meshes(flora, support.grown(flora, support.plants(np.arange(2)))[1])
-    centres = np.concatenate([support.face_centres(m) for m in (*tubes, *leaves)])
+    centers = np.concatenate([support.face_centers(m) for m in (*tubes, *leaves)])
     weight = np.concatenate([support.face_areas(m) for m in (*tubes, *leaves)])
     found = []
-    for measure in (centres[:, 2], np.hypot(centres[:, 0], centres[:, 1])):
+    for measure in (centers[:, 2], np.hypot(centers[:, 0], centers[:, 1])):
         order = np.argsort(measure)
         found.append(measure[order][np.searchsorted(np.cumsum(weight[order]), 0.9 * weight.sum())])
     return found

@@ -233,7 +233,7 @@ def test_orders_of_a_tree_that_forks_at_known_places() -> None:
     np.testing.assert_allclose(drawn.length, [4, 4, 2, 1])
     np.testing.assert_allclose(drawn.at, [0, 0.5, 0.25, 0.5])
     np.testing.assert_allclose(drawn.outward, [0, 0, 0.25, 0.25])
-    # The limb tapers by .1 in 3 m, so it had .533 a metre before; one straight piece keeps its radius.
+    # The limb tapers by .1 in 3 m, so it had .533 a meter before; one straight piece keeps its radius.
     np.testing.assert_allclose(drawn.radius[drawn.first[:-1]], [1, 0.5 + 0.1 / 3, 0.2, 0.1])
 
 

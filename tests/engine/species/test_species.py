@@ -23,10 +23,10 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.leaves.models import LEAF_MODELS, MAX_LEAF_POLYGONS, leaf_model
-from tetflora_addon.species.catalogue import list_species, load_species
+from tetflora_addon.species.catalog import list_species, load_species
 from tetflora_addon.species.schema import MAX_FILE_BYTES, ORDER_KEYS, read_species, species_from_dict
 from tetflora_addon.species.skeletons import MAX_ORDERS
-from tetflora_addon.species.species import CROWN_SHAPES, crown_ratio
+from tetflora_addon.species.species import CROWN_PROFILES, crown_ratio
 
 
 def refusal(data: Any) -> str:
@@ -70,10 +70,10 @@ ORDER_MISTAKES = [
     ("pipe", 4.5, "0 to 4"),
     ("forks", [1, 1.5], "0 to 8"),
     ("leaf_kind", "fruit", "leaf, blossom"),
-    ("leaf_colour_tip", [0.1, 0.2], "[r, g, b]"),
-    ("leaf_colour_tip", [0.1, 0.2, 3], "0 to 1"),
-    ("leaf_colour_young", 0.3, "[r, g, b]"),
-    ("leaf_colour_young", [0.1, -0.2, 0.3], "0 to 1"),
+    ("leaf_color_tip", [0.1, 0.2], "[r, g, b]"),
+    ("leaf_color_tip", [0.1, 0.2, 3], "0 to 1"),
+    ("leaf_color_young", 0.3, "[r, g, b]"),
+    ("leaf_color_young", [0.1, -0.2, 0.3], "0 to 1"),
     ("leaf_light_tip", [0.5, 0.1], "number from 0 to 1"),
     ("leaf_light_tip", 1.1, "0 to 1"),
     ("leaf_size_young", 0, "0.05 to 5"),
@@ -89,9 +89,9 @@ ORDER_MISTAKES = [
     ("crown", "cubic", "conical"),
     ("crown", ["conical"], "conical"),
     ("crown", 3, "conical"),
-    ("leaf_colour", [[0.1, 0.2], [0, 0, 0]], "0 to 1"),
-    ("leaf_colour", [[0.1, 0.2, 0.3], [0.2, 0, 0]], "0 to 1"),
-    ("branch_colour", [1, 1, 1], "0 to 1"),
+    ("leaf_color", [[0.1, 0.2], [0, 0, 0]], "0 to 1"),
+    ("leaf_color", [[0.1, 0.2, 0.3], [0.2, 0, 0]], "0 to 1"),
+    ("branch_color", [1, 1, 1], "0 to 1"),
 ]
 
 
@@ -124,7 +124,7 @@ SPECIES_MISTAKES: list[tuple[str, Any, str]] = [
     ("name", "  ", "1 to 1000"),
     ("name", 5, "string"),
     ("description", ["a"], "string"),
-    ("colour", 1, "unknown key"),
+    ("color", 1, "unknown key"),
     ("Barks", "ridged", 'did you mean "bark"?'),
     ("orders", [], f"1 to {MAX_ORDERS}"),
     ("orders", {}, f"1 to {MAX_ORDERS}"),
@@ -246,7 +246,7 @@ def test_built_in_leaves(name: str) -> None:
 
 def test_crown_shapes_are_ratios() -> None:
     r = np.linspace(0, 1, 101)
-    for shape, name in enumerate(CROWN_SHAPES):
+    for shape, name in enumerate(CROWN_PROFILES):
         ratio = crown_ratio(np.full(101, shape), r)
         assert (ratio > 0).all(), name
         assert ratio.max() == pytest.approx(1), name

@@ -45,9 +45,9 @@ def test_all_that_is_written_is_read() -> None:
         "kept": 0.1,
         "turnover": 0.5,
     }
-    colours = {"fresh": [0.2, 0.3, 0.1], "dry": [0.3, 0.2, 0.1], "autumn": [[0.5, 0.3, 0.1]] * 4}
+    colors = {"fresh": [0.2, 0.3, 0.1], "dry": [0.3, 0.2, 0.1], "autumn": [[0.5, 0.3, 0.1]] * 4}
     year = read(
-        latitude=41, spring=3, autumn=4, leaf={**LEAF, **numbers, **colours}, blossom=LEAF, source="Somebody 1999"
+        latitude=41, spring=3, autumn=4, leaf={**LEAF, **numbers, **colors}, blossom=LEAF, source="Somebody 1999"
     )
     assert (year.latitude, year.spring, year.autumn, year.source) == (41, 3, 4, "Somebody 1999")
     autumn = ((0.5, 0.3, 0.1),) * 4

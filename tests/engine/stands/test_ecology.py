@@ -13,10 +13,10 @@ from tests.engine import support
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.species.ages import ages_of
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.ecology import Ecology
 from tetflora_addon.species.schema import species_from_dict
-from tetflora_addon.stands.guilds import Guild, Guilds
+from tetflora_addon.stands.traits import StandSpecies, StandTraits
 
 
 @pytest.mark.parametrize(
@@ -24,8 +24,8 @@ from tetflora_addon.stands.guilds import Guild, Guilds
     [
         ({"shad": 3}, 'ecology.shad: unknown key; did you mean "shade"'),
         ({"shade": 6}, "ecology.shade: must be from 0 to 5"),
-        ({"crown": 3}, "ecology.crown: must be a pair"),
-        ({"slenderness": [1, "x"]}, r"ecology.slenderness\[1\]: must be a number"),
+        ({"crown_width": 3}, "ecology.crown_width: must be a pair"),
+        ({"height_curve": [1, "x"]}, r"ecology.height_curve\[1\]: must be a number"),
         (7, "ecology: must be an object"),
     ],
 )
@@ -35,21 +35,21 @@ def test_mistakes_are_named(ecology: object, words: str) -> None:
 
 
 def test_a_file_may_say_some_of_it() -> None:
-    species = species_from_dict(support.small(ecology={"shade": 1, "crown": [1, 20]}), "small", "small.json")
-    assert species.ecology == Ecology(shade=1.0, crown=(1.0, 20.0)) == Guild(species).needs
+    species = species_from_dict(support.small(ecology={"shade": 1, "crown_width": [1, 20]}), "small", "small.json")
+    assert species.ecology == Ecology(shade=1.0, crown_width=(1.0, 20.0)) == StandSpecies(species).needs
     assert species_from_dict(support.small(), "small", "small.json").ecology is None
 
 
 @pytest.mark.parametrize("name", support.SPECIES)
 def test_every_species_can_grow_in_a_stand(name: str) -> None:
     species = load_species(name)
-    needs, guilds = Guild(species).needs, Guilds([Guild(species)])
-    girth = np.linspace(0.0, 1.2 * needs.diameter, 200)
+    needs, traits = StandSpecies(species).needs, StandTraits([StandSpecies(species)])
+    basal = np.linspace(0.0, 1.2 * needs.diameter, 200)
     zero = np.zeros(200, np.int64)
-    heights, radii = guilds.heights(zero, girth), guilds.radii(zero, girth)
+    heights, radii = traits.heights(zero, basal), traits.radii(zero, basal)
     assert heights[0] == 0 and (np.diff(heights) >= 0).all() and 0.5 * needs.height < heights[-1] <= needs.height
     assert (np.diff(radii) >= 0).all() and radii[-1] < 0.8 * needs.height + 4.0
-    assert guilds.free[0] > 0.1
+    assert traits.free[0] > 0.1
     # What is described is no larger than the largest, where the file says more than its size.
     assert species.ecology is None or needs.source
 
@@ -58,7 +58,7 @@ def test_every_species_can_grow_in_a_stand(name: str) -> None:
 def test_what_is_not_described_follows_from_one_lifespan(name: str) -> None:
     """A trunk thickens in a stand within the years after which the same plant, as it grows by its age, dies."""
     plain = replace(load_species(name), ages=None, ecology=None)
-    assert Guild(replace(plain, ages=ages_of(plain))).needs == Guild(plain).needs
+    assert StandSpecies(replace(plain, ages=ages_of(plain))).needs == StandSpecies(plain).needs
 
 
 def test_it_changes_no_plant() -> None:

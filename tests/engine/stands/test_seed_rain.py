@@ -10,26 +10,26 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tetflora_addon.species.catalogue import load_species
-from tetflora_addon.stands.change import SeedRain, planted
-from tetflora_addon.stands.guilds import Guild, Guilds
+from tetflora_addon.species.catalog import load_species
+from tetflora_addon.stands.change import SeedDispersal, planted
 from tetflora_addon.stands.plants import Plants
 from tetflora_addon.stands.site import StandSite
+from tetflora_addon.stands.traits import StandSpecies, StandTraits
 
 SIDE = 600.0
 RADIUS = 3.0
 
 
-def fallen(dispersal: float, radius: float = RADIUS, age: float = 500.0) -> tuple[SeedRain, NDArray[np.float64]]:
-    """Seeds on a square metre (rows, columns) around one beech in the middle of the ground."""
+def fallen(dispersal: float, radius: float = RADIUS, age: float = 500.0) -> tuple[SeedDispersal, NDArray[np.float64]]:
+    """Seeds on a square meter (rows, columns) around one beech in the middle of the ground."""
     beech = load_species("beech")
-    guilds = Guilds([Guild(beech, ecology=replace(Guild(beech).needs, dispersal=dispersal))])
-    site, suits = StandSite(0.0, 0.0, SIDE / 120, np.zeros((120, 120))), np.ones((1, 120**2))
-    plants: Plants = planted(site, guilds, suits, 1.0, 0).take(np.array([0]))
+    traits = StandTraits([StandSpecies(beech, ecology=replace(StandSpecies(beech).needs, dispersal=dispersal))])
+    site, suitability = StandSite(0.0, 0.0, SIDE / 120, np.zeros((120, 120))), np.ones((1, 120**2))
+    plants: Plants = planted(site, traits, suitability, 1.0, 0).take(np.array([0]))
     one = replace(
         plants, x=np.array([SIDE / 2]), y=np.array([SIDE / 2]), radius=np.array([radius]), age=np.array([age])
     )
-    rain = SeedRain(site, guilds, suits, 300.0, 0.0)
+    rain = SeedDispersal(site, traits, suitability, 300.0, 0.0)
     return rain, rain.fallen(one).reshape(rain.rows, rain.columns)
 
 
@@ -37,7 +37,7 @@ def fallen(dispersal: float, radius: float = RADIUS, age: float = 500.0) -> tupl
 def test_as_many_seeds_fall_as_are_borne(dispersal: float) -> None:
     rain, seeds = fallen(dispersal)
     area = SIDE**2 / seeds.size
-    assert seeds.sum() * area == pytest.approx(rain.guilds.seeds[0] * np.pi * RADIUS**2, rel=1e-3)
+    assert seeds.sum() * area == pytest.approx(rain.traits.fecundity[0] * np.pi * RADIUS**2, rel=1e-3)
     assert (seeds >= 0).all()
 
 

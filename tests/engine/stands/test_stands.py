@@ -14,23 +14,23 @@ from hypothesis import strategies as st
 
 from tetflora_addon import parallel
 from tetflora_addon.errors import TetFloraError
-from tetflora_addon.jobs import at_once
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.jobs import run_to_end
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.ecology import Ecology
 from tetflora_addon.stands.change import grown, planted
 from tetflora_addon.stands.grow import StandSettings, begun, grow
-from tetflora_addon.stands.guilds import Guild, Guilds
 from tetflora_addon.stands.light import Crowns, LightGrid
 from tetflora_addon.stands.plants import LYING, Records
 from tetflora_addon.stands.site import StandSite
+from tetflora_addon.stands.traits import StandSpecies, StandTraits
 
 SIDE = 40.0
-MIXED = [Guild(load_species(name)) for name in ("beech", "birch")]
+MIXED = [StandSpecies(load_species(name)) for name in ("beech", "birch")]
 YEARS = StandSettings(years=60, interval=10, density=6000.0, recruits=500.0, seed=3)
 
 
 def even_site(size: float, **settings: float) -> StandSite:
-    """A level square of so many metres, in cells of 5 m."""
+    """A level square of so many meters, in cells of 5 m."""
     return StandSite(0.0, 0.0, 5.0, np.zeros((round(size / 5.0), round(size / 5.0))), **settings)
 
 
@@ -43,11 +43,11 @@ def half_planted(settings: StandSettings = YEARS) -> StandSite:
 
 @cache
 def records() -> Records:
-    return at_once(grow(half_planted(), MIXED, YEARS))
+    return run_to_end(grow(half_planted(), MIXED, YEARS))
 
 
 def crowns(number: int, seed: int) -> Crowns:
-    """Crowns of all sizes in a grid of 24 x 17 columns of a metre, and around it."""
+    """Crowns of all sizes in a grid of 24 x 17 columns of a meter, and around it."""
     draw = np.random.default_rng(seed).random((7, number))
     height = 0.2 + 20 * draw[0] ** 2
     base = height * 0.9 * draw[1]
@@ -84,12 +84,12 @@ def test_the_order_of_crowns_does_not_matter() -> None:
 
 
 def test_less_light_never_makes_more() -> None:
-    guilds = Guilds([MIXED[0]])
+    traits = StandTraits([MIXED[0]])
     site = even_site(SIDE)
-    suits = np.stack([site.suits(needs) for needs in guilds.needs])
-    plants = planted(site, guilds, suits, 400.0, 1)
+    suitability = np.stack([site.suitability(needs) for needs in traits.needs])
+    plants = planted(site, traits, suitability, 400.0, 1)
     open_, closed = LightGrid(40, 40, 1.0), LightGrid(40, 40, 1.0)
-    own = plants.crowns(guilds)
+    own = plants.crowns(traits)
     roof = Crowns(*(np.array([v]) for v in (20.0, 20.0, 22.0, 9.0, 12.0, 3000.0, 0.0)))
     joined = Crowns(*(np.concatenate([getattr(own, f.name), getattr(roof, f.name)]) for f in fields(Crowns)))
     after = []
@@ -98,10 +98,10 @@ def test_less_light_never_makes_more() -> None:
         taken = np.zeros(len(some.x))
         for i, index in enumerate(strips):
             taken[index] = grid.taken(i)
-        after.append(grown(plants, own, taken[: len(plants)], grid, guilds, slice(0, len(plants))))
-    assert (after[0].girth >= after[1].girth).all() and after[0].girth.sum() > 1.05 * after[1].girth.sum()
-    assert (after[0].vigour >= after[1].vigour).all()
-    assert (after[1].girth >= plants.girth).all() and (after[1].height >= plants.height).all()
+        after.append(grown(plants, own, taken[: len(plants)], grid, traits, slice(0, len(plants))))
+    assert (after[0].basal >= after[1].basal).all() and after[0].basal.sum() > 1.05 * after[1].basal.sum()
+    assert (after[0].vigor >= after[1].vigor).all()
+    assert (after[1].basal >= plants.basal).all() and (after[1].height >= plants.height).all()
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -110,11 +110,11 @@ def test_the_same_bytes_in_any_number_of_threads_and_chunks(threads: int, monkey
     monkeypatch.setattr("tetflora_addon.stands.light._STRIP_CELLS", 400)
     monkeypatch.setattr("tetflora_addon.stands.light._STRIP_ROWS", 4 + threads)
     monkeypatch.setattr("tetflora_addon.stands.grow._BLOCK", 100 * threads)
-    parallel.use(threads)
+    parallel.set_threads(threads)
     try:
-        assert same(at_once(grow(half_planted(), MIXED, YEARS)), records())
+        assert same(run_to_end(grow(half_planted(), MIXED, YEARS)), records())
     finally:
-        parallel.use(0)
+        parallel.set_threads(0)
 
 
 def test_plants_stay_where_they_may_be_and_are_sound() -> None:
@@ -122,7 +122,7 @@ def test_plants_stay_where_they_may_be_and_are_sound() -> None:
     x, y, z = rows.position.T
     assert (x >= -10.0).all() and (x <= 10.0 + 1e-4).all() and (y >= 5.0).all() and (y <= 45.0 + 1e-4).all()
     assert z.min() >= 0.0 and z.max() <= 8.0
-    assert (rows.height >= YEARS.least_height - 1e-5).all()
+    assert (rows.height >= YEARS.min_height - 1e-5).all()
     assert (rows.crown_base < rows.height).all() and (rows.crown_width > 0).all()
     assert (np.abs(rows.offset) <= 0.6 + 1e-6).all()
     assert {0, 1} == set(rows.species.tolist())
@@ -171,14 +171,14 @@ def test_a_year_between_two_records_lies_between_them() -> None:
 
 def test_dense_stands_thin_themselves() -> None:
     stand = begun(even_site(60.0), MIXED[:1], StandSettings(years=70, interval=0, density=8000.0, recruits=0.0))
-    guilds, thinned = stand.guilds, []
+    traits, thinned = stand.traits, []
     for year in range(70):
         stand.step(year)
         plants = stand.plants
-        thinned.append((len(plants), guilds.masses(plants.guild, plants.girth, plants.height).mean()))
+        thinned.append((len(plants), traits.masses(plants.species, plants.basal, plants.height).mean()))
     number, mass = np.log(np.array(thinned)[25:]).T
     assert -1.8 < np.polyfit(number, mass, 1)[0] < -1.2
-    leaves = plants.leaf_area(guilds).sum() / 3600.0
+    leaves = plants.leaf_area(traits).sum() / 3600.0
     assert 4.5 < leaves < 8.0
 
 
@@ -194,25 +194,25 @@ def test_dense_stands_thin_themselves() -> None:
 )
 def test_what_cannot_be_is_refused(changes: dict[str, float], words: str) -> None:
     with pytest.raises(TetFloraError, match=words):
-        at_once(grow(even_site(500.0), MIXED, replace(YEARS, **changes)))
+        run_to_end(grow(even_site(500.0), MIXED, replace(YEARS, **changes)))
 
 
 def test_sites_that_cannot_be_are_refused() -> None:
     with pytest.raises(TetFloraError, match="moisture"):
         StandSite(0, 0, 1.0, np.zeros((3, 3)), moisture=np.zeros((2, 3)))
     with pytest.raises(TetFloraError, match="climate"):
-        at_once(grow(even_site(20.0, winter=-40.0), MIXED[:1], YEARS))
+        run_to_end(grow(even_site(20.0, coldest_month=-40.0), MIXED[:1], YEARS))
 
 
 def test_a_stand_in_which_nothing_is_tall_enough_has_no_records() -> None:
-    assert not len(at_once(grow(even_site(20.0), MIXED, replace(YEARS, years=2, least_height=150.0))))
+    assert not len(run_to_end(grow(even_site(20.0), MIXED, replace(YEARS, years=2, min_height=150.0))))
 
 
 def test_species_suit_their_climate() -> None:
-    needs = Ecology(warmth=600.0, winter=-10.0, drought=3.0, waterlogging=1.0)
-    high = StandSite(0, 0, 1.0, np.linspace(0, 2500, 50)[None, :], warmth=1700.0, winter=0.0)
-    suits = high.suits(needs)
-    assert (np.diff(suits) <= 0).all() and suits[0] > 0.8 and suits[-1] == 0.0
+    needs = Ecology(degree_days=600.0, coldest_month=-10.0, drought=3.0, waterlogging=1.0)
+    high = StandSite(0, 0, 1.0, np.linspace(0, 2500, 50)[None, :], degree_days=1700.0, coldest_month=0.0)
+    suitability = high.suitability(needs)
+    assert (np.diff(suitability) <= 0).all() and suitability[0] > 0.8 and suitability[-1] == 0.0
     wet = np.linspace(0, 1, 50)[None, :]
-    fresh = StandSite(0, 0, 1.0, 0 * wet, moisture=wet).suits(needs)
+    fresh = StandSite(0, 0, 1.0, 0 * wet, moisture=wet).suitability(needs)
     assert fresh[0] == 0.0 and fresh[-1] < 0.5 < fresh.max()

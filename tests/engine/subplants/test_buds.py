@@ -16,7 +16,7 @@ from tetflora_addon.subplants.buds import BUD_RINGS, bud_numbers, bud_rings
 from tetflora_addon.subplants.tubes import tube_buffers
 from tetflora_addon.subplants.wood_detail import fineness
 
-_BUD = {"length": 0.01, "width": 0.5, "lateral": 1.0, "colour": [0.3, 0.1, 0.05]}
+_BUD = {"length": 0.01, "width": 0.5, "lateral": 1.0, "color": [0.3, 0.1, 0.05]}
 
 
 def twigs(**bud: float) -> tuple[Flora, WholeBranches]:
@@ -29,12 +29,12 @@ def test_one_at_each_end_and_in_each_axil() -> None:
     leaves = leaf_counts(flora.rows, whole.branches)
     np.testing.assert_array_equal(bud_numbers(flora, whole), BUD_RINGS * np.where(leaves > 0, leaves + 1, 0))
     rings, owner = bud_rings(flora, whole, fineness(flora, whole, even(1e-5)))
-    centre = rings.centre.reshape(-1, BUD_RINGS, 3)
-    length = np.linalg.norm(centre[:, -1] - centre[:, 0], axis=1)
+    center = rings.center.reshape(-1, BUD_RINGS, 3)
+    length = np.linalg.norm(center[:, -1] - center[:, 0], axis=1)
     assert length.min() > 0.007
     assert length.max() < 0.019
     # They point the way the twig grows.
-    along = ((centre[:, -1] - centre[:, 0]) * whole.branches.frame[owner, :, 2]).sum(axis=1) / length
+    along = ((center[:, -1] - center[:, 0]) * whole.branches.frame[owner, :, 2]).sum(axis=1) / length
     assert along.min() > 0.6
     wide = 2 * np.linalg.norm(rings.reach[0], axis=0).reshape(-1, BUD_RINGS).max(axis=1)
     np.testing.assert_allclose(wide / length, 0.5 / 1.08, rtol=1e-3)
@@ -61,19 +61,19 @@ def test_they_grow_from_nothing_and_stay_where_they_are() -> None:
     for pixel in (0.99 * coarse, 0.6 * coarse, 0.1 * coarse):
         fine = fineness(flora, some, even(pixel))
         rings, _ = bud_rings(flora, some, fine)
-        centre = rings.centre.reshape(-1, BUD_RINGS, 3)
-        sizes.append(np.linalg.norm(centre[:, -1] - centre[:, 0], axis=1).max())
-        places.append(centre[:, 0])
+        center = rings.center.reshape(-1, BUD_RINGS, 3)
+        sizes.append(np.linalg.norm(center[:, -1] - center[:, 0], axis=1).max())
+        places.append(center[:, 0])
     assert sizes[0] < 0.01 * sizes[2] < sizes[1] < sizes[2]
     np.testing.assert_allclose(places[0], places[2], atol=2e-3)
 
 
-def test_meshes_with_buds_are_whole_and_have_their_colour() -> None:
+def test_meshes_with_buds_are_whole_and_have_their_color() -> None:
     flora, whole = twigs()
     mesh = tube_buffers(flora, [whole], even(0.0003))
     check_topology(mesh)
-    colour = mesh.attributes["tf_colour"][1]
-    assert (np.abs(colour - [0.3, 0.1, 0.05]).max(axis=1) < 1e-6).mean() > 0.2
+    color = mesh.attributes["tf_color"][1]
+    assert (np.abs(color - [0.3, 0.1, 0.05]).max(axis=1) < 1e-6).mean() > 0.2
 
 
 def test_ends_are_closed() -> None:

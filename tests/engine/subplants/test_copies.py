@@ -28,10 +28,10 @@ def test_each_copy_is_the_model(name: str, parts: list[int]) -> None:
     model, number = LEAF_MODELS[name], sum(parts)
     rng = np.random.default_rng(1)
     frame, size = frames(number), rng.uniform(0.01, 0.3, number)
-    position, colour = rng.normal(size=(number, 3)) * 10, rng.random((number, 3))
+    position, color = rng.normal(size=(number, 3)) * 10, rng.random((number, 3))
     copies = LeafCopies(model, number, 0.25)
     for part in np.split(np.arange(number), np.cumsum(parts)[:-1]):
-        copies.add(part.astype(np.uint64), position[part], frame[part].astype(np.float32), size[part], colour[part])
+        copies.add(part.astype(np.uint64), position[part], frame[part].astype(np.float32), size[part], color[part])
     mesh = copies.buffers()
 
     expected = np.einsum("nij,vj->nvi", frame * size[:, None, None], model.positions) + position[:, None]
@@ -45,8 +45,8 @@ def test_each_copy_is_the_model(name: str, parts: list[int]) -> None:
     assert (mesh.face_offsets[:-1].reshape(number, -1) == model.face_offsets[:-1] + copy * corners).all()
     assert mesh.face_offsets[-1] == number * corners
     assert (mesh.attributes["UVMap"][1].reshape(number, -1) == model.uv.reshape(-1)).all()
-    by_copy = mesh.attributes["tf_colour"][1].reshape(number, -1, 3)
-    np.testing.assert_allclose(by_copy, np.broadcast_to(colour[:, None], by_copy.shape), atol=1e-7)
+    by_copy = mesh.attributes["tf_color"][1].reshape(number, -1, 3)
+    np.testing.assert_allclose(by_copy, np.broadcast_to(color[:, None], by_copy.shape), atol=1e-7)
     assert (mesh.attributes["tf_transmission"][1] == np.float32(0.25)).all()
 
 
@@ -55,12 +55,12 @@ def test_kites_lie_where_their_keys_say() -> None:
     kites, number = leaf_kites(LEAF_MODELS["needles"]), 4000
     rng = np.random.default_rng(2)
     frame, size, position = frames(number), rng.uniform(0.01, 0.3, number), rng.normal(size=(number, 3))
-    key, colour = rng.integers(0, 2**63, number).astype(np.uint64), rng.random((number, 3))
+    key, color = rng.integers(0, 2**63, number).astype(np.uint64), rng.random((number, 3))
     meshes = []
     for parts in ([number], [1500, 2500]):
         copies = KiteCopies(kites, number, 0.25)
         for part in np.split(np.arange(number), np.cumsum(parts)[:-1]):
-            copies.add(key[part], position[part], frame[part].astype(np.float32), size[part], colour[part])
+            copies.add(key[part], position[part], frame[part].astype(np.float32), size[part], color[part])
         meshes.append(copies.buffers())
     assert (meshes[0].positions == meshes[1].positions).all()
     placed = np.einsum("nij,kvj->nkvi", frame * size[:, None, None], kites.positions) + position[:, None, None]

@@ -49,10 +49,10 @@ def check_topology(mesh: MeshBuffers) -> None:
 
 
 def check_attributes(mesh: MeshBuffers) -> None:
-    assert set(mesh.attributes) - {"tf_girth"} == {"UVMap", "tf_colour", "tf_transmission"}
+    assert set(mesh.attributes) - {"tf_girth"} == {"UVMap", "tf_color", "tf_transmission"}
     assert mesh.attributes["UVMap"][0] == "CORNER"
     assert mesh.attributes["UVMap"][1].shape[1] == 2
-    for name in ("tf_colour", "tf_transmission"):
+    for name in ("tf_color", "tf_transmission"):
         domain, values = mesh.attributes[name]
         assert domain == "FACE"
         assert values.min() >= 0
@@ -86,12 +86,12 @@ def test_tubes_are_open_pipes_that_face_outwards() -> None:
     for key in pieces.branches.key[pieces.t0 == 0][::3]:
         own = pieces.take(pieces.branches.key == key)
         mesh = support.tube_mesh(flora, own)
-        centre, normal = support.face_centres(mesh), support.face_vectors(mesh)
+        center, normal = support.face_centers(mesh), support.face_vectors(mesh)
         axis = own.end - own.start
-        along = np.clip(np.einsum("fni,ni->fn", centre[:, None] - own.start, axis) / (axis**2).sum(1), 0, 1)
-        apart = centre[:, None] - own.start - along[..., None] * axis
+        along = np.clip(np.einsum("fni,ni->fn", center[:, None] - own.start, axis) / (axis**2).sum(1), 0, 1)
+        apart = center[:, None] - own.start - along[..., None] * axis
         nearest = np.linalg.norm(apart, axis=2).argmin(axis=1)
-        assert (np.einsum("fi,fi->f", apart[np.arange(len(centre)), nearest], normal) > 0).all()
+        assert (np.einsum("fi,fi->f", apart[np.arange(len(center)), nearest], normal) > 0).all()
 
 
 def test_a_straight_tube_is_a_frustum() -> None:
@@ -107,8 +107,8 @@ def test_a_straight_tube_is_a_frustum() -> None:
         expected = trunk.radius[0] * (1 - (1 - taper) * heights[ring] / trunk.length[0])
         np.testing.assert_allclose(radii[ring], expected, rtol=1e-5)
         assert radius_at(flora.rows, trunk, np.array([heights[ring] / trunk.length[0]])) == pytest.approx(expected)
-    centre, vectors = support.face_centres(mesh), support.face_vectors(mesh)
-    lateral = np.einsum("fi,fi->f", centre * [1, 1, 0], vectors)
+    center, vectors = support.face_centers(mesh), support.face_vectors(mesh)
+    lateral = np.einsum("fi,fi->f", center * [1, 1, 0], vectors)
     assert (lateral > 0).all()
     assert support.face_areas(mesh).sum() == pytest.approx(wood_areas(flora, pieces).sum(), rel=1e-3)
 
@@ -154,15 +154,15 @@ def test_uv_of_leaves_and_bark() -> None:
     assert quads[..., 0].max() == 1
 
 
-def test_one_colour_a_branch_and_a_leaf() -> None:
+def test_one_color_a_branch_and_a_leaf() -> None:
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.plants(1))
     own = pieces.take(pieces.branches.row == 0)
-    colours = support.tube_mesh(flora, own).attributes["tf_colour"][1]
-    assert len(np.unique(colours, axis=0)) == 1
-    leaves = support.leaf_mesh(flora, pieces, 0).attributes["tf_colour"][1]
+    colors = support.tube_mesh(flora, own).attributes["tf_color"][1]
+    assert len(np.unique(colors, axis=0)) == 1
+    leaves = support.leaf_mesh(flora, pieces, 0).attributes["tf_color"][1]
     assert len(np.unique(leaves, axis=0)) > 0.9 * len(leaves) / flora.forms[0][0][0].polygons
-    low, high = (flora.rows["leaf_colour"][1, 0] + s * flora.rows["leaf_colour"][1, 1] for s in (-1, 1))
+    low, high = (flora.rows["leaf_color"][1, 0] + s * flora.rows["leaf_color"][1, 1] for s in (-1, 1))
     assert ((leaves >= low - 1e-6) & (leaves <= high + 1e-6)).all()
 
 

@@ -23,7 +23,7 @@ from tetflora_addon.subplants.wood_detail import DEVIATION, MOST_SIDES, Pixels, 
 
 
 def even(pixel: float) -> Pixels:
-    """The same number of metres to a pixel everywhere."""
+    """The same number of meters to a pixel everywhere."""
     return Pixels(lambda points: np.full(len(points), pixel))
 
 
@@ -115,13 +115,13 @@ def test_joints_become_a_curve_within_the_wood() -> None:
     whole, pixel = grown(flora)[0], 0.002
     near = tube_buffers(flora, [whole], even(pixel))
     sides = int(fineness(flora, whole, even(pixel)).sides[0])
-    centre = near.positions.reshape(-1, sides, 3).mean(axis=1).astype(np.float64)
-    step = np.diff(centre, axis=0)
+    center = near.positions.reshape(-1, sides, 3).mean(axis=1).astype(np.float64)
+    step = np.diff(center, axis=0)
     length = np.linalg.norm(step, axis=1)
     turn = np.arccos(np.clip((step[1:] * step[:-1]).sum(axis=1) / (length[1:] * length[:-1]), -1, 1))
     assert (turn * (length[1:] + length[:-1]) / 16 < 2 * DEVIATION * pixel).all()
     coarse = tube_buffers(flora, [whole]).positions.reshape(5, -1, 3).mean(axis=1)
-    np.testing.assert_allclose(np.linalg.norm(centre[:, None] - coarse, axis=2).min(axis=0), 0.0, atol=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(center[:, None] - coarse, axis=2).min(axis=0), 0.0, atol=1e-4)
 
 
 def test_near_wood_is_the_same_in_any_order() -> None:

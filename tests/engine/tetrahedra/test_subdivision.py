@@ -17,7 +17,7 @@ SEEDS = st.integers(0, 10**9)
 
 
 def positive(rng, n):
-    """Tetrahedra of a few metres that are not all but flat."""
+    """Tetrahedra of a few meters that are not all but flat."""
     vertices = rng.normal(size=(4 * n, 4, 3)) * 3
     vertices = vertices[geometry.quality(vertices) > 0.02][:n]
     turned = geometry.signed_volume(vertices) < 0
@@ -108,7 +108,7 @@ def test_corners_are_the_whole_at_half_size_and_the_rest_shares_the_diagonal(see
 
 @given(SEEDS, st.permutations(range(4)), st.permutations(range(4)))
 @settings(deadline=None, max_examples=30)
-def test_neighbours_divide_their_common_face_alike(seed, order, other_order):
+def test_neighbors_divide_their_common_face_alike(seed, order, other_order):
     rng = np.random.default_rng(seed)
     one = positive(rng, 1)[0]
     two = one.copy()

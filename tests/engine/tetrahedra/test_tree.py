@@ -76,13 +76,13 @@ def test_box_holds_scene_and_view(kind, window, seed, far):
     corners = camera.to_camera_space(rng.uniform(*bounds, (500, 3)))
     assert (corners >= low).all() and (corners <= high).all()
     assert (low < 0).all() and high[2] > 0
-    # A terminal is inside the view just when its centre is seen.
-    centre = camera.to_camera_space(tree.vertices(nodes).mean(axis=1))
-    at_one = centre[:, :2] / (centre[:, 2:] if kind == "PERSP" else 1.0)
+    # A terminal is inside the view just when its center is seen.
+    center = camera.to_camera_space(tree.vertices(nodes).mean(axis=1))
+    at_one = center[:, :2] / (center[:, 2:] if kind == "PERSP" else 1.0)
     left, right, bottom, top = camera.window
     reach = camera.to_camera_space(tree.vertices(nodes[tree.inside[nodes]]))[..., 2].max()
     assert reach <= camera.far * (1 + 1e-12)
-    seen = (centre[:, 2] > 0) & (centre[:, 2] < reach)
+    seen = (center[:, 2] > 0) & (center[:, 2] < reach)
     seen &= (at_one >= (left, bottom)).all(axis=1) & (at_one <= (right, top)).all(axis=1)
     np.testing.assert_array_equal(tree.inside[nodes], seen)
     assert tree.inside[nodes].sum() == (2 if kind == "PERSP" else 6)
@@ -155,7 +155,7 @@ def test_any_division_fills_the_root_and_points_are_found(kind, window, seed, fa
     points = rng.uniform(*bounds, (2000, 3))
     found = tree.locate(points)
     weights = geometry.barycentric(tree.vertices(found), points)
-    # Distance from the face that is passed most, metres: rounding of planes.
+    # Distance from the face that is passed most, meters: rounding of planes.
     heights = 1 / np.linalg.norm(geometry.barycentric_gradients(tree.vertices(found)), axis=-1)
     assert (weights * heights).min() > -1e-6
     thick = nodes[geometry.quality(tree.vertices(nodes)) > 1e-2]
@@ -233,8 +233,8 @@ def test_split_keeps_numbers_parents_and_the_view():
     np.testing.assert_array_equal(tree.children[nodes], children)
     np.testing.assert_array_equal(tree.inside[children[:, 0]], tree.inside[nodes])
     assert tree.levels == tree.level[children].max() + 1
-    centre = tree.vertices(children).mean(axis=2)
-    side = geometry.plane_distance(tree.planes(nodes)[:, None], centre)
+    center = tree.vertices(children).mean(axis=2)
+    side = geometry.plane_distance(tree.planes(nodes)[:, None], center)
     assert (side[:, 0] < 0).all() and (side[:, 1] > 0).all()
 
 

@@ -118,13 +118,13 @@ def test_what_is_beside_the_view_is_coarse_and_what_is_in_it_fine() -> None:
     result = run(flora, seeds, camera, anchored=True)[1]
     check(flora, seeds, result)
     middle = result.tree.vertices(result.nodes).mean(axis=1)
-    clearance = camera.widened(0.04).clearance(middle)
+    distance_to_view = camera.widened(0.04).distance_to_view(middle)
     explicit = result.decision == Decision.EXPLICIT
     assert explicit.any()
     many = result.totals.polygons > RefinementSettings().few_polygons
     wide = ACROSS_THE_BORDER * RefinementSettings().block * camera.extent_around(middle)
-    assert (clearance[explicit & many] <= wide[explicit & many]).all()
-    assert (result.decision[many & (clearance > 20)] == Decision.HIDDEN).all()
+    assert (distance_to_view[explicit & many] <= wide[explicit & many]).all()
+    assert (result.decision[many & (distance_to_view > 20)] == Decision.HIDDEN).all()
     assert result.in_view[result.nodes[explicit]].all()
 
 

@@ -7,7 +7,7 @@ An identifier follows from the name that the asset has when it becomes a species
 it is the species of the same plants.
 
 How large they are, and a small picture of them for menus, follow from points on their surface, within a moment: nothing
-is compiled and no renderer is asked. Materials count by their mean colour.
+is compiled and no renderer is asked. Materials count by their mean color.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...arrays import srgb_of
 from ...errors import SceneError
 from ..attributes import members, read
-from ..materials.face_looks import GREY, Looks
+from ..materials.face_looks import GRAY, Looks
 from ..materials.nodes import is_ours
 from ..scene.objects import SURFACE_TYPES, may_instance
 from ..species.asset_species import (
@@ -43,7 +43,7 @@ from .places import Scatter, read_scatters, variants_of
 
 _POINTS = 60_000  # of a picture
 _TRIANGLES = 200_000  # of one mesh that are looked at
-_LEAST = 1e-3  # metres that a crown is wide and tall
+_LEAST = 1e-3  # meters that a crown is wide and tall
 _FINER = 2  # pixels of the picture that is made for one that is kept
 _BASE = 0.1  # fraction of the area that lies below the crown's base
 _UP, _SIDE = np.array([0.0, -0.26, 0.966]), np.array([1.0, 0.0, 0.0])  # axes of the picture: a little from above
@@ -52,20 +52,20 @@ _SUN = np.array([-0.45, -0.55, 0.7])
 
 @dataclass(frozen=True)
 class Measures:
-    """Of a plant of scale 1: metres, number of faces, m², linear RGB; and a picture, the lowest row first."""
+    """Of a plant of scale 1: meters, number of faces, m², linear RGB; and a picture, the lowest row first."""
 
     radius: float
     base: float
     height: float
     polygons: float
     leaves: float
-    colour: tuple[float, float, float]
+    color: tuple[float, float, float]
     picture: NDArray[np.uint8]
 
 
 @dataclass
 class _Mesh:
-    """A mesh in its places (k, 4, 4): corners of triangles (t, 3, 3), area (t,), colour (t, 3), coverage (t,).
+    """A mesh in its places (k, 4, 4): corners of triangles (t, 3, 3), area (t,), color (t, 3), coverage (t,).
 
     ``faces`` and ``leaves``, the area of leaves, are those of one place.
     """
@@ -73,7 +73,7 @@ class _Mesh:
     places: NDArray[np.float64]
     corners: NDArray[np.float64]
     area: NDArray[np.float64]
-    colour: NDArray[np.float64]
+    color: NDArray[np.float64]
     coverage: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
@@ -120,7 +120,7 @@ def _read_one(
         places=places,
         corners=corners,
         area=area,
-        colour=np.array([look.colour for look in seen])[slot],
+        color=np.array([look.color for look in seen])[slot],
         coverage=coverage,
         low=positions.min(axis=0),
         high=positions.max(axis=0),
@@ -155,8 +155,8 @@ def measure(variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: b
     if not found:
         return None
     numbers = np.array([(m.radius, m.base, m.height, m.polygons, m.leaves) for m in found]).mean(axis=0).tolist()
-    colour = tuple(np.mean([m.colour for m in found], axis=0).tolist())
-    return Measures(*numbers, colour, found[0].picture)
+    color = tuple(np.mean([m.color for m in found], axis=0).tolist())
+    return Measures(*numbers, color, found[0].picture)
 
 
 def size_of(
@@ -173,7 +173,7 @@ def size_of(
 
 
 def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
-    """Distance from an asset's origin within which all of it lies, metres in its own space.
+    """Distance from an asset's origin within which all of it lies, meters in its own space.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def _measured(meshes: list[_Mesh], picture: bool) -> Measures:
     for mesh in meshes:
         box = _corners(mesh.low, mesh.high, mesh.places)
         low, high = np.minimum(low, box.min(axis=(0, 1))), np.maximum(high, box.max(axis=(0, 1)))
-    points, normals, colours = _sampled(meshes)
+    points, normals, colors = _sampled(meshes)
     radius, height = _extent(low, high)
     base = float(np.clip(np.quantile(points[:, 2], _BASE), 0.0, height)) if len(points) else 0.0
     return Measures(
@@ -219,8 +219,8 @@ def _measured(meshes: list[_Mesh], picture: bool) -> Measures:
         height=height,
         polygons=float(sum(len(mesh.places) * mesh.faces for mesh in meshes)),
         leaves=sum(mesh.sizes * mesh.leaves for mesh in meshes),
-        colour=tuple(colours.mean(axis=0).tolist()) if len(colours) else GREY,
-        picture=_drawn(points, normals, colours, low, high) if picture else np.zeros((0, 0, 4), np.uint8),
+        color=tuple(colors.mean(axis=0).tolist()) if len(colors) else GRAY,
+        picture=_drawn(points, normals, colors, low, high) if picture else np.zeros((0, 0, 4), np.uint8),
     )
 
 
@@ -244,18 +244,18 @@ def _sampled(meshes: list[_Mesh]) -> tuple[NDArray[np.float64], NDArray[np.float
         point = corners[:, 0] + u * edges[0] + v * edges[1]
         turned = [np.einsum("nij,nj->ni", place[:, :3, :3], edge) for edge in edges]
         position = np.einsum("nij,nj->ni", place[:, :3, :3], point) + place[:, :3, 3]
-        out.append((position, np.cross(*turned), mesh.colour[triangle]))
+        out.append((position, np.cross(*turned), mesh.color[triangle]))
     if not out:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))
-    position, normal, colour = (np.concatenate(column) for column in zip(*out, strict=True))
+    position, normal, color = (np.concatenate(column) for column in zip(*out, strict=True))
     length = np.sqrt(np.einsum("ni,ni->n", normal, normal))
-    return position, normal / np.maximum(length, 1e-12)[:, None], colour
+    return position, normal / np.maximum(length, 1e-12)[:, None], color
 
 
 def _drawn(
     points: NDArray[np.float64],
     normals: NDArray[np.float64],
-    colours: NDArray[np.float64],
+    colors: NDArray[np.float64],
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> NDArray[np.uint8]:
@@ -268,11 +268,11 @@ def _drawn(
     row = np.floor(0.5 * side + scale * (away @ _UP)).astype(np.int64)
     depth = away @ np.cross(_SIDE, _UP)
     inside = (column >= 0) & (column < side) & (row >= 0) & (row < side)
-    column, row, depth, normals, colours = (a[inside] for a in (column, row, depth, normals, colours))
+    column, row, depth, normals, colors = (a[inside] for a in (column, row, depth, normals, colors))
     light = 0.4 + 0.6 * np.abs(normals @ (_SUN / np.linalg.norm(_SUN)))
     order = np.argsort(depth, kind="stable")  # the nearest is written last
     picture = np.zeros((side, side, 4))
-    picture[row[order], column[order], :3] = np.clip(colours * light[:, None], 0.0, 1.0)[order]
+    picture[row[order], column[order], :3] = np.clip(colors * light[:, None], 0.0, 1.0)[order]
     picture[row[order], column[order], 3] = 1.0
     small = picture.reshape(PICTURE_SIDE, _FINER, PICTURE_SIDE, _FINER, 4).mean(axis=(1, 3))
     with np.errstate(invalid="ignore"):
@@ -358,7 +358,7 @@ def measure_again(depsgraph: bpy.types.Depsgraph, entry: TetFloraAssetSpecies) -
     if found is None:
         return False
     entry.name = (entry.object or entry.collection).name
-    for name in ("radius", "base", "height", "polygons", "leaves", "colour"):
+    for name in ("radius", "base", "height", "polygons", "leaves", "color"):
         setattr(entry, name, getattr(found, name))
     entry.picture = stored_picture(found.picture)
     return True

@@ -324,8 +324,8 @@ class _Walk:
 
 #: Changes what a digest is of; raise it when what is read of an asset changes.
 _VERSION = 2
-_COLOURS = {'FLOAT_COLOR', 'BYTE_COLOR'}
-_TYPES = {'FLOAT', 'INT', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLOURS}
+_COLORS = {'FLOAT_COLOR', 'BYTE_COLOR'}
+_TYPES = {'FLOAT', 'INT', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLORS}
 
 
 @dataclass(frozen=True)
@@ -398,7 +398,7 @@ def _add_mesh(content: hashlib._Hash, mesh: bpy.types.Mesh, slots: Slots) -> Non
         kind = attribute.data_type
         if kind in _TYPES and (attribute.name in wanted or kind == 'FLOAT2'):
             content.update(f"{attribute.name} {attribute.domain} {kind}".encode())
-            content.update(values_of(attribute, "color" if kind in _COLOURS else ""))
+            content.update(values_of(attribute, "color" if kind in _COLORS else ""))
     first = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
     content.update(first.encode())
 

@@ -30,7 +30,7 @@ from ..placing.rules import set_grounds
 from ..runtime import GoneError, JobData, is_there, job
 from ..scene.field_sizes import has_history
 from ..settings import with_identity
-from ..species.edits import catalogue, new_identifier, revert_species, species_data, store_species, unknown_text
+from ..species.edits import catalog, new_identifier, revert_species, species_data, store_species, unknown_text
 from ..stands.growing import GrownStand, again_steps, is_stand, new_stand_steps
 from .files import Biome, find_biome, layers_of, pages_of, stand_settings, stands_of
 from .ground import lay_biome_soil, make_line
@@ -39,7 +39,7 @@ _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
 
 
 @dataclass(frozen=True)
-class Added:
+class BiomeResult:
     """What adding or planting a biome made.
 
     Attributes
@@ -67,7 +67,7 @@ def add_biome_steps(
     biome: Biome,
     grounds: Sequence[bpy.types.Object],
     seed: int = 0,
-) -> Generator[Progress, object, Added]:
+) -> Generator[Progress, object, BiomeResult]:
     """Add a biome to grounds, with all of its plants. Closing the steps, or an error, leaves everything as it was.
 
     Raises
@@ -121,7 +121,7 @@ def add_biome_steps(
 @job("Planting the biome")
 def plant_biome_steps(
     data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, biome: bpy.types.PropertyGroup
-) -> Generator[Progress, object, Added]:
+) -> Generator[Progress, object, BiomeResult]:
     """Plant all layers of a biome again by their settings, but frozen ones and stands of which a year is kept.
 
     Raises
@@ -162,7 +162,7 @@ def _plant(
     uid: str,
     stands: Sequence[tuple[str, int]],
     without: Sequence[str] = (),
-) -> Generator[Progress, object, Added]:
+) -> Generator[Progress, object, BiomeResult]:
     """Plants of all layers, one after the other, and the soil under them; ``without`` tells of stands that failed."""
     first = _STANDS if stands else 0.0
     yield Progress(first, "Planting")
@@ -196,7 +196,7 @@ def _plant(
     biome = find_biome(scene, uid)
     grounds = [entry.object for entry in biome.grounds if entry.object is not None] if biome is not None else []
     kept = lay_biome_soil(scene, depsgraph, grounds) if grounds else []
-    return Added(biome.name if biome is not None else "", layers, bare, kept)
+    return BiomeResult(biome.name if biome is not None else "", layers, bare, kept)
 
 
 def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
@@ -209,12 +209,12 @@ def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
     """
     renamed = {}
     for identifier, page in pages_of(scene, biome).items():
-        name, known = identifier, catalogue()
+        name, known = identifier, catalog()
         if identifier in known and dict(species_data(scene, identifier)) != page:
             name = renamed[identifier] = new_identifier(identifier, known.__contains__)
         if name not in known:
             store_species(scene, name, page)
-    known = catalogue()
+    known = catalog()
     for layer in biome.layers:
         for part in layer.get("species", []):
             needed = part.get("shed_by") or part["species"]
@@ -226,7 +226,7 @@ def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
 
 def _make_litter(scene: bpy.types.Scene, entry: bpy.types.PropertyGroup) -> None:
     """Make a species of what another sheds, where an entry needs it and nobody has it."""
-    if entry.shed_by and entry.species not in catalogue():
+    if entry.shed_by and entry.species not in catalog():
         kind = next((k for k in (*FALLEN, FALLEN_LEAVES) if entry.species.endswith(f"_{k}")), "")
         made = fallen_from(scene, entry.shed_by, kind) if kind else ""
         entry.species = made or entry.species

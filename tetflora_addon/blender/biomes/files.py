@@ -16,8 +16,8 @@ from typing import Any
 
 import bpy
 
-from ...errors import SceneError, SpeciesError, shown
-from ...files import IDENTIFIER_RULE, is_identifier, json_of, read_whole
+from ...errors import SceneError, SpeciesError, quoted
+from ...files import IDENTIFIER_RULE, is_identifier, parse_json, read_whole
 from ...planting.zones import Limits
 from ...species.schema import species_from_dict
 from ..file_library import MAX_FILE_BYTES, as_text
@@ -55,7 +55,7 @@ _MORE = {"description", "species", "limits", "gives_way", "ground", "season"}
 #: Settings of populations that mean something in one file only.
 _LOCAL = ("grounds", "ground_collection", "vertex_group", "image", "uv_layer", "areas", "paths")
 #: Settings of a species of a stand.
-STAND_ENTRY = ("species", "planted", "rain")
+STAND_ENTRY = ("species", "planted", "incoming_seeds")
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def read_biome(path: Path) -> Biome:
         It cannot be read, or breaks a rule of the format; names file and key.
     """
     try:
-        return checked(json_of(read_whole(path, MAX_FILE_BYTES), refuse_constant), path.stem)
+        return checked(parse_json(read_whole(path, MAX_FILE_BYTES), refuse_constant), path.stem)
     except OSError as error:
         raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
     except (ValueError, SpeciesError) as error:

@@ -103,16 +103,16 @@ def lay_biome_soil(
     on_it = set(fits)
     found = [b for b in scene.tetflora.biomes if on_it & {entry.object for entry in b.grounds}]
     earth, turf, share, here = np.zeros((cells, 3)), np.zeros((cells, 3)), np.zeros(cells), np.full(cells, 1e-9)
-    hidden, colour = np.zeros(cells), np.zeros((cells, 3))
+    hidden, color = np.zeros(cells), np.zeros((cells, 3))
     for biome in found:
         ground = data_of(biome).get("ground", {})
         value = {name: np.array(ground.get(name, GROUND[name][0])) for name in ("earth", "turf", "turf_share")}
         own = np.full(cells, 1e-6)
-        for low, cell, area, colours in _low_plants(scene, depsgraph, biome.uid, sheet):
+        for low, cell, area, colors in _low_plants(scene, depsgraph, biome.uid, sheet):
             own += np.bincount(cell, minlength=cells)
             if low:
                 hidden += np.bincount(cell, area, cells)
-                colour += np.stack([np.bincount(cell, area * c, cells) for c in colours.T], axis=1)
+                color += np.stack([np.bincount(cell, area * c, cells) for c in colors.T], axis=1)
         own = _blurred(own.reshape(sheet.rows, sheet.columns)).reshape(-1)
         here += own
         earth += own[:, None] * value["earth"]
@@ -121,7 +121,7 @@ def lay_biome_soil(
     earth, turf, share = earth / here[:, None], turf / here[:, None], share / here
     square = sheet.cell**2
     lying = 1.0 - np.exp(-hidden / square)
-    mean = SHADED * colour / np.maximum(hidden, 1e-12)[:, None]
+    mean = SHADED * color / np.maximum(hidden, 1e-12)[:, None]
     ground = earth + (lying * (1.0 - share))[:, None] * (mean - earth)
     shape = sheet.rows, sheet.columns
     earth, share = ground.reshape(*shape, 3), share.reshape(shape)
@@ -141,8 +141,8 @@ def _low_plants(
             place = np.clip(place, 0, (sheet.columns - 1, sheet.rows - 1))
             crowns = [crown_for(scene, kind) for kind in read.identifiers]
             seen = np.array([crown.seen for crown in crowns])[read.species] * read.scale**2
-            colours = np.array([crown.colour for crown in crowns])[read.species]
-            yield bool(population.covers), place[:, 1] * sheet.columns + place[:, 0], seen, colours
+            colors = np.array([crown.color for crown in crowns])[read.species]
+            yield bool(population.covers), place[:, 1] * sheet.columns + place[:, 0], seen, colors
 
 
 def _blurred(grid: NDArray[np.float64], reach: int = 8) -> NDArray[np.float64]:

@@ -16,10 +16,10 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ...errors import NAME, SceneError, readable
-from ...files import is_identifier, is_regular, json_of, read_whole
+from ...files import is_identifier, is_regular, parse_json, read_whole
 from ..file_library import ENDING, MAX_FILE_BYTES, OwnFiles, Pictures
 from ..preferences import own_species_folder, species_folders
-from ..species.catalogue import Item, number_of
+from ..species.catalog import Item, number_of
 
 FOLDER = "biomes"
 PICTURES = (".jpg", ".png")
@@ -75,7 +75,7 @@ def biomes() -> dict[str, BiomeInfo]:
 
 def _info(path: Path) -> BiomeInfo:
     try:
-        data = json_of(read_whole(path, MAX_FILE_BYTES))
+        data = parse_json(read_whole(path, MAX_FILE_BYTES))
     except (OSError, ValueError):
         data = None
     if not isinstance(data, Mapping):

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, PointerProperty, StringProperty
 
-from ...files import json_of
+from ...files import parse_json
 from ...planting.zones import Limits
 from ..placing.properties import HIDDEN, LIVE, GroundMask, TetFloraGround
 from ..settings import settings_in
@@ -52,7 +52,7 @@ class TetFloraBiome(bpy.types.PropertyGroup, GroundMask, settings_in(Limits, **L
 def data_of(biome: bpy.types.PropertyGroup) -> dict[str, Any]:
     """What a biome keeps of its file beside its layers; nothing where that cannot be read."""
     try:
-        data = json_of(biome.data) if biome.data else {}
+        data = parse_json(biome.data) if biome.data else {}
     except ValueError:
         data = {}
     return data if isinstance(data, dict) else {}

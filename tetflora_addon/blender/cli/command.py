@@ -175,7 +175,7 @@ def _parser() -> argparse.ArgumentParser:
     stats.set_defaults(run=_stats)
 
     for command in (refining, render):
-        command.add_argument("--form", choices=_choices("proxy_form"), help="override the proxy form of the scene")
+        command.add_argument("--proxies", choices=_choices("proxy_kind"), help="override the proxy kind of the scene")
         about = "override the Lighting of the scene"
         command.add_argument("--baked-light", choices=_choices("baked_light"), help=about)
     for command in (refining, render, stats):
@@ -314,8 +314,8 @@ def _still_path(scene: bpy.types.Scene) -> str:
 
 
 def _set_proxies(scene: bpy.types.Scene, options: argparse.Namespace) -> None:
-    if options.form is not None:
-        scene.tetflora.proxy_form = options.form.upper()
+    if options.proxies is not None:
+        scene.tetflora.proxy_kind = options.proxies.upper()
     if options.baked_light is not None:
         scene.tetflora.baked_light = options.baked_light.upper()
 

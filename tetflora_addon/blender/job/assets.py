@@ -15,14 +15,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...assets import kept
+from ...assets import asset_cache
 from ...assets.asset import Asset, AssetSource, AssetTable, Instances
 from ...assets.compiled import compile_steps
 from ...camera.camera import Camera
 from ...emission.asset_costs import AssetCosts
-from ...emission.asset_plan import Keeping
+from ...emission.asset_plan import OriginalPolicy
 from ...errors import SceneError, TetFloraError
-from ...jobs import Progress, at_once, mapped
+from ...jobs import Progress, mapped, run_to_end
 from ...refinement.asset_parts import PlacedAssets
 from ..assets.parts import Target, digest_of, read_source_steps
 from ..assets.places import Places
@@ -32,12 +32,12 @@ from ..worker import steps_in_thread
 #: Part of the progress bar that compiling takes.
 _START, _END = 0.02, 0.05
 
-#: What the artist should know of the assets that were read last, see `Bound`; nothing of those that were known already.
+#: What the artist should know of the assets that were read last, see `SceneAssets`; nothing of those known before.
 asset_warnings: list[str] = []
 
 
 @dataclass(frozen=True)
-class Bound:
+class SceneAssets:
     """Assets of a scene that take part in refinement, and where they are.
 
     Attributes
@@ -52,7 +52,7 @@ class Bound:
         Objects that show instances; None for those that are plants of many objects.
     owner : (n,) int32
         Index into these.
-    keeping : Keeping
+    originals : OriginalPolicy
         Which are always drawn as the originals.
     """
 
@@ -61,7 +61,7 @@ class Bound:
     matrices: NDArray[np.float64]
     owners: tuple[bpy.types.Object | None, ...]
     owner: NDArray[np.int32]
-    keeping: Keeping
+    originals: OriginalPolicy
     warnings: tuple[str, ...] = field(default=())
 
     @property
@@ -85,7 +85,7 @@ def bind_steps(
     depsgraph: bpy.types.Depsgraph,
     camera: Camera,
     left: float,
-) -> Generator[Progress, bool | None, Bound | None]:
+) -> Generator[Progress, bool | None, SceneAssets | None]:
     """Compile the assets of places, which count from the camera's origin; None where there are none.
 
     Raises
@@ -116,9 +116,9 @@ def bind_steps(
     placed = PlacedAssets(AssetTable.of(assets), instances)
     owner = np.repeat([owners.index(_owner(one)) for one in places], number).astype(np.int32)
     _, costs = _costs(places, depsgraph, _covered(placed, camera))
-    keeping = costs.keeping(_in_cycles(scene), left, always=scene.tetflora.asset_detail == 'AUTO')
+    originals = costs.originals(_in_cycles(scene), left, always=scene.tetflora.asset_detail == 'AUTO')
     asset_warnings.extend(dict.fromkeys(warnings))
-    return Bound(tuple(targets), placed, matrices, tuple(owners), owner, keeping, tuple(asset_warnings))
+    return SceneAssets(tuple(targets), placed, matrices, tuple(owners), owner, originals, tuple(asset_warnings))
 
 
 def _owner(places: Places) -> bpy.types.Object | None:
@@ -154,8 +154,8 @@ def triangles_of(target: Target, depsgraph: bpy.types.Depsgraph) -> int:
 def _covered(placed: PlacedAssets, camera: Camera) -> NDArray[np.float64]:
     """Pixels (a,) that instances of each asset would cover if nothing hid them."""
     wholes = placed.wholes()
-    seen = camera.clearance(wholes.centre) < wholes.reach
-    pixels = np.minimum(wholes.extent / camera.extent_around(wholes.centre), max(camera.width, camera.height)) ** 2
+    seen = camera.distance_to_view(wholes.center) < wholes.reach
+    pixels = np.minimum(wholes.extent / camera.extent_around(wholes.center), max(camera.width, camera.height)) ** 2
     return np.bincount(placed.instances.asset, seen * pixels, len(placed.assets.every))
 
 
@@ -171,10 +171,10 @@ def _compiled(
     source: AssetSource | None = None
     with originals_shown(scene, depsgraph):
         digest = digest_of(target, depsgraph)
-        asset = kept.find(digest)
+        asset = asset_cache.find(digest)
         if asset is None and hidden:
             # While results hide what shows the asset, it is evaluated in here only.
-            source, told = at_once(read_source_steps(target, depsgraph))
+            source, told = run_to_end(read_source_steps(target, depsgraph))
             warnings += told
     if asset is not None:
         return asset
@@ -195,5 +195,5 @@ def _compiled(
         asset = yield from steps_in_thread(compiling, progress)
     except TetFloraError as error:
         raise SceneError(str(error)) from None
-    kept.keep(asset)
+    asset_cache.keep(asset)
     return asset

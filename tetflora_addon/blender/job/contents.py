@@ -22,17 +22,17 @@ from ...growth.seeds import Seeds
 from ...growth.wind import Wind
 from ...processes import pool
 from ...refinement.lights import Light
+from ...refinement.outliers import Outliers
 from ...refinement.polygons import Polygons
 from ...refinement.settings import RefinementSettings
 from ...refinement.statistics import Statistics
-from ...refinement.strays import Strays
-from ...species.catalogue import list_species, load_species
+from ...species.catalog import list_species, load_species
 from ...species.species import Species
 from ..assets.places import Places, read_places
 from ..preferences import wanted_threads
-from ..results.forms import form_of
 from ..results.hiding import originals_shown
 from ..results.leaf_objects import resolved_species
+from ..results.proxy_kinds import proxy_kind_of
 from ..scene.ages import kind_species
 from ..scene.explicit import Explicit, read_explicit
 from ..scene.lights import read_lights, read_sources, sky_suns
@@ -44,7 +44,7 @@ from ..settings import check_limits, season_of, wind_of, years_of
 
 
 @dataclass(frozen=True)
-class Given:
+class SceneContents:
     """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
 
     ``owners`` are the objects of the plants in their order, each with the number of its own; ``places`` are those of
@@ -77,7 +77,7 @@ class Given:
         """All explicit polygons."""
         return None if self.explicit is None else Polygons.everything(self.explicit.meshes)
 
-    def counted_from(self, origin: np.ndarray) -> Given:
+    def counted_from(self, origin: np.ndarray) -> SceneContents:
         """The same in coordinates that begin at a place (3,) in the world, as those of the camera (`Camera.local`)."""
         if not origin.any():
             return self
@@ -92,16 +92,16 @@ class Given:
             places=tuple(one.counted_from(origin) for one in self.places),
         )
 
-    def named(self, strays: Strays) -> dict[str, float]:
-        """Objects that strays belong to, and the least of their distances, metres."""
+    def named(self, outliers: Outliers) -> dict[str, float]:
+        """Objects that outliers belong to, and the least of their distances, meters."""
         ends = np.cumsum([number for _, number in self.owners])
-        names = [self.owners[i][0] for i in np.searchsorted(ends, strays.plants, side="right").tolist()]
+        names = [self.owners[i][0] for i in np.searchsorted(ends, outliers.plants, side="right").tolist()]
         ends = np.cumsum([len(one) for one in self.places])
-        names += [self.places[i].owner.name for i in np.searchsorted(ends, strays.assets, side="right").tolist()]
+        names += [self.places[i].owner.name for i in np.searchsorted(ends, outliers.assets, side="right").tolist()]
         meshes = self.explicit.meshes if self.explicit is not None else None
-        names += [meshes.surfaces[meshes.surface[i]].name for i in strays.instances.tolist()]
+        names += [meshes.surfaces[meshes.surface[i]].name for i in outliers.instances.tolist()]
         found: dict[str, float] = {}
-        for name, away in zip(names, strays.away.tolist(), strict=True):
+        for name, away in zip(names, outliers.away.tolist(), strict=True):
             found[name] = min(away, found.get(name, np.inf))
         return found
 
@@ -117,7 +117,9 @@ def expected_polygons(flora: Flora, seeds: Seeds) -> float:
     return float(flora.polygons[trunks(flora.rows, seeds).row].sum())
 
 
-def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Given:
+def read_scene(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+) -> SceneContents:
     """Read everything that takes part in refinement except the camera.
 
     Raises
@@ -144,7 +146,7 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
         looks = LayerLooks(view_layer)
         worn = {owner: looks.of(owner) for owner in dict.fromkeys(one.owner for one in places)}
         occluders = read_occluders(depsgraph, view_layer)
-        return Given(seeds, explicit, occluders, lights, sources, owners, places, worn, unknown)
+        return SceneContents(seeds, explicit, occluders, lights, sources, owners, places, worn, unknown)
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
@@ -235,8 +237,8 @@ def memory_left(scene: bpy.types.Scene, camera: Camera | None = None) -> float:
 
 
 def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
-    """The scene's settings, with the block sizes of its proxy form."""
-    emission = form_of(scene).emission
+    """The scene's settings, with the block sizes of its proxy kind."""
+    emission = proxy_kind_of(scene).emission
     # Proxies that fill their tetrahedra are divided as long as they show; facets need no more than their visibility.
     proxy_block = emission.proxy_block if emission.facets else min(emission.proxy_block, 1e9)
     return replace(settings_from(scene), hidden_block=emission.hidden_block, proxy_block=proxy_block)
@@ -244,8 +246,8 @@ def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
 
 def use_machine(scene: bpy.types.Scene) -> None:
     """Let what follows work with as many threads, and processes with as much memory, as the artist wants."""
-    parallel.use(wanted_threads(scene))
-    pool.use(memory.limit(scene.tetflora.max_memory))
+    parallel.set_threads(wanted_threads(scene))
+    pool.set_memory_limit(memory.limit(scene.tetflora.max_memory))
 
 
 def check_fits(what: str, polygons: float, left: float, remedy: str) -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ... import memory
 from ...compiled.crowns import Crown
-from ...emission.budget import enough
+from ...emission.budget import image_limit
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
@@ -40,7 +40,7 @@ from ..species.edits import display_height, species_for
 from .contents import check_settings, memory_left, picture_bytes, settings_from
 
 _LOOKED_AT = 2_000  # plants of each kind of storage that stand for all
-_LEAVES = 0.8  # of a plant's polygons are leaves: .71 to .85 for trees of the catalogue
+_LEAVES = 0.8  # of a plant's polygons are leaves: .71 to .85 for trees of the catalog
 _PATIENCE = 30.0  # times that counting took before plants are counted again
 _GIGA, _MEGA = memory.GIGABYTE, 1e6
 
@@ -81,7 +81,7 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     allowed = memory_left(scene, camera)
     everything = scene.tetflora.expand_everything
     return estimate(
-        stand, camera, settings_from(scene), used, allowed, enough(camera, scene.tetflora.facet), everything
+        stand, camera, settings_from(scene), used, allowed, image_limit(camera, scene.tetflora.facet), everything
     )
 
 

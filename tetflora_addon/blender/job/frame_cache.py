@@ -3,7 +3,7 @@
 """The frame cache: results of a render that later frames use again, found by a digest of all that they depend on.
 
 A frame with the digest of an earlier one gets its results back; the least recently used go first when the cache is
-full. The camera counts by its cell (`camera.view_cells`), so that neighbouring frames have the same digest.
+full. The camera counts by its cell (`camera.view_cells`), so that neighboring frames have the same digest.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from ...camera.camera import Camera
 from ...camera.view_cells import Around, ViewCells, cell_camera
-from ...growth.crown_forms import farthest
+from ...growth.crown_shapes import farthest
 from ...species.species import Species
 from ..assets.marks import reach_of
 from ..assets.parts import digest_of
@@ -33,10 +33,10 @@ from ..scene.skeletons import species_of
 from ..settings import season_of, wind_of, years_of
 from ..species.asset_species import asset_species
 from ..species.edits import species_for
-from .contents import Given, load_for, read_scene, settings_from
+from .contents import SceneContents, load_for, read_scene, settings_from
 
 _MAX_SPECIES = 64
-_CHOICES = ("proxy_form", "baked_light", "expand_everything", "asset_detail")
+_CHOICES = ("proxy_kind", "baked_light", "expand_everything", "asset_detail")
 #: Settings of a scene that results do not depend on.
 _IGNORED = {
     "statistics",
@@ -72,7 +72,7 @@ def scene_digest(
     depsgraph: bpy.types.Depsgraph,
     view_layer: bpy.types.ViewLayer,
     camera: Camera | None = None,
-    given: Given | None = None,
+    given: SceneContents | None = None,
 ) -> str:
     """Digest of camera, plants, meshes, assets, occluders, lights, settings, species, materials, day and wind.
 
@@ -163,7 +163,7 @@ def add_to_digest(content: hashlib._Hash, value: object) -> None:
         content.update(f"{value!r};".encode())  # or 1, 11 would be 11, 1
 
 
-def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: Given | None = None) -> Camera:
+def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: SceneContents | None = None) -> Camera:
     """The active camera, or the one of its cell if it moves and the scene shares results between frames.
 
     Cells are larger where the contents given are far from them.
@@ -180,25 +180,25 @@ def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given:
     return cell_camera(camera, ViewCells(settings.cell_length, settings.cell_turn), around) or camera
 
 
-def _around(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: Given) -> Around:
+def _around(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: SceneContents) -> Around:
     """Spheres around meshes and assets, and around plants with all branches on the way to the last twig."""
     seeds, meshes = given.seeds, None if given.explicit is None else given.explicit.meshes
-    # Lengths are in metres for trunks, and in those of their parents for all others.
+    # Lengths are in meters for trunks, and in those of their parents for all others.
     grown = [kind_species(species_for(scene, species_of(kind)), kind, years_of(scene)) for kind in seeds.identifiers]
     orders = [species.orders for species in grown]
     heights = np.array([np.cumprod([order.length.mean for order in own]).sum() for own in orders])
-    centres, radii = [seeds.position], [heights[seeds.species] * seeds.scale * farthest(seeds.crown)]
+    centers, radii = [seeds.position], [heights[seeds.species] * seeds.scale * farthest(seeds.crown)]
     if meshes is not None:
         reach = [np.linalg.norm(surface.positions, axis=1).max() for surface in meshes.surfaces]
-        centres.append(meshes.origin)
+        centers.append(meshes.origin)
         radii.append(np.array(reach)[meshes.surface] * meshes.largest)
     reaches = {one.target: 0.0 for one in given.places}
     for target in reaches:
         reaches[target] = reach_of(target, depsgraph)
     for one in given.places:
-        centres.append(one.matrices[:, :3, 3])
+        centers.append(one.matrices[:, :3, 3])
         radii.append(reaches[one.target] * np.linalg.norm(one.matrices[:, :3, :3], axis=1).max(axis=1))
-    return Around(np.concatenate(centres), np.concatenate(radii))
+    return Around(np.concatenate(centers), np.concatenate(radii))
 
 
 def camera_moves(scene: bpy.types.Scene) -> bool:
@@ -226,7 +226,7 @@ def key_of(
     depsgraph: bpy.types.Depsgraph,
     layers: Sequence[bpy.types.ViewLayer],
     camera: Camera,
-    given: Given,
+    given: SceneContents,
 ) -> str:
     """Digest of all that results for view layers depend on, with their camera and contents.
 

@@ -28,9 +28,9 @@ from ...buffers import MeshBuffers, concatenate_buffers
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
 from ...emission.asset_plan import AssetPlan, PlacedClusters
-from ...emission.budget import afford
+from ...emission.budget import fit_to_budget
 from ...emission.drawing import drawing
-from ...emission.forms import Refined
+from ...emission.emitters import EmissionInput
 from ...emission.plants import Block, Transition, expanded_blocks
 from ...emission.polygons import PolygonBlock
 from ...jobs import Progress, mapped
@@ -47,21 +47,21 @@ from ..compat import drawn_disc
 from ..main_thread import in_main_thread
 from ..materials.materials import baked_material
 from ..results.collection import Results
-from ..results.forms import ProxyForm, form_of
 from ..results.hiding import hide_originals, originals_shown, remove_results
 from ..results.instances import add_cluster, add_cluster_instances, add_instances, add_stand_in, carrier_of
 from ..results.leaf_objects import leaf_objects, material_steps
 from ..results.meshes import AssetMeshes, cluster_mesh_steps, mesh_steps, read_mesh
 from ..results.output import adopt_materials, release_materials, result_collections
 from ..results.proxies import Baking, write_proxies
+from ..results.proxy_kinds import ProxyKind, proxy_kind_of
 from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..scene.skeletons import look_of
-from ..worker import at_once, call_in_thread, in_thread, nobody_waits, steps_in_thread
-from .assets import Bound, asset_warnings, bind_steps, is_plain
+from ..worker import call_in_thread, in_thread, nobody_waits, run_to_end, steps_in_thread
+from .assets import SceneAssets, asset_warnings, bind_steps, is_plain
 from .contents import (
-    Given,
+    SceneContents,
     check_expanded,
     compile_for,
     in_wind,
@@ -73,7 +73,7 @@ from .contents import (
 )
 
 #: Clusters of which meshes are made between two looks at the window.
-_AT_ONCE = 16
+_BATCH = 16
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_FRACTION = 0.6
 #: Polygons, were all plants expanded, from which on other processes are started at once.
@@ -92,24 +92,24 @@ class _Run:
 
     depsgraph: bpy.types.Depsgraph
     camera: Camera | None = None
-    given: Given | None = None
+    given: SceneContents | None = None
     data: JobData | None = None
     results: Results | None = None
     beside: Sequence[bpy.types.Collection] = ()
     flora: Flora | None = None
-    bound: Bound | None = None
+    bound: SceneAssets | None = None
     settings: RefinementSettings | None = None
     originals: list[bpy.types.Object] = field(default_factory=list)
     statistics: Statistics = field(default_factory=Statistics)
     clock: Stopwatch = field(default_factory=Stopwatch)
-    form: ProxyForm | None = None
+    form: ProxyKind | None = None
     baking: Baking | None = None
 
 
-def left_alone(bound: Bound, plan: AssetPlan) -> NDArray[np.bool_]:
+def left_alone(bound: SceneAssets, plan: AssetPlan) -> NDArray[np.bool_]:
     """Owners (k,) of which every instance is the original: they go on showing them themselves."""
     whole = np.zeros(len(bound.placed), bool)
-    whole[plan.whole] = True
+    whole[plan.originals] = True
     number = np.bincount(bound.owner, ~whole, len(bound.owners))
     return (number == 0) & np.array([_scatters(owner) for owner in bound.owners], bool)
 
@@ -144,13 +144,13 @@ def write_assets(run: _Run, plan: AssetPlan) -> Generator[Progress, None, None]:
     ids = _ids(bound.placed.instances.key)
     progress = Progress(0.94, "Placing instances")
     yield progress
-    whole = plan.whole[~alone[owner[plan.whole]]]
+    whole = plan.originals[~alone[owner[plan.originals]]]
     for number, (target, shown, rows) in enumerate(_groups(bound, asset[whole], owner[whole])):
         at = whole[rows]
         source = target.datablock or carrier_of(results, target)
         add_instances(results, f"{target.name} {number:03d}", source, bound.matrices[at], ids[at], shown)
         yield progress
-    statistics.instances_whole = len(whole) + int(alone[owner[plan.whole]].sum())
+    statistics.instances_whole = len(whole) + int(alone[owner[plan.originals]].sum())
     for own, make in ((plan.meshes, _clusters), (plan.kites, _kites)):
         for target in range(len(bound.targets)):
             rows = np.flatnonzero(asset[own.instance] == target)
@@ -165,7 +165,7 @@ def write_assets(run: _Run, plan: AssetPlan) -> Generator[Progress, None, None]:
 
 
 def _groups(
-    bound: Bound, asset: NDArray[np.int32], owner: NDArray[np.int32]
+    bound: SceneAssets, asset: NDArray[np.int32], owner: NDArray[np.int32]
 ) -> Iterator[tuple[Target, bpy.types.Object | None, NDArray[np.int64]]]:
     """Rows (k,) of the same asset and the same owner each."""
     for pair in np.unique(asset.astype(np.int64) * len(bound.owners) + owner).tolist():
@@ -227,7 +227,7 @@ def _write_clusters(
             run.statistics.polygons_proxy += faces
         else:
             run.statistics.polygons_meshed += faces
-        if number % _AT_ONCE == 0:
+        if number % _BATCH == 0:
             yield progress
     shown = bound.owner[instance]
     for number, who in enumerate(np.unique(shown).tolist()):
@@ -276,7 +276,7 @@ def _of_all_ages(run: _Run, blocks: Iterator[Block]) -> Iterator[Block]:
     """Blocks of which those of one species and look at several ages are one mesh: each object costs a renderer time."""
     first: dict[tuple[str, str], int] = {}
     named = [(one.identifier, run.results.look_of(n)) for n, one in enumerate(run.flora.species)]
-    same = [first.setdefault(named[n], n) if one.form is None else n for n, one in enumerate(run.flora.species)]
+    same = [first.setdefault(named[n], n) if one.skeleton is None else n for n, one in enumerate(run.flora.species)]
     if same == list(range(len(same))):
         yield from blocks
         return
@@ -297,9 +297,9 @@ def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Generator[Prog
         name = f"{surface.name} {block.number:03d}"
         obj = yield from run.results.add(name, "explicit", block.buffers, materials, look=surface.look)
         _made(run, obj, block.buffers, lit=False)
-        return Progress(0.95, f"Keeping polygons: {run.statistics.polygons_meshed:,}")
+        return Progress(0.95, f"OriginalPolicy polygons: {run.statistics.polygons_meshed:,}")
 
-    yield from _written(blocks, write, Progress(0.95, "Keeping polygons"))
+    yield from _written(blocks, write, Progress(0.95, "OriginalPolicy polygons"))
 
 
 def _written(
@@ -310,7 +310,7 @@ def _written(
         for block in made:
             if block is not None:
                 progress = yield from progress.during(write(block))
-            yield progress.again if block is None else progress
+            yield progress.repeated if block is None else progress
 
 
 def _made(run: _Run, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> None:
@@ -320,7 +320,7 @@ def _made(run: _Run, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> 
     run.statistics.memory_mb += buffers.nbytes / 1e6
 
 
-def _bake_light(baking: Baking, refined: Refined) -> Generator[Progress, None, None]:
+def _bake_light(baking: Baking, refined: EmissionInput) -> Generator[Progress, None, None]:
     """Compute the light of everything, and write that of meshes."""
     if refined.facet_pixels is not None:
         facets = (Progress(0.9, f"Baking light: {count:,} facets") for count in baking.add_facets(refined))
@@ -331,7 +331,7 @@ def _bake_light(baking: Baking, refined: Refined) -> Generator[Progress, None, N
     for done in baking.light_meshes():
         if done is not None:
             progress = Progress(0.93 + 0.02 * done, f"Baking light: {done:.0%} of the leaves")
-        yield progress.again if done is None else progress
+        yield progress.repeated if done is None else progress
 
 
 def refine_steps(
@@ -342,7 +342,7 @@ def refine_steps(
     for_render: bool = False,
     beside: Sequence[bpy.types.Collection] = (),
     camera: Camera | None = None,
-    given: Given | None = None,
+    given: SceneContents | None = None,
     mark: str = "",
     first_look: bool = False,
 ) -> Generator[Progress, bool | None, Statistics]:
@@ -486,7 +486,7 @@ def _replace(run: _Run) -> None:
 
 def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: object) -> Statistics:
     """Refine a scene at once; options and errors as for `refine_steps`."""
-    return at_once(refine_steps(scene, depsgraph, **options))
+    return run_to_end(refine_steps(scene, depsgraph, **options))
 
 
 def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, Refinement]:
@@ -502,9 +502,9 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     camera = read_camera(scene, depsgraph).local()
     given = read_scene(scene, depsgraph, depsgraph.view_layer).counted_from(camera.origin)
     flora = in_wind(scene, compile_for(given.species, scene, depsgraph), camera)
-    bound = at_once(bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera)))
+    bound = run_to_end(bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera)))
     settings = refinement_settings(scene)
-    return camera, at_once(_run_loop(_Run(depsgraph, camera, given, flora=flora, bound=bound, settings=settings)))
+    return camera, run_to_end(_run_loop(_Run(depsgraph, camera, given, flora=flora, bound=bound, settings=settings)))
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
@@ -546,7 +546,7 @@ def _run_loop(run: _Run) -> Generator[Progress, bool | None, Refinement]:
     return state
 
 
-def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, Refined]:
+def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, EmissionInput]:
     """Refine, and find out what the proxies depend on."""
     flora, given, bound, camera, statistics = run.flora, run.given, run.bound, run.camera, run.statistics
     form = run.form.emission
@@ -557,17 +557,17 @@ def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, Refined
         for name, done in measuring(flora, range(len(flora.species))):
             yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
         yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
-    detail = afford(refinement, camera, run.settings, form.faces)
+    detail = fit_to_budget(refinement, camera, run.settings, form.faces)
     run.clock.lap("refine")
     _count(statistics, detail.refinement)
-    statistics.strays = given.named(refinement.strays)
-    refinement, keeping = detail.refinement, None if bound is None else bound.keeping
+    statistics.outliers = given.named(refinement.outliers)
+    refinement, originals = detail.refinement, None if bound is None else bound.originals
     if not form.facets:
-        return Refined(flora, refinement, camera, tolerance=detail.tolerance, keeping=keeping)
+        return EmissionInput(flora, refinement, camera, tolerance=detail.tolerance, originals=originals)
     clusters = None
     if bound is not None:
         looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner]
-        how = bound.keeping, detail.asset_limit, looks, detail.asset_larger
+        how = bound.originals, detail.asset_limit, looks, detail.asset_larger
         clusters = PlacedClusters(refinement.assets.placed, camera, *how)
     # Light is baked for facets, whatever is made of them then.
     becomes = None if run.baking is not None else form.form(camera, disc)
@@ -585,13 +585,13 @@ def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, Refined
         run.settings.shadow_cutoff,
         clusters,
     )
-    return Refined(flora, refinement, camera, with_all, detail.tolerance, keeping, disc)
+    return EmissionInput(flora, refinement, camera, with_all, detail.tolerance, originals, disc)
 
 
 def _write_refined(run: _Run) -> Generator[Progress, bool | None, None]:
     """Refine, and make meshes, instances and proxies; objects that scatter what has taken part are replaced as well."""
     scene, given = run.results.scene, run.given
-    run.form, left = form_of(scene), memory_left(scene, run.camera)
+    run.form, left = proxy_kind_of(scene), memory_left(scene, run.camera)
     # What the process holds already and what the image takes count too.
     run.settings = replace(run.settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
     if given.sources is not None:

@@ -23,7 +23,6 @@ import bpy
 from ...errors import TetFloraError
 from ..main_thread import in_main_thread, window_draws
 from ..results.collection import has_results, leave_out_of_file, result_collections
-from ..results.forms import raise_settings, restore_settings
 from ..results.hiding import (
     hidden_originals,
     lift_marks,
@@ -34,6 +33,7 @@ from ..results.hiding import (
     unpack_override_marks,
 )
 from ..results.output import KIND, adopt_materials, release_materials
+from ..results.proxy_kinds import raise_settings, restore_settings
 from ..runtime import Handlers, Listeners, complain, failed_frames, remember, with_uid
 from ..saved_files import clear_unreadable, migrate
 from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
@@ -206,7 +206,7 @@ def _make(scene: bpy.types.Scene) -> None:
             if statistics.unknown:
                 _complain(scene, f"without some plants: {statistics.unknown}")
             elif statistics.left_out:
-                _warn(statistics.left_out, " ".join(sorted(statistics.strays)))
+                _warn(statistics.left_out, " ".join(sorted(statistics.outliers)))
             for text in asset_warnings:
                 _warn(text, text)
             new = [c for c in result_collections(scene, 'RENDER') if c not in before]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bark by nodes: patterns that follow each branch by its UV map, fade on thin twigs, and keep the mean colour.
+"""Bark by nodes: patterns that follow each branch by its UV map, fade on thin twigs, and keep the mean color.
 
 A pattern lives on a cylinder of radius 1, of which the branch is an unrolled image: (cos 2πu, sin 2πu, 2πv). It
 therefore closes without a seam at u = 0 and is as wide as it is high. How many features there are to a radius follows
@@ -25,17 +25,17 @@ PLACE = "TetFlora Bark Place"
 # Raise this when nodes of a group change; `bark_version` then makes new materials as well.
 _VERSION = 5
 
-# A perimeter of this length tilts the Bump node's normal by 45 degrees: the middle of the range that matters, metres.
+# A perimeter of this length tilts the Bump node's normal by 45 degrees: the middle of the range that matters, meters.
 _REFERENCE = 0.25
-# Longest perimeter that counts, metres; that of a trunk of 2 m.
+# Longest perimeter that counts, meters; that of a trunk of 2 m.
 _THICKEST = 6.0
-# How far the pattern of a branch is moved per unit of its colour, in radii: branches differ in colour, so in pattern.
+# How far the pattern of a branch is moved per unit of its color, in radii: branches differ in color, so in pattern.
 _SHIFT = 10.0
-# Perimeter of the branch on which there are `Bark.scale` features to a radius, metres; also of one that does not say.
+# Perimeter of the branch on which there are `Bark.scale` features to a radius, meters; also of one that does not say.
 _USUAL = 1.57
 # Light that relief costs in Cycles over what tilted normals explain.
 _STEEPER = 1.15
-# Moss grows up to this height above the base of a branch, on branches of these perimeters, metres.
+# Moss grows up to this height above the base of a branch, on branches of these perimeters, meters.
 _MOSSY, _MOSS_GIRTH = 3.0, (0.3, 0.9)
 # Patches of moss and lichen to a meter.
 _PATCHES = 5.0
@@ -43,9 +43,9 @@ _PATCHES = 5.0
 _SHADY = (0.0, 0.76, 0.65)
 # What lies so many radii below the base of a branch is an old root.
 _ROOTS = -0.1
-# Up to this height rain splashes from the ground, metres.
+# Up to this height rain splashes from the ground, meters.
 _SPLASH = 0.7
-# Colours of moss, algae and lichen over the lightness of the bark under them.
+# Colors of moss, algae and lichen over the lightness of the bark under them.
 _MOSS, _ALGAE, _LICHEN = (0.78, 0.9, 0.36), (0.93, 1.05, 0.68), (1.15, 1.2, 1.0)
 # Knots: how far apart, in radii; the fraction of them that there is; how far ridges give way, in sizes of the eye.
 _KNOTS_APART, _NO_KNOT, _AROUND = 1.25, 0.3, 2.4
@@ -78,7 +78,7 @@ class Bark:
     Attributes
     ----------
     pattern : callable
-        (graph, place) → (factors of the colour, height in widths of a feature): terms.
+        (graph, place) → (factors of the color, height in widths of a feature): terms.
     scale : float
         Features to a radius, on a branch of .25 m radius; 2π times as many around it.
     stretch : float
@@ -90,7 +90,7 @@ class Bark:
     depth : float
         Of the relief, in widths of a feature.
     smooth, full : float
-        Perimeters under which there is no pattern, and over which it is complete, metres.
+        Perimeters under which there is no pattern, and over which it is complete, meters.
     moss, lichen : float
         How much of it there is.
     power : float
@@ -117,7 +117,7 @@ class Place:
     Attributes
     ----------
     round : vector
-        On the cylinder of radius 1, moved by the branch's colour.
+        On the cylinder of radius 1, moved by the branch's color.
     cells : vector
         The same in features: their widths around the branch, their lengths along it.
     turn, along : number
@@ -125,7 +125,7 @@ class Place:
     scale, stretch : number
         Features to a radius, and their length over their width.
     girth : number
-        Length around the branch at its base, metres.
+        Length around the branch at its base, meters.
     """
 
     round: Term
@@ -181,8 +181,8 @@ def place_group() -> bpy.types.NodeTree:
     Returns
     -------
     bpy.types.NodeTree
-        Outputs Place, on the cylinder of radius 1 (in radii, moved by the branch's colour), Turn, Along (radii), and
-        Perimeter, metres. The perimeter P is that of the branch where it is seen: a relief of height u times D tilts
+        Outputs Place, on the cylinder of radius 1 (in radii, moved by the branch's color), Turn, Along (radii), and
+        Perimeter, meters. The perimeter P is that of the branch where it is seen: a relief of height u times D tilts
         the normal by θ with tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
     """
 
@@ -195,7 +195,7 @@ def place_group() -> bpy.types.NodeTree:
         sine = graph.math('SQRT', 1.0 - cosine * cosine)
         cotangent = cosine / graph.math('MAXIMUM', sine, 1e-3)
         return {
-            "Place": cylinder + graph.attribute("tf_colour", "Vector") * _SHIFT,
+            "Place": cylinder + graph.attribute("tf_color", "Vector") * _SHIFT,
             "Turn": u,
             "Along": along,
             "Perimeter": graph.math('MINIMUM', cotangent * _REFERENCE, _THICKEST),
@@ -216,8 +216,8 @@ def bark_group(character: str) -> bpy.types.NodeTree:
     Returns
     -------
     bpy.types.NodeTree
-        Inputs Colour, Scale, Stretch, Contrast, Depth, Smooth Under, Full Over, Moss, Lichen; outputs Colour, whose
-        mean over the surface is the colour that went in, Normal, Gain, and Shown, which is 0 where both are those of
+        Inputs Color, Scale, Stretch, Contrast, Depth, Smooth Under, Full Over, Moss, Lichen; outputs Color, whose
+        mean over the surface is the color that went in, Normal, Gain, and Shown, which is 0 where both are those of
         a smooth twig: Cycles then passes over all nodes of the pattern, which is most of the wood in a crown. Gain is
         what Cycles loses at a normal that is tilted by θ, and EEVEE does not: of the light that comes evenly from the
         normal's half space the fraction (1 + cos θ) / 2 lies above the surface itself.
@@ -229,7 +229,7 @@ def bark_group(character: str) -> bpy.types.NodeTree:
     """
     bark = _bark(character)
     inputs = (
-        ("Colour", 'Color', (0.16, 0.11, 0.07, 1.0), None, "Mean color"),
+        ("Color", 'Color', (0.16, 0.11, 0.07, 1.0), None, "Mean color"),
         ("Scale", 'Float', bark.scale, (0.0, 1000.0), "Number of features per radius of a branch of 0.25 m"),
         ("Stretch", 'Float', bark.stretch, (0.01, 100.0), "Length to width of the features"),
         ("Contrast", 'Float', bark.contrast, (0.0, 4.0), "Contrast around the mean color"),
@@ -251,9 +251,9 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         # Roots, below the base, are thin but as old as the trunk.
         age = graph.math('MAXIMUM', age, graph.step(where["Along"], 0.0, _ROOTS))
         change = (tone / bark.mean - (1.0, 1.0, 1.0)) * (given["Contrast"] * age) + (1.0, 1.0, 1.0)
-        colour = graph.tinted(given["Colour"], change)
+        color = graph.tinted(given["Color"], change)
         if bark.moss or bark.lichen:
-            colour = _overgrown(graph, given, (place, girth, age), colour)
+            color = _overgrown(graph, given, (place, girth, age), color)
         # Thickness must not be part of the height, whose slope alone is wanted.
         depth = where["Perimeter"] / (scale * tau) * given["Depth"] * age
         bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": depth, "Height": height})
@@ -262,19 +262,19 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         tilt = graph.vector('DOT_PRODUCT', bump, graph.outputs("ShaderNodeNewGeometry")["Normal"])
         # Tilted normals explain most of the loss; the rest is measured.
         gain = 2.0 / (1.0 + graph.math('MAXIMUM', tilt, 0.0)) * _STEEPER + (1.0 - _STEEPER)
-        return {"Colour": colour, "Normal": bump, "Gain": gain, "Shown": shown}
+        return {"Color": color, "Normal": bump, "Gain": gain, "Shown": shown}
 
-    outputs = ("Colour", 'Color'), ("Normal", 'Vector'), ("Gain", 'Float'), ("Shown", 'Float')
+    outputs = ("Color", 'Color'), ("Normal", 'Vector'), ("Gain", 'Float'), ("Shown", 'Float')
     return node_group(f"TetFlora {character.capitalize()} Bark", _VERSION, inputs, outputs, build)
 
 
 def base_girth(graph: Graph) -> Term:
-    """Length around the branch at its base, metres; a usual one where the mesh does not say."""
+    """Length around the branch at its base, meters; a usual one where the mesh does not say."""
     girth = graph.attribute("tf_girth", "Fac")
     return (girth < 1e-6) * _USUAL + girth
 
 
-def _overgrown(graph: Graph, given: dict[str, Term], at: tuple[Place, Term, Term], colour: Term) -> Term:
+def _overgrown(graph: Graph, given: dict[str, Term], at: tuple[Place, Term, Term], color: Term) -> Term:
     """Moss where it is damp, lichen where a noise is low: as light as the bark beneath, so that the mean stays."""
     place, girth, age = at
     radii = girth / tau
@@ -292,10 +292,10 @@ def _overgrown(graph: Graph, given: dict[str, Term], at: tuple[Place, Term, Term
     algae = graph.step(damp, 0.0, 0.8) * (given["Moss"] * age)
     algae = graph.step(there, 0.45, 0.85) * (algae * 0.6)
     lichen = graph.step(noise, 0.37, 0.34) * (given["Lichen"] * age)
-    light = graph.outputs("ShaderNodeRGBToBW", {"Color": colour})["Val"]
+    light = graph.outputs("ShaderNodeRGBToBW", {"Color": color})["Val"]
     for tint, amount in ((_LICHEN, lichen), (_ALGAE, algae), (_MOSS, moss)):
-        colour = graph.mixed(amount, colour, tint * light)
-    return colour
+        color = graph.mixed(amount, color, tint * light)
+    return color
 
 
 def bark_version(character: str) -> int:
@@ -379,17 +379,17 @@ def lips(graph: Graph, eye: Knot) -> tuple[Term, Term]:
 
 
 def tones(graph: Graph, value: Term, stops: Tones) -> Term:
-    """Colours between stops."""
+    """Colors between stops."""
     node = graph.node("ShaderNodeValToRGB", {"Fac": value})
     ramp = node.color_ramp.elements
     while len(ramp) < len(stops):
         ramp.new(0.5)
-    for element, (position, colour) in zip(ramp, stops, strict=True):
-        element.position, element.color = position, (*colour, 1.0)
+    for element, (position, color) in zip(ramp, stops, strict=True):
+        element.position, element.color = position, (*color, 1.0)
     return Term(graph, node.outputs["Color"])
 
 
-# Patterns: factors of the colour, whose mean is measured and taken out, and a height in widths of a feature.
+# Patterns: factors of the color, whose mean is measured and taken out, and a height in widths of a feature.
 
 
 def ridged(graph: Graph, place: Place) -> tuple[Term, Term]:
@@ -454,23 +454,23 @@ def netted(graph: Graph, place: Place) -> tuple[Term, Term]:
 
 
 def plated(graph: Graph, place: Place) -> tuple[Term, Term]:
-    """Long plates of flakes that lie in layers, each its own red-brown or grey, with dark fissures between."""
+    """Long plates of flakes that lie in layers, each its own red-brown or gray, with dark fissures between."""
     return _plates(graph, place)[:2]
 
 
 def papery(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Plates low on the trunk; on limbs and high up thin orange skin that curls off in flakes."""
-    colour, height, part, fine = _plates(graph, place)
+    color, height, part, fine = _plates(graph, place)
     up = graph.step(place.along, 20.0, 38.0)
     high = graph.math('MAXIMUM', up, graph.step(place.girth, 0.75, 0.45))
     tone = fine * 1.7 + (part * -0.5 + -0.115)
     skin = tones(graph, tone, ((0.2, _PAPER[0]), (0.5, _PAPER[1]), (0.85, _PAPER[2])))
-    colour = graph.mixed(high, colour, skin) * graph.mixed(up, (1.0, 1.0, 1.0), _ORANGE)
-    return colour, height * (high * -0.6 + 1.0)
+    color = graph.mixed(high, color, skin) * graph.mixed(up, (1.0, 1.0, 1.0), _ORANGE)
+    return color, height * (high * -0.6 + 1.0)
 
 
 def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
-    """Colour, height, part of a flake from its rim, and a fine noise."""
+    """Color, height, part of a flake from its rim, and a fine noise."""
     noise, wave = graph.noise(times(place.cells, 0.9, 1.5), 3.0, 0.62)
     where = bent(place.cells, wave, 1.0, 0.6)
     plate = cell(graph, where)
@@ -486,9 +486,9 @@ def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
     rim = graph.step(part, 0.22, 0.05)
     lit = rim * 0.14 + (part * -0.08 + (fine * 0.65 + plate.random[1] * 0.28))
     red = tones(graph, lit, _RED)
-    grey = tones(graph, lit, ((0.15, (0.15, 0.12, 0.105)), (0.5, (0.4, 0.33, 0.29)), (0.9, (0.76, 0.68, 0.62))))
-    colour = graph.mixed(graph.step(noise * 0.6 + plate.random[2], 0.45, 1.15), red, grey)
-    return graph.mixed(solid, (0.09, 0.062, 0.052), colour), height, part, fine
+    gray = tones(graph, lit, ((0.15, (0.15, 0.12, 0.105)), (0.5, (0.4, 0.33, 0.29)), (0.9, (0.76, 0.68, 0.62))))
+    color = graph.mixed(graph.step(noise * 0.6 + plate.random[2], 0.45, 1.15), red, gray)
+    return graph.mixed(solid, (0.09, 0.062, 0.052), color), height, part, fine
 
 
 def scaly(graph: Graph, place: Place) -> tuple[Term, Term]:
@@ -617,15 +617,15 @@ def peeling(graph: Graph, place: Place) -> tuple[Term, Term]:
     skin = dots * -0.3 + (noise * 0.5 + 0.45)
     white = tones(graph, skin, ((0.1, (0.32, 0.3, 0.28)), (0.6, (0.86, 0.85, 0.83)), (0.85, (1.0, 1.0, 1.0))))
     under = tones(graph, skin, ((0.1, (0.3, 0.25, 0.22)), (0.6, (0.7, 0.66, 0.62)), (0.85, (0.85, 0.79, 0.73))))
-    colour = graph.mixed(edge * 0.6, graph.mixed(torn, white, under), (0.2, 0.17, 0.15))
+    color = graph.mixed(edge * 0.6, graph.mixed(torn, white, under), (0.2, 0.17, 0.15))
     rough = furrows(graph, place, 8.0, 3.4)
     black = tones(graph, rough, ((0.3, (0.026, 0.026, 0.024)), (0.9, (0.15, 0.135, 0.115))))
     height = torn * -0.35 + (scar * (rough * 2.4) + skin * 0.35)
-    return graph.mixed(scar, colour, black), height
+    return graph.mixed(scar, color, black), height
 
 
 def ringed(graph: Graph, place: Place) -> tuple[Term, Term]:
-    """Scars of fallen fronds: rings that hang unevenly, each standing out over the next, with fibres between."""
+    """Scars of fallen fronds: rings that hang unevenly, each standing out over the next, with fibers between."""
     noise = graph.noise(place.cells, 4.0, 0.6)[0]
     turn = graph.math('FRACT', noise * 1.2 + graph.parts(place.round)[2] * 3.6)
     scar = graph.step(turn, 0.0, 0.2) * graph.step(turn, 1.0, 0.5)

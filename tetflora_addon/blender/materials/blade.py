@@ -39,7 +39,7 @@ _VEIN_HUE = (1.15, 1.0, 1.0)
 _THROUGH_HUE = (1.3, 1.0, 0.4)
 #: A step from .1 down to .02 covers .06 of the half period of veins, which is .5.
 _VEIN_MEAN = 0.06 / 0.5
-#: How fast veins of second order bend towards the tip, per leaf length.
+#: How fast veins of second order bend toward the tip, per leaf length.
 _BEND = 0.9
 #: Half widths at the base of the midrib and of what is darker beside it: all, and none; leaf lengths.
 _RIB, _HALO = (0.003, 0.009), (0.009, 0.03)
@@ -73,7 +73,7 @@ class BladeLook:
     relief : float
         Height of the blade between veins, over their distance.
     mottling : float
-        How uneven the colour is.
+        How uneven the color is.
     rough : float
         Roughness of the upper side's gloss.
     wear : float
@@ -121,13 +121,13 @@ def blade_group(kind: str) -> bpy.types.NodeTree:
     Returns
     -------
     bpy.types.NodeTree
-        Inputs Colour, Leaf Length, Veins, Midrib, Vein Lines, Dark Against Light, Relief, Mottling, Wear, Paler
+        Inputs Color, Leaf Length, Veins, Midrib, Vein Lines, Dark Against Light, Relief, Mottling, Wear, Paler
         Underside, Gloss, Roughness. Outputs Reflected and Through, the colors of reflected and of passing light; Gloss;
         Roughness; Normal.
     """
     blade = BLADES[kind]
     inputs = (
-        ("Colour", 'Color', LEAF_GREEN, None, "Mean color"),
+        ("Color", 'Color', LEAF_GREEN, None, "Mean color"),
         ("Leaf Length", 'Float', 0.1, (0.0, 100.0), "Length of a leaf, for the relief (m)"),
         ("Veins", 'Float', blade.veins, (0.0, 5000.0), "Number of veins per leaf length"),
         ("Midrib", 'Float', blade.midrib, (0.0, 2.0), "How much lighter the midrib is"),
@@ -154,7 +154,7 @@ def blade_version(kind: str) -> int:
 def _built(graph: Graph, given: dict[str, Term], blade: BladeLook) -> dict[str, Any]:
     """What the group's outputs are linked to, by name."""
     place = graph.attribute("UVMap", "Vector")
-    own = graph.math('FRACT', graph.vector('DOT_PRODUCT', graph.attribute("tf_colour", "Vector"), _DIGITS))
+    own = graph.math('FRACT', graph.vector('DOT_PRODUCT', graph.attribute("tf_color", "Vector"), _DIGITS))
     moved = place + (17.0, 29.0, 0.0) * own
     geometry = graph.outputs("ShaderNodeNewGeometry")
     side = geometry["Backfacing"] * 2.0 + -1.0  # -1 above, 1 below
@@ -164,7 +164,7 @@ def _built(graph: Graph, given: dict[str, Term], blade: BladeLook) -> dict[str, 
 
     back, through = (_varied(graph, mottled, *line) for line in ((tone, _VEIN_HUE), (glow, _THROUGH_HUE)))
     back = back * paler(side * given["Paler Underside"])
-    back, through = (graph.tinted(given["Colour"], colour) for colour in (back, through * tuple(THROUGH_TINT.tolist())))
+    back, through = (graph.tinted(given["Color"], color) for color in (back, through * tuple(THROUGH_TINT.tolist())))
     if blade.wear:
         dead = _dead(graph, given, place, own, noise)
         back, through = (graph.mixed(dead, *pair) for pair in ((back, _DEAD), (through, _DEAD_THROUGH)))
@@ -206,7 +206,7 @@ def _venation(
     else:
         if blade.palmate:
             aside, along = _nearest_rib(graph, aside, along)
-        # Veins leave at an angle, bend towards the tip, and alternate from left to right.
+        # Veins leave at an angle, bend toward the tip, and alternate from left to right.
         start = aside * (aside * -_BEND + -1.0 / tan(radians(blade.angle))) + along
         wave = graph.math('PINGPONG', start * given["Veins"] + (across > 0.0) * 0.5, 0.5)
     vein = graph.step(wave, 0.1, 0.02) - _VEIN_MEAN
@@ -245,9 +245,9 @@ def _nearest_rib(graph: Graph, aside: Term, along: Term) -> tuple[Term, Term]:
 
 
 def _varied(graph: Graph, mottled: Term, tone: Term | None, hue: tuple[float, float, float]) -> Term:
-    """Factors on colours: mottling, and a tone times a hue."""
-    grey = graph.xyz(mottled, mottled, mottled)
-    return grey if tone is None else grey + hue * tone
+    """Factors on colors: mottling, and a tone times a hue."""
+    gray = graph.xyz(mottled, mottled, mottled)
+    return gray if tone is None else gray + hue * tone
 
 
 def _dead(graph: Graph, given: dict[str, Term], place: Term, own: Term, noise: Term) -> Term:

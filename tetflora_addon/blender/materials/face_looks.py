@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each face of a mesh looks like from afar: colour, transmission and coverage, sampled from its materials.
+"""What each face of a mesh looks like from afar: color, transmission and coverage, sampled from its materials.
 
 A triangle is divided into smaller ones of equal size, as many as it covers texels. In the middle of each, shaders and
 nodes are evaluated (`node_values`), and images are means over a piece as large as it (`Pyramid`). Triangles with the
@@ -66,7 +66,7 @@ class Pyramid:
     def look(
         self, u: NDArray[np.float32], v: NDArray[np.float32], size: NDArray[np.float32], extension: str
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Mean colours (3, p, k) and alpha (p, k) around some points.
+        """Mean colors (3, p, k) and alpha (p, k) around some points.
 
         Parameters
         ----------
@@ -92,8 +92,8 @@ class Pyramid:
         found += self._texels(high + x1) * (x * y)[..., None]
         if outside is not None:
             found[outside] = 0
-        colour, alpha = np.ascontiguousarray(np.moveaxis(found[..., :3], -1, 0)), found[..., 3].copy()
-        return colour / np.maximum(alpha, 1e-6), alpha
+        color, alpha = np.ascontiguousarray(np.moveaxis(found[..., :3], -1, 0)), found[..., 3].copy()
+        return color / np.maximum(alpha, 1e-6), alpha
 
     def _texels(self, index: NDArray[np.int32]) -> NDArray[np.float32]:
         return np.take(self.texels, index).view(np.float16).reshape(*index.shape, 4).astype(np.float32)
@@ -126,7 +126,7 @@ def pyramid_of(image: bpy.types.Image, weighted: bool, most: int = MOST_TEXELS) 
     Parameters
     ----------
     weighted : bool
-        Whether its alpha counts: coarser copies then have the colour of what is not transparent.
+        Whether its alpha counts: coarser copies then have the color of what is not transparent.
     most : int
         If less than `MOST_TEXELS`, only about as many columns or rows are looked at.
     """
@@ -200,13 +200,13 @@ def _halved(level: NDArray[np.floating]) -> NDArray[np.float32]:
 
 
 #: What Blender shows where there is no material.
-GREY = (0.8, 0.8, 0.8)
+GRAY = (0.8, 0.8, 0.8)
 
 #: Parts along an edge, at most; texels of the finest image along an edge of a part, about. Where steps, or several
 #: images, make the mean of what nodes get something else than the mean of what comes out, single texels are looked at.
 _MOST_PARTS, _MOST_PARTS_UNEVEN = 32, 64
 _TEXELS, _TEXELS_UNEVEN = 8.0, 3.0
-#: Texture coordinates and colours that differ by less are the same.
+#: Texture coordinates and colors that differ by less are the same.
 _SAME = 1.0 / (1 << 14)
 
 
@@ -234,14 +234,14 @@ class Plan:
     problems : list of str
         For the artist.
     viewport : (3,) float32
-        The material's colour in viewports, for images that are missing.
+        The material's color in viewports, for images that are missing.
     constant : (5,) float32
-        Cover, colour times cover, and the lightness of what goes through; of where all has its mean, if it varies.
+        Cover, color times cover, and the lightness of what goes through; of where all has its mean, if it varies.
     surface : bpy.types.NodeSocket, optional
         What its shaders lead to; None if it has none.
     is_known : bool
         Whether its transmission is.
-    maps, colours : list of str
+    maps, colors : list of str
         UV maps and other attributes that it depends on.
     texels : float
         Of the finest image, along a unit of texture coordinates.
@@ -258,7 +258,7 @@ class Plan:
     surface: bpy.types.NodeSocket | None = None
     is_known: bool = False
     maps: list[str] = field(default_factory=list)
-    colours: list[str] = field(default_factory=list)
+    colors: list[str] = field(default_factory=list)
     images: set[bpy.types.Image] = field(default_factory=set)
     texels: float = 1.0
     uneven: bool = False
@@ -280,10 +280,10 @@ class Plan:
         return self.layers.types.get(name) == 'FLOAT2'
 
     def attribute(self, name: str) -> Values:
-        """A colour attribute (4, p, k)."""
+        """A color attribute (4, p, k)."""
         exists = name in self.layers.types
-        if exists and name not in self.colours:
-            self.colours.append(name)
+        if exists and name not in self.colors:
+            self.colors.append(name)
         mean = np.full(4, 0.5 if exists else 0.0, np.float32)
         if (known := self.layers.means.get(name)) is not None:
             mean[: len(known)] = known if len(known) > 1 else known[0]
@@ -323,7 +323,7 @@ class Plan:
     @property
     def names(self) -> list[str]:
         """Attributes that it depends on; none where it is the same everywhere."""
-        return [*self.maps, *(name for name in self.colours if name not in self.maps)]
+        return [*self.maps, *(name for name in self.colors if name not in self.maps)]
 
     def sampled(self, corners: dict[str, NDArray], most: int) -> NDArray:
         """Means over some triangles (t, 5) float32, as `constant`.
@@ -446,17 +446,17 @@ def _middles(n: int) -> NDArray[np.float32]:
 _TRIANGLES = 1 << 16
 #: Points of all distinct triangles of these, about, and of a whole mesh if it has fewer.
 _POINTS, _ALL_POINTS = 1 << 19, 1 << 22
-_COLOURS = {'FLOAT_COLOR', 'BYTE_COLOR'}
+_COLORS = {'FLOAT_COLOR', 'BYTE_COLOR'}
 _DOMAINS = {'POINT', 'CORNER', 'FACE'}
-_TYPES = {'FLOAT', 'INT', 'INT8', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLOURS}
-_LEAST = 1e-4  # coverage below which a face has no colour of its own
-_FAR = np.float32(1e6)  # texture coordinates and colours beyond it are no use
+_TYPES = {'FLOAT', 'INT', 'INT8', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLORS}
+_LEAST = 1e-4  # coverage below which a face has no color of its own
+_FAR = np.float32(1e6)  # texture coordinates and colors beyond it are no use
 _ROUGH = 0.5  # of materials that do not say
 _FEW_TEXELS = 512  # columns or rows of images of which only the mean counts
 _TINY = 1e-30  # added to areas, so that those of faces without any count alike
 
 
-#: Of all faces (f,) of a mesh: linear ``colour`` (f, 3), the mean over what is not transparent; ``transmission``, the
+#: Of all faces (f,) of a mesh: linear ``color`` (f, 3), the mean over what is not transparent; ``transmission``, the
 #: fraction of scattered light that leaves on the other side, NaN where nobody knows; ``coverage``, the fraction that is
 #: not transparent; and ``roughness`` of the gloss.
 FaceLooks = dict[str, NDArray[np.float16]]
@@ -496,7 +496,7 @@ class FaceReader:
         return self._pyramids[key]
 
     def prepare(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> MeshLooks:
-        """Read all that the looks of a mesh follow from, so that it need not be there any more afterwards."""
+        """Read all that the looks of a mesh follow from, so that it need not be there any more afterward."""
         made = MeshLooks(mesh, materials, self)
         self.warn(problem for plan in made.plans for problem in plan.problems)
         return made
@@ -525,7 +525,7 @@ class MeshLooks:
         self._values: dict[str, tuple[str, NDArray]] = {}
         for name in {name for plan in self.plans for name in plan.names}:
             attribute = mesh.attributes[name]
-            values = values_of(attribute, "color" if attribute.data_type in _COLOURS else "")
+            values = values_of(attribute, "color" if attribute.data_type in _COLORS else "")
             self._values[name] = attribute.domain, values.reshape(len(values), -1)
         # Without the attribute all faces are of the first slot.
         self._slot = read(mesh, "material_index") if "material_index" in types and len(materials) > 1 else None
@@ -556,7 +556,7 @@ class MeshLooks:
             Ascending.
         """
         made = {name: np.ones(faces, np.float16) for name in ("transmission", "coverage", "roughness")}
-        made["colour"] = np.zeros((faces, 3), np.float16)
+        made["color"] = np.zeros((faces, 3), np.float16)
         if not any(plan.names for plan in self.plans):
             constant = np.array([plan.constant for plan in self.plans])
             for low in range(0, faces, _TRIANGLES):
@@ -584,11 +584,11 @@ class MeshLooks:
         """Means over what is not transparent, from those over whole faces (n, 5)."""
         plain = np.array([plan.constant[1:4] / max(plan.constant[0], _LEAST) for plan in self.plans], np.float32)
         known = np.array([plan.is_known for plan in self.plans])
-        cover, colour, through = values[:, 0], values[:, 1:4], values[:, 4]
-        light = luminance(colour.T)
+        cover, color, through = values[:, 0], values[:, 1:4], values[:, 4]
+        light = luminance(color.T)
         passed = np.divide(through, light, out=np.zeros_like(light), where=light > 1e-6)
-        colour = np.where((cover > _LEAST)[:, None], colour / np.maximum(cover, _LEAST)[:, None], plain[slot])
-        made["colour"][faces] = np.clip(colour, 0, 1)
+        color = np.where((cover > _LEAST)[:, None], color / np.maximum(cover, _LEAST)[:, None], plain[slot])
+        made["color"][faces] = np.clip(color, 0, 1)
         made["coverage"][faces] = np.clip(cover, 0, 1)
         made["roughness"][faces] = np.array([roughness_of(material) for material in self.materials])[slot]
         made["transmission"][faces] = np.where(known[slot], np.clip(passed, 0, 1), np.nan)
@@ -628,7 +628,7 @@ def roughness_of(material: bpy.types.Material | None) -> float:
 class Look:
     """Means over a material: linear RGB, transmission (NaN if unknown), fraction that is not transparent."""
 
-    colour: tuple[float, float, float] = GREY
+    color: tuple[float, float, float] = GRAY
     transmission: float = 0.0
     coverage: float = 1.0
 
@@ -645,22 +645,22 @@ class Looks:
         Parameters
         ----------
         attributes : mapping of str to (n, k) float32
-            Of the mesh that wears it, for those that take their colour from one.
+            Of the mesh that wears it, for those that take their color from one.
         """
         if material is None:
             return Look()
         types = {name: 'FLOAT2' if values.shape[1] == 2 else 'FLOAT_VECTOR' for name, values in attributes.items()}
         means = {name: values.mean(axis=0, dtype=np.float64) for name, values in attributes.items()}
         plan = _plan_of(material, MeshLayers("", types, means), self._reader)
-        cover, *colour, through = plan.constant.astype(np.float64).tolist()
-        colour = np.clip(np.array(colour) / max(cover, _LEAST), 0, 1)
-        passed = np.clip(through / max(float(luminance(colour * cover)), 1e-6), 0, 1)
-        return Look(tuple(colour.tolist()), float(passed) if plan.is_known else np.nan, cover)
+        cover, *color, through = plan.constant.astype(np.float64).tolist()
+        color = np.clip(np.array(color) / max(cover, _LEAST), 0, 1)
+        passed = np.clip(through / max(float(luminance(color * cover)), 1e-6), 0, 1)
+        return Look(tuple(color.tolist()), float(passed) if plan.is_known else np.nan, cover)
 
 
 def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, reader: FaceReader) -> Plan:
     """Evaluate a material once where everything has its mean, and note what that takes."""
-    seen = np.array(GREY if material is None else np.clip(material.diffuse_color[:3], 0, 1), np.float32)
+    seen = np.array(GRAY if material is None else np.clip(material.diffuse_color[:3], 0, 1), np.float32)
     name = "" if material is None else material.name
     plan = Plan(name, layers, reader, seen, np.array([1.0, *seen, 0.0], np.float32), is_known=material is None)
     output = None if material is None else active_output(tree_in_use(material), 'OUTPUT_MATERIAL')

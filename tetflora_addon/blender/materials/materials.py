@@ -34,7 +34,7 @@ _BAKED_VERSION = 1
 
 
 def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> bpy.types.Material:
-    """Material "TetFlora <species> leaf": reads ``tf_colour`` and ``tf_transmission`` of each face, veins by ``UVMap``.
+    """Material "TetFlora <species> leaf": reads ``tf_color`` and ``tf_transmission`` of each face, veins by ``UVMap``.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> b
     """
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
-        colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
+        color, transmission = graph.attribute("tf_color", "Color"), graph.attribute("tf_transmission", "Fac")
         given = {name.replace("_", " ").title(): value for name, value in looks.items()}
-        blade = graph.outputs("ShaderNodeGroup", {"Colour": colour, **given}, node_tree=blade_group(kind))
+        blade = graph.outputs("ShaderNodeGroup", {"Color": color, **given}, node_tree=blade_group(kind))
         near = {
-            "Colour": WHITE,
+            "Color": WHITE,
             "Transmission": transmission,
             "Reflected Tint": blade["Reflected"],
             "Through Tint": blade["Through"],
@@ -65,7 +65,7 @@ def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> b
             "Normal": blade["Normal"],
         }
         normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
-        plain = {"Colour": colour, "Transmission": transmission, "Normal": normal}
+        plain = {"Color": color, "Transmission": transmission, "Normal": normal}
         scattered = graph.outputs("ShaderNodeLightPath")["Is Diffuse Ray"]
         _lead_out(graph, graph.mix(scattered, _scattered(graph, near), _scattered(graph, plain)))
         disable_bump_correction(material)
@@ -74,7 +74,7 @@ def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> b
 
 
 def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Material:
-    """Material "TetFlora <species> bark": ``tf_colour`` with a pattern that shows when the camera is close.
+    """Material "TetFlora <species> bark": ``tf_color`` with a pattern that shows when the camera is close.
 
     Parameters
     ----------
@@ -90,19 +90,19 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
 
     Notes
     -----
-    The pattern varies the colour around its mean, so that bark and its microsurfaces agree from afar.
+    The pattern varies the color around its mean, so that bark and its microsurfaces agree from afar.
     """
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
-        colour = graph.attribute("tf_colour", "Color")
-        bark = graph.outputs("ShaderNodeGroup", {"Colour": colour}, node_tree=bark_group(character))
+        color = graph.attribute("tf_color", "Color")
+        bark = graph.outputs("ShaderNodeGroup", {"Color": color}, node_tree=bark_group(character))
         dull = {"Transmission": 0.0, "Gloss": 0.0}
         normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
-        young = _scattered(graph, {**dull, "Colour": colour, "Normal": normal})
+        young = _scattered(graph, {**dull, "Color": color, "Normal": normal})
         # Light that was scattered before meets the plain bark: nobody sees a pattern in it.
         shown = bark["Shown"] * (1.0 - graph.outputs("ShaderNodeLightPath")["Is Diffuse Ray"])
-        for engine, tone in (('CYCLES', graph.scaled(bark["Colour"], bark["Gain"])), ('EEVEE', bark["Colour"])):
-            old = _scattered(graph, {**dull, "Colour": tone, "Normal": bark["Normal"]})
+        for engine, tone in (('CYCLES', graph.scaled(bark["Color"], bark["Gain"])), ('EEVEE', bark["Color"])):
+            old = _scattered(graph, {**dull, "Color": tone, "Normal": bark["Normal"]})
             _lead_out(graph, graph.mix(shown, young, old), engine=engine)
         # The correction takes up to a tenth of the light away from what is rough, unlike for proxies.
         disable_bump_correction(material)
@@ -204,18 +204,18 @@ def baked_material() -> bpy.types.Material:
 
 def _proxy_looks(graph: Graph, normal: Any) -> dict[str, Any]:
     """What proxies feed the scatter group with: gloss where light goes through, as in leaves."""
-    colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
+    color, transmission = graph.attribute("tf_color", "Color"), graph.attribute("tf_transmission", "Fac")
     gloss = (transmission > 0.0) * GLOSS
-    return {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": normal}
+    return {"Color": color, "Transmission": transmission, "Gloss": gloss, "Normal": normal}
 
 
 def _principled(graph: Graph) -> Term:
     """What stands for the artist's materials: Fresnel's gloss, which is most of what leaves show against the light."""
-    colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
+    color, transmission = graph.attribute("tf_color", "Color"), graph.attribute("tf_transmission", "Fac")
     front = graph.node(
-        "ShaderNodeBsdfPrincipled", {"Base Color": colour, "Roughness": graph.attribute("tf_roughness", "Fac")}
+        "ShaderNodeBsdfPrincipled", {"Base Color": color, "Roughness": graph.attribute("tf_roughness", "Fac")}
     )
-    back = graph.node("ShaderNodeBsdfTranslucent", {"Color": colour})
+    back = graph.node("ShaderNodeBsdfTranslucent", {"Color": color})
     return graph.mix(transmission, front, back)
 
 

@@ -32,7 +32,7 @@ _SCATTER_VERSION = 2
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 UNIT = (0.0, 1.0)
-#: The engine's, as a colour of a socket.
+#: The engine's, as a color of a socket.
 THROUGH_TINT = (*scattering.THROUGH_TINT.tolist(), 1.0)
 #: Inputs of the cloud that the shell's group has as well.
 LOBE_INPUTS = (
@@ -54,7 +54,7 @@ def microsphere_group() -> bpy.types.NodeTree:
     Returns
     -------
     bpy.types.NodeTree
-        Inputs Colour, Transmission, Normal, Plane, p, s, spear, Through Tint, Roundness, Facing; outputs Cycles and
+        Inputs Color, Transmission, Normal, Plane, p, s, spear, Through Tint, Roundness, Facing; outputs Cycles and
         EEVEE, one for each engine's material output. Link EEVEE's Thickness to a Value of 0: otherwise EEVEE takes the
         object's extent for it, and half of what is transmitted is lost.
 
@@ -70,7 +70,7 @@ def microsphere_group() -> bpy.types.NodeTree:
     about = "0: particles face the viewer, as in the paper; 1: particles are round from all sides"
     facing = "Normal of particles with their own surface; at zero, particles face the viewer"
     inputs = (
-        ("Colour", 'Color', LEAF_GREEN, None, "Mean color of the contents"),
+        ("Color", 'Color', LEAF_GREEN, None, "Mean color of the contents"),
         ("Transmission", 'Float', 0.0, UNIT, "Fraction of scattered light that passes"),
         ("Normal", 'Vector', (0.0, 0.0, 1.0), None, "Axis of the planes, of either sign"),
         ("Plane", 'Float', 0.0, UNIT, "Weight of the plane term; the rest are particles"),
@@ -85,7 +85,7 @@ def _shaders(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
     """Both engines' shaders from the same lobes."""
     geometry = graph.outputs("ShaderNodeNewGeometry")
     incoming, face = geometry["Incoming"], geometry["True Normal"]
-    back, transmission = graph.scaled(given["Colour"], given["p"]), given["Transmission"]
+    back, transmission = graph.scaled(given["Color"], given["p"]), given["Transmission"]
     through = graph.tinted(back, given["Through Tint"]) * transmission
     back = back * (1.0 - transmission)
 
@@ -99,7 +99,7 @@ def _shaders(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
     for normal, weight in ((particle, 1.0 - given["Plane"]), (plane, given["Plane"] - kept)):
         reflected, transmitted = back * weight, through * weight
         simple += _sheet(graph, reflected, transmitted, normal)
-        # Towards the face's own side; where that turns the plane away from the viewer, both sides change places.
+        # Toward the face's own side; where that turns the plane away from the viewer, both sides change places.
         facing = graph.vector('DOT_PRODUCT', normal, face)
         turned = facing < 0.0
         normal = normal * (turned * -2.0 + 1.0)
@@ -155,7 +155,7 @@ def particle_normal(graph: Graph, given: dict[str, Any], geometry: dict[str, Ter
 
 
 def _sheet(graph: Graph, near: Term, far: Term, normal: Term) -> list[bpy.types.Node]:
-    """Cosine lobes around a normal, of one colour on its side and of another on the other."""
+    """Cosine lobes around a normal, of one color on its side and of another on the other."""
     return [
         graph.node("ShaderNodeBsdfDiffuse", {"Color": near, "Normal": normal}),
         graph.node("ShaderNodeBsdfTranslucent", {"Color": far, "Normal": normal}),
@@ -185,7 +185,7 @@ def _gloss_weight(
 def _highlight(graph: Graph, normal: Term, weight: Term, width: Term) -> Term:
     """White reflection around a normal; light that bounces among facets counts, or up to a third would be lost.
 
-    Its weight is no colour: grey facets would absorb at each bounce.
+    Its weight is no color: gray facets would absorb at each bounce.
     """
     inputs = {"Color": (1.0, 1.0, 1.0, 1.0), "Roughness": graph.math('SQRT', width), "Normal": normal}
     shader = graph.node("ShaderNodeBsdfAnisotropic", inputs, distribution='MULTI_GGX')
@@ -194,7 +194,7 @@ def _highlight(graph: Graph, normal: Term, weight: Term, width: Term) -> Term:
 
 
 def _sum(graph: Graph, shaders: list[Any]) -> Any:
-    """All shaders together; their colours hold the weights."""
+    """All shaders together; their colors hold the weights."""
     return reduce(lambda a, b: graph.node("ShaderNodeAddShader", {"Shader": a, "Shader_001": b}), shaders)
 
 
@@ -204,12 +204,12 @@ def scatter_group() -> bpy.types.NodeTree:
     Returns
     -------
     bpy.types.NodeTree
-        Inputs Colour, Transmission, Reflected Tint, Through Tint, Gloss, Gloss Roughness, Normal; output Shader. Of the
-        light that arrives, (1 − Gloss) · Colour is scattered, evenly over the side of the light or, for the fraction
+        Inputs Color, Transmission, Reflected Tint, Through Tint, Gloss, Gloss Roughness, Normal; output Shader. Of the
+        light that arrives, (1 − Gloss) · Color is scattered, evenly over the side of the light or, for the fraction
         Transmission, over the other side, each times its tint; Gloss is mirrored. No more comes out than went in.
     """
     inputs = (
-        ("Colour", 'Color', LEAF_GREEN),
+        ("Color", 'Color', LEAF_GREEN),
         ("Transmission", 'Float', 0.0, UNIT, "Fraction of scattered light that passes"),
         ("Reflected Tint", 'Color', WHITE, None, "Multiplies the color of reflected light"),
         ("Through Tint", 'Color', THROUGH_TINT, None, "Multiplies the color of passing light"),
@@ -219,10 +219,10 @@ def scatter_group() -> bpy.types.NodeTree:
     )
 
     def build(graph: Graph, given: Any) -> dict[str, Any]:
-        colour, normal = given["Colour"], given["Normal"]
-        back = graph.tinted(colour, given["Reflected Tint"])
+        color, normal = given["Color"], given["Normal"]
+        back = graph.tinted(color, given["Reflected Tint"])
         reflected = graph.node("ShaderNodeBsdfDiffuse", {"Color": back, "Normal": normal})
-        through = graph.tinted(colour, given["Through Tint"])
+        through = graph.tinted(color, given["Through Tint"])
         transmitted = graph.node("ShaderNodeBsdfTranslucent", {"Color": through, "Normal": normal})
         sheet = graph.mix(given["Transmission"], reflected, transmitted)
         roughness = given["Gloss Roughness"]
@@ -242,7 +242,7 @@ _GROUP_VERSION = 2 + loses_summed_lobes()
 _MATERIAL_VERSION = 2 + loses_summed_lobes()
 _BAKED_VERSION = 1
 
-# Longer than any cell, for faces that the ray runs away from, metres.
+# Longer than any cell, for faces that the ray runs away from, meters.
 _NEVER = 1e9
 # A slope under which the ray runs along a face, 1/m.
 _ALONG = 1e-9
@@ -264,7 +264,7 @@ def shell_group() -> bpy.types.NodeTree:
     def build(graph: Graph, given: Any) -> dict[str, Any]:
         geometry = graph.outputs("ShaderNodeNewGeometry")
         inputs = {name: given[name] for name in ("p", "s", "spear", "Through Tint", "Roundness")}
-        inputs["Colour"] = _varied_colour(graph, given["Variation"])
+        inputs["Color"] = _varied_color(graph, given["Variation"])
         inputs["Transmission"] = graph.attribute("tf_transmission", "Fac")
         inputs["Normal"] = graph.attribute("tf_normal", "Vector")
         inputs["Plane"] = graph.attribute("tf_plane", "Fac")
@@ -307,8 +307,8 @@ def baked_shell_group() -> bpy.types.NodeTree:
                 parts.append(light * (far * last + near * first))
             total = sum(parts[1:], parts[0])
             emission = graph.node("ShaderNodeEmission", {"Color": total, "Strength": given["Strength"]})
-            grey = graph.xyz(*[path.transmittance] * 3)
-            clear = graph.node("ShaderNodeBsdfTransparent", {"Color": grey})
+            gray = graph.xyz(*[path.transmittance] * 3)
+            clear = graph.node("ShaderNodeBsdfTransparent", {"Color": gray})
             # Not a mix, which would make the emission weaker by the opacity that it contains already.
             added = graph.node("ShaderNodeAddShader", {"Shader": emission, "Shader_001": clear})
             shaders[engine] = added.outputs[0]
@@ -353,11 +353,11 @@ class _Path:
     Attributes
     ----------
     length : Term
-        Metres inside the cell that count at this face.
+        Meters inside the cell that count at this face.
     transmittance, depth : Term
         e^{−κℓ}, and κℓ.
     levels, slopes : list of Term
-        The four barycentric coordinates at the hit, in the order of the vertices, and what they lose a metre.
+        The four barycentric coordinates at the hit, in the order of the vertices, and what they lose a meter.
     leaving : Term
         1 on the faces where the ray leaves.
     """
@@ -373,7 +373,7 @@ class _Path:
 def _paths(graph: Graph, geometry: dict[str, Term]) -> dict[str, _Path]:
     """The ray's way through the cell for each engine, which differ in how they tell how far the eye is.
 
-    Along ω = −incoming a barycentric coordinate falls by ∇λ·incoming a metre; the ray leaves where the first reaches
+    Along ω = −incoming a barycentric coordinate falls by ∇λ·incoming a meter; the ray leaves where the first reaches
     zero. The coordinate of the entry face itself rises and never counts. On exit faces the same backwards gives where
     the ray has entered. Faces where it enters carry the whole way; faces where it leaves carry none, unless the ray
     began in the cell: then all of its length counts.
@@ -408,8 +408,8 @@ def _eye_distance(graph: Graph, incoming: Term) -> Term:
     """Distance from the eye along the ray; from the camera's plane if it is orthographic. Endless in shadow maps."""
     camera = graph.outputs("ShaderNodeCameraData")
     ways = {"vector_type": 'VECTOR', "convert_from": 'CAMERA', "convert_to": 'WORLD'}
-    towards = graph.node("ShaderNodeVectorTransform", {"Vector": camera["View Vector"]}, **ways)
-    distance = abs(graph.vector('DOT_PRODUCT', towards, incoming)) * camera["View Distance"]
+    toward = graph.node("ShaderNodeVectorTransform", {"Vector": camera["View Vector"]}, **ways)
+    distance = abs(graph.vector('DOT_PRODUCT', toward, incoming)) * camera["View Distance"]
     return graph.outputs("ShaderNodeLightPath")["Is Shadow Ray"] * _NEVER + distance
 
 
@@ -434,10 +434,10 @@ def _end_weights(graph: Graph, depth: Term) -> tuple[Term, Term]:
     return weights[0], weights[1]
 
 
-def _varied_colour(graph: Graph, amount: Term) -> Term:
-    """The cell's colour, lighter or darker by up to `amount`; over many cells the mean stays."""
+def _varied_color(graph: Graph, amount: Term) -> Term:
+    """The cell's color, lighter or darker by up to `amount`; over many cells the mean stays."""
     factor = (graph.attribute("tf_random", "Fac") * 2.0 + -1.0) * amount + 1.0
-    return graph.scaled(graph.attribute("tf_colour", "Color"), factor)
+    return graph.scaled(graph.attribute("tf_color", "Color"), factor)
 
 
 def _decided(graph: Graph, opacity: Term, geometry: dict[str, Term], stochastic: Term) -> Term:

@@ -5,7 +5,7 @@
 Nodes that only a renderer knows let the first color that feeds them pass; where none does, as in noise, they count with
 one half. What depends on the direction of a ray, or on which instance it is, counts with its mean.
 
-Numbers are arrays (p, k), colours (3, p, k); what is the same everywhere is (1, 1) and (3, 1, 1).
+Numbers are arrays (p, k), colors (3, p, k); what is the same everywhere is (1, 1) and (3, 1, 1).
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ Values = NDArray[np.float32]
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
-def luminance(colour: Values) -> Values:
+def luminance(color: Values) -> Values:
     """Lightness (p, k) of linear Rec. 709."""
-    return np.tensordot(_LUMINANCE, colour, axes=1)
+    return np.tensordot(_LUMINANCE, color, axes=1)
 
 
 def _ratio(a: Values, b: Values) -> Values:
@@ -119,13 +119,13 @@ def _value_of(a: Values, b: Values, t: Values) -> Values:
     return from_hsv(np.stack(np.broadcast_arrays(first[0], first[1], (1 - t) * first[2] + t * second[2])))
 
 
-def _colour_of(a: Values, b: Values, t: Values) -> Values:
+def _color_of(a: Values, b: Values, t: Values) -> Values:
     first, second = to_hsv(a), to_hsv(b)
     other = from_hsv(np.stack(np.broadcast_arrays(second[0], second[1], first[2])))
     return np.where(second[1] != 0, (1 - t) * a + t * other, a)
 
 
-#: Ways to mix two colours by a factor.
+#: Ways to mix two colors by a factor.
 BLENDS: dict[str, Callable[[Values, Values, Values], Values]] = {
     'MIX': lambda a, b, t: a + t * (b - a),
     'DARKEN': lambda a, b, t: a + t * (np.minimum(a, b) - a),
@@ -144,35 +144,35 @@ BLENDS: dict[str, Callable[[Values, Values, Values], Values]] = {
     'DIVIDE': lambda a, b, t: np.where(b != 0, (1 - t) * a + t * _ratio(a, b), a),
     'HUE': _hue_of,
     'SATURATION': _saturation_of,
-    'COLOR': _colour_of,
+    'COLOR': _color_of,
     'VALUE': _value_of,
 }
 
 
-def to_hsv(colour: Values) -> Values:
+def to_hsv(color: Values) -> Values:
     """Hue, saturation and value of RGB."""
-    most, least = colour.max(axis=0), colour.min(axis=0)
+    most, least = color.max(axis=0), color.min(axis=0)
     span = most - least
-    r, g, b = _ratio(most - colour, np.broadcast_to(span, colour.shape))
-    hue = np.where(colour[0] == most, b - g, np.where(colour[1] == most, 2 + r - b, 4 + g - r)) / 6
+    r, g, b = _ratio(most - color, np.broadcast_to(span, color.shape))
+    hue = np.where(color[0] == most, b - g, np.where(color[1] == most, 2 + r - b, 4 + g - r)) / 6
     hue = np.where(span > 0, hue - np.floor(hue), 0)
     return np.stack([hue, _ratio(span, most), most])
 
 
-def from_hsv(colour: Values) -> Values:
+def from_hsv(color: Values) -> Values:
     """RGB of hue, saturation and value."""
-    hue, saturation, value = colour
+    hue, saturation, value = color
     shift = np.array([0, 4, 2], np.float32).reshape(3, *[1] * hue.ndim)
     turn = (hue * 6 + shift) % 6
     return value * (1 - saturation * (1 - np.clip(np.abs(turn - 3) - 1, 0, 1)))
 
 
-def hue_saturation(colour: Values, hue: Values, saturation: Values, value: Values, factor: Values) -> Values:
+def hue_saturation(color: Values, hue: Values, saturation: Values, value: Values, factor: Values) -> Values:
     """The node *Hue/Saturation/Value*."""
-    h, s, v = to_hsv(colour)
+    h, s, v = to_hsv(color)
     h = h + hue + np.float32(0.5)
     made = from_hsv(np.stack(np.broadcast_arrays(h - np.floor(h), np.clip(s * saturation, 0, 1), v * value)))
-    return np.maximum(colour + factor * (made - colour), 0)
+    return np.maximum(color + factor * (made - color), 0)
 
 
 def map_range(value: Values, low: Values, high: Values, to_low: Values, to_high: Values, kind: str) -> Values:
@@ -205,7 +205,7 @@ class ImageMissing(Exception):
     """An image that cannot be read; the text tells the artist."""
 
 
-#: Shaders by the input of their colour, and what they let through of the light that they scatter.
+#: Shaders by the input of their color, and what they let through of the light that they scatter.
 _SIMPLE = {
     'BSDF_DIFFUSE': ("Color", 0.0),
     'BSDF_TRANSLUCENT': ("Color", 1.0),
@@ -229,14 +229,14 @@ class Scattered(NamedTuple):
     ----------
     cover : (p, k)
         Fraction that is not transparent.
-    colour : (3, p, k)
+    color : (3, p, k)
         Fraction of light that is scattered to either side; none where transparent.
     through : (p, k)
         Lightness of the part that leaves on the other side.
     """
 
     cover: Values
-    colour: Values
+    color: Values
     through: Values
 
 
@@ -270,18 +270,18 @@ class NodeValues:
             return _UNLIT
         node = source.node
         if (simple := _SIMPLE.get(node.type)) is not None:
-            colour = self._tint(node, simple[0], stack)
+            color = self._tint(node, simple[0], stack)
             if node.type == 'EMISSION':
-                colour = colour * self._part(node, "Strength", stack)
-            return _solid(_ONE, colour, np.full((1, 1), simple[1], np.float32))
+                color = color * self._part(node, "Strength", stack)
+            return _solid(_ONE, color, np.full((1, 1), simple[1], np.float32))
         work = getattr(self, f"_shade_{node.type.lower()}", None)
         return _UNLIT if work is None else work(node, stack)
 
     def _shade_bsdf_principled(self, node: bpy.types.Node, stack: Stack) -> Scattered:
-        colour = self._tint(node, "Base Color", stack)
+        color = self._tint(node, "Base Color", stack)
         glass, inside = (self._part(node, f"{name} Weight", stack) for name in ("Transmission", "Subsurface"))
         through = np.clip(np.maximum(glass, inside / 2), 0, 1)
-        return _solid(np.clip(self._part(node, "Alpha", stack), 0, 1), colour, through)
+        return _solid(np.clip(self._part(node, "Alpha", stack), 0, 1), color, through)
 
     def _shade_eevee_specular(self, node: bpy.types.Node, stack: Stack) -> Scattered:
         gone = np.clip(self._part(node, "Transparency", stack), 0, 1)
@@ -300,11 +300,11 @@ class NodeValues:
     def _shade_add_shader(self, node: bpy.types.Node, stack: Stack) -> Scattered:
         a, b = (self.shader(find_socket(node.inputs, key), stack) for key in ("Shader", "Shader_001"))
         # Light that either lets pass straight passes; more than all of it cannot.
-        return Scattered(np.clip(a.cover + b.cover - 1, 0, 1), a.colour + b.colour, a.through + b.through)
+        return Scattered(np.clip(a.cover + b.cover - 1, 0, 1), a.color + b.color, a.through + b.through)
 
     def _tint(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
         try:
-            return np.clip(self.colour(node, key, stack), 0, 1)
+            return np.clip(self.color(node, key, stack), 0, 1)
         except ImageMissing as error:
             self._points.tell(str(error))
             return self._points.viewport.reshape(3, 1, 1)
@@ -322,8 +322,8 @@ class NodeValues:
         """An input as a number (p, k)."""
         return self._as(*self._input(find_socket(node.inputs, key), stack), 'VALUE')
 
-    def colour(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
-        """An input as a colour or vector (3, p, k)."""
+    def color(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
+        """An input as a color or vector (3, p, k)."""
         return self._as(*self._input(find_socket(node.inputs, key), stack), 'RGBA')
 
     def _as(self, values: Values, kind: str, wanted: str) -> Values:
@@ -344,8 +344,8 @@ class NodeValues:
     def _output(self, socket: bpy.types.NodeSocket, stack: Stack) -> Values:
         node = socket.node
         if node.type == 'TEX_IMAGE':
-            colour, alpha = self._image(node, stack)
-            return alpha if socket.identifier == "Alpha" else colour
+            color, alpha = self._image(node, stack)
+            return alpha if socket.identifier == "Alpha" else color
         if (mean := _MEANS.get((node.type, socket.identifier))) is not None:
             return np.full((1, 1), mean, np.float32)
         if node.type == 'LIGHT_PATH' and socket.identifier.startswith("Is "):
@@ -364,7 +364,7 @@ class NodeValues:
                 u, v, self._size = self._points.uv("")
             else:
                 self._size = np.zeros((1, 1), np.float32)
-                u, v = self.colour(node, "Vector", stack)[:2]
+                u, v = self.color(node, "Vector", stack)[:2]
             pyramid = self._points.pyramid(node, self._scale)
             self._images[key] = pyramid.look(u, v, self._size * np.float32(self._scale), node.extension)
             self._scale = outer
@@ -378,8 +378,8 @@ class NodeValues:
 
     def _unknown(self, node, socket, stack) -> Values:
         self._points.unknown()
-        if socket.type == 'RGBA' and (colours := [s for s in node.inputs if s.type == 'RGBA' and s.is_linked]):
-            return self.colour(node, colours[0].identifier, stack)
+        if socket.type == 'RGBA' and (colors := [s for s in node.inputs if s.type == 'RGBA' and s.is_linked]):
+            return self.color(node, colors[0].identifier, stack)
         return np.full((1, 1) if socket.type == 'VALUE' else (3, 1, 1), 0.5, np.float32)
 
     def _of_uvmap(self, node, _socket, _stack) -> Values:
@@ -400,8 +400,8 @@ class NodeValues:
         return values[:3].mean(axis=0) if socket.identifier == "Fac" else values[:3]
 
     def _of_mapping(self, node, _socket, stack) -> Values:
-        vector = self.colour(node, "Vector", stack)
-        shift, turn, scale = (self.colour(node, key, stack) for key in ("Location", "Rotation", "Scale"))
+        vector = self.color(node, "Vector", stack)
+        shift, turn, scale = (self.color(node, key, stack) for key in ("Location", "Rotation", "Scale"))
         shift, turn, scale = (values.mean(axis=(1, 2), keepdims=True) for values in (shift, turn, scale))
         linear = np.array(Euler(turn.ravel().tolist()).to_matrix()) @ np.diag(scale.ravel().astype(np.float64))
         move = shift if node.vector_type in {'POINT', 'TEXTURE'} else np.zeros_like(shift)
@@ -417,17 +417,17 @@ class NodeValues:
             return self._unknown(node, socket, stack)
         word = {'FLOAT': "Float", 'VECTOR': "Vector", 'RGBA': "Color"}[kind]
         if kind == 'VECTOR' and node.factor_mode == 'NON_UNIFORM':
-            factor = self.colour(node, "Factor_Vector", stack)
+            factor = self.color(node, "Factor_Vector", stack)
         else:
             factor = self.number(node, "Factor_Float", stack)
         factor = np.clip(factor, 0, 1) if node.clamp_factor else factor
-        read = self.number if kind == 'FLOAT' else self.colour
+        read = self.number if kind == 'FLOAT' else self.color
         a, b = read(node, f"A_{word}", stack), read(node, f"B_{word}", stack)
         made = self._blend(node.blend_type if kind == 'RGBA' else 'MIX', a, b, factor)
         return np.clip(made, 0, 1) if kind == 'RGBA' and node.clamp_result else made
 
     def _of_mix_rgb(self, node, _socket, stack) -> Values:
-        a, b = self.colour(node, "Color1", stack), self.colour(node, "Color2", stack)
+        a, b = self.color(node, "Color1", stack), self.color(node, "Color2", stack)
         made = self._blend(node.blend_type, a, b, np.clip(self.number(node, "Fac", stack), 0, 1))
         return np.clip(made, 0, 1) if node.use_clamp else made
 
@@ -438,18 +438,18 @@ class NodeValues:
 
     def _of_hue_sat(self, node, _socket, stack) -> Values:
         keys = ("Hue", "Saturation", "Value", "Fac")
-        return hue_saturation(self.colour(node, "Color", stack), *(self.number(node, key, stack) for key in keys))
+        return hue_saturation(self.color(node, "Color", stack), *(self.number(node, key, stack) for key in keys))
 
     def _of_gamma(self, node, _socket, stack) -> Values:
-        return np.maximum(self.colour(node, "Color", stack), 0) ** self.number(node, "Gamma", stack)
+        return np.maximum(self.color(node, "Color", stack), 0) ** self.number(node, "Gamma", stack)
 
     def _of_brightcontrast(self, node, _socket, stack) -> Values:
         bright, contrast = self.number(node, "Bright", stack), self.number(node, "Contrast", stack)
-        return np.maximum((1 + contrast) * self.colour(node, "Color", stack) + bright - contrast * 0.5, 0)
+        return np.maximum((1 + contrast) * self.color(node, "Color", stack) + bright - contrast * 0.5, 0)
 
     def _of_invert(self, node, _socket, stack) -> Values:
-        colour, factor = self.colour(node, "Color", stack), self.number(node, "Fac", stack)
-        return colour + factor * (1 - 2 * colour)
+        color, factor = self.color(node, "Color", stack), self.number(node, "Fac", stack)
+        return color + factor * (1 - 2 * color)
 
     def _of_math(self, node, socket, stack) -> Values:
         made = self._compute(node, socket, [s for s in node.inputs if s.enabled], stack, self.number)
@@ -459,14 +459,14 @@ class NodeValues:
         if node.operation == 'SCALE':
             scale = self.number(node, "Scale", stack)
             self._scale *= abs(float(scale.mean()))
-            return self.colour(node, "Vector", stack) * scale
+            return self.color(node, "Vector", stack) * scale
         operands = [s for s in node.inputs if s.enabled and s.type == 'VECTOR']
         if node.operation in {'DOT_PRODUCT', 'LENGTH', 'DISTANCE'}:
-            first, *rest = (self.colour(node, s.identifier, stack) for s in operands)
+            first, *rest = (self.color(node, s.identifier, stack) for s in operands)
             if node.operation == 'DOT_PRODUCT':
                 return (first * rest[0]).sum(axis=0)
             return np.sqrt(((first - (rest[0] if rest else 0)) ** 2).sum(axis=0))
-        made = self._compute(node, socket, operands, stack, self.colour)
+        made = self._compute(node, socket, operands, stack, self.color)
         if node.operation == 'MULTIPLY' and not operands[1].is_linked:
             self._scale *= float(np.sqrt(abs(np.prod(operands[1].default_value[:2]))))
         return made
@@ -489,16 +489,16 @@ class NodeValues:
         mapping = node.mapping
         mapping.initialize()
         single = node.type == 'CURVE_FLOAT'
-        # The last curve of colours is for all of them, and comes first.
+        # The last curve of colors is for all of them, and comes first.
         curves = list(mapping.curves)
         if single:
             table = self._table(node, lambda x: [mapping.evaluate(curves[0], x)])
             value, factor = self.number(node, "Value", stack), self.number(node, "Factor", stack)
             return value + factor * (_looked_up(table, value)[0] - value)
         table = self._table(node, lambda x: [mapping.evaluate(c, mapping.evaluate(curves[3], x)) for c in curves[:3]])
-        colour, factor = self.colour(node, "Color", stack), self.number(node, "Fac", stack)
-        made = np.stack([_looked_up(table[:, i : i + 1], colour[i])[0] for i in range(3)])
-        return colour + factor * (made - colour)
+        color, factor = self.color(node, "Color", stack), self.number(node, "Fac", stack)
+        made = np.stack([_looked_up(table[:, i : i + 1], color[i])[0] for i in range(3)])
+        return color + factor * (made - color)
 
     def _table(self, node: bpy.types.Node, value: Callable[[float], list[float]]) -> NDArray[np.float32]:
         key = node.as_pointer()
@@ -523,13 +523,13 @@ class NodeValues:
         return np.minimum(np.maximum(value, low), high)
 
     def _of_rgbtobw(self, node, _socket, stack) -> Values:
-        return luminance(self.colour(node, "Color", stack))
+        return luminance(self.color(node, "Color", stack))
 
     def _of_separate_color(self, node, socket, stack) -> Values:
         if getattr(node, "mode", 'RGB') != 'RGB':
             return self._unknown(node, socket, stack)
         part = [s.identifier for s in node.outputs].index(socket.identifier)
-        return self.colour(node, node.inputs[0].identifier, stack)[part]
+        return self.color(node, node.inputs[0].identifier, stack)[part]
 
     def _of_combine_color(self, node, socket, stack) -> Values:
         if getattr(node, "mode", 'RGB') != 'RGB':
@@ -580,8 +580,8 @@ def _constant(socket: bpy.types.NodeSocket) -> Values:
     return np.full((1, 1), float(value), np.float32)
 
 
-def _solid(cover: Values, colour: Values, through: Values) -> Scattered:
-    scattered = np.clip(colour, 0, 1) * cover
+def _solid(cover: Values, color: Values, through: Values) -> Scattered:
+    scattered = np.clip(color, 0, 1) * cover
     return Scattered(cover, scattered, luminance(scattered) * through)
 
 

@@ -242,20 +242,20 @@ class Graph:
         return Term(self, node.outputs[0])
 
     def mixed(self, factor: Any, a: Any, b: Any, **settings: Any) -> Term:
-        """Colours mixed; those that are no terms are (r, g, b)."""
+        """Colors mixed; those that are no terms are (r, g, b)."""
         inputs = {"Factor_Float": factor}
-        for key, colour in (("A_Color", a), ("B_Color", b)):
-            inputs[key] = (*colour[:3], 1.0) if isinstance(colour, tuple) else colour
+        for key, color in (("A_Color", a), ("B_Color", b)):
+            inputs[key] = (*color[:3], 1.0) if isinstance(color, tuple) else color
         return self.outputs("ShaderNodeMix", inputs, data_type='RGBA', **settings)["Result_Color"]
 
-    def tinted(self, colour: Any, tint: Any) -> Term:
-        """Product of two colours, at most 1 so that no surface returns more light than it gets."""
-        return self.mixed(1.0, colour, tint, blend_type='MULTIPLY', clamp_result=True)
+    def tinted(self, color: Any, tint: Any) -> Term:
+        """Product of two colors, at most 1 so that no surface returns more light than it gets."""
+        return self.mixed(1.0, color, tint, blend_type='MULTIPLY', clamp_result=True)
 
-    def scaled(self, colour: Any, factor: Any) -> Term:
-        """Colour times a number, at most 1."""
-        grey = self.node("ShaderNodeCombineColor", {"Red": factor, "Green": factor, "Blue": factor})
-        return self.tinted(colour, grey)
+    def scaled(self, color: Any, factor: Any) -> Term:
+        """Color times a number, at most 1."""
+        gray = self.node("ShaderNodeCombineColor", {"Red": factor, "Green": factor, "Blue": factor})
+        return self.tinted(color, gray)
 
     def step(self, value: Any, low: Any, high: Any) -> Term:
         """0 under `low`, 1 over `high`, smooth between; falls where `low` is above `high`."""
@@ -374,7 +374,7 @@ def _add_input(
 
 
 def surface_material(name: str, version: int, build: Callable[[Graph, bpy.types.Material], None]) -> bpy.types.Material:
-    """A material with nodes, as `get_or_create` finds or makes it; `build` may change its viewport colour."""
+    """A material with nodes, as `get_or_create` finds or makes it; `build` may change its viewport color."""
 
     def fill(made: bpy.types.Material) -> None:
         made.diffuse_color = LEAF_GREEN

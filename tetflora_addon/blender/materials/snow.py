@@ -144,8 +144,8 @@ def snow_group() -> bpy.types.NodeTree:
 
 def _cloud_group() -> bpy.types.NodeTree:
     """The group "TetFlora Snow Cloud": color and transmission of the particle that is hit in a cloud, under snow."""
-    inputs = (("Colour", 'Color', LEAF_GREEN), ("Transmission", 'Float', 0.0, UNIT))
-    outputs = (("Colour", 'Color'), ("Transmission", 'Float'), ("Cover", 'Float'))
+    inputs = (("Color", 'Color', LEAF_GREEN), ("Transmission", 'Float', 0.0, UNIT))
+    outputs = (("Color", 'Color'), ("Transmission", 'Float'), ("Cover", 'Float'))
 
     def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
         geometry = graph.outputs("ShaderNodeNewGeometry")
@@ -159,8 +159,8 @@ def _cloud_group() -> bpy.types.NodeTree:
             cover.append(held[-1] * (upward > 0.0))
         share = graph.attribute("tf_plane", "Fac")
         kept, white = ((second - first) * share + first for first, second in (held, cover))
-        colour = graph.mixed(white, given["Colour"], _CLUSTER)
-        return {"Colour": colour, "Transmission": given["Transmission"] * (1.0 - kept), "Cover": white}
+        color = graph.mixed(white, given["Color"], _CLUSTER)
+        return {"Color": color, "Transmission": given["Transmission"] * (1.0 - kept), "Cover": white}
 
     return node_group(CLOUD, _VERSION, inputs, outputs, build)
 
@@ -203,7 +203,7 @@ def _fit_cloud(snowy: bool) -> None:
         elif name == SHELL:
             spheres = next(n for n in tree.nodes if n.type == 'GROUP' and n.node_tree.name == MICROSPHERE)
             node = _group_node(tree, _cloud_group(), spheres, mark=True)
-            for key in ("Colour", "Transmission"):
+            for key in ("Color", "Transmission"):
                 _put_between(tree, spheres.inputs[key], node.inputs[key], node.outputs[key])
         else:
             _cover_baked_shell(tree)
@@ -218,7 +218,7 @@ def _cover_baked_shell(tree: bpy.types.NodeTree) -> None:
         added = end.inputs[engine].links[0].from_node
         baked, clear = (socket.links[0].from_socket for socket in added.inputs)
         through = Term(graph, clear.node.inputs["Color"].links[0].from_socket)
-        looks = {"Colour": _CLUSTER, "s": 0.0, "p": graph.math('SUBTRACT', 1.0, through)}
+        looks = {"Color": _CLUSTER, "s": 0.0, "p": graph.math('SUBTRACT', 1.0, through)}
         looks |= {"Normal": graph.attribute("tf_normal", "Vector"), "Plane": graph.attribute("tf_plane", "Fac")}
         lit = graph.outputs("ShaderNodeGroup", looks, node_tree=microsphere_group())
         graph.feed(added.inputs[0], graph.mix(cover, baked, lit[engine]))

@@ -35,7 +35,7 @@ def is_soil(material: bpy.types.Material | None) -> bool:
 def lay_soil(
     name: str,
     grounds: Sequence[bpy.types.Object],
-    colours: NDArray[np.float64],
+    colors: NDArray[np.float64],
     green: NDArray[np.float64],
     tint: NDArray[np.float64],
     low: NDArray[np.float64],
@@ -44,7 +44,7 @@ def lay_soil(
     """Give grounds a soil, see `soil_material`, of square cells, meters; names of those that keep the artist's own."""
     fits = [obj for obj in grounds if may_have_soil(obj)]
     before = next((slot.material for obj in fits for slot in obj.material_slots if is_soil(slot.material)), None)
-    material = soil_material(name, colours, green, tint, low, cell * np.array(green.shape[::-1]), before)
+    material = soil_material(name, colors, green, tint, low, cell * np.array(green.shape[::-1]), before)
     for obj in fits:
         if obj.material_slots:
             obj.material_slots[0].material = material
@@ -64,7 +64,7 @@ def may_have_soil(obj: bpy.types.Object) -> bool:
 
 def soil_material(
     name: str,
-    colours: NDArray[np.float64],
+    colors: NDArray[np.float64],
     green: NDArray[np.float64],
     tint: NDArray[np.float64],
     low: NDArray[np.float64],
@@ -75,7 +75,7 @@ def soil_material(
 
     Parameters
     ----------
-    colours : (rows, columns, 3) float64
+    colors : (rows, columns, 3) float64
         Linear RGB of soil and what lies on it; the first row is at the smallest y.
     green : (rows, columns) float64
         Fraction of the ground that plants hide.
@@ -86,13 +86,13 @@ def soil_material(
     material : bpy.types.Material, optional
         Soil of before. What the artist changed in its nodes stays.
     """
-    image = _image(name, colours, green)
+    image = _image(name, colors, green)
     nodes = None if material is None else shader_tree(material).nodes
     if nodes is None or any(nodes.get(key) is None for key in (_PLACE, _SIZE, _MAP, _GREEN)):
         if material is None:
             material = bpy.data.materials.new(name)
             material[MARK] = True
-        material.diffuse_color = (*(float(c) for c in colours.mean(axis=(0, 1))), 1.0)
+        material.diffuse_color = (*(float(c) for c in colors.mean(axis=(0, 1))), 1.0)
         graph = Graph(shader_tree(material))
         _build(graph)
         graph.arrange()
@@ -108,13 +108,13 @@ def soil_material(
     return material
 
 
-def _image(name: str, colours: NDArray[np.float64], green: NDArray[np.float64]) -> bpy.types.Image:
+def _image(name: str, colors: NDArray[np.float64], green: NDArray[np.float64]) -> bpy.types.Image:
     """The map: colors as the display has them, so that eight bits are enough for dark ones, and the green in alpha."""
     rows, columns = green.shape
     image = bpy.data.images.new(name, columns, rows, alpha=True)
     image[MARK] = True
     image.alpha_mode = 'CHANNEL_PACKED'
-    encoded = srgb_of(np.clip(colours, 0.0, 1.0))
+    encoded = srgb_of(np.clip(colors, 0.0, 1.0))
     pixels = np.concatenate([encoded, np.clip(green, 0.0, 1.0)[..., None]], axis=2)
     image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).reshape(-1))
     image.pack()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The catalogue as an asset library: a .blend with one plant of each species, to be dragged into any scene.
+"""The catalog as an asset library: a .blend with one plant of each species, to be dragged into any scene.
 
 An asset is an empty like any other plant, so that what is dragged in takes part in refinement at once. Species that
 only the open file has are left out: the file into which an asset is dragged would not know them.
@@ -18,11 +18,11 @@ import numpy as np
 
 from ...errors import SceneError
 from ...files import read_whole, write_whole
-from ...species.catalogue import SpeciesInfo, list_species, load_species
+from ...species.catalog import SpeciesInfo, list_species, load_species
 from ..preferences import species_folders
 from ..runtime import Handlers
 from ..saved_files import VERSION, write_blend
-from ..species.catalogue import thumbnail_file
+from ..species.catalog import thumbnail_file
 from .plant_objects import prepare_scene
 
 FILE = "tetflora_plants.blend"
@@ -33,12 +33,12 @@ _MOST_BYTES = 4_000_000
 
 
 def write_asset_library(folder: Path) -> tuple[Path, int]:
-    """Write a .blend with a plant of each species of the catalogue, marked as assets, over an earlier one.
+    """Write a .blend with a plant of each species of the catalog, marked as assets, over an earlier one.
 
     Parameters
     ----------
     folder : Path
-        Made if there is none. Blender's file of asset catalogues there gets a line for TetFlora.
+        Made if there is none. Blender's file of asset catalogs there gets a line for TetFlora.
 
     Returns
     -------
@@ -50,9 +50,9 @@ def write_asset_library(folder: Path) -> tuple[Path, int]:
     Raises
     ------
     SceneError
-        The folder cannot be written, or its file of catalogues cannot be read.
+        The folder cannot be written, or its file of catalogs cannot be read.
     SpeciesError
-        A species of the catalogue is broken.
+        A species of the catalog is broken.
     """
     known = list_species(species_folders())
     path = folder / FILE
@@ -132,7 +132,7 @@ def _write_catalog(path: Path) -> None:
 
 def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> None:
     """Plants came from another file: this scene needs what a scene with plants needs."""
-    # Dragged assets are still linked here, and become the file's own afterwards.
+    # Dragged assets are still linked here, and become the file's own afterward.
     objects = [item.id for item in context.import_items if isinstance(item.id, bpy.types.Object)]
     if any(obj.tetflora.is_plant for obj in objects):
         prepare_scene(bpy.context.scene)

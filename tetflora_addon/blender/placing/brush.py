@@ -35,10 +35,10 @@ PAINTED = "Painted plants"
 _PAINTED_MARK = "tetflora_painted"  # on the field that painted plants go to
 _OBJECTS = -1  # where single plants are, in place of the number of a field
 _REACH = 2.0  # radii above and below the brush within which ground counts
-_LEAST_REACH = 10.0  # metres
+_LEAST_REACH = 10.0  # meters
 _STRONG = 0.5  # strength from which on Erase clears the ground, and not only the plants that it meets
 _SAME = 0.1  # radii within which a dab that removes nothing adds nothing to the one before
-_PLACE = 0.05  # metres around a plant that was removed, where no other stands
+_PLACE = 0.05  # meters around a plant that was removed, where no other stands
 
 
 def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tuple[str, ...]]:
@@ -183,38 +183,38 @@ class Stroke:
         self._weak = False  # whether there were others
         self._taken: dict[str, list[NDArray[np.float64]]] = {}  # places of plants by their population
 
-    def dab(self, centre: Sequence[float], pressure: float = 1.0) -> int:
+    def dab(self, center: Sequence[float], pressure: float = 1.0) -> int:
         """Do what the brush does at a place on the ground (3 floats); how many plants that adds or removes."""
         with self._data.watched():
-            return self._dab(centre, pressure)
+            return self._dab(center, pressure)
 
-    def _dab(self, centre: Sequence[float], pressure: float) -> int:
+    def _dab(self, center: Sequence[float], pressure: float) -> int:
         brush, _ = brush_of(self.scene, pressure)
         dab, self.dabs = self.dabs, self.dabs + 1
         if self.mode == 'PAINT':
-            return self._paint(brush, centre, dab)
+            return self._paint(brush, center, dab)
         # Those that cannot be removed count for Thin: they are denser all the same.
         decide = strokes.erase if self.mode == 'ERASE' else strokes.thin
         alive = np.flatnonzero(~self._gone)
-        chosen = alive[decide(brush, centre, self.standing.places[alive], self.key, dab)]
+        chosen = alive[decide(brush, center, self.standing.places[alive], self.key, dab)]
         chosen = chosen[self.standing.removable[chosen]]
         self._gone[chosen] = True
         self.removed += len(chosen)
         if self.mode == 'THIN' or brush.strength < _STRONG:
             self._weak = True
         else:
-            last = np.subtract(self._cleared[-1], centre[:2]) if self._cleared else np.inf
+            last = np.subtract(self._cleared[-1], center[:2]) if self._cleared else np.inf
             if len(chosen) or np.linalg.norm(last) > _SAME * brush.radius:
-                self._cleared.append((centre[0], centre[1]))
+                self._cleared.append((center[0], center[1]))
         return len(chosen)
 
-    def _paint(self, brush: Brush, centre: Sequence[float], dab: int) -> int:
+    def _paint(self, brush: Brush, center: Sequence[float], dab: int) -> int:
         # Of a million plants only those nearby are copied.
-        near = self.standing.places[strokes.within(self.standing.places, centre, strokes.reach_of(brush))]
+        near = self.standing.places[strokes.within(self.standing.places, center, strokes.reach_of(brush))]
         standing = np.concatenate([near, *(places for places, _ in self._new)])
-        places, keys = strokes.paint(brush, centre, standing, self.key, dab)
+        places, keys = strokes.paint(brush, center, standing, self.key, dab)
         reach = max(_REACH * brush.radius, _LEAST_REACH)
-        height = self.ground.heights(places, centre[2] + reach, centre[2] - reach)
+        height = self.ground.heights(places, center[2] + reach, center[2] - reach)
         on_ground = np.isfinite(height)
         self._new.append((np.column_stack([places, height])[on_ground], keys[on_ground]))
         self.added += int(on_ground.sum())
@@ -292,17 +292,17 @@ class Stroke:
 
 
 def draped_circle(
-    ground: Ground, centre: Sequence[float], normal: Sequence[float], radius: float, sides: int = 48
+    ground: Ground, center: Sequence[float], normal: Sequence[float], radius: float, sides: int = 48
 ) -> NDArray[np.float64]:
     """The brush's circle on the map laid on the ground, (sides + 1, 3) with the first corner twice.
 
-    Where there is no ground, it goes on in the plane through the centre.
+    Where there is no ground, it goes on in the plane through the center.
     """
     angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
-    x, y = centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)
+    x, y = center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)
     reach = max(_REACH * radius, _LEAST_REACH)
-    z = ground.heights(np.stack([x[:-1], y[:-1]], axis=1), centre[2] + reach, centre[2] - reach)
+    z = ground.heights(np.stack([x[:-1], y[:-1]], axis=1), center[2] + reach, center[2] - reach)
     z = np.concatenate([z, z[:1]])
     tilt = max(abs(normal[2]), 0.2)
-    plane = centre[2] - ((x - centre[0]) * normal[0] + (y - centre[1]) * normal[1]) / tilt
+    plane = center[2] - ((x - center[0]) * normal[0] + (y - center[1]) * normal[1]) / tilt
     return np.stack([x, y, np.where(np.isfinite(z), z, plane)], axis=1)

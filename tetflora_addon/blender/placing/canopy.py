@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...growth.crown_forms import BASE, WIDTH
+from ...growth.crown_shapes import BASE, WIDTH
 from ...planting.canopy import Canopy, Sheet
 from ...planting.cover import Floor, Habitat, Suits, mapping
 from ..attributes import world_matrix
@@ -24,7 +24,7 @@ from ..scene.crowns import crown_for
 from ..scene.fields import field_kinds, fields_of, read_aged_field
 from ..scene.own_ages import stored_ages
 from ..scene.skeletons import species_of
-from ..worker import at_once
+from ..worker import run_to_end
 
 _kept: dict[str, Floor] = {}  # the last one, by content: settings change more often than the plants above
 
@@ -61,7 +61,7 @@ def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     for _, _, form, kinds, which, taller in parts:
         own = [crown_for(scene, kind) for kind in kinds]
         known = np.array([(c.radius, c.base, c.height, c.leaves) for c in own]).reshape(-1, 4)[which]
-        crowns.append(_formed(known, form) * taller[:, None] ** [1, 1, 1, 2])
+        crowns.append(_shaped(known, form) * taller[:, None] ** [1, 1, 1, 2])
         species.append(np.array([number_of(species_of(kind)) for kind in kinds], dtype=np.int32)[which])
     position, size = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
     radius, base, top, area = np.concatenate(crowns).T
@@ -69,7 +69,7 @@ def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     return canopy, tuple(numbers)
 
 
-def _formed(crowns: NDArray[np.float64], form: NDArray[np.float64] | None) -> NDArray[np.float64]:
+def _shaped(crowns: NDArray[np.float64], form: NDArray[np.float64] | None) -> NDArray[np.float64]:
     """Radius, base, top and leaf area (n, 4) of crowns that have forms (n, 5) of their own."""
     if form is None:
         return crowns
@@ -122,7 +122,7 @@ def read_suits(
     }
 
     def suits() -> dict[int, Suits]:
-        floor = at_once(floor_steps(canopy, triangles, len(above)))
+        floor = run_to_end(floor_steps(canopy, triangles, len(above)))
         return {number: floor.suits(*one) for number, one in asked.items()}
 
     return suits

@@ -31,11 +31,11 @@ from ..materials.soil import SHADED, lay_soil
 from ..runtime import JobData, is_there, job
 from ..scene.crowns import crown_for, crown_steps
 from ..settings import with_identity
-from ..species.edits import catalogue, revert_species, species_data, species_for, store_species
+from ..species.edits import catalog, revert_species, species_data, species_for, store_species
 from ..worker import steps_in_thread
 from .canopy import canopy_of, floor_steps, is_cover, shedder_of, standing
 from .distances import HECTARE
-from .populations import Made, add_population, forget_population, make_plants_steps, refuse_frozen, still_there
+from .populations import PlacedPlants, add_population, forget_population, make_plants_steps, refuse_frozen, still_there
 from .rules import active_population, copy_settings, grounds_of
 from .terrain import MASKS, read_ground
 
@@ -76,7 +76,7 @@ class Ingredient:
 
 
 @dataclass(frozen=True)
-class Covered:
+class CoverResult:
     """What covering made.
 
     Attributes
@@ -86,7 +86,7 @@ class Covered:
         Grounds that keep a material of the artist's.
     """
 
-    made: Made
+    made: PlacedPlants
     bare: list[str]
 
 
@@ -107,7 +107,7 @@ def cover_steps(
     soil: bool = True,
     grounds: Iterable[bpy.types.Object] | None = None,
     masks: Mapping[str, Any] = MappingProxyType({}),
-) -> Generator[Progress, object, Covered]:
+) -> Generator[Progress, object, CoverResult]:
     """Cover the ground of a population.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
@@ -148,7 +148,7 @@ def cover_steps(
         with closing(make_plants_steps(scene, depsgraph, found)) as steps:
             made = yield from part_of(steps, _PLANTING, 1.0)
         bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
-    return Covered(made, bare)
+    return CoverResult(made, bare)
 
 
 def _begun(
@@ -251,7 +251,7 @@ def _add_cover(
 
 def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Ingredient]:
     """Species of a cover; those of what falls are made where the file does not have them."""
-    known = catalogue()
+    known = catalog()
     parts = [Ingredient(*one) for one in GROWN if one[0] in known]
     order = _shedders(canopy, above)
     for kind, habitat, number, most in DROPPED:
@@ -274,7 +274,7 @@ def fallen_from(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
     One that is there stays as it is, because it may be the artist's own.
     """
     name = f"{identifier}_{kind}"
-    if name in catalogue():
+    if name in catalog():
         return name
     try:
         page = _PAGES[kind](species_for(scene, identifier), species_data(scene, identifier))
@@ -321,9 +321,9 @@ def _lay_soil(
     shape = sheet.rows, sheet.columns
     green = covered(growing, cells)
     areas = np.array([one.number * one.area * one.suits.mean() for one in growing] or [0.0])
-    colours = np.stack([one.colour for one in growing] or [HUMUS])
+    colors = np.stack([one.color for one in growing] or [HUMUS])
     # Seen from above, a meadow is darker than its blades, which shade each other.
-    tint = SHADED * (areas @ colours / max(areas.sum(), 1e-12))
+    tint = SHADED * (areas @ colors / max(areas.sum(), 1e-12))
     earth = tinted(lying, HUMUS, cells).reshape(*shape, 3)
     return lay_soil(f"{cover.name} soil", grounds, earth, green.reshape(shape), tint, sheet.low, sheet.cell)
 
@@ -341,7 +341,7 @@ def _strata(
         habitat, crown = Habitat[entry.habitat], crown_for(scene, entry.species)
         suits: NDArray[np.float64] = floor.map_of(habitat, shedder_of(entry, above))
         patch = 0.6 if habitat.value[1] else 1.0  # of the ground is within patches
-        one = Stratum(patch * suits, thin * entry.weight, crown.seen, np.array(crown.colour))
+        one = Stratum(patch * suits, thin * entry.weight, crown.seen, np.array(crown.color))
         (lying if habitat.falls else growing).append(one)
     return lying, growing
 
@@ -349,7 +349,7 @@ def _strata(
 @job("Strewing leaves")
 def strew_steps(
     data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup
-) -> Generator[Progress, object, Made | None]:
+) -> Generator[Progress, object, PlacedPlants | None]:
     """Strew the leaves that fall in autumn under a population; None where nothing above sheds its leaves.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the

@@ -17,11 +17,11 @@ from ...errors import SpeciesError
 from ...planting.rules import suggested_distance
 from ..scene.crowns import crown_for, crown_to_draw
 from ..scene.skeletons import aged_kind
-from ..species.catalogue import default_species
+from ..species.catalog import default_species
 
-#: Square metres of the area that densities are counted on: foresters count trees by the hectare.
+#: Square meters of the area that densities are counted on: foresters count trees by the hectare.
 HECTARE = 10_000.0
-#: Square metres of the area that densities of the brush are counted on.
+#: Square meters of the area that densities of the brush are counted on.
 SQUARE = 100.0
 #: Whence the distance comes, as stored.
 SOURCES = (
@@ -36,7 +36,7 @@ def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
     Raises
     ------
     SpeciesError
-        The catalogue is empty.
+        The catalog is empty.
     """
     weights: dict[str, float] = {}
     for entry in population.mix:
@@ -51,7 +51,7 @@ def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
     Raises
     ------
     SpeciesError
-        The catalogue is empty.
+        The catalog is empty.
     """
     brush = scene.tetflora.brush
     if brush.source == 'ONE' and brush.species:
@@ -69,7 +69,7 @@ def follows_species(settings: bpy.types.PropertyGroup) -> bool:
 
 
 def distance_of(settings: bpy.types.PropertyGroup) -> float:
-    """Distance in metres that counts for a population or brush: its own, or the one that suits its species."""
+    """Distance in meters that counts for a population or brush: its own, or the one that suits its species."""
     return suggestion(settings) if follows_species(settings) else settings.min_distance
 
 
@@ -81,19 +81,19 @@ def distance_to_draw(settings: bpy.types.PropertyGroup) -> float | None:
 def suggestion(
     settings: bpy.types.PropertyGroup, find: Callable[[bpy.types.Scene, str], Crown | None] = crown_for
 ) -> float | None:
-    """Distance in metres that suits the species of a population or brush.
+    """Distance in meters that suits the species of a population or brush.
 
     Species are compiled at the first time, up to a tenth of a second each. None where a crown is not found.
     """
     scene, of_brush = settings.id_data, "strokes" in settings.bl_rna.properties
     try:
         weights = painted_weights(scene) if of_brush else weights_of(settings)
-    except SpeciesError:  # an empty catalogue, of which Populate and the brush complain
+    except SpeciesError:  # an empty catalog, of which Populate and the brush complain
         return settings.min_distance
     crowns = [find(scene, aged_kind(identifier, 0.0 if of_brush else settings.age)) for identifier in weights]
     if None in crowns:
         return None
-    # Plants per square metre, if they are asked for.
+    # Plants per square meter, if they are asked for.
     density = settings.density / (SQUARE if of_brush else HECTARE) if of_brush or settings.by_density else None
     scale = (settings.scale_min + settings.scale_max) / 2.0
     suited = suggested_distance([crown.radius for crown in crowns], list(weights.values()), scale, density)

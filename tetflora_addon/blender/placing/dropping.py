@@ -18,12 +18,12 @@ from ..runtime import JobData, job
 from .field_edits import own_mesh, positions
 from .ground import Ground
 
-_STAYS = 1e-6  # metres: a smaller gap counts as standing on the ground
+_STAYS = 1e-6  # meters: a smaller gap counts as standing on the ground
 _LOOKING = "Looking for the ground"
 
 
 @dataclass(frozen=True)
-class Dropped:
+class DropResult:
     """How many plants moved, and how many have no ground below or above."""
 
     moved: int
@@ -37,7 +37,7 @@ def drop_steps(
     depsgraph: bpy.types.Depsgraph,
     plants: Sequence[bpy.types.Object],
     fields: Sequence[bpy.types.Object],
-) -> Generator[Progress, object, Dropped]:
+) -> Generator[Progress, object, DropResult]:
     """Move plants vertically to the nearest ground; children move with their parents before they fall themselves.
 
     Parameters
@@ -71,7 +71,7 @@ def drop_steps(
     of_plants, *of_fields = np.split(heights, ends[:-1])
     moved = _drop_plants(view_layer, plants, of_plants)
     moved += sum(_drop_field(field, own) for field, own in zip(fields, of_fields, strict=True))
-    return Dropped(moved, int(np.isnan(heights).sum()))
+    return DropResult(moved, int(np.isnan(heights).sum()))
 
 
 def _drop_plants(

@@ -3,7 +3,7 @@
 """Changing fields of plants that TetFlora made: points taken out and put in, with all that is stored with them.
 
 Whole arrays throughout. A field whose points come from nodes, or that has edges and faces, belongs to somebody else's
-modelling and is left alone.
+modeling and is left alone.
 """
 
 from __future__ import annotations

@@ -23,24 +23,24 @@ from ...planting.strokes import admitted
 from ..attributes import write
 from ..compat import shader_tree
 from ..materials.nodes import Graph, find_socket
-from ..species.catalogue import default_species
-from ..species.edits import catalogue
-from ..worker import at_once
+from ..species.catalog import default_species
+from ..species.edits import catalog
+from ..worker import run_to_end
 from .cover import cover_steps
 from .plant_objects import add_plants
 from .terrain import grid_mesh
 
 NAME = "First forest"
-EYE_HEIGHT = 1.7  # metres
+EYE_HEIGHT = 1.7  # meters
 SAMPLES = 24
 #: Attribute of the ground that is 0 on the path and 1 beside it.
 OFF_PATH = "off_path"
 _MARK = "tetflora_first_forest"  # on the collection, so that it may be renamed
 _STARTUP = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}
-_WEST, _EAST, _SOUTH, _NORTH = -48.0, 48.0, -14.0, 112.0  # of the ground, metres; the camera looks north
-_STEP = 2.0  # metres between the ground's vertices
+_WEST, _EAST, _SOUTH, _NORTH = -48.0, 48.0, -14.0, 112.0  # of the ground, meters; the camera looks north
+_STEP = 2.0  # meters between the ground's vertices
 _CANDIDATES = 4000
-_PATH = 2.2  # metres from the middle of the path to its edge
+_PATH = 2.2  # meters from the middle of the path to its edge
 
 
 def tread(material: bpy.types.Material) -> None:
@@ -84,7 +84,7 @@ def _ramp(graph: Graph, factor: object, stops: Sequence[tuple[float, tuple[float
 
 @dataclass(frozen=True)
 class Layer:
-    """Plants of one species, placed after the layers before; lengths in metres, ``smallest`` and ``largest`` scale."""
+    """Plants of one species, placed after the layers before; lengths in meters, ``smallest`` and ``largest`` scale."""
 
     species: str
     number: int
@@ -123,7 +123,7 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
     Raises
     ------
     SpeciesError
-        The catalogue is empty.
+        The catalog is empty.
     """
     default_species()
     scene, note = _scene_for(context)
@@ -146,7 +146,7 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
 
 
 def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The ground's height at places on the map, metres; the path lies in a shallow hollow and the land rises beyond."""
+    """The ground's height at places on the map, meters; the path lies in a shallow hollow and the land rises beyond."""
     x, y = np.asarray(x, float), np.asarray(y, float)
     waves = 0.5 * np.sin(0.11 * x + 0.6) * np.cos(0.083 * y) + 0.22 * np.sin(0.29 * x - 0.17 * y + 1.0)
     aside = np.abs(x - path(y))
@@ -155,7 +155,7 @@ def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def path(y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where the middle of the path is, x by y, metres."""
+    """Where the middle of the path is, x by y, meters."""
     return 5.0 * np.sin(np.asarray(y, float) / 21.0)
 
 
@@ -206,7 +206,7 @@ def places(seed: int) -> list[NDArray[np.float64]]:
     standing, out = np.zeros((0, 2)), []
     for number, layer in enumerate(LAYERS):
         keys = child_key(child_key(key_of_seed(seed), number), np.arange(_CANDIDATES))
-        # In the camera's view, with more near than far: as many in each metre of depth.
+        # In the camera's view, with more near than far: as many in each meter of depth.
         y = layer.near + (layer.far - layer.near) * uniform(keys, 1)
         x = (2.0 * uniform(keys, 2) - 1.0) * (0.75 * (y + 6.0))
         x = x + path(y) * np.clip(1.0 - y / 60.0, 0.0, 1.0)
@@ -219,7 +219,7 @@ def places(seed: int) -> list[NDArray[np.float64]]:
 
 
 def _plant(scene: bpy.types.Scene, seed: int) -> None:
-    known = catalogue()
+    known = catalog()
     for number, (layer, place) in enumerate(zip(LAYERS, places(seed), strict=True)):
         keys = child_key(child_key(key_of_seed(seed), 100 + number), np.arange(len(place)))
         scale = layer.smallest + (layer.largest - layer.smallest) * uniform(keys, 1)
@@ -241,7 +241,7 @@ def _cover(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     steps = cover_steps(
         scene, layer.depsgraph, scene.tetflora.populate, grounds=[ground], masks={"vertex_group": OFF_PATH}
     )
-    at_once(steps)
+    run_to_end(steps)
     tread(ground.material_slots[0].material)
     scene.tetflora.populations_index = -1  # Populate begins with settings for a new one
 
@@ -267,7 +267,7 @@ def _sun() -> bpy.types.Object:
 def _settings(scene: bpy.types.Scene) -> None:
     """Quick settings for Refine and renders, and the species of the forest for Populate and the brush."""
     scene.tetflora.quality = 'DRAFT'
-    mix, known_species = scene.tetflora.populate.mix, catalogue()
+    mix, known_species = scene.tetflora.populate.mix, catalog()
     for layer in LAYERS if not mix else ():
         if layer.species in known_species:
             entry = mix.add()

@@ -19,8 +19,8 @@ from ..materials.nodes import is_ours
 from ..species.asset_species import asset_of
 
 _FEW = 8  # objects of which all are asked; of more only those whose boxes the ray meets
-_ABOVE = 1e-3  # metres above a plant's foot from which it falls, so that rounding does not let it through the ground
-_AT_ONCE = 200  # places between two looks at the keyboard
+_ABOVE = 1e-3  # meters above a plant's foot from which it falls, so that rounding does not let it through the ground
+_BATCH = 200  # places between two looks at the keyboard
 
 Hit = tuple[Vector, Vector]
 
@@ -59,7 +59,7 @@ class Ground:
         return len(self.objects)
 
     def cast(self, origin: Vector, direction: Vector, distance: float = inf) -> Hit | None:
-        """First place, and its normal towards the ray's origin, that a ray meets; world space, None without any."""
+        """First place, and its normal toward the ray's origin, that a ray meets; world space, None without any."""
         direction = direction.normalized()
         nearest, found = distance, None
         for obj in self._candidates(origin, direction):
@@ -111,7 +111,7 @@ class Ground:
         down, up = Vector((0.0, 0.0, -1.0)), Vector((0.0, 0.0, 1.0))
         out = np.full(len(places), np.nan)
         for i, (x, y, z) in enumerate(places.tolist()):
-            if i % _AT_ONCE == 0:
+            if i % _BATCH == 0:
                 yield i / len(places)
             low = self.cast(Vector((x, y, z + _ABOVE)), down)
             high = self.cast(Vector((x, y, z)), up, abs(z - low[0].z) if low else inf)

@@ -10,7 +10,7 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 
 from ...errors import SceneError
-from ...jobs import at_once
+from ...jobs import run_to_end
 from ...planting.places import Placement, new_seeds
 from .. import settings
 from ..attributes import world_matrix
@@ -19,8 +19,8 @@ from ..scene.ages import plainly_aged, relative_heights
 from ..scene.fields import fields_of, quaternions, read_aged_field, stored_size, write_field
 from ..scene.own_ages import stored_ages
 from ..scene.plants import single_plants
-from ..scene.skeletons import form_of, species_of
-from ..species.edits import catalogue, display_height
+from ..scene.skeletons import skeleton_object_of, species_of
+from ..species.edits import catalog, display_height
 from .field_edits import FIELD_MARK
 
 COLLECTION = "TetFlora plants"
@@ -29,7 +29,7 @@ FIELD = "Field of plants"
 EMPTIES_UNASKED = 10_000
 POPULATION_MARK = "tetflora_population"  # on the collection of a population's plants
 _MARK = "tetflora_plants"  # on the collection, so that it may be renamed
-_AT_ONCE = 300  # empties of one step, ten milliseconds
+_BATCH = 300  # empties of one step, ten milliseconds
 _FEW = 1000  # plants that may get their names the way Blender does it
 
 
@@ -98,7 +98,7 @@ def add_plants(
     list of bpy.types.Object
         In the placement's order.
     """
-    return at_once(add_plants_steps(scene, placement, species, collection, ages))
+    return run_to_end(add_plants_steps(scene, placement, species, collection, ages))
 
 
 def add_plants_steps(
@@ -122,7 +122,7 @@ def _empties_steps(
     ages: np.ndarray | None = None,
 ) -> Generator[list[bpy.types.Object], object, list[bpy.types.Object]]:
     """One empty for each row of places, XYZ Euler angles, scales, numbers of kinds and seeds."""
-    known = catalogue()
+    known = catalog()
     names = _numbered([known[s].name if s in known else s for s in species], rows[3])
     target = (collection or plant_collection(scene)).objects
     new = bpy.data.objects.new
@@ -134,11 +134,11 @@ def _empties_steps(
         kind, group = kinds[number], obj.tetflora
         group.version, group.is_plant, group.species, group.seed = VERSION, True, species[kind], seeds[number]
         if forms[kind] is not None:
-            group.form = forms[kind]
+            group.skeleton = forms[kind]
         if ages is not None and ages[number] != 0.0:
             group.age = ages[number]
         target.link(obj)
-        if not count % _AT_ONCE:
+        if not count % _BATCH:
             yield [obj for obj in made if obj is not None]
     heights = np.array([display_height(s) for s in species], dtype=np.float32)[rows[3]]
     for kind in range(len(species)) if ages is not None else ():
@@ -238,7 +238,10 @@ def field_from_plants(
     """
     plants = sorted(plants, key=lambda o: o.name_full)
     read = single_plants(plants, depsgraph)
-    species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
+    species, forms = (
+        [species_of(kind) for kind in read.identifiers],
+        [skeleton_object_of(kind) for kind in read.identifiers],
+    )
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
     made = link_field(scene, write_field(FIELD, *rows, species, forms, stored_ages(plants)), collection)
     remove_plants(plants)
@@ -254,7 +257,7 @@ def plants_from_field(
 ) -> list[bpy.types.Object]:
     """Put empties in place of a field; the same individuals stand at the same places.
 
-    Recorded sizes become ages and scales; empties have no crown forms.
+    Recorded sizes become ages and scales; empties have no crown shapes.
 
     Parameters
     ----------
@@ -275,9 +278,12 @@ def plants_from_field(
             + (f"the limit for objects is {most:,}. Split the field first" if len(read) else "add points first")
         )
     angles = np.array([Matrix(frame).to_euler() for frame in read.frame])
-    species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
+    species, forms = (
+        [species_of(kind) for kind in read.identifiers],
+        [skeleton_object_of(kind) for kind in read.identifiers],
+    )
     rows = (read.position, angles, read.scale, read.species, read.seed)
-    made = at_once(_empties_steps(scene, rows, species, forms, collection, ages))
+    made = run_to_end(_empties_steps(scene, rows, species, forms, collection, ages))
     remove_fields([field])
     return made
 

@@ -14,7 +14,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...errors import NAME, readable, shown
+from ...errors import NAME, quoted, readable
 from ...files import IDENTIFIER_RULE, is_identifier
 from ..settings import limits_of
 from .properties import TetFloraMixEntry, TetFloraPopulation

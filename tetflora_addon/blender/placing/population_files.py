@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Populations as JSON files: the rules by which plants are placed, for other scenes and other people.
 
-Keys are the names of the settings in Python. Angles are degrees, lengths metres. Objects, images and collections are
+Keys are the names of the settings in Python. Angles are degrees, lengths meters. Objects, images and collections are
 named; those missing in another file are left empty and reported. Everything unknown is refused.
 """
 
@@ -16,7 +16,7 @@ from typing import Any
 import bpy
 
 from ...errors import SceneError
-from ...files import json_of, read_whole, write_whole
+from ...files import parse_json, read_whole, write_whole
 from .population_data import (
     check_format,
     check_keys,
@@ -80,7 +80,7 @@ def read_populations(
         The file cannot be read, or breaks a rule of the format; names file and key. Nothing is added.
     """
     try:
-        entries = _checked(json_of(read_whole(path, MAX_FILE_BYTES), refuse_constant))
+        entries = _checked(parse_json(read_whole(path, MAX_FILE_BYTES), refuse_constant))
     except OSError as error:
         raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
     except ValueError as error:

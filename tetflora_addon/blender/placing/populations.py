@@ -47,7 +47,7 @@ NAME = "Population"
 
 
 @dataclass(frozen=True)
-class Made:
+class PlacedPlants:
     """The plants that placing a population made."""
 
     objects: list[bpy.types.Object]  # in the order of the placement, or one field
@@ -119,7 +119,7 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
 @job("Placing plants")
 def make_plants_steps(
     data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
-) -> Generator[Progress, object, Made]:
+) -> Generator[Progress, object, PlacedPlants]:
     """Place a population's plants by its settings, in place of those that it has.
 
     Closing the steps, or an error, leaves the scene as it was.
@@ -173,7 +173,7 @@ def make_plants_steps(
     population.made, population.message = len(placement), placement.reason
     population.placed_by = fingerprint(population)
     returned = min(returned, len(placement))
-    return Made(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
+    return PlacedPlants(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
 
 
 def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraPopulation:
@@ -215,7 +215,7 @@ def _new_plants(
 
 def reroll_steps(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
-) -> Generator[Progress, object, Made]:
+) -> Generator[Progress, object, PlacedPlants]:
     """Place a population anew with another seed, which follows from the one that it has.
 
     Closing the steps, or an error, leaves the seed as it was as well.
@@ -226,7 +226,7 @@ def reroll_steps(
         As `make_plants_steps`.
     """
     old, uid = population.seed, population.uid
-    # A hash and not the next number: populations with neighbouring seeds would follow each other's arrangements.
+    # A hash and not the next number: populations with neighboring seeds would follow each other's arrangements.
     population.seed = int(uniform(child_key(key_of_seed(old), 1), 0) * 2**31)
     try:
         return (yield from make_plants_steps(scene, depsgraph, population))

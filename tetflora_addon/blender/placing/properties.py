@@ -19,7 +19,7 @@ from ...setting import LENGTH
 from ..runtime import Listeners
 from ..scene.own_ages import AGE_PROPERTY
 from ..settings import properties_of, settings_in
-from ..species.catalogue import SpeciesChoice, items_for, number_of
+from ..species.catalog import SpeciesChoice, items_for, number_of
 from .distances import SOURCES, choose, follows_species
 from .plant_objects import EMPTIES_UNASKED
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...files import json_of
+from ...files import parse_json
 from ...planting.cover import Suits
 from ...planting.places import Placement, place, without
 from ...planting.rules import Companion, Rules
@@ -32,8 +32,8 @@ from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
 from ..settings import active_in, check_limits
-from ..species.catalogue import default_species
-from ..species.edits import catalogue, unknown_text
+from ..species.catalog import default_species
+from ..species.edits import catalog, unknown_text
 from .canopy import not_of_covers, read_suits
 from .distances import HECTARE, distance_of, weights_of
 from .plant_objects import EMPTIES_UNASKED, plants_of
@@ -45,7 +45,7 @@ IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
     *("mix_index", "distance_from", "covers", "biome"),
 }
-_DIGITS = 4  # of erased places: tenths of a millimetre
+_DIGITS = 4  # of erased places: tenths of a millimeter
 #: Settings of a species of a mixture.
 ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance", "habitat", "shed_by")
 
@@ -158,13 +158,13 @@ def makes_field(population: bpy.types.PropertyGroup, number: int) -> bool:
 
 
 def unknown_species(population: bpy.types.PropertyGroup) -> list[str]:
-    """Species of a population that the catalogue does not have."""
-    known = catalogue()
+    """Species of a population that the catalog does not have."""
+    known = catalog()
     return [e.species for e in population.mix if e.species and e.species not in known]
 
 
 def note_erased(population: bpy.types.PropertyGroup, centers: NDArray[np.float64] | Sequence, radius: float) -> None:
-    """Keep circles on the map bare, with centers (n, 2) or more columns; metres."""
+    """Keep circles on the map bare, with centers (n, 2) or more columns; meters."""
     flat = np.round(np.asarray(centers, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
     strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
     population.erased = json.dumps(strokes, separators=(",", ":"))
@@ -181,7 +181,7 @@ def erased_places(population: bpy.types.PropertyGroup) -> tuple[Path, ...]:
 
 def _strokes(population: bpy.types.PropertyGroup) -> list[list[float]]:
     try:
-        strokes = json_of(population.erased) if population.erased else []
+        strokes = parse_json(population.erased) if population.erased else []
         if all(len(stroke) % 2 and np.isfinite(np.array(stroke, np.float64)).all() for stroke in strokes):
             return strokes
     except (ValueError, TypeError):
@@ -260,7 +260,7 @@ def read_search(
     Raises
     ------
     SceneError
-        No ground, or a species that the catalogue does not have.
+        No ground, or a species that the catalog does not have.
     """
     unknown = unknown_species(population)
     if unknown:

@@ -17,7 +17,7 @@ from ..attributes import image_pixels, members, read, values_of, world_matrix
 from ..scene.objects import objects_within
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
-#: Custom property of curves that are paths without a bevel: half their width, metres.
+#: Custom property of curves that are paths without a bevel: half their width, meters.
 HALF_WIDTH = "tetflora_half_width"
 #: Settings of populations that mask the ground: keyword arguments of `read_ground`.
 MASKS = (
@@ -43,11 +43,11 @@ class Line:
     Attributes
     ----------
     points : (k, 2) float64
-        On the map, metres.
+        On the map, meters.
     cyclic : bool
         The last point is joined to the first, which is not repeated.
     half_width : float
-        Width that its bevel adds to each side, metres.
+        Width that its bevel adds to each side, meters.
     """
 
     points: NDArray[np.float64]
@@ -159,7 +159,7 @@ def read_ground(
     vertex_group : str
         Group whose weights define how suitable the ground is; every mesh needs it, or a float attribute of its name.
     image : bpy.types.Image, optional
-        Its luminance, as stored, defines how suitable the ground is: 50 % grey halves the number of plants. Alpha does
+        Its luminance, as stored, defines how suitable the ground is: 50 % gray halves the number of plants. Alpha does
         not count.
     uv_layer : str
         UV map for the image; the one that renders if empty.
@@ -170,7 +170,7 @@ def read_ground(
     paths : bpy.types.Collection, optional
         All of its curves are kept free.
     path_distance : float
-        Metres to either side of the paths, beyond the depth of their bevel.
+        Meters to either side of the paths, beyond the depth of their bevel.
 
     Raises
     ------
@@ -184,15 +184,15 @@ def read_ground(
     weights = np.concatenate(weight) if vertex_group else None
     if weights is not None and invert_group:
         weights = 1.0 - weights
-    grey = None
+    gray = None
     if image is not None:
-        grey = _luminance(image)
-        grey = 1.0 - grey if invert_image else grey
+        gray = _luminance(image)
+        gray = 1.0 - gray if invert_image else gray
     return Terrain(
         triangles=np.concatenate(triangles),
         weight=weights,
         uv=None if image is None else np.concatenate(uv),
-        image=grey,
+        image=gray,
         areas=() if areas is None else tuple(line.points for line in _lines(areas, depsgraph, "Areas", closed=True)),
         paths=() if paths is None else tuple(_path(line, path_distance) for line in _lines(paths, depsgraph, "Paths")),
         border=np.concatenate(border),
@@ -281,7 +281,7 @@ def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> NDArray[np.float64]:
 
 
 def _luminance(image: bpy.types.Image) -> NDArray[np.float32]:
-    """Grey values of an image, (h, w), the first row at the bottom."""
+    """Gray values of an image, (h, w), the first row at the bottom."""
     if image.source == 'TILED':
         raise SceneError(
             f'The image "{image.name}" has UDIM tiles, which Populate does not support; use a single image'

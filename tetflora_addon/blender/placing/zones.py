@@ -3,7 +3,7 @@
 """Zones of the biomes of a scene: which part of its ground each biome takes, and which comes first.
 
 Biomes with limits or a mask come first, in the order of the list; those without take what is left. So a riparian wood
-that is added to a beech wood pushes it back from the water.
+that is added to a beech forest pushes it back from the water.
 """
 
 from __future__ import annotations

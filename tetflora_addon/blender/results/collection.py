@@ -16,7 +16,7 @@ from ..materials import snow
 from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
 from ..scene.looks import LIKE
-from ..species.catalogue import SpeciesChoice
+from ..species.catalog import SpeciesChoice
 from .hiding import adopt_copies
 from .meshes import mesh_steps, point_object
 from .output import (
@@ -61,7 +61,7 @@ class Results:
     Attributes
     ----------
     origin : (3,) float
-        Where in the world positions in buffers are counted from, metres: objects are placed there.
+        Where in the world positions in buffers are counted from, meters: objects are placed there.
     owners : mapping of bpy.types.Object to str
         Looks of objects that show instances, where more than they themselves say counts.
     looks : sequence of str

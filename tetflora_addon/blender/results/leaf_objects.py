@@ -22,7 +22,7 @@ from ...species.species import LEAF_KINDS, Species
 from ..attributes import evaluated_mesh
 from ..materials.materials import bark_material, bark_steps, leaf_material
 from ..materials.nodes import is_ours
-from ..scene.skeletons import form_of, read_skeleton, species_of
+from ..scene.skeletons import read_skeleton, skeleton_object_of, species_of
 from ..species.edits import species_for
 from .meshes import UV_MAP, read_mesh_arrays
 from .output import replaced_material
@@ -147,7 +147,7 @@ def _filled(model: LeafModel) -> float:
 
 
 def _length(species: Species, kind: str) -> float:
-    """Mean length of leaves of a kind, metres."""
+    """Mean length of leaves of a kind, meters."""
     every = [*species.orders, *([] if species.spur is None else [species.spur])]
     bearing = [order for order in every if order.leaf_kind == kind and order.leaves.mean > 0]
     sizes = [order.leaf_size.mean * (1.0 + order.leaf_size_tip) / 2.0 for order in bearing]
@@ -155,7 +155,7 @@ def _length(species: Species, kind: str) -> float:
 
 
 _INDEX = "material_index"
-_COLOURED = "tetflora_coloured"  # on materials whose viewport colour is set; another is the artist's choice
+_COLORED = "tetflora_colored"  # on materials whose viewport color is set; another is the artist's choice
 
 
 def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
@@ -176,10 +176,10 @@ def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.
     SpeciesError
         Unknown or broken species, an object that is missing or not a mesh with faces, or a form without edges.
     """
-    identifier, form = species_of(kind_of_plant), form_of(kind_of_plant)
+    identifier, form = species_of(kind_of_plant), skeleton_object_of(kind_of_plant)
     species = species_for(scene, identifier)
     if form is not None:
-        species = replace(species, form=read_skeleton(form, depsgraph))
+        species = replace(species, skeleton=read_skeleton(form, depsgraph))
     chosen = leaf_objects(scene).get(identifier)
     if chosen is not None:
         species = replace(species, leaf=(_model_of(species, chosen, depsgraph, "leaf"),))
@@ -269,14 +269,14 @@ def _brought(scene: bpy.types.Scene, identifier: str, kind: str, form: int) -> l
 
 
 def _in_viewports(material: bpy.types.Material, species: Species, kind: str) -> bpy.types.Material:
-    """The material, with the mean colour of the species for solid viewports and exports without nodes."""
-    if is_ours(material) and material.get(_COLOURED) is None:
-        material[_COLOURED] = True
+    """The material, with the mean color of the species for solid viewports and exports without nodes."""
+    if is_ours(material) and material.get(_COLORED) is None:
+        material[_COLORED] = True
         every = [*species.orders, *([] if species.spur is None else [species.spur])]
         orders = [order for order in every if kind == "bark" or order.leaf_kind == kind]
         if orders and kind == "bark":
-            material.diffuse_color = (*orders[0].branch_colour.mean, 1.0)
+            material.diffuse_color = (*orders[0].branch_color.mean, 1.0)
         elif orders:
-            inside, outside = orders[-1].leaf_colour.mean, orders[-1].leaf_colour_tip
+            inside, outside = orders[-1].leaf_color.mean, orders[-1].leaf_color_tip
             material.diffuse_color = (*((a + b) / 2.0 for a, b in zip(inside, outside, strict=True)), 1.0)
     return material

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...arrays import linear_of, spread
 from ...buffers import MeshBuffers, PointBuffers
-from ...jobs import at_once
+from ...jobs import run_to_end
 from ..attributes import KINDS, face_offsets, members, read, type_for, values_of, write
 from ..compat import can_resize_point_clouds
 from ..materials.nodes import Graph, Term, node_group
@@ -62,7 +62,7 @@ def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Ma
         Arrays of wrong shape or type, or indices out of range, with which Blender would crash later; no datablock is
         left behind.
     """
-    return at_once(mesh_steps(name, buffers, materials))
+    return run_to_end(mesh_steps(name, buffers, materials))
 
 
 def mesh_steps(
@@ -317,8 +317,8 @@ def read_mesh(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) 
     flat = np.zeros(faces, bool) if sharp is None else values_of(sharp)
     smooth = not flat.all() or mesh.has_custom_normals
     uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
-    colours = mesh.color_attributes
-    colour = colours[colours.render_color_index].name if 0 <= colours.render_color_index < len(colours) else ""
+    colors = mesh.color_attributes
+    color = colors[colors.render_color_index].name if 0 <= colors.render_color_index < len(colors) else ""
     slots = np.zeros(faces, np.int32)
     if "material_index" in mesh.attributes:
         slots = np.clip(members(mesh.polygons, "material_index", dtype=np.int32), 0, len(materials) - 1)
@@ -329,7 +329,7 @@ def read_mesh(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) 
         slots=slots,
         materials=materials,
         layers=dict(_layers(mesh)),
-        rendered=(uv, colour),
+        rendered=(uv, color),
         normals=members(mesh.corner_normals, "vector", 3) if smooth and faces else None,
         flat=flat,
         texture_space=np.array([mesh.texspace_location, mesh.texspace_size], np.float64),
@@ -575,7 +575,7 @@ def _common(layers: list[AttributeArray | None]) -> tuple[str, str, list[Attribu
 
 
 def _converted(values: NDArray, old: str, new: str) -> NDArray:
-    """Values of a type as those of a wider one: numbers are grey, vectors begin alike."""
+    """Values of a type as those of a wider one: numbers are gray, vectors begin alike."""
     if old == 'BYTE_COLOR' and new == 'FLOAT_COLOR':
         linear = linear_of(values)
         linear[:, 3] = values[:, 3]

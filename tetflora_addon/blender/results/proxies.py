@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ...buffers import MeshBuffers, PointBuffers
 from ...emission.asset_plan import ASSETS
-from ...emission.forms import Buffers, Refined
-from ...emission.light import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
+from ...emission.emitters import Buffers, EmissionInput
+from ...emission.light import BATCH, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ...jobs import Progress
 from ...refinement.statistics import Statistics
 from ...species.species import Species
@@ -22,8 +22,8 @@ from ..attributes import face_offsets, read, write
 from ..materials.nodes import find_socket, is_ours
 from ..worker import calling, in_thread
 from .collection import Results
-from .forms import ProxyForm, form_of
 from .output import KIND
+from .proxy_kinds import ProxyKind, proxy_kind_of
 
 
 class Baking:
@@ -49,7 +49,7 @@ class Baking:
         self.sheets.add_faces(buffers.positions, buffers.corner_verts, buffers.face_offsets)
         self.first_facet = len(self.sheets)
 
-    def add_facets(self, refined: Refined) -> Iterator[int]:
+    def add_facets(self, refined: EmissionInput) -> Iterator[int]:
         """Add the facets of all proxies; yields how many there are so far.
 
         They stay, to be written with their light.
@@ -61,7 +61,7 @@ class Baking:
                 count += len(facets)
             yield count
 
-    def look(self, refined: Refined) -> Generator[float, None, None]:
+    def look(self, refined: EmissionInput) -> Generator[float, None, None]:
         """Compute the light; yields the fraction that is done."""
         scene = refined.flora, refined.refinement, refined.camera
         facets = refined.facet_pixels is not None
@@ -71,7 +71,7 @@ class Baking:
         """Write the light of meshes; yields the fraction that is done, and None while a thread computes."""
         for number, (made, first) in enumerate(self._meshes):
             mesh = made.data
-            stored = [read(mesh, name) for name in ("position", ".corner_vert", "tf_colour", "tf_transmission")]
+            stored = [read(mesh, name) for name in ("position", ".corner_vert", "tf_color", "tf_transmission")]
             given = self.light, first, made[KIND] == "bark", face_offsets(mesh), *stored
             found = yield from in_thread(calling(_light_of_mesh, *given))
             for name, (domain, values) in found.items():
@@ -86,16 +86,16 @@ def _light_of_mesh(
     offsets: NDArray[np.int32],
     positions: NDArray[np.float32],
     corner_verts: NDArray[np.int32],
-    colour: NDArray[np.float32],
+    color: NDArray[np.float32],
     transmission: NDArray[np.float32],
 ) -> Mapping[str, tuple[str, NDArray[np.float32]]]:
     """Attributes of a mesh whose faces are the sheets from ``first`` on: its light, at vertices where it is round."""
     faces = len(offsets) - 1
     front, back = np.zeros((2, faces, 3), np.float32)
-    for start in range(0, faces, AT_ONCE):
-        part = slice(start, min(start + AT_ONCE, faces))
+    for start in range(0, faces, BATCH):
+        part = slice(start, min(start + BATCH, faces))
         sheets = np.arange(first + part.start, first + part.stop)
-        given = offsets[part.start : part.stop + 1], colour[part], transmission[part]
+        given = offsets[part.start : part.stop + 1], color[part], transmission[part]
         front[part], back[part] = light.of_faces(positions, corner_verts, *given, sheets)
     if rounded:
         front, back = (at_vertices(side, corner_verts, offsets, len(positions)) for side in (front, back))
@@ -103,7 +103,7 @@ def _light_of_mesh(
 
 
 def write_proxies(
-    results: Results, form: ProxyForm, refined: Refined, statistics: Statistics, baking: Baking | None = None
+    results: Results, form: ProxyKind, refined: EmissionInput, statistics: Statistics, baking: Baking | None = None
 ) -> Generator[Progress, None, None]:
     """Make the proxies of a refined scene; a thread makes the next block while one is written.
 
@@ -129,7 +129,7 @@ def write_proxies(
         yield progress
         for buffers in made:
             if buffers is None:
-                yield progress.again
+                yield progress.repeated
                 continue
             yield from progress.during(_added(results, form, buffers, number, baked, refined.flora.species))
             statistics.polygons_proxy += buffers.polygons
@@ -140,7 +140,7 @@ def write_proxies(
 
 
 def _added(
-    results: Results, form: ProxyForm, buffers: Buffers, number: int, baked: bool, every: Sequence[Species]
+    results: Results, form: ProxyKind, buffers: Buffers, number: int, baked: bool, every: Sequence[Species]
 ) -> Generator[None, None, None]:
     """Write one block of proxies, of one of some species, step by step."""
     points, of_assets = isinstance(buffers, PointBuffers), buffers.species == ASSETS
@@ -160,7 +160,7 @@ def _added(
 
 
 def set_sockets(material: bpy.types.Material, scene: bpy.types.Scene, sockets: Mapping[str, str]) -> None:
-    """Set sockets of a material's group to the scene's settings, see `ProxyForm`; the artist's own changes stay."""
+    """Set sockets of a material's group to the scene's settings, see `ProxyKind`; the artist's own changes stay."""
     if not sockets or not is_ours(material) or material.node_tree is None:
         return
     for node in material.node_tree.nodes:
@@ -173,7 +173,7 @@ def set_sockets(material: bpy.types.Material, scene: bpy.types.Scene, sockets: M
 
 def shade_again(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
     """`set_sockets` for results from the frame cache, which share their material with later ones."""
-    sockets = form_of(scene).sockets
+    sockets = proxy_kind_of(scene).sockets
     if not sockets or scene.tetflora.baked_light != 'OFF':
         return
     proxies = [obj for obj in collection.objects if obj.get(KIND) == "proxy"]

@@ -6,7 +6,7 @@ Up to `MOST` different ages of a species are kinds of their own. Of more, each g
 fixed ages, so that no plant depends on which others there are, and the scale of the plant makes up for the difference
 in height. The classes of a species are a geometric series from its first year, or from a tenth of the age at which it
 is full-grown where that is less, to when the last limbs of a dead plant have fallen: each is some 1.6 times the one
-before. The years that pass in a scene are added afterwards and change no class.
+before. The years that pass in a scene are added afterward and change no class.
 """
 
 from __future__ import annotations

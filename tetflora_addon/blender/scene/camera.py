@@ -142,7 +142,7 @@ def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[fl
 
 
 def _lens(data: bpy.types.Camera, matrix: NDArray[np.float64], depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
-    """Radius of the aperture and distance of focus, metres; a radius of 0 without depth of field.
+    """Radius of the aperture and distance of focus, meters; a radius of 0 without depth of field.
 
     The lens's diameter is its focal length over the f-stop; Cycles takes 1 m for the focal length of an orthographic
     camera.
@@ -153,9 +153,9 @@ def _lens(data: bpy.types.Camera, matrix: NDArray[np.float64], depsgraph: bpy.ty
     length = 1.0 if data.type == 'ORTHO' else data.lens * 1e-3
     focus = dof.focus_distance
     if dof.focus_object is not None:
-        towards = world_matrix(dof.focus_object, depsgraph)[:3, 3] - matrix[:3, 3]
+        toward = world_matrix(dof.focus_object, depsgraph)[:3, 3] - matrix[:3, 3]
         back = matrix[:3, 2] / max(np.linalg.norm(matrix[:3, 2]), 1e-12)
-        focus = float(abs(towards @ back))
+        focus = float(abs(toward @ back))
     return length / (2.0 * dof.aperture_fstop), max(float(focus), 1e-3)
 
 
@@ -279,7 +279,7 @@ def camera_of(
     view, projection : (4, 4) float64
         From world to camera space, and from there to the cube that is drawn.
     clip : tuple of float
-        Near and far clipping depths, metres. Orthographic views also show what is as far behind them.
+        Near and far clipping depths, meters. Orthographic views also show what is as far behind them.
     size : tuple of int
         Pixels.
     """

@@ -107,8 +107,8 @@ def _find_all(species: Iterable[Species]) -> None:
 
 
 def _measured(asset: TetFloraAssetSpecies) -> Crown:
-    colour = tuple(asset.colour)
-    return Crown(asset.radius, asset.height, asset.polygons, asset.base, asset.leaves, 0.0, colour)
+    color = tuple(asset.color)
+    return Crown(asset.radius, asset.height, asset.polygons, asset.base, asset.leaves, 0.0, color)
 
 
 def _guess(identifier: str) -> Crown:

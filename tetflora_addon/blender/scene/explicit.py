@@ -189,7 +189,7 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
         face_offsets=offsets,
         triangles=triangles,
         material=slot,
-        colours=np.array([look.colour for look in seen], np.float64),
+        colors=np.array([look.color for look in seen], np.float64),
         transmission=transmission,
         coverage=np.array([look.coverage for look in seen], np.float64),
         solid=solid,

@@ -22,7 +22,7 @@ from .motion import bags_of, curves_of
 from .own_ages import Lives, Sizes
 
 HEIGHT = "tf_height"
-#: Attributes of numbers, with the most that is sound: metres, and years since death.
+#: Attributes of numbers, with the most that is sound: meters, and years since death.
 NUMBERS = {
     HEIGHT: 200.0,
     "tf_diameter": 20.0,

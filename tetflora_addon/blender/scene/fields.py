@@ -205,7 +205,7 @@ def write_field(
     Parameters
     ----------
     position : (n, 3) float
-        World space, metres.
+        World space, meters.
     rotation : (n, 4) float
         Quaternions, w first.
     scale : (n,) float
@@ -236,7 +236,7 @@ def write_field(
         group.age = ages[0]
     for identifier, form in zip(identifiers, forms or [None] * len(identifiers), strict=True):
         entry = group.field_species.add()
-        entry.species, entry.form = identifier, form
+        entry.species, entry.skeleton = identifier, form
     return obj
 
 

@@ -3,7 +3,7 @@
 """The light of a scene: its lights, its world, and the ground that reflects them.
 
 World node trees can be arbitrary. Only the background that leads to the output is read, and the first image or sky that
-feeds its colour. Blender's skies cannot be evaluated outside of a render; a few measured numbers describe them.
+feeds its color. Blender's skies cannot be evaluated outside of a render; a few measured numbers describe them.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from .objects import read_occluders, renderable_objects
 BLACK = World.plain((0.0, 0.0, 0.0))
 #: Rows of an image that are looked at, about.
 _ROWS = 256
-#: Colour of ground whose material cannot be read.
+#: Color of ground whose material cannot be read.
 _GROUND = (0.2, 0.2, 0.2)
 # Sun's elevations, degrees, of the rows below.
 _ELEVATIONS = (2.0, 10.0, 30.0, 60.0, 90.0)
-# Radiance above the horizon M + B (z − ½) + C f, with z up and f towards the sun's azimuth; mean radiance D below it;
+# Radiance above the horizon M + B (z − ½) + C f, with z up and f toward the sun's azimuth; mean radiance D below it;
 # irradiance of the sun's disc. RGB each, measured in Cycles 5.2 (128 × 64 pixels) with the node's own defaults, such
-# that mean, irradiance of level ground and of what stands towards the sun are kept. 4.5 has the same within 2 %.
+# that mean, irradiance of level ground and of what stands toward the sun are kept. 4.5 has the same within 2 %.
 _SKIES: dict[str, list[list[float]]] = json.loads(Path(__file__).with_name("skies.json").read_text(encoding="utf-8"))
 
 
@@ -43,7 +43,7 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer)
     """Lights that render and shine, by name.
 
     Instances of lights and lights with an invalid transform are left out. Light linking, textures and the spread of
-    areas do not count; of nodes, strength and colour of the emission do where they are plain numbers.
+    areas do not count; of nodes, strength and color of the emission do where they are plain numbers.
 
     Notes
     -----
@@ -57,44 +57,44 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer)
         data = obj.evaluated_get(depsgraph).data
         matrix = world_matrix(obj, depsgraph).astype(np.float64)
         length = float(np.linalg.norm(matrix[:3, 2]))
-        colour = _colour(data)
-        if not colour.any() or not np.isfinite(matrix).all() or length < 1e-9:
+        color = _color(data)
+        if not color.any() or not np.isfinite(matrix).all() or length < 1e-9:
             continue
         given = {"position": matrix[:3, 3], "direction": -matrix[:3, 2] / length, "shadow": bool(data.use_shadow)}
         if data.type == 'SUN':
-            found.append(Light('SUN', width=float(data.angle), colour=colour, **given))
+            found.append(Light('SUN', width=float(data.angle), color=color, **given))
         elif data.type == 'AREA':
-            found.append(_area(data, matrix, colour, given))
+            found.append(_area(data, matrix, color, given))
         else:
             # Without "normalize" the energy is that of a unit surface.
             radius = data.shadow_soft_size
             surface = 1.0 if data.normalize else np.pi * radius**2
             spot = {"angle": data.spot_size / 2.0, "blend": data.spot_blend} if data.type == 'SPOT' else {}
-            colour = colour * surface / (4.0 * np.pi)
-            found.append(Light(data.type, width=2.0 * radius, colour=colour, **given, **spot))
+            color = color * surface / (4.0 * np.pi)
+            found.append(Light(data.type, width=2.0 * radius, color=color, **given, **spot))
     return tuple(found)
 
 
-def _area(data: bpy.types.AreaLight, matrix: NDArray[np.float64], colour: NDArray[np.float64], given: dict) -> Light:
+def _area(data: bpy.types.AreaLight, matrix: NDArray[np.float64], color: NDArray[np.float64], given: dict) -> Light:
     ellipse = data.shape in {'DISK', 'ELLIPSE'}
     sides = np.array([data.size, data.size_y if data.shape in {'RECTANGLE', 'ELLIPSE'} else data.size])
     span = matrix[:3, :2].T * sides[:, None] / 2.0
     if not data.normalize:
-        colour = colour * np.linalg.norm(np.cross(*span)) * (np.pi if ellipse else 4.0)
+        color = color * np.linalg.norm(np.cross(*span)) * (np.pi if ellipse else 4.0)
     width = 2.0 * float(np.linalg.norm(span, axis=1).max())
-    return Light('AREA', width=width, colour=colour / np.pi, span=span, ellipse=ellipse, **given)
+    return Light('AREA', width=width, color=color / np.pi, span=span, ellipse=ellipse, **given)
 
 
-def _colour(data: bpy.types.Light) -> NDArray[np.float64]:
+def _color(data: bpy.types.Light) -> NDArray[np.float64]:
     """Linear RGB times energy, nodes and exposure included."""
-    colour = np.array(data.color[:]) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
+    color = np.array(data.color[:]) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if getattr(data, "use_temperature", False):
-        colour = colour * np.array(data.temperature_color[:])
+        color = color * np.array(data.temperature_color[:])
     if (emission := _emission(data)) is not None:
         tint, strength = emission.inputs["Color"], emission.inputs["Strength"]
-        colour = colour * (1.0 if tint.is_linked else np.array(tint.default_value[:3]))
-        colour = colour * (1.0 if strength.is_linked else strength.default_value)
-    return np.maximum(colour.astype(np.float64), 0.0)
+        color = color * (1.0 if tint.is_linked else np.array(tint.default_value[:3]))
+        color = color * (1.0 if strength.is_linked else strength.default_value)
+    return np.maximum(color.astype(np.float64), 0.0)
 
 
 def _emission(data: bpy.types.Light) -> bpy.types.Node | None:
@@ -158,7 +158,7 @@ def sky_suns(scene: bpy.types.Scene) -> tuple[Light, ...]:
 
 
 def _surroundings(socket: bpy.types.NodeSocket, factor: float, notes: list[str]) -> tuple[World, tuple[Light, ...]]:
-    """Sky and suns of what feeds a background's colour."""
+    """Sky and suns of what feeds a background's color."""
     if not socket.is_linked:
         return World.plain(np.array(socket.default_value[:3]) * factor), ()
     above = list(upstream(socket))
@@ -187,11 +187,11 @@ def _image(node: bpy.types.Node, factor: float, turn: float) -> World:
     rows, columns = len(pixels) // step, pixels.shape[1] // step
     pixels = pixels[: rows * step, : columns * step].reshape(rows, step, columns, step, 3).mean(axis=(1, 3))
 
-    def radiance(towards: NDArray[np.float64]) -> NDArray[np.float64]:
+    def radiance(toward: NDArray[np.float64]) -> NDArray[np.float64]:
         # As Cycles: u = ½ − φ / 2π, v = ½ + latitude / π, with row 0 lowest.
-        longitude = np.arctan2(towards[:, 1], towards[:, 0]) + turn
+        longitude = np.arctan2(toward[:, 1], toward[:, 0]) + turn
         column = (0.5 - longitude / (2.0 * np.pi)) % 1.0 * columns
-        row = (0.5 + np.arcsin(np.clip(towards[:, 2], -1.0, 1.0)) / np.pi) * rows
+        row = (0.5 + np.arcsin(np.clip(toward[:, 2], -1.0, 1.0)) / np.pi) * rows
         at = np.minimum(row.astype(int), rows - 1), np.minimum(column.astype(int), columns - 1)
         return pixels[at].astype(np.float64) * factor
 
@@ -204,18 +204,18 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
         notes.append(f"the sky type {node.sky_type} is not supported; SINGLE_SCATTERING is used")
         kind = 'SINGLE_SCATTERING'
     if kind in {'PREETHAM', 'HOSEK_WILKIE'}:
-        towards = np.array(node.sun_direction[:], np.float64)
-        towards /= max(np.linalg.norm(towards), 1e-9)
+        toward = np.array(node.sun_direction[:], np.float64)
+        toward /= max(np.linalg.norm(toward), 1e-9)
     else:
         up, around = node.sun_elevation, node.sun_rotation
         # Turned clockwise, as seen from above, from +Y.
-        towards = np.array([np.cos(up) * np.sin(around), np.cos(up) * np.cos(around), np.sin(up)])
+        toward = np.array([np.cos(up) * np.sin(around), np.cos(up) * np.cos(around), np.sin(up)])
     c, s = np.cos(turn), np.sin(turn)
-    towards = np.array([c * towards[0] + s * towards[1], c * towards[1] - s * towards[0], towards[2]])
-    elevation = np.degrees(np.arcsin(np.clip(towards[2], -1.0, 1.0)))
+    toward = np.array([c * toward[0] + s * toward[1], c * toward[1] - s * toward[0], toward[2]])
+    elevation = np.degrees(np.arcsin(np.clip(toward[2], -1.0, 1.0)))
     row = np.array([np.interp(elevation, _ELEVATIONS, column) for column in zip(*_SKIES[kind], strict=True)])
     mean, rise, ahead, below, disc = row.reshape(5, 3) * factor
-    level = towards * [1.0, 1.0, 0.0]
+    level = toward * [1.0, 1.0, 0.0]
     level /= max(np.linalg.norm(level), 1e-9)
 
     def radiance(places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -225,32 +225,32 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
 
     suns: tuple[Light, ...] = ()
     if getattr(node, "sun_disc", False) and disc.any() and elevation > 0.0:
-        colour = disc * node.sun_intensity
-        suns = (Light('SUN', np.zeros(3), -towards, float(node.sun_size), colour=colour),)
+        color = disc * node.sun_intensity
+        suns = (Light('SUN', np.zeros(3), -toward, float(node.sun_size), color=color),)
     return World.of(radiance), suns
 
 
 def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Sources:
     """Lights, world, and occluders, which cast shadows and reflect light upward."""
     world = read_world(scene)
-    colours = [_ground_colour(o) for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
-    ground = np.mean(colours, axis=0) if colours else np.zeros(3)
+    colors = [_ground_color(o) for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
+    ground = np.mean(colors, axis=0) if colors else np.zeros(3)
     lights = (*read_lights(depsgraph, view_layer), *world.suns)
     return Sources(lights, world.world, read_occluders(depsgraph, view_layer), ground)
 
 
-def _ground_colour(obj: bpy.types.Object) -> NDArray[np.float64]:
-    """Mean colour of a mesh's first material."""
+def _ground_color(obj: bpy.types.Object) -> NDArray[np.float64]:
+    """Mean color of a mesh's first material."""
     material = obj.active_material
     if material is None:
-        return np.array(Looks().of(None, {}).colour)
+        return np.array(Looks().of(None, {}).color)
     tree = tree_in_use(material)
     nodes = tree.nodes if tree else ()
     if not any(n.type == 'TEX_IMAGE' and n.image is not None for n in nodes):
-        # Only color ramps tell which colours noise becomes.
+        # Only color ramps tell which colors noise becomes.
         stops = [stop.color[:3] for n in nodes if n.type == 'VALTORGB' for stop in n.color_ramp.elements]
         if stops:
             return np.mean(stops, axis=0)
         if any(n.type.startswith(("BSDF", "EMISSION")) and n.inputs[0].is_linked for n in nodes):
             return np.array(_GROUND)
-    return np.array(Looks().of(material, {}).colour)
+    return np.array(Looks().of(material, {}).color)

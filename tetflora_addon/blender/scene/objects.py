@@ -492,7 +492,7 @@ def read_occluders(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLay
     Returns
     -------
     (t, 3, 3) float64
-        Corners in world space, metres; ``(0, 3, 3)`` if there are none.
+        Corners in world space, meters; ``(0, 3, 3)`` if there are none.
 
     Raises
     ------

@@ -82,7 +82,7 @@ class Lives:
 
 @dataclass(frozen=True)
 class Sizes(Arrays):
-    """Sizes of plants (n,), metres in the field's space; 0 is not known.
+    """Sizes of plants (n,), meters in the field's space; 0 is not known.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError, TetFloraError
-from ...growth.crown_forms import crown_forms
+from ...growth.crown_shapes import crown_shapes
 from ...growth.hashing import child_key, key_of_seed
 from ...growth.seasons import is_gone
 from ...growth.seeds import Seeds
@@ -26,7 +26,7 @@ from ...growth.wind import rotation_vectors
 from ..attributes import frames_of, world_matrix
 from ..settings import season_of
 from ..species.asset_species import asset_of, asset_species, find_asset, name_of
-from ..species.edits import catalogue, edited_infos, species_for
+from ..species.edits import catalog, edited_infos, species_for
 from .ages import Part, classed
 from .fields import read_aged_field, read_field_matrices
 from .looks import LayerLooks
@@ -81,7 +81,7 @@ def read_plants(
     NoPlantsError
         No plant is left; the message says how to get some.
     SceneError
-        No plant is of a species that the catalogue has, or one has a scale of 0, or a transform that is not a number;
+        No plant is of a species that the catalog has, or one has a scale of 0, or a transform that is not a number;
         the message names the objects.
     """
     read = partial(_read_plants, scene, depsgraph, view_layer)
@@ -103,7 +103,7 @@ def read_plants(
 def _read_plants(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
 ) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
-    known, assets = catalogue(), {*asset_species(scene), *gone_species(scene)}
+    known, assets = catalog(), {*asset_species(scene), *gone_species(scene)}
     odd: list[tuple[str, str]] = []  # names of objects, each with a species
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
@@ -313,11 +313,11 @@ def _merged(read: list[Seeds]) -> Seeds:
         tables.append({i: seeds.identifiers[i] for i in np.flatnonzero(occurring).tolist()})
     identifiers = tuple(sorted({kind for table in tables for kind in table.values()}))
     number = {kind: i for i, kind in enumerate(identifiers)}
-    parts, formed = [], any(seeds.crown is not None for seeds in read)
+    parts, shaped = [], any(seeds.crown is not None for seeds in read)
     for seeds, table in zip(read, tables, strict=True):
         to_all = np.zeros(len(seeds.identifiers), np.int32)
         to_all[list(table)] = [number[kind] for kind in table.values()]
-        crown = crown_forms(len(seeds)) if formed and seeds.crown is None else seeds.crown
+        crown = crown_shapes(len(seeds)) if shaped and seeds.crown is None else seeds.crown
         parts.append(replace(seeds, identifiers=identifiers, species=to_all[seeds.species], crown=crown))
     # Do not copy millions of frames where there is nothing to join.
     return parts[0] if len(parts) == 1 else Seeds.concatenate(parts)
@@ -325,7 +325,7 @@ def _merged(read: list[Seeds]) -> Seeds:
 
 def _check_species(plants: list[tuple[str, str]]) -> None:
     """Refuse kinds, each with the name of an object that has it, whose species nobody has."""
-    known = catalogue()
+    known = catalog()
     bad = [(name, species) for name, kind in plants if (species := species_of(kind)) not in known]
     if bad:
         raise SceneError(_unknown(bad))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plants of recorded sizes as kinds, scales and crown forms.
+"""Plants of recorded sizes as kinds, scales and crown shapes.
 
 A plant that stands still is of the class of heights that is nearest: each is 1.5 times the one below, and the scale
 makes up for what is left. Classes belong to the species alone, so that no plant depends on others.
@@ -24,14 +24,14 @@ from numpy.typing import NDArray
 from ...compiled.flora import compile_species
 from ...compiled.measured import fitted, measured
 from ...errors import SpeciesError
-from ...growth.crown_forms import GIRTH, PLAIN, crown_forms
+from ...growth.crown_shapes import PLAIN, THICKNESS, crown_shapes
 from ...growth.growth import radius_at, trunks
 from ...growth.seeds import Seeds
 from ...species.ages import ages_of, with_age
 from ...species.growing import Ages
 from ...species.species import Species
 from .own_ages import MOST_YEARS, Lives, Sizes
-from .skeletons import age_of, aged_kind, dead_of, form_of, is_aged, species_of
+from .skeletons import age_of, aged_kind, dead_of, is_aged, skeleton_object_of, species_of
 
 #: Height of a class over that of the one below, and classes below that of full-grown plants.
 _STEP, _BELOW = 1.5, 9
@@ -41,7 +41,7 @@ _SINCE = np.array([1.0, 6.0, 25.0])
 #: Of plants that grow: cohorts of a species at most; what counts as far apart: years of birth, ratio of the ages at the
 #: end and of lengths of life; years between points of the curve of a cohort, and between classes of death.
 _COHORTS, _APART, _STRETCH, _DEATHS = 12, (20.0, np.log(1.6), np.log(1.8)), 5.0, 20.0
-_BREAST, _TALL = 1.3, 1.5  # height of the diameter, and least height of a plant that has one, metres
+_BREAST, _TALL = 1.3, 1.5  # height of the diameter, and least height of a plant that has one, meters
 _DIES = 0.999  # part of its life after which a plant that dies early no longer grows
 _PLANTS = 32  # that are measured of each class
 _MEASURED = 1  # times that a plant is, to fit it
@@ -93,7 +93,7 @@ def sized(
             continue
         with suppress(SpeciesError):
             species = find(species_of(kind))
-            if form_of(kind) is not None:  # it is as it was drawn
+            if skeleton_object_of(kind) is not None:  # it is as it was drawn
                 scale[own] *= measure_of(species).fitted(seeds.take(own), sizes.take(own))[0]
                 continue
             some = sizes.take(own)
@@ -236,16 +236,16 @@ class Measure:
 
     @property
     def height(self) -> float:
-        """Of a plant on average, metres."""
+        """Of a plant on average, meters."""
         return self._typical * self.ratios[0]
 
     @property
     def width(self) -> float:
-        """Of a crown on average, metres."""
+        """Of a crown on average, meters."""
         return self._typical * self.ratios[1]
 
     def fitted(self, seeds: Seeds, sizes: Sizes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Scales (n,) and crown forms (n, 5) with which plants have their recorded sizes."""
+        """Scales (n,) and crown shapes (n, 5) with which plants have their recorded sizes."""
         none = np.zeros(len(seeds), np.int32)
         one = replace(seeds, identifiers=("",), species=none, scale=np.ones(len(seeds)), crown=None)
         chance = trunks(self.flora.rows, one).length / self.length
@@ -253,7 +253,7 @@ class Measure:
         scale = np.where(known, sizes.height * sizes.fit[:, 0] / (self.height * chance), 1.0)
         width = sizes.width * sizes.fit[:, 1] / (self.width * chance * scale)
         wide = known & (sizes.width > 0.0)
-        forms = crown_forms(
+        forms = crown_shapes(
             len(seeds),
             np.where(wide, width, 1.0),
             np.where(known, sizes.base / np.maximum(sizes.height, 1e-9), 0.0),
@@ -261,11 +261,11 @@ class Measure:
         )
         has = (sizes.diameter > 0.0) & (sizes.height > _TALL)
         if has.any():
-            formed = trunks(self.flora.rows, replace(one, scale=scale, crown=forms))
-            place = np.minimum(_BREAST / formed.length, 0.95)
-            own = 2.0 * radius_at(self.flora.rows, formed, place)
-            forms[:, GIRTH] = np.where(has & (place < 0.95), sizes.diameter / np.maximum(own, 1e-9), 1.0)
-            forms = crown_forms(len(seeds), *forms.T)
+            shaped = trunks(self.flora.rows, replace(one, scale=scale, crown=forms))
+            place = np.minimum(_BREAST / shaped.length, 0.95)
+            own = 2.0 * radius_at(self.flora.rows, shaped, place)
+            forms[:, THICKNESS] = np.where(has & (place < 0.95), sizes.diameter / np.maximum(own, 1e-9), 1.0)
+            forms = crown_shapes(len(seeds), *forms.T)
         return scale, forms
 
 

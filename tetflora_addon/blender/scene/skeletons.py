@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plants modelled by hand: curves, mesh edges and hair curves as skeletons, and kinds of plants.
+"""Plants modeled by hand: curves, mesh edges and hair curves as skeletons, and kinds of plants.
 
-A kind is a text of the species and, if there are any, the form, the age, years since death, and the look (`looks`):
+A kind is a text of the species and, if there are any, the skeleton, the age, years since death, and the look (`looks`):
 plants of one kind are compiled once, and are results of their own.
 """
 
@@ -17,8 +17,8 @@ from ...species.curves import Chains, bezier_chains, joined_edges, nurbs_chain, 
 from ...species.skeletons import Skeleton, skeleton_from_edges
 from ..attributes import evaluated_mesh, frames_of, members, values_of, world_matrix
 
-#: Types of objects that can be the form of a plant.
-FORM_TYPES = ('CURVE', 'CURVES', 'MESH')
+#: Types of objects that can be the skeleton of a plant.
+SKELETON_TYPES = ('CURVE', 'CURVES', 'MESH')
 
 RADIUS = "radius"  # the attribute's name in hair curves and, by convention, in meshes
 _CATMULL_ROM, _POLY, _BEZIER, _NURBS = range(4)  # Blender's numbers for types of hair curves
@@ -45,7 +45,7 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
     Returns
     -------
     Skeleton
-        About the object's origin, in metres, z up: with its scale and tilt, without its position and its turn about
+        About the object's origin, in meters, z up: with its scale and tilt, without its position and its turn about
         the vertical, which are the plant's.
 
     Raises
@@ -54,15 +54,15 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
         Another type of object, a mesh with faces, no edges, scale 0, or as `skeleton_from_edges`; the message names the
         object.
     """
-    if obj.type not in FORM_TYPES:
+    if obj.type not in SKELETON_TYPES:
         raise SpeciesError(
-            f'"{obj.name}" cannot be used as the form of a plant: '
+            f'"{obj.name}" cannot be the skeleton of a plant: '
             "choose a curve, hair curves, or a mesh of edges without faces"
         )
     matrix = world_matrix(obj, depsgraph)
     _, scale, sound = frames_of(matrix[None, :3, :3])
     if not sound[0]:
-        raise SpeciesError(f'"{obj.name}" cannot be used as the form of a plant: its scale is 0; clear it with Alt S')
+        raise SpeciesError(f'"{obj.name}" cannot be the skeleton of a plant: its scale is 0; clear it with Alt S')
     if obj.type == 'MESH':
         (points, edges), line = _of_mesh(obj, depsgraph), None
     else:
@@ -79,10 +79,10 @@ def _of_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[NDA
     with evaluated_mesh(obj, depsgraph) as mesh:
         if not len(mesh.polygons):
             return _mesh_arrays(mesh)
-    # A modifier such as Skin adds faces around the edges: the modelled mesh is the skeleton.
+    # A modifier such as Skin adds faces around the edges: the modeled mesh is the skeleton.
     if len(obj.data.polygons):
         raise SpeciesError(
-            f'"{obj.name}" cannot be used as the form of a plant: it has faces. Keep only edges along the centers of '
+            f'"{obj.name}" cannot be the skeleton of a plant: it has faces. Keep only edges along the centers of '
             "branches (X > Only Faces in Edit Mode), or use a curve"
         )
     return _mesh_arrays(obj.data)
@@ -194,8 +194,8 @@ def kind_of(plant: bpy.types.Object) -> str:
 
 
 def kind_of_choice(group: bpy.types.PropertyGroup) -> str:
-    """Kind of a group of properties with a species and a form."""
-    return group.species if group.form is None else f"{group.species}{_BREAK}{group.form.name_full}"
+    """Kind of a group of properties with a species and a skeleton."""
+    return group.species if group.skeleton is None else f"{group.species}{_BREAK}{group.skeleton.name_full}"
 
 
 def aged_kind(kind: str, age: float, dead: float = 0.0) -> str:
@@ -230,8 +230,8 @@ def species_of(kind: str) -> str:
     return _part(kind, 0)
 
 
-def form_of(kind: str) -> bpy.types.Object | None:
-    """Object with the form of a kind of plant; None without one."""
+def skeleton_object_of(kind: str) -> bpy.types.Object | None:
+    """Object with the skeleton of a kind of plant; None without one."""
     name = _part(kind, 1)
     return next((o for o in bpy.data.objects if o.name_full == name), None) if name else None
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ...errors import NAME, SpeciesError, readable
 from ...files import is_identifier
-from ...species.catalogue import SpeciesInfo
+from ...species.catalog import SpeciesInfo
 
 #: What identifiers of assets begin with.
 PREFIX = "asset-"
@@ -51,7 +51,7 @@ class TetFloraAssetSpecies(bpy.types.PropertyGroup):
     height: FloatProperty(name="Height", description="Height above the asset's origin, meters", default=5.0)
     polygons: FloatProperty(name="Polygons", description="Number of faces")
     leaves: FloatProperty(name="Leaf Area", description="One-sided area, square meters")
-    colour: FloatVectorProperty(name="Color", description="Mean color, linear", size=3, default=(0.1, 0.2, 0.05))
+    color: FloatVectorProperty(name="Color", description="Mean color, linear", size=3, default=(0.1, 0.2, 0.05))
     picture: StringProperty(name="Picture", description="Small picture for menus, as compressed pixels")
 
 

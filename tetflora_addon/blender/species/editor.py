@@ -19,8 +19,8 @@ from ...parameters import Key
 from ...species.schema import LENGTH_HIGH, ORDER_KEYS
 from ...species.skeletons import MAX_ORDERS
 from ...species.species import BARKS, QUALITY_LIMITS
-from .catalogue import SpeciesChoice
-from .edits import catalogue, change_species, species_data, species_for, tell_listeners
+from .catalog import SpeciesChoice
+from .edits import catalog, change_species, species_data, species_for, tell_listeners
 
 #: Items of ``leaf_form`` and ``blossom_form`` that are no built-in model.
 OBJECT_LEAF, OWN_LEAF, NO_LEAF = "OBJECT", "OWN", "NONE"
@@ -30,7 +30,7 @@ _kept: dict[tuple[str, ...], list[tuple[str, str, str, int]]] = {}  # Blender ke
 
 def present_species(editor: bpy.types.PropertyGroup) -> str:
     """Identifier of the species that the editor shows; what the drop-down shows when none was chosen yet."""
-    return editor.species or next(iter(catalogue()), "")
+    return editor.species or next(iter(catalog()), "")
 
 
 def _data_of(editor: bpy.types.PropertyGroup) -> dict[str, Any]:
@@ -311,7 +311,7 @@ _VARIES = "Maximum deviation from the mean, in both directions"
 
 
 def _label(name: str) -> str:
-    return name.replace("_", " ").replace("colour", "color").title()
+    return name.replace("_", " ").replace("color", "color").title()
 
 
 def _description(name: str, key: Key) -> str:
@@ -398,7 +398,7 @@ def _integer(name: str, key: Key) -> dict[str, Any]:
     return {name: made}
 
 
-def _colour(name: str, key: Key) -> dict[str, Any]:
+def _color(name: str, key: Key) -> dict[str, Any]:
     """A color, or that of a mean and its variation."""
     if key.kind == "rgb":
         return {name: _tone(name, (), _common(name, key))}
@@ -413,12 +413,12 @@ def _tone(name: str, part: tuple[int, ...], said: dict[str, Any]) -> Any:
         min=0.0,
         max=1.0,
         get=lambda self: tuple(number_in(value_of(self, name), *part, c) for c in range(3)),
-        set=lambda self, value: _write_colour(self, name, part, value),
+        set=lambda self, value: _write_color(self, name, part, value),
         **said,
     )
 
 
-def _write_colour(group: bpy.types.PropertyGroup, name: str, part: tuple[int, ...], value: Any) -> None:
+def _write_color(group: bpy.types.PropertyGroup, name: str, part: tuple[int, ...], value: Any) -> None:
     new = [rounded(c) for c in value]
     if part:
         old = value_of(group, name)
@@ -441,8 +441,8 @@ _MAKERS: dict[str, Callable[[str, Key], dict[str, Any]]] = {
     "range": _range,
     "number": _single,
     "integer": _integer,
-    "colour": _colour,
-    "rgb": _colour,
+    "color": _color,
+    "rgb": _color,
     "choice": _choice,
 }
 

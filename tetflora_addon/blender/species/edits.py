@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Species that an artist changed in this file: JSON text on the scene, in place of the catalogue's species.
+"""Species that an artist changed in this file: JSON text on the scene, in place of the catalog's species.
 
 The text is what a species file holds, so it passes the same checks, and a key that comes in another version of the
 format needs no migration of its own. `species_for` is the one door: refinement, previews and panels load through it.
@@ -28,8 +28,8 @@ import bpy
 from bpy.props import StringProperty
 
 from ...errors import NAME, SpeciesError, readable
-from ...files import is_identifier, json_of
-from ...species.catalogue import (
+from ...files import is_identifier, parse_json
+from ...species.catalog import (
     SpeciesInfo,
     builtin_folder,
     checked_identifier,
@@ -47,7 +47,7 @@ from .asset_species import asset_infos, find_asset, name_of, refuse_asset
 
 #: Custom property of collections: JSON of species by their identifiers, see `pack`.
 PAGES = "tetflora_pages"
-_FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
+_FALLBACK_HEIGHT = 5.0  # meters, of the arrow of a plant whose species cannot be read
 
 #: Called after every change of a species, without arguments; the preview listens.
 listeners = Listeners()
@@ -159,7 +159,7 @@ def pages_of(collection: bpy.types.Collection) -> tuple[Page, ...]:
 @lru_cache(maxsize=256)
 def _pages(text: str) -> tuple[Page, ...]:
     try:
-        found = json_of(text)
+        found = parse_json(text)
     except ValueError:
         found = {}
     entries = found.items() if isinstance(found, dict) else ()
@@ -175,7 +175,7 @@ def edits_of_scenes(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEd
 
 
 def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
-    """A species as this file has it: edited here, else the catalogue's.
+    """A species as this file has it: edited here, else the catalog's.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
 
 
 def display_height(identifier: str) -> float:
-    """Height of a species' trunk in metres, for the arrow that stands for a plant in the viewport."""
+    """Height of a species' trunk in meters, for the arrow that stands for a plant in the viewport."""
     asset = find_asset(None, identifier)
     if asset is not None:
         return asset.height
@@ -254,7 +254,7 @@ def species_data(scene: bpy.types.Scene | None, identifier: str) -> dict[str, An
 @lru_cache(maxsize=64)
 def _decoded(text: bytes | str, name: str) -> dict[str, Any]:
     try:
-        data = json_of(text)
+        data = parse_json(text)
     except ValueError as error:
         raise SpeciesError(f"{name}: {error}") from None
     if not isinstance(data, dict):
@@ -263,7 +263,7 @@ def _decoded(text: bytes | str, name: str) -> dict[str, Any]:
 
 
 def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[dict[str, Any]], None]) -> None:
-    """Change a species in this file; the catalogue's file stays as it is.
+    """Change a species in this file; the catalog's file stays as it is.
 
     Parameters
     ----------
@@ -334,7 +334,7 @@ def new_identifier(name: str, taken: Callable[[str], bool]) -> str:
     return identifier
 
 
-def catalogue() -> dict[str, SpeciesInfo]:
+def catalog() -> dict[str, SpeciesInfo]:
     """All species that this user or this file has, by identifier, in the order in which they are offered.
 
     Assets are among them; `grown` leaves them out.
@@ -354,15 +354,15 @@ def _seen_assets() -> dict[str, SpeciesInfo]:
 
 
 def unknown_text(identifier: str) -> str:
-    """What is said of an identifier that the catalogue does not have: which asset is gone, or what there is."""
+    """What is said of an identifier that the catalog does not have: which asset is gone, or what there is."""
     if find_asset(None, identifier) is not None:
         name = readable(name_of(identifier), NAME)
         return f'"{name}", which was used as a species, was deleted; undo that, or choose another species'
-    return f'Unknown species "{readable(identifier, NAME)}"; choose one of {", ".join(catalogue())}'
+    return f'Unknown species "{readable(identifier, NAME)}"; choose one of {", ".join(catalog())}'
 
 
 def grown() -> dict[str, SpeciesInfo]:
-    """The species of the catalogue that grow, and not the assets."""
+    """The species of the catalog that grow, and not the assets."""
     known = listed()
     edited = edited_infos()
     return in_order(known | edited) if edited else known

@@ -17,9 +17,9 @@ from ...errors import SceneError, SpeciesError, TetFloraError
 from ...jobs import Progress, part_of
 from ...species.species import Species
 from ...stands.grow import StandSettings, grow
-from ...stands.guilds import Guild
 from ...stands.plants import Records
 from ...stands.site import StandSite
+from ...stands.traits import StandSpecies
 from ..attributes import write
 from ..placing.plant_objects import link_field
 from ..placing.terrain import read_ground
@@ -44,7 +44,7 @@ from ..scene.fields import field_kinds, quaternions, write_field
 from ..scene.own_ages import Sizes
 from ..scene.sizes import kinds_of_sizes, measure_of
 from ..settings import check_limits
-from ..species.edits import catalogue, species_for
+from ..species.edits import catalog, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .sites import Soil, stand_site
 
@@ -87,17 +87,17 @@ def shown_stand(context: bpy.types.Context) -> bpy.types.PropertyGroup:
 
 
 def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
-    """Give a stand the settings of another, and its species; a mixed wood where it has none."""
+    """Give a stand the settings of another, and its species; a mixed forest where it has none."""
     for prop in source.bl_rna.properties:
         if prop.identifier not in _OWN:
             setattr(target, prop.identifier, getattr(source, prop.identifier))
     target.species.clear()
-    known = catalogue()
-    rows = [(e.species, e.planted, e.rain) for e in source.species if e.species]
+    known = catalog()
+    rows = [(e.species, e.planted, e.incoming_seeds) for e in source.species if e.species]
     rows = rows or [(name, *shares) for name, shares in MIXED_WOOD.items() if name in known]
     for name, planted, rain in rows or [(name, 1.0, 1.0) for name in list(known)[:1]]:
         entry = target.species.add()
-        entry.species, entry.planted, entry.rain = name, planted, rain
+        entry.species, entry.planted, entry.incoming_seeds = name, planted, rain
 
 
 @job("Growing the stand")
@@ -116,7 +116,7 @@ def new_stand_steps(
     Raises
     ------
     TetFloraError
-        No ground, a species that the catalogue does not have, or settings with which nothing grows.
+        No ground, a species that the catalog does not have, or settings with which nothing grows.
     """
     data.add_objects(grounds := list(grounds))
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
@@ -172,7 +172,7 @@ def _again_steps(
     entries = [entry for entry in stand.species if entry.species]
     if not entries:
         raise SceneError(f'"{field.name}" has no species; add one to the list')
-    guilds = [Guild(species_for(scene, e.species), e.planted, e.rain) for e in entries]
+    members = [StandSpecies(species_for(scene, e.species), e.planted, e.incoming_seeds) for e in entries]
     names = [entry.species for entry in entries]
     soil = Soil(**{f.name: getattr(stand, f.name) for f in fields(Soil)})
     settings = StandSettings(**{f.name: getattr(stand, f.name) for f in fields(StandSettings)})
@@ -180,7 +180,7 @@ def _again_steps(
     ground = zoned(scene, depsgraph, stand, grounds, ground)
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
     try:
-        records = yield from _growing(site, guilds, settings)
+        records = yield from _growing(site, members, settings)
     except TetFloraError as error:
         raise SceneError(f'"{field.name}": {error}') from None
     if not len(records):
@@ -195,7 +195,7 @@ def _again_steps(
         )
     progress = Progress(sum(_GROWING), "Measuring plants")
     columns = yield from call_in_thread(progress, _columns, records, site, corner)
-    yield from steps_in_thread(_measuring([guild.species for guild in guilds], records), progress)
+    yield from steps_in_thread(_measuring([member.species for member in members], records), progress)
     data.check()
     _replace(field, names, *columns)
     last = int(records.year.max())
@@ -205,9 +205,11 @@ def _again_steps(
     return GrownStand(field, len(records.at(last)), len(records), last)
 
 
-def _growing(site: StandSite, guilds: list[Guild], settings: StandSettings) -> Generator[Progress, object, Records]:
+def _growing(
+    site: StandSite, members: list[StandSpecies], settings: StandSettings
+) -> Generator[Progress, object, Records]:
     (begin, part) = _GROWING
-    with closing(steps_in_thread(grow(site, guilds, settings), Progress(0.0, "Growing the stand"))) as steps:
+    with closing(steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))) as steps:
         return (yield from part_of(steps, begin, begin + part))
 
 
@@ -259,11 +261,11 @@ def _replace(
     field.matrix_world = other.matrix_world.copy()
     _hand_over(other, field, {**_size_columns(*sizes), YEAR: records.year, PLANT: records.plant})
     group = field.tetflora
-    forms = {entry.species: entry.form for entry in group.field_species}
+    forms = {entry.species: entry.skeleton for entry in group.field_species}
     group.field_species.clear()
     for name in names:
         entry = group.field_species.add()
-        entry.species, entry.form = name, forms.get(name)
+        entry.species, entry.skeleton = name, forms.get(name)
 
 
 def _size_columns(*sizes: NDArray) -> dict[str, NDArray]:

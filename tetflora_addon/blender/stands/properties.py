@@ -9,7 +9,7 @@ from ...planting.rules import Rules
 from ...stands.grow import StandSettings
 from ..placing.properties import AroundPaths, TetFloraGround
 from ..settings import properties_of, settings_in
-from ..species.catalogue import SpeciesChoice
+from ..species.catalog import SpeciesChoice
 
 _RULES = properties_of(Rules, options=set())
 _FACTOR = {"min": 0.0, "max": 1.0, "subtype": 'FACTOR', "options": set()}
@@ -29,8 +29,8 @@ class TetFloraStandEntry(bpy.types.PropertyGroup, SpeciesChoice):
         max=1e6,
         options=set(),
     )
-    rain: FloatProperty(
-        name="Seeds",
+    incoming_seeds: FloatProperty(
+        name="Incoming Seeds",
         description="Share of this species among the seeds that arrive from outside, relative to the others",
         default=1.0,
         min=0.0,
@@ -49,7 +49,7 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
     grounds: CollectionProperty(name="Grounds", description="Meshes that the stand grows on", type=TetFloraGround)
     species: CollectionProperty(
         name="Species",
-        description="Species of the stand; if empty, a mixed wood of central Europe",
+        description="Species of the stand; if empty, a mixed forest of central Europe",
         type=TetFloraStandEntry,
     )
     species_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
@@ -58,8 +58,8 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
     # Woods of a scene end where their ground does.
     open_edges: properties_of(StandSettings, options=set(), default=True).open_edges
 
-    warmth: FloatProperty(
-        name="Warmth",
+    degree_days: FloatProperty(
+        name="Degree Days",
         description=(
             "Sum of the daily mean temperatures above 5 °C in a year, where altitude is 0; it is colder above. About "
             "900 in Lapland, 1,700 in central Europe, 3,500 on the Mediterranean"
@@ -72,8 +72,8 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
         precision=0,
         options=set(),
     )
-    winter: FloatProperty(
-        name="Winter",
+    coldest_month: FloatProperty(
+        name="Coldest Month",
         description="Mean temperature of the coldest month, in °C, where altitude is 0",
         default=-1.0,
         min=-80.0,

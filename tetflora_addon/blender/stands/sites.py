@@ -17,7 +17,7 @@ from ...planting.terrain import Terrain
 from ...planting.wetness import wet_ground
 from ...stands.site import StandSite
 
-#: Finest cells of the ground, metres, and their most.
+#: Finest cells of the ground, meters, and their most.
 _FINEST, _MOST = 1.0, 500_000
 _LEVEL = 0.4  # wetness of ground that is neither ridge nor valley
 
@@ -26,8 +26,8 @@ _LEVEL = 0.4  # wetness of ground that is neither ridge nor valley
 class Soil:
     """Climate and soil as the settings say, see `properties.TetFloraStand`; ``slope_max`` in radians."""
 
-    warmth: float
-    winter: float
+    degree_days: float
+    coldest_month: float
     moisture: float
     relief: float
     fertility: float
@@ -69,8 +69,8 @@ def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, NDArray[np.float
         plantable,
         moisture,
         np.full(height.shape, soil.fertility),
-        soil.warmth,
-        soil.winter,
+        soil.degree_days,
+        soil.coldest_month,
     )
     return site, np.array([grid.west, grid.south])
 

@@ -125,7 +125,7 @@ def _shapes_of(
     for plants in read_asset_plants(scene, depsgraph, depsgraph.view_layer):
         crown = crown_for(scene, plants.species)
         size = crown.radius, crown.base, crown.height
-        crowns.append(simple_crowns(plants.matrices, size, crown.colour, boxes=make is bounds_of_plants))
+        crowns.append(simple_crowns(plants.matrices, size, crown.color, boxes=make is bounds_of_plants))
     try:
         seeds, _, of(scene).message = read_plants(scene, depsgraph, depsgraph.view_layer)
     except NoPlantsError:

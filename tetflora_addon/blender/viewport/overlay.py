@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...camera.camera import Camera
-from ...preview.levels import FORMS, Level, Levels, as_shown, colours_of
+from ...preview.levels import FORMS, Level, Levels, as_shown, colors_of
 from ...preview.light_plants import Shapes
 from ...preview.projected import THICK, drawable, project
 from ...refinement.decisions import Decision
@@ -42,14 +42,14 @@ _TEXT, _COMPLAINT = (0.95, 0.95, 0.95, 1.0), (1.0, 0.7, 0.3, 1.0)
 _handles: list[object] = []
 
 
-def batch(kind: str, positions: NDArray, colours: NDArray, indices: NDArray) -> gpu.types.GPUBatch:
-    """A batch of 'LINES' or 'TRIS' with a colour (v, 4) for each corner (v, 3)."""
+def batch(kind: str, positions: NDArray, colors: NDArray, indices: NDArray) -> gpu.types.GPUBatch:
+    """A batch of 'LINES' or 'TRIS' with a color (v, 4) for each corner (v, 3)."""
     layout = gpu.types.GPUVertFormat()
     layout.attr_add(id="pos", comp_type='F32', len=3, fetch_mode='FLOAT')
     layout.attr_add(id="color", comp_type='F32', len=4, fetch_mode='FLOAT')
     corners = gpu.types.GPUVertBuf(layout, len(positions))
     corners.attr_fill("pos", np.ascontiguousarray(positions, np.float32))
-    corners.attr_fill("color", np.ascontiguousarray(colours, np.float32))
+    corners.attr_fill("color", np.ascontiguousarray(colors, np.float32))
     elements = gpu.types.GPUIndexBuf(type=kind, seq=np.ascontiguousarray(indices, np.int32))
     return gpu.types.GPUBatch(type=kind, buf=corners, elem=elements)
 
@@ -62,13 +62,13 @@ def chosen_by_worth(level: Level, forms: set[str], most: int) -> NDArray[np.intp
     return wanted[np.argsort(-level.contribution[wanted], kind="stable")[:most]]
 
 
-def wires(levels: Levels, level: Level, colour: str, forms: set[str]) -> gpu.types.GPUBatch | None:
+def wires(levels: Levels, level: Level, color: str, forms: set[str]) -> gpu.types.GPUBatch | None:
     """Edges of a level's tetrahedra; None where there are none."""
     some = chosen_by_worth(level, forms, MOST_WIRES)
     if len(some) == 0:
         return None
     vertices = levels.vertices(level, some)
-    shown = colours_of(level, colour, int(levels.levels[-1].depth.max()))[some]
+    shown = colors_of(level, color, int(levels.levels[-1].depth.max()))[some]
     indices = EDGES[None] + 4 * np.arange(len(some))[:, None, None]
     return batch(
         'LINES', vertices.reshape(-1, 3), np.repeat(_opaque(shown, _WIRE_ALPHA), 4, axis=0), indices.reshape(-1, 2)
@@ -85,13 +85,13 @@ def translucent(
         return None, 0
     some = levels.back_to_front(level, camera, some)
     projected = project(levels.vertices(level, some).astype(np.float64), level.extinction[some], camera)
-    colours = np.zeros((len(some), 5, 4), np.float32)
-    colours[:, :, :3] = as_shown(level.colour[some])[:, None]
-    colours[:, THICK, 3] = projected.opacity
+    colors = np.zeros((len(some), 5, 4), np.float32)
+    colors[:, :, :3] = as_shown(level.color[some])[:, None]
+    colors[:, THICK, 3] = projected.opacity
     triangles = projected.triangles[projected.opacity[projected.triangles[:, 0] // 5] > _FAINT]
     if len(triangles) == 0:
         return None, 0
-    return batch('TRIS', projected.corners.reshape(-1, 3), colours.reshape(-1, 4), triangles), len(some)
+    return batch('TRIS', projected.corners.reshape(-1, 3), colors.reshape(-1, 4), triangles), len(some)
 
 
 def plants(shapes: Shapes) -> gpu.types.GPUBatch | None:
@@ -99,15 +99,15 @@ def plants(shapes: Shapes) -> gpu.types.GPUBatch | None:
     if shapes.plants == 0:
         return None
     kind = 'TRIS' if shapes.indices.shape[1] == 3 else 'LINES'
-    return batch(kind, shapes.positions, _opaque(shapes.colours, 1.0), shapes.indices)
+    return batch(kind, shapes.positions, _opaque(shapes.colors, 1.0), shapes.indices)
 
 
-def pyramid(camera: Camera, far: float, colour: tuple[float, float, float, float]) -> gpu.types.GPUBatch:
+def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]) -> gpu.types.GPUBatch:
     """Edges of what a camera sees between its near plane and a distance; its place and directions for a panorama."""
     if camera.kind == "PANO":
         axes = np.concatenate([camera.frame.T, -camera.frame.T]) * far / 10.0 + camera.position
         ends = np.concatenate([axes, camera.position[None]])
-        return batch('LINES', ends, np.tile(colour, (7, 1)), np.array([(6, i) for i in range(6)]))
+        return batch('LINES', ends, np.tile(color, (7, 1)), np.array([(6, i) for i in range(6)]))
     left, right, bottom, top = camera.window
     rim = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
     parts = []
@@ -117,11 +117,11 @@ def pyramid(camera: Camera, far: float, colour: tuple[float, float, float, float
         parts.append(local @ camera.frame.T + camera.position)
     ring = [(i, (i + 1) % 4) for i in range(4)]
     edges = [*ring, *((a + 4, b + 4) for a, b in ring), *((i, i + 4) for i in range(4))]
-    return batch('LINES', np.concatenate(parts), np.tile(colour, (8, 1)), np.array(edges))
+    return batch('LINES', np.concatenate(parts), np.tile(color, (8, 1)), np.array(edges))
 
 
-def _opaque(colours: NDArray[np.float32], alpha: float) -> NDArray[np.float32]:
-    return np.concatenate([colours, np.full((len(colours), 1), alpha, np.float32)], axis=1)
+def _opaque(colors: NDArray[np.float32], alpha: float) -> NDArray[np.float32]:
+    return np.concatenate([colors, np.full((len(colors), 1), alpha, np.float32)], axis=1)
 
 
 def view_camera(region: bpy.types.RegionView3D, near: float, origin: NDArray[np.float64]) -> Camera:
@@ -184,8 +184,8 @@ def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.S
         )
         _draw(made, origin)
     if settings.wires:
-        key = (*shown, settings.colour)
-        made = _kept(preview, "wires", key, lambda: wires(levels, level, settings.colour, forms))
+        key = (*shown, settings.color)
+        made = _kept(preview, "wires", key, lambda: wires(levels, level, settings.color, forms))
         _draw(made, origin)
     gpu.state.blend_set('NONE')
 
@@ -211,7 +211,7 @@ def _draw_frozen(preview: Preview) -> None:
 
 
 def _reach(preview: Preview, camera: Camera) -> float:
-    """How far a frozen camera's pyramid is drawn: to the farthest that it sees of plants, metres."""
+    """How far a frozen camera's pyramid is drawn: to the farthest that it sees of plants, meters."""
     if preview.levels is None:
         return min(camera.far, 100.0)
 
@@ -229,7 +229,7 @@ def _place(camera: Camera) -> tuple[float, ...]:
 
 
 def lines_of(scene: bpy.types.Scene, preview: Preview) -> list[tuple[str, tuple[float, float, float, float]]]:
-    """Lines of the figures in the corner of a viewport, from top to bottom, and their colours."""
+    """Lines of the figures in the corner of a viewport, from top to bottom, and their colors."""
     settings, lines = scene.tetflora.preview, []
     if preview.levels is not None:
         level = preview.levels.at(settings.level)
@@ -242,10 +242,10 @@ def lines_of(scene: bpy.types.Scene, preview: Preview) -> list[tuple[str, tuple[
             (Decision.SPLIT, "to split", figures.split),
         )
         for decision, name, number in parts:
-            colour = (*FORMS[decision], 1.0) if settings.colour == 'FORM' else _TEXT
-            lines.append((f"    {number:,} {name}", colour))
+            color = (*FORMS[decision], 1.0) if settings.color == 'FORM' else _TEXT
+            lines.append((f"    {number:,} {name}", color))
         lines.append((f"    {figures.polygons:,} explicit polygons", _TEXT))
-        if settings.colour != 'FORM' and settings.wires:
+        if settings.color != 'FORM' and settings.wires:
             lines.append(("    dark: low    bright: high", _TEXT))
     if preview.shapes is not None:
         shapes = preview.shapes
@@ -266,8 +266,8 @@ def _draw_figures(scene: bpy.types.Scene, preview: Preview, area: bpy.types.Area
     blf.size(0, 12.0 * scale)
     blf.enable(0, blf.SHADOW)
     blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.9)
-    for n, (text, colour) in enumerate(reversed(lines)):
-        blf.color(0, *colour)
+    for n, (text, color) in enumerate(reversed(lines)):
+        blf.color(0, *color)
         blf.position(0, left + 16.0 * scale, 16.0 * scale + n * step, 0.0)
         blf.draw(0, text)
     blf.disable(0, blf.SHADOW)

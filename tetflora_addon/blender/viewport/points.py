@@ -27,20 +27,20 @@ from ..placing.rules import awaits_update, makes_field, read_search, shown_popul
 from ..runtime import Handlers, call_off, call_soon, redraw, with_uid
 from ..species import edits
 
-Colour = tuple[float, float, float, float]
+Color = tuple[float, float, float, float]
 
 WIDTH = 2.0  # of a cursor's lines, pixels times the interface's scale
 #: Dots that are drawn at most, evenly chosen among the plants.
 MOST_DOTS = 20_000
 #: Plants that are placed at most for a preview.
 MOST_PLACED = 200_000
-#: One after the other for the species of the mixture; linear RGB, distinguishable by colour-blind eyes as well
+#: One after the other for the species of the mixture; linear RGB, distinguishable by color-blind eyes as well
 #: (the palette of Okabe and Ito, "Color Universal Design", 2008).
 PALETTE = np.array(
     [[0.0, 0.62, 0.45], [0.9, 0.62, 0.0], [0.34, 0.71, 0.91], [0.94, 0.89, 0.26], [0.84, 0.37, 0.0], [0.8, 0.47, 0.65]]
 )
 _SIZE = 6.0  # pixels
-_LIFT = 0.1  # metres above the ground, which would hide half of each dot
+_LIFT = 0.1  # meters above the ground, which would hide half of each dot
 _SOON = 0.08  # seconds from a change to new dots
 
 
@@ -48,12 +48,12 @@ _SOON = 0.08  # seconds from a change to new dots
 class Dots:
     """The dots of a population."""
 
-    position: NDArray[np.float32]  # (n, 3), metres from the origin
-    colour: NDArray[np.float32]  # (n, 4)
+    position: NDArray[np.float32]  # (n, 3), meters from the origin
+    color: NDArray[np.float32]  # (n, 4)
     plants: int  # that would be placed; at least, where ``more``
     more: bool
     message: str  # why there are fewer than asked for; empty if there are not
-    origin: NDArray[np.float64]  # (3,), near most of them, metres in world space
+    origin: NDArray[np.float64]  # (3,), near most of them, meters in world space
 
 
 @dataclass
@@ -125,9 +125,9 @@ def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: 
     origin = origin_near(placement.position)
     position = (placement.position[drawn] - origin).astype(np.float32)
     position[:, 2] += _LIFT
-    colour = np.ones((len(drawn), 4), np.float32)
-    colour[:, :3] = PALETTE[placement.species[drawn] % len(PALETTE)]
-    return Dots(position, colour, number, number >= MOST_PLACED, placement.reason, origin)
+    color = np.ones((len(drawn), 4), np.float32)
+    color[:, :3] = PALETTE[placement.species[drawn] % len(PALETTE)]
+    return Dots(position, color, number, number >= MOST_PLACED, placement.reason, origin)
 
 
 def status(population: bpy.types.PropertyGroup) -> str:
@@ -184,7 +184,7 @@ def _draw() -> None:
         return
     shader = gpu.shader.from_builtin(compat.dot_shader())
     if _state.batch is None:
-        _state.batch = batch_for_shader(shader, 'POINTS', {"pos": _state.dots.position, "color": _state.dots.colour})
+        _state.batch = batch_for_shader(shader, 'POINTS', {"pos": _state.dots.position, "color": _state.dots.color})
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.point_size_set(_SIZE * context.preferences.system.ui_scale)
     with gpu.matrix.push_pop():
@@ -236,7 +236,7 @@ class GroundCursor:
     """Line strips in one window, from `start` to `stop`; change ``lines`` and redraw the area."""
 
     def __init__(self) -> None:
-        self.lines: list[tuple[NDArray[np.float64], Colour]] = []
+        self.lines: list[tuple[NDArray[np.float64], Color]] = []
         self._window: int | None = None
         self._handle: object | None = None
 
@@ -263,21 +263,21 @@ class GroundCursor:
         scale = context.preferences.system.ui_scale
         shader.bind()
         shader.uniform_float("viewportSize", size)
-        for points, colour in self.lines:
+        for points, color in self.lines:
             origin = origin_near(points)
             near = np.ascontiguousarray(points - origin, np.float32)
             batch = batch_for_shader(shader, 'LINE_STRIP', {"pos": near})
             with gpu.matrix.push_pop():
                 gpu.matrix.translate(origin.tolist())
                 # A dark line below makes the bright one seen on any ground.
-                for line, width in (((0.0, 0.0, 0.0, 0.5 * colour[3]), 2.0 * WIDTH), (colour, WIDTH)):
+                for line, width in (((0.0, 0.0, 0.0, 0.5 * color[3]), 2.0 * WIDTH), (color, WIDTH)):
                     shader.uniform_float("lineWidth", width * scale)
                     shader.uniform_float("color", line)
                     batch.draw(shader)
         gpu.state.blend_set('NONE')
 
 
-def circle(centre: Sequence[float], radius: float, sides: int = 32) -> NDArray[np.float64]:
+def circle(center: Sequence[float], radius: float, sides: int = 32) -> NDArray[np.float64]:
     """A level circle, (sides + 1, 3) with the first corner twice."""
     angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
-    return np.stack([np.cos(angle), np.sin(angle), np.zeros(sides + 1)], axis=1) * radius + np.asarray(centre, float)
+    return np.stack([np.cos(angle), np.sin(angle), np.zeros(sides + 1)], axis=1) * radius + np.asarray(center, float)

@@ -196,7 +196,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         default=True,
         **_SHOWN,
     )
-    colour: EnumProperty(
+    color: EnumProperty(
         name="Color By",
         description="What the colors of tetrahedra show",
         items=(

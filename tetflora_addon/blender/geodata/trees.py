@@ -1,0 +1,256 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fields of trees from inventories, and from rasters of canopy height: each tree has the size that is recorded."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Generator, Mapping
+from dataclasses import replace
+from math import tau
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError, SpeciesError
+from ...geodata.canopy import checked_canopy, find_trees, heights_above, without_areas
+from ...geodata.inventories import Inventory, read_inventory
+from ...geodata.projection import MapOrigin
+from ...geodata.species_names import GENUS, KIN, KIND, best_of, name_counts, words_of
+from ...growth.hashing import child_key, key_of_seed, uniform
+from ...growth.seeds import Seeds
+from ...jobs import Progress
+from ...planting.places import Placement
+from ...planting.rules import species_by_weight
+from ...species.species import Species
+from ..attributes import write
+from ..placing.plant_objects import add_field
+from ..scene.field_sizes import FIT, HEIGHT, NUMBERS, OFFSET, SIZE_ATTRIBUTES
+from ..scene.own_ages import Sizes
+from ..scene.sizes import fits_of
+from ..species.edits import catalog, grown, species_for
+from ..worker import call_in_thread, steps_in_thread
+from .completion import complete
+from .origin import Import, Imported, Steps, importing
+from .outlines import building_areas
+from .terrain import heights_steps, read_raster
+
+#: What to do with species that nobody knows.
+GENERIC, LEFT_OUT = 'GENERIC', 'LEAVE_OUT'
+_GENERIC = "broadleaf_tree"
+
+
+@importing
+def inventory_steps(
+    order: Import, unknown: str, units: str, skip: bool, columns: Mapping[str, str] | None = None
+) -> Steps:
+    """Make a field of the trees of a file; yields progress. Closing the steps leaves all as it was.
+
+    Parameters
+    ----------
+    unknown : str
+        `GENERIC`, `LEFT_OUT`, or the identifier of a species for trees of species that nobody knows.
+    units, skip, columns
+        As of `read_inventory`.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
+    """
+    progress = Progress(0.0, f"Reading {order.path.name}")
+    yield progress
+    inventory = yield from call_in_thread(progress, read_inventory, order.path, order.epsg, units, skip, columns)
+    if (box := order.box(inventory.points, inventory.system)) is not None:
+        inside = box.holds(inventory.points)
+        if not inside.any():
+            raise order.nothing_left()
+        inventory = replace(
+            inventory,
+            name=inventory.name[inside],
+            points=inventory.points[inside],
+            sizes={name: values[inside] for name, values in inventory.sizes.items()},
+            notes=[*inventory.notes, f"{(~inside).sum():,} beyond the Crop"],
+        )
+    place = order.origin(inventory.points, inventory.system)
+    flat = order.local(place, inventory.points, inventory.system)
+    identifiers, kinds, kin, others = _species(inventory, unknown)
+    kept = np.flatnonzero(kinds >= 0)
+    if not len(kept):
+        raise SceneError(f"{order.what}none of its trees is of a known species; choose what stands for unknown ones")
+    kinds, sizes = kinds[kept], {name: values[kept] for name, values in inventory.sizes.items()}
+    yield Progress(0.5, "Completing sizes")
+    sizes["height"], completed = complete(sizes, kinds, identifiers, lambda name: species_for(order.scene, name))
+    made = yield from _plant(order, place, flat[kept], kinds, identifiers, sizes)
+    left = " and left out" * (len(kept) < len(flat))
+    made.told[1:1] = [
+        *[f"{others.total():,} of unknown species{left}: {told(others, 25)}"] * bool(others),
+        *[f"rows without a tree left out: {told(inventory.left_out)}"] * bool(inventory.left_out),
+        *[f"heights of {completed:,} follow from trunk or crown"] * bool(completed),
+        *[f"{kin.total():,} stand as their nearest kin: {told(kin)}"] * bool(kin),
+    ]
+    made.told += [*inventory.notes, f"coordinates: {inventory.system.name}"]
+    if number := inventory.skipped:
+        made.told.append(f"{number:,} broken row{'s' * (number > 1)} skipped, the first: {inventory.first}")
+    made.warning = bool(others or number)
+    return made
+
+
+def _species(inventory: Inventory, unknown: str) -> tuple[list[str], NDArray[np.int32], Counter, Counter]:
+    """Species of the catalog, and the index (n,) of each tree's, -1 for those to leave out; and names that stand for
+    others, with how many trees have them: of other species, and of no known one.
+    """
+    kin, others = Counter(), Counter()
+    known, counts = catalog(), np.bincount(inventory.name, minlength=len(inventory.names))
+    chosen: list[str] = []
+    for names, count in zip(inventory.names, counts.tolist(), strict=True):
+        if not count:  # of rows that were left out
+            chosen.append("")
+            continue
+        match, name = best_of(names, known)
+        if match is None or match.certainty == KIND:
+            others[names[0] if names else ""] += count
+            kind = match.species if match is not None else _GENERIC
+            kind = {GENERIC: kind, LEFT_OUT: ""}.get(unknown, unknown)
+        else:
+            kind = match.species
+            # A bare genus says no more than what it gets.
+            if match.certainty == KIN or (match.certainty == GENUS and len(words_of(name)) > 1):
+                kin[name] += count
+        chosen.append(kind)
+    identifiers = sorted({kind for kind in chosen if kind})
+    index = {kind: number for number, kind in enumerate(identifiers)}
+    return identifiers, np.array([index.get(kind, -1) for kind in chosen], np.int32)[inventory.name], kin, others
+
+
+@importing
+def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: Path | None = None) -> Steps:
+    """Make a field of the trees that a raster of canopy height shows; yields progress.
+
+    Closing the steps leaves all as it was.
+
+    Parameters
+    ----------
+    mix : mapping
+        Weights of species by identifier.
+    least : float
+        Height of the smallest tree, meters.
+    below : Path, optional
+        Elevations of the ground, which are subtracted.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, has no trees, or cannot lie in this scene.
+    """
+    raster, what = (yield from read_raster(order)), order.what
+    if below is not None:
+        ground = yield from read_raster(order, below)
+        progress = Progress(0.05, "Subtracting the ground")
+        raster = yield from call_in_thread(progress, heights_above, raster, ground, what)
+    values, notes = checked_canopy(raster.values, what)
+    raster = replace(raster, values=values)
+    notes = [*raster.notes, f"coordinates: {raster.system.name}", *notes]
+    place = order.origin(raster.outline, raster.system)
+    h, w = raster.values.shape
+    # Steps from a cell in the middle to the next ones, in meters of the scene.
+    near = raster.places(np.array([0, 1, 0]) + w // 2, np.array([0, 0, 1]) + h // 2)
+    middle, along, down = order.local(place, near, raster.system)
+    along, down = along - middle, down - middle
+    cell = float(np.sqrt(abs(along[0] * down[1] - along[1] * down[0])))
+    if roofs := building_areas(order.scene):
+        flat_cells = replace(raster, corner=middle - along * (w // 2) - down * (h // 2), along=along, down=down)
+        flat_cells, number = yield from call_in_thread(
+            Progress(0.1, "Leaving out roofs"), without_areas, flat_cells, roofs
+        )
+        raster = replace(raster, values=flat_cells.values)
+        notes += [f"{number:,} cells on buildings left out"] * (number > 0)
+    if cell > _COARSEST:
+        raise SceneError(f"{what}its cells are {cell:.1f} m wide; trees can be told apart up to {_COARSEST:g} m")
+    found = yield from steps_in_thread(find_trees(raster.values, cell, least), Progress(0.1, "Looking for treetops"))
+    number = len(found.height)
+    if not number:
+        raise SceneError(f"{what}nothing in it is {least:g} m high; check its unit, or lower Min Height")
+    flat = order.local(place, raster.places(found.column, found.row), raster.system)
+    identifiers = list(mix)
+    keys = child_key(child_key(key_of_seed(0), _SPECIES), np.arange(number))
+    kinds = species_by_weight(tuple(mix.values()), uniform(keys, 0))
+    unit = np.stack([along / np.linalg.norm(along), down / np.linalg.norm(down)])
+    sizes = {
+        "height": found.height.astype(np.float32),
+        "crown_width": found.width.astype(np.float32),
+        "offset": np.column_stack([found.offset @ unit, np.zeros(number)]).astype(np.float32),
+    }
+    made = yield from _plant(order, place, flat, kinds, identifiers, sizes)
+    made.told += notes
+    return made
+
+
+_COARSEST = 3.0  # meters
+_SPECIES, _AZIMUTH, _SEED = 1, 2, 3
+
+
+def _plant(
+    order: Import,
+    place: MapOrigin,
+    flat: NDArray[np.float64],
+    kinds: NDArray[np.int32],
+    identifiers: list[str],
+    sizes: dict[str, NDArray[np.float32]],
+) -> Steps:
+    """Make the field; its plants stand on the ground, those beside it as high as the ground is on average."""
+    progress = Progress(0.8, "Standing trees on the ground")
+    yield progress
+    heights = yield from heights_steps(order, progress)
+    parts, z = [f"{len(flat):,} tree{'s' * (len(flat) > 1)} imported"], np.zeros(len(flat))
+    if heights is not None:
+        z = heights.at(heights.height, flat)
+        beside, corner = ~np.isfinite(z), np.array([heights.west, heights.south])
+        # Beyond its box the ground goes on as at its border.
+        beyond = ((flat < corner) | (flat > corner + heights.cell * np.array(heights.height.shape[::-1]))).any(axis=1)
+        number = (beside | beyond).sum()
+        parts += [f"{number:,} stand beside the ground"] * bool(number)
+        z[beside] = z[~beside].mean() if not beside.all() else 0.0
+    keys = child_key(key_of_seed(0), np.arange(len(flat)))
+    seeds = (uniform(keys, _SEED) * 2**31).astype(np.int32)
+    turns = tau * uniform(keys, _AZIMUTH)
+    placement = Placement(np.column_stack([flat, z]), turns, np.ones(len(flat)), kinds, seeds, len(flat))
+    age = sizes.get("age")
+    ages = None if age is None else np.where(sizes["height"] > 0.0, 0.0, age)
+    columns = {name: sizes[key] for name in NUMBERS if (key := name.removeprefix("tf_")) in sizes and sizes[key].any()}
+    columns |= {OFFSET: sizes["offset"]} if "offset" in sizes else {}
+    if HEIGHT in columns:
+        columns[FIT] = yield from _fit_steps(order.scene, placement, identifiers, columns)
+    yield Progress(0.95, "Making the field")
+    made = add_field(order.scene, placement, identifiers, ages=ages)
+    made.name = made.data.name = order.path.stem
+    for name, values in columns.items():
+        write(made.data, name, values, data_type=SIZE_ATTRIBUTES[name])
+    order.remember(place)
+    return Imported(made, parts)
+
+
+def _fit_steps(
+    scene: bpy.types.Scene, placement: Placement, identifiers: list[str], columns: dict[str, NDArray[np.float32]]
+) -> Generator[Progress, Any, NDArray[np.float32]]:
+    """Factors on height and crown width, (n, 3), that make up for what is random in each plant."""
+    none, number = np.zeros((len(placement), 3)), len(placement)
+    numbers = (columns.get(name, none[:, 0]).astype(np.float64) for name in NUMBERS)
+    own = Sizes(*numbers, columns.get(OFFSET, none)[:, :2], none[:, :2] + 1.0)
+    turn, frame = placement.azimuth, np.zeros((number, 3, 3))
+    frame[:, 0, 0] = frame[:, 1, 1] = np.cos(turn)
+    frame[:, 1, 0], frame[:, 0, 1], frame[:, 2, 2] = np.sin(turn), -np.sin(turn), 1.0
+    given = placement.species, placement.seed.astype(np.int64), none, frame, np.ones(number)
+    species = {name: species_for(scene, name) for name in set(identifiers) & grown().keys()}
+
+    def find(name: str) -> Species:
+        if name not in species:  # an asset
+            raise SpeciesError(name)
+        return species[name]
+
+    progress = Progress(0.85, "Fitting plants to their sizes")
+    found = yield from call_in_thread(progress, fits_of, Seeds(tuple(identifiers), *given), own, find)
+    return np.pad(found, ((0, 0), (0, 1))).astype(np.float32)

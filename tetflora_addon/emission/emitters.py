@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kinds of proxies in the engine: buffers, sizes and memory. `results.proxy_kinds` has their labels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..buffers import MeshBuffers, PointBuffers
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..proxies.microsurfaces import Facets
+from ..proxies.primitives import (
+    Primitive,
+    Spheres,
+    Triangles,
+    facet_mesh,
+    joined,
+    sphere_points,
+    spheres_of,
+    triangle_mesh,
+    triangles_of,
+)
+from ..refinement.loop import Refinement
+from .asset_plan import AssetPlan, OriginalPolicy, explicit_plan
+from .drawing import Drawing, FacetConverter, Parts, drawn_blocks
+from .faces import FaceRows
+from .frontier import Shown
+from .leaf_detail import TOLERANCE
+from .light import BakedLight, baked_attributes
+from .plants import Block, explicit_blocks
+from .polygons import PolygonBlock, kept_polygons, polygon_blocks
+from .shells import proxy_shells
+
+Buffers = MeshBuffers | PointBuffers
+
+
+@dataclass(frozen=True)
+class EmissionInput:
+    """A refined scene, the input of all forms of proxies.
+
+    Attributes
+    ----------
+    flora : Flora
+    refinement : Refinement
+    camera : Camera
+    drawing : Drawing or None
+        What all is drawn with; None in forms without facets.
+    tolerance : float
+        Pixels by which the margins of near leaves may be off, in forms without facets.
+    originals : OriginalPolicy or None
+        When instances of assets are the originals; None where there are no instances.
+    disc : float
+        Area that the renderer draws of a sphere of radius 1.
+    """
+
+    flora: Flora
+    refinement: Refinement
+    camera: Camera
+    drawing: Drawing | None = None
+    tolerance: float = TOLERANCE
+    originals: OriginalPolicy | None = None
+    disc: float = np.pi
+    _waiting: list[Parts] = field(default_factory=list, compare=False)
+    _shown: list[Shown] = field(default_factory=list, compare=False)
+
+    @property
+    def facet_pixels(self) -> float | None:
+        """Side in pixels of facets that are seen; None in forms that have none."""
+        return None if self.drawing is None else self.drawing.facet
+
+    def mesh_blocks(self) -> Iterator[Block]:
+        """Meshes of plants. Facets are made with them, and wait until `facet_parts` is asked for them.
+
+        What of other things is drawn as it is can be asked for after that.
+        """
+        if self.drawing is None:
+            yield from explicit_blocks(self.flora, self.refinement, self.camera, self.tolerance)
+            return
+        self._waiting.clear()
+        self._shown.clear()
+        for made in drawn_blocks(self.drawing):
+            if isinstance(made, Block):
+                yield made
+            else:
+                (self._waiting if isinstance(made, Parts) else self._shown).append(made)
+
+    def polygon_blocks(self) -> Iterator[PolygonBlock]:
+        """Polygons of your own meshes that stay, after `mesh_blocks`."""
+        if self.drawing is None:
+            return polygon_blocks(kept_polygons(self.refinement))
+        rows = FaceRows.concatenate([FaceRows.empty(), *(rows for what, rows in self._shown if what == "face")])
+        return polygon_blocks(rows.whole(self.refinement.polygons.meshes))
+
+    def asset_plan(self) -> AssetPlan:
+        """Instances of assets that are drawn as they are, after `mesh_blocks`."""
+        if self.drawing is None:
+            return explicit_plan(self.refinement, self.originals)
+        return AssetPlan.of(self.refinement.assets.placed, self.originals, self._shown)
+
+    def facet_parts(self, again: bool = False) -> Iterator[Parts]:
+        """Facets of all that is drawn as such, block by block, after `mesh_blocks`.
+
+        again: whether they will be asked for once more, so that they have to stay.
+        """
+        waiting = list(self._waiting)
+        if not again:
+            self._waiting.clear()
+        while waiting:
+            yield waiting.pop(0)
+
+
+@dataclass(frozen=True)
+class ProxyEmitter:
+    """How one form of proxies becomes buffers.
+
+    Attributes
+    ----------
+    blocks : callable
+        Makes the buffers of a `EmissionInput`, for proxies that the renderer lights.
+    form : callable or None
+        Given the camera and `EmissionInput.disc`, what facets become where they are made; None in forms without facets.
+    baked_blocks : callable or None
+        The same with baked light, given that light and the number of the first facet in its list of sheets. None:
+        proxies of this form are always lit by the renderer.
+    faces : float or None
+        Faces per proxy tetrahedron; None where the proxies are facets, whose number follows from Facet Size.
+    hidden_block, proxy_block : float
+        As in `RefinementSettings`.
+    """
+
+    blocks: Callable[[EmissionInput], Iterator[Buffers]]
+    form: Callable[[Camera, float], FacetConverter] | None = None
+    baked_blocks: Callable[[EmissionInput, BakedLight, int], Iterator[Buffers]] | None = None
+    faces: float | None = None
+    hidden_block: float = math.inf
+    proxy_block: float = math.inf
+
+    @property
+    def facets(self) -> bool:
+        """Whether the proxies are facets, or one sphere for each."""
+        return self.faces is None
+
+
+def as_triangles(facets: Facets, _seen: bool) -> Primitive:
+    """The form of *Microsurfaces*."""
+    return triangles_of(facets)
+
+
+@dataclass(frozen=True)
+class AsSpheres:
+    """The form of *Microspheres*, and of *Automatic*, where ``seen_too`` is False and what is seen becomes triangles.
+
+    In the fidelity benchmark facets come closer to the plants wherever they are seen. Hidden proxies only cast shadows
+    and light other plants; spheres do that as well with a third of the memory.
+    """
+
+    camera: Camera
+    disc: float
+    seen_too: bool
+
+    def __call__(self, facets: Facets, seen: bool) -> Primitive:
+        """Spheres or triangles."""
+        if seen and not self.seen_too:
+            return triangles_of(facets)
+        return spheres_of(facets, self.camera if seen else None, self.disc)
+
+
+def _triangles_everywhere(_camera: Camera, _disc: float) -> FacetConverter:
+    return as_triangles
+
+
+def _spheres_everywhere(camera: Camera, disc: float) -> FacetConverter:
+    return AsSpheres(camera, disc, seen_too=True)
+
+
+def _spheres_where_hidden(camera: Camera, disc: float) -> FacetConverter:
+    return AsSpheres(camera, disc, seen_too=False)
+
+
+def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
+    """Facets as the form of the drawing has made them: triangles, spheres, or triangles where they are seen."""
+    for parts in refined.facet_parts():
+        triangles = [some for some, _ in parts if isinstance(some, Triangles)]
+        spheres = [some for some, _ in parts if isinstance(some, Spheres)]
+        if triangles:
+            yield replace(triangle_mesh(joined(triangles)), species=parts.species, look=parts.look)
+        if spheres:
+            yield replace(sphere_points(joined(spheres)), species=parts.species, look=parts.look)
+
+
+def shell_blocks(
+    refined: EmissionInput, light: BakedLight | None = None, _first_sheet: int = 0
+) -> Iterator[MeshBuffers]:
+    """Proxies as shells, in one block."""
+    shells = proxy_shells(refined.flora, refined.refinement, light)
+    if shells is not None:
+        yield shells
+
+
+def _numbered(refined: EmissionInput, first_sheet: int) -> Iterator[tuple[Parts, Facets, NDArray[np.int64]]]:
+    """Blocks of facets, each as parts and as one, with the sheets (n,) that they are in baked light."""
+    for parts in refined.facet_parts():
+        facets = joined([some for some, _ in parts])
+        yield parts, facets, np.arange(first_sheet, first_sheet + len(facets))
+        first_sheet += len(facets)
+
+
+def _baked_facets(refined: EmissionInput, light: BakedLight, first_sheet: int) -> Iterator[MeshBuffers]:
+    for parts, facets, sheets in _numbered(refined, first_sheet):
+        made, values = facet_mesh(facets), baked_attributes('FACE', *light.of_facets(facets, sheets))
+        yield replace(made, attributes={**made.attributes, **values}, species=parts.species, look=parts.look)
+
+
+def _baked_spheres(refined: EmissionInput, light: BakedLight, first_sheet: int) -> Iterator[PointBuffers]:
+    for parts, facets, sheets in _numbered(refined, first_sheet):
+        camera = refined.camera
+        drawn = [spheres_of(some, camera if seen else None, refined.disc) for some, seen in parts]
+        made, values = sphere_points(joined(drawn)), light.of_spheres(facets, sheets)
+        baked = {name: array for name, (_, array) in baked_attributes('POINT', values).items()}
+        yield replace(made, attributes={**made.attributes, **baked}, species=parts.species, look=parts.look)
+
+
+MICROSURFACES = ProxyEmitter(facet_blocks, _triangles_everywhere, _baked_facets)
+MICROSPHERES = ProxyEmitter(facet_blocks, _spheres_everywhere, _baked_spheres)
+#: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
+AUTOMATIC = ProxyEmitter(facet_blocks, _spheres_where_hidden, _baked_facets)
+#: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because
+#: their shape shows.
+SHELLS = ProxyEmitter(shell_blocks, None, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)

@@ -1,0 +1,501 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Inventories of trees: what columns mean, in which units, and what they say of each tree."""
+
+from __future__ import annotations
+
+import datetime
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError, quoted
+from . import table
+from .layers import ENDINGS
+from .projection import LONGITUDE_LATITUDE, MOST_AWAY, PLAIN, System, between, chosen_system, place_about
+from .species_names import KIND, is_name, key_of, species_named
+from .tables import NOTHING, NUMBER, RANGE, WORD, Table, cells, place_in, read_csv, read_points
+from .titles import FIELDS, NAMES, NEVER, Title, read_title, said_of
+
+#: Largest value of each size, meters or years: taller than any tree that lives.
+_MOST: dict[str, float] = table("titles")["most"]
+_TRUNKS = ("diameter", "girth")
+#: Medians without a unit, meters, beyond which it was centimeters, and beyond which millimeters.
+_SMALLER = {"diameter": (2.5, 150.0), "girth": (8.0, 500.0)}
+#: Years since the death of trees of which only is known that they are dead: twigs have fallen, limbs have not.
+DEAD_YEARS = 5.0
+#: Degrees within which all points of an inventory may lie that calls degrees x and y; and meters that no plot has.
+_SPREAD, _NARROW = 2.0, 0.1
+#: Choices of units.
+METRIC, IMPERIAL = 'METRIC', 'IMPERIAL'
+_PREVIEWED, _SAMPLE, _SHOWN = 300, 60, 3  # rows that are looked at, values of them, and values that are shown
+_CLASSES = 12  # the most that a class of sizes is numbered
+_YEAR = re.compile(r"(?<!\d)(1[5-9]\d\d|20\d\d)(?!\d)")
+_STRAY = 20.0  # times as far from the middle as half of all are
+_NAMED = 6  # rows that a message names
+
+
+@dataclass(frozen=True)
+class Inventory:
+    """Trees of a file, in the order of their rows; sizes in meters, 0 where nobody knows.
+
+    Attributes
+    ----------
+    names : tuple of tuple of str
+        Names of a tree in the order in which they count, each combination once.
+    name : (n,) int64
+        Index into them.
+    points : (n, 2) float64
+        Coordinates.
+    system : System
+    sizes : dict
+        ``height``, ``diameter`` (of the trunk), ``crown_width``, ``crown_base``, ``age`` and ``dead`` (years since
+        then), each (n,) float32.
+    notes : list of str
+        What was guessed, and which columns were used and which not.
+    skipped : int
+        Rows that were broken.
+    first : str
+        What was wrong with the first of them.
+    left_out : Counter
+        Rows that are no trees, by what they are.
+    """
+
+    names: tuple[tuple[str, ...], ...]
+    name: NDArray[np.int64]
+    points: NDArray[np.float64]
+    system: System
+    sizes: dict[str, NDArray[np.float32]]
+    notes: list[str] = field(default_factory=list)
+    skipped: int = 0
+    first: str = ""
+    left_out: Counter = field(default_factory=Counter)
+
+
+class Column(NamedTuple):
+    """A column as a dialog shows it: its title, the field that it was taken for, and some of its values."""
+
+    title: str
+    field: str
+    values: tuple[str, ...]
+
+
+def read_inventory(
+    path: Path, epsg: int = 0, units: str = METRIC, skip: bool = False, columns: Mapping[str, str] | None = None
+) -> Inventory:
+    """Read a file.
+
+    Parameters
+    ----------
+    epsg : int
+        EPSG code of the coordinates; 0 where the file tells.
+    units : {'METRIC', 'IMPERIAL'}
+        Of columns that do not name theirs: meters, and centimeters for trunks; or feet, and inches for trunks.
+    skip : bool
+        Leave out broken rows instead of refusing the file.
+    columns : mapping, optional
+        What columns hold by their titles, for those that are not to be told by title and values: one of `FIELDS`, with
+        a unit if the title does not name it, such as ``height ft``; empty for none.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names line or feature, and column.
+    """
+    table_ = _table(path, skip, epsg=epsg)
+    return _Reading(table_, units, skip, _chosen(table_, columns or {})).inventory(epsg)
+
+
+def preview(path: Path) -> list[Column]:
+    """Columns of a file as they are taken from its first rows.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken.
+    """
+    table_ = _table(path, True, _PREVIEWED, PLAIN)
+    taken = taken_for(table_, {})
+    return [
+        Column(title, taken[title].field, tuple(list(dict.fromkeys(filter(None, texts.tolist())))[:_SHOWN]))
+        for title, texts in table_.columns.items()
+    ]
+
+
+def _table(path: Path, skip: bool, most: int | None = None, epsg: int = 0) -> Table:
+    """Rows of a file, of which there is at least one."""
+    layer = path.suffix.lower() in ENDINGS
+    found = read_points(path, skip, most, epsg) if layer else read_csv(path, skip, most)
+    if not len(found.numbers):
+        raise SceneError(
+            found.first
+            or f"{found.name}: it has no {'points' if found.points is not None else 'rows'}; choose another one"
+        )
+    return found
+
+
+def _chosen(table_: Table, columns: Mapping[str, str]) -> dict[str, Title]:
+    """What was chosen for columns."""
+    found = {}
+    for title, text in columns.items():
+        name, _, unit = text.strip().partition(" ")
+        meters = read_title(f"height {unit}").unit if unit else 0.0
+        why = "no such column" if title not in table_.columns else ""
+        if name not in FIELDS or (unit and not meters):
+            why = why or f"{shown(text)} is none of {', '.join(filter(None, FIELDS))}"
+        if why:
+            raise SceneError(f"{table_.name}: column {shown(title)}: {why}; correct Columns")
+        told = read_title(title)
+        found[title] = Title(name, meters or told.unit, told.doubt if told.field == name else -1)
+    return found
+
+
+def taken_for(table_: Table, chosen: Mapping[str, Title]) -> dict[str, Title]:
+    """What each column is taken for, by its title and its first values."""
+    found, samples = dict(chosen), {}
+    decided = {title.field for title in chosen.values()}.difference(NAMES, ("status", "dead"))
+    for title, texts in table_.columns.items():
+        if title not in chosen:
+            sample = samples[title] = np.unique(texts[: 4 * _PREVIEWED])[: 4 * _SAMPLE]
+            sample = samples[title] = sample[sample != ""][:_SAMPLE]
+            found[title] = _confirmed(read_title(title), sample)
+            if found[title].field in decided:
+                found[title] = found[title]._replace(field="")
+    fields = {title.field for title in found.values()}
+    if "longitude" in fields and "latitude" not in fields:  # the German word for latitude is that for width, too
+        found |= {title: Title("latitude", 0.0, 1) for title in samples if title.lower() == "breite"}
+        fields = {title.field for title in found.values()}
+    free = [title for title in samples if not found[title].field and found[title].doubt < NEVER]
+    if table_.points is None and not ({"longitude", "latitude"} <= fields or {"x", "y"} <= fields or "place" in fields):
+        _by_values(found, free, samples, "place", 0.9)
+    if not fields.intersection(NAMES):
+        _by_values(found, free, samples, "name", 0.5)
+    sizes = fields.intersection((*_MOST, *NAMES))
+    for title in [title for title in samples if found[title].field == "z"]:  # treetops of a laser scan
+        found[title] = found[title]._replace(field="" if sizes else "height")
+    return {title: found[title] for title in table_.columns}
+
+
+def _by_values(
+    found: dict[str, Title], free: list[str], samples: Mapping[str, NDArray[np.str_]], name: str, least: float
+) -> None:
+    """Take the column for a field whose values suit best."""
+    shares = {title: _share(name, samples[title]) for title in free}
+    best = max(shares, key=lambda title: shares[title], default="")
+    if best and shares[best] >= least:
+        found[best] = Title(name, 0.0, 1)
+
+
+def _share(name: str, sample: NDArray[np.str_]) -> float:
+    """How many of some values suit a field of names or places, 0 to 1."""
+    if name == "place":
+        fits = [not math.isnan(place_in(text)[0]) for text in sample.tolist()]
+    else:
+        matches = [species_named(text) for text in sample.tolist() if is_name(text)]
+        fits = [match is not None and (match.certainty < KIND or name == "leaf") for match in matches]
+    return sum(fits) / max(len(fits), 1)
+
+
+def _confirmed(title: Title, sample: NDArray[np.str_]) -> Title:
+    """A title, or one for nothing where its values cannot be what it says."""
+    name, none = title.field, title._replace(field="")
+    if not len(sample):
+        return title
+    if name == "place":
+        return title if _share("place", sample) >= 0.5 else none
+    values, units, kinds = cells(sample)
+    numbers = np.isin(kinds, (NUMBER, RANGE))
+    if name in NAMES:
+        doubtful = (title.doubt > 0 or name == "leaf") and _share(name, sample) < 0.3
+        return none if numbers.all() or doubtful else title
+    if name == "planted":
+        return title if any(map(_YEAR.search, sample.tolist())) else none
+    if name in _MOST:
+        known = values[kinds == NUMBER]
+        bare = len(known) > 0 and not (kinds == RANGE).any() and not units.any()
+        # Numbers of classes, of which nobody tells the sizes.
+        classes = title.classes and bare and (known <= _CLASSES).all() and (known == np.round(known)).all()
+        return none if classes or (kinds == WORD).all() else title
+    return title
+
+
+class _Reading:
+    """One table on its way to an inventory."""
+
+    def __init__(self, table_: Table, units: str, skip: bool, chosen: Mapping[str, Title]) -> None:
+        self.table, self.units, self.skip = table_, units, skip
+        self.good = np.ones(len(table_.numbers), bool)
+        self.notes, self.first, self.left_out = list(table_.notes), table_.first, Counter()
+        self.found: dict[str, list[tuple[str, Title]]] = {}
+        self.used: dict[str, str] = {}
+        taken = taken_for(table_, chosen)
+        for title, what in sorted(taken.items(), key=lambda pair: pair[1].doubt):
+            if what.field:
+                self.found.setdefault(what.field, []).append((title, what))
+
+    def inventory(self, epsg: int) -> Inventory:
+        """The trees of the table; refuses the file or leaves out rows."""
+        self._leave_out()
+        sizes = {name: self._size(name) for name in _MOST}
+        for name, source, factor in (("diameter", "girth", 1.0 / math.pi), ("crown_width", "crown_radius", 2.0)):
+            sizes[name] = np.where(sizes[name] > 0.0, sizes[name], factor * sizes.pop(source))
+        sizes["age"] = np.where(sizes["age"] > 0.0, sizes["age"], self._since_planting())
+        base, height = sizes["crown_base"], sizes["height"]
+        above = (base >= height) & (height > 0.0) & (base > 0.0)
+        self._refuse(above, "crown_base", lambda i: f"{base[i]:g} m is not below the height of {height[i]:g} m")
+        sizes["dead"] = self._dead()
+        points, system = self._points(epsg)
+        names, index = self._names()
+        if not self.good.any():
+            raise SceneError(
+                self.first or f"{self.table.name}: none of its rows is a tree that can be used; choose another one"
+            )
+        kept = {name: values[self.good].astype(np.float32) for name, values in sizes.items()}
+        if not any(values.any() for values in (kept["height"], kept["diameter"], kept["crown_width"], kept["age"])):
+            self.notes.append("no column of heights, trunks or crowns: all trees are full-grown")
+        used = ", ".join(f"{title} ({FIELDS[name]})" for title, name in self.used.items())
+        self.notes += [f"columns used: {used}"] * bool(used)
+        unused = [title for title in self.table.columns if title not in self.used]
+        if unused:
+            self.notes.append(f"columns not used: {', '.join(unused)}")
+        skipped = int((~self.good).sum()) - self.left_out.total() + self.table.broken
+        return Inventory(
+            names, index[self.good], points[self.good], system, kept, self.notes, skipped, self.first, self.left_out
+        )
+
+    def _texts(self, title: str) -> NDArray[np.str_]:
+        """Texts of a column, which is one that is used."""
+        self.used[title] = next(name for name, found in self.found.items() if title in dict(found))
+        return self.table.columns[title]
+
+    def _each(self, title: str, what: Callable[[str], Any]) -> NDArray[Any]:
+        """What each text (n,) of a column says."""
+        distinct, index = np.unique(self._texts(title), return_inverse=True)
+        return np.array([what(text) for text in distinct.tolist()])[index]
+
+    def _refuse(self, bad: NDArray[np.bool_], column: str, why: Callable[[int], str]) -> None:
+        """Refuse the file, or leave out rows."""
+        bad = bad & self.good
+        if not bad.any():
+            return
+        index, *more = np.flatnonzero(bad).tolist()
+        title = self.found[column][0][0] if column in self.found else column
+        text = f"{self.table.where(index, title)}: {why(index)}"
+        if more:
+            also = ", ".join(f"{number:,}" for number in self.table.numbers[more[: _NAMED - 1]].tolist())
+            text += f"; {len(more):,} more, {self.table.row} {also}{' ...' if len(more) >= _NAMED else ''}"
+        if not self.skip:
+            raise SceneError(f"{text}. Correct it, or turn on Skip Broken Rows")
+        self.first = self.first or text
+        self.good &= ~bad
+
+    def _leave_out(self) -> None:
+        """Leave out rows that are no trees, by what stands in place of a species or of their condition."""
+        for name in ("status", *NAMES):
+            for title, _ in self.found.get(name, ()):
+                what = self._each(title, partial(_no_tree, condition=name == "status"))
+                self.left_out.update(what[(what != "") & self.good].tolist())
+                self.good &= what == ""
+
+    def _size(self, name: str) -> NDArray[np.float64]:
+        """Sizes in meters, ages in years; 0 for unknown."""
+        read = [(title, what, *cells(self.table.columns[title])) for title, what in self.found.get(name, ())]
+        if not read:
+            return np.zeros(len(self.good))
+        chosen = read[0]
+        for other in read[1:]:  # classes beside what they stand for
+            (_, _, bare, _, own), middle = chosen, other[2]
+            both = (own == NUMBER) & (other[4] == RANGE) & (middle > 0.0)
+            if both.any() and np.median(np.abs(bare[both] / middle[both] - 1.0)) > 0.5:
+                chosen = other
+        title, what, values, units, kinds = chosen
+        texts = self._texts(title)
+        self.found[name].sort(key=lambda pair: pair[0] != title)  # messages name the one that counts
+        self._refuse(np.isnan(values), name, lambda i: f"{shown(str(texts[i]))} is not a number")
+        words = kinds == WORD
+        if words.any():
+            example = quoted(str(texts[np.argmax(words)]))
+            self.notes.append(f'{words.sum():,} of "{title}" are no numbers, such as {example}')
+        known = values[(units == 0.0) & (values > 0.0)]
+        if name != "age":
+            unit = what.unit or (self._guess(title, name, known) if len(known) else 1.0)
+            values = values * np.where(units > 0.0, units, unit)
+        elif len(known) and np.median(known) > 1500.0:  # years of planting
+            self.found.setdefault("planted", []).append((title, what))
+            return np.zeros(len(self.good))
+        most = _MOST[name]
+        self._refuse(
+            ~((values >= 0.0) & (values <= most)),
+            name,
+            lambda i: f"{shown(str(texts[i]))} is not from 0 to {most:,.0f} {'years' if name == 'age' else 'm'}",
+        )
+        return np.where(self.good, values, 0.0)
+
+    def _guess(self, title: str, name: str, known: NDArray[np.float64]) -> float:
+        """Meters of the unit of a column that names none."""
+        if self.units == IMPERIAL:
+            unit, text = (0.0254, "inches") if name in _TRUNKS else (0.3048, "feet")
+        else:
+            centimeters, millimeters = _SMALLER.get(name, (_MOST[name], 100.0 * _MOST[name]))
+            middle = float(np.median(known))
+            found = (1.0, "m"), (0.01, "cm"), (0.001, "mm")
+            unit, text = found[int(middle > centimeters) + int(middle > millimeters)]
+            if name not in _TRUNKS and unit == 1.0:
+                return unit
+        self.notes.append(f'"{title}" read as {text}')
+        return unit
+
+    def _since_planting(self) -> NDArray[np.float64]:
+        """Ages from years of planting, 0 for unknown."""
+        if "planted" not in self.found:
+            return np.zeros(len(self.good))
+        title = self.found["planted"][0][0]
+        years = self._each(title, lambda text: int(found[0]) if (found := _YEAR.search(text)) else 0)
+        now = datetime.date.today().year
+        self.notes.append(f'ages from "{title}" to {now}')
+        return np.where(years > 0, np.maximum(now - years, 1), 0).astype(np.float64)
+
+    def _dead(self) -> NDArray[np.float64]:
+        """Years since death, 0 for those alive."""
+        years = np.zeros(len(self.good))
+        for name in ("dead", "status", "name", "common"):
+            for title, _ in self.found.get(name, ()):
+                words = ("dead", "yes") if name == "dead" else ("dead",)
+                says = self._each(title, lambda text, words=words: said_of(text) in words and not species_named(text))
+                values = np.where(says, DEAD_YEARS, 0.0)
+                if name == "dead" and re.search("year|jahr|ann|año", title.lower()):
+                    values = np.nan_to_num(np.clip(cells(self.table.columns[title])[0], 0.0, _MOST["age"]))
+                years = np.maximum(years, values)
+        return years
+
+    def _points(self, epsg: int) -> tuple[NDArray[np.float64], System]:
+        """Coordinates and their system."""
+        name, points, system, pair = self.table.name, self.table.points, self.table.system, ("coordinates",)
+        if points is None:
+            degrees, meters, one = ("longitude", "latitude"), ("x", "y"), ("place",)
+            pair, *more = [pair for pair in (degrees, meters, one) if self.found.keys() >= set(pair)] or [()]
+            if not pair:
+                raise SceneError(
+                    f"{name}: line 1: no columns of coordinates; name them x and y, or longitude and latitude"
+                )
+            if meters in more and epsg and not chosen_system(epsg, System(), "").geographic:
+                pair = meters
+            if pair == one:
+                points, own = self._places()
+                epsg = epsg or own
+                plain = (np.abs(points[self.good]) > (360.0, 180.0)).any()
+            else:
+                points = np.stack([self._coordinate(column) for column in pair], axis=1)
+                plain = pair == meters
+                if not plain and not epsg and len(low := points[self.good]) and np.median(np.abs(low[:, 1])) > 360.0:
+                    plain = True
+                    self.notes.append("longitude and latitude read as meters")
+            if plain and not epsg and _are_degrees(points[self.good]):
+                plain = False
+                self.notes.append("x and y read as longitude and latitude")
+            system = chosen_system(epsg or (0 if plain else LONGITUDE_LATITUDE), System(), f"{name}: ")
+        if system.geographic:
+            some = np.abs(points[self.good])
+            if len(some) and 90.0 < np.median(some[:, 1]) <= 180.0 and np.median(some[:, 0]) <= 90.0:
+                points = points[:, ::-1]
+                self.notes.append("coordinates read as latitude, longitude")
+            self._refuse(
+                ~((points >= (-360.0, -90.0)) & (points <= (360.0, 90.0))).all(axis=1),
+                pair[0],
+                lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} are no longitude and latitude; set Coordinate System",
+            )
+        self._refuse_far(points, system, pair[0])
+        return points, system
+
+    def _refuse_far(self, points: NDArray[np.float64], system: System, column: str) -> None:
+        """Refuse rows that lie far from most others, as those do whose coordinates are 0 or wrong."""
+        good = np.flatnonzero(self.good)
+        if not len(good):
+            return
+        middle, away = np.median(points[good], axis=0), np.zeros(len(points))
+        place = place_about(system, middle, middle, f"{self.table.name}: ")
+        local = between(points[good], system, place.system) - [place.east, place.north]
+        away[good] = np.nan_to_num(np.abs(local).max(axis=1), nan=np.inf)
+        far = (away >= MOST_AWAY) & (away > _STRAY * np.median(away[good]))
+        if 2 * far[good].sum() < len(good):
+            self._refuse(
+                far, column, lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} is {_away(away[i])} most other trees"
+            )
+
+    def _places(self) -> tuple[NDArray[np.float64], int]:
+        """Coordinates that stand in one column, and the EPSG code that stands there too, or 0."""
+        title = self.found["place"][0][0]
+        texts = self._texts(title)
+        found = np.array([place_in(text) for text in texts.tolist()], np.float64).reshape(-1, 3)
+        points, plain = found[:, :2], found[:, 2] < 0.0
+        self._refuse(np.isnan(points).any(axis=1), "place", lambda i: f"{shown(str(texts[i]))} is no place")
+        points = np.where(np.isnan(points), 0.0, points)
+        some = np.abs(points[plain & self.good])
+        first = bool(re.match(r"(?i).*lon.*lat|.*\bx.*y\b", title)) or (len(some) > 0 and (some[:, 0] > 90.0).any())
+        if len(some) and (some <= 180.0).all() and not first:  # latitude comes first, unless it cannot be one
+            points[plain] = points[plain][:, ::-1]
+            self.notes.append(f'"{title}" read as latitude, longitude')
+        return points, int(found[:, 2].max(initial=0.0))
+
+    def _coordinate(self, column: str) -> NDArray[np.float64]:
+        """Numbers (n,) of a column of coordinates, in meters or degrees."""
+        title, what = self.found[column][0]
+        texts = self._texts(title)
+        values, _, kinds = cells(texts)
+        self._refuse(np.isin(kinds, (NOTHING, WORD)), column, lambda _: "a tree without coordinates")
+        bad = np.isnan(values) | (kinds == RANGE) | ~(np.abs(values) < 1e9)
+        self._refuse(bad, column, lambda i: f"{shown(str(texts[i]))} is not a coordinate")
+        return np.where(self.good, values, 0.0) * (what.unit or 1.0)
+
+    def _names(self) -> tuple[tuple[tuple[str, ...], ...], NDArray[np.int64]]:
+        """Names of the trees: each combination once, and the index of each tree."""
+        titles = [title for kind in NAMES for title, _ in self.found.get(kind, ())]
+        genera, names = (len(self.found.get(kind, ())) for kind in NAMES[:2])
+        if not titles:
+            self.notes.append("no column of species")
+            return ((),), np.zeros(len(self.good), np.int64)
+        codes = np.zeros(len(self.good), np.int64)
+        for title in titles:  # numbers of combinations, column by column
+            distinct, own = np.unique(self._texts(title), return_inverse=True)
+            codes = np.unique(codes * len(distinct) + own, return_inverse=True)[1]
+        first = np.unique(codes, return_index=True)[1]
+        rows = zip(*(self.table.columns[title][first].tolist() for title in titles), strict=True)
+        return tuple(_ordered(row[:genera], row[genera : genera + names], row[genera + names :]) for row in rows), codes
+
+
+def _ordered(genera: tuple[str, ...], names: tuple[str, ...], others: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of one tree: genus and epithet together, the others, the genus alone."""
+    genus = next((g for g in genera if is_name(g)), "")
+    joined = [f"{genus} {name}" for name in names if genus and is_name(name) and key_of(genus) not in key_of(name)]
+    return tuple(name for name in (*joined[:1], *names, *others, genus) if is_name(name))
+
+
+def _are_degrees(points: NDArray[np.float64]) -> bool:
+    """Whether coordinates that are called x and y are degrees: nobody lists trees of a plot so small."""
+    if not len(points) or (np.abs(points) > (180.0, 90.0)).any():
+        return False
+    spread = np.ptp(points, axis=0).max()
+    return bool(spread < _SPREAD and ((points != np.round(points, 3)).mean() > 0.5 or 0.0 < spread < _NARROW))
+
+
+def _no_tree(text: str, condition: bool) -> str:
+    """What stands in place of a tree, if a cell of its condition or of its species says so."""
+    what = said_of(text)
+    return what if what in ("vacant", "stump", "planned", "removed") and (condition or not species_named(text)) else ""
+
+
+def _away(meters: float) -> str:
+    """How far a row is from others, for messages."""
+    return f"{meters / 1000.0:,.0f} km from" if math.isfinite(meters) else "too far from"

@@ -1,0 +1,568 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Coordinate systems: any projected one by its EPSG code, longitude and latitude, and a plane about the middle of data.
+
+Figures of systems, ellipsoids and shifts of datums are in ``systems.json``, those of the EPSG Dataset (IOGP) as PROJ
+9.8 gives them; a shift is the first without a grid in the middle of a system's area, good to some meters at worst.
+
+Names of parameters are those of IOGP Publication 373-7-2 (2023), where the formulas stand in real numbers. Here a place
+is one complex number: isometric latitude + i longitude on the ellipsoid, and north + i east on the map. What keeps
+angles is an analytic function then, and its way back the inverse function. Transverse Mercator is Krüger's series to
+the fourth order in the third flattening, exact to a micrometer within 3,000 km of the meridian (C. F. F. Karney,
+"Transverse Mercator with an accuracy of a few nanometers", Journal of Geodesy 85, 2011, equations 7 to 36). In methods
+angles are radians, and longitudes count from their own meridian.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from math import asin, atan2, cos, exp, inf, log, sin, sqrt, tan, tanh
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError, readable
+from . import table
+
+#: EPSG code of longitude and latitude, and what stands for a plane in meters in place of a code.
+LONGITUDE_LATITUDE, PLAIN = 4326, -1
+_HEIGHTS = {4937: 4258}  # systems with heights, by those without
+_Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
+_Way = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
+_STEPS = 5  # of Newton's method for latitudes, which doubles the digits each time
+_ROUNDS = 7  # each of which leaves a 150th of the error
+_HALF_PI = np.pi / 2.0
+#: Degrees from the meridian: beyond it nobody has a scene, and series come to an end.
+MOST_OFF = 40.0
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """Half of the longer axis in meters, and the inverse of the flattening."""
+
+    a: float = 6378137.0
+    inverse: float = 298.257223563
+
+    @cached_property
+    def e2(self) -> float:
+        """Square of the eccentricity."""
+        f = 1.0 / self.inverse
+        return f * (2.0 - f)
+
+    @cached_property
+    def e(self) -> float:
+        """Eccentricity."""
+        return sqrt(self.e2)
+
+    def isometric(self, latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Isometric latitude."""
+        return np.arcsinh(np.tan(latitude)) - self.e * np.arctanh(self.e * np.sin(latitude))
+
+    def of_isometric(self, psi: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Latitude from `isometric`."""
+        phi = np.zeros_like(psi)
+        for _ in range(_ROUNDS):
+            phi = np.arctan(np.sinh(psi + self.e * np.arctanh(self.e * np.sin(phi))))
+        return phi
+
+    def cosine(self, latitude: float) -> float:
+        """Radius of a parallel, over the longer half-axis."""
+        return cos(latitude) / sqrt(1.0 - self.e2 * sin(latitude) ** 2)
+
+    def authalic(self, latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Twice the area between equator and parallel, over what a radian has of it on a sphere."""
+        s = np.sin(latitude)
+        return (1.0 - self.e2) * (s / (1.0 - self.e2 * s * s) + np.arctanh(self.e * s) / self.e)
+
+    def of_authalic(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Latitude from `authalic`."""
+        phi = np.arcsin(np.clip(q / self.authalic(np.array(_HALF_PI)), -1.0, 1.0))
+        for _ in range(_STEPS):
+            slope = 2.0 * (1.0 - self.e2) * np.cos(phi) / (1.0 - self.e2 * np.sin(phi) ** 2) ** 2
+            phi = phi + (q - self.authalic(phi)) / np.maximum(slope, 1e-9)
+        return phi
+
+    def at(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Places (n, 3) on the ellipsoid, meters from the middle of the Earth."""
+        nu = self.a / np.sqrt(1.0 - self.e2 * np.sin(latitude) ** 2)
+        flat = nu * np.cos(latitude)
+        return np.stack(
+            [flat * np.cos(longitude), flat * np.sin(longitude), nu * (1.0 - self.e2) * np.sin(latitude)], axis=1
+        )
+
+    def of(self, places: NDArray[np.float64]) -> _Pair:
+        """Longitude and latitude of places (n, 3) near the ellipsoid."""
+        x, y, z = places.T
+        flat = np.hypot(x, y)
+        tangent = z / (flat * (1.0 - self.e2))
+        for _ in range(_STEPS):
+            nu = self.a / np.sqrt(1.0 - self.e2 * tangent**2 / (1.0 + tangent**2))
+            tangent = (z + self.e2 * nu * tangent / np.hypot(1.0, tangent)) / flat
+        return np.arctan2(y, x), np.arctan(tangent)
+
+
+WGS84 = Ellipsoid()
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A coordinate system.
+
+    Attributes
+    ----------
+    method : str
+        A key of `METHODS`, or ``geo`` for longitude and latitude.
+    ellipsoid : Ellipsoid
+    shift : tuple of 7 floats
+        To WGS 84: meters, seconds of arc, and parts in a million, as of a position vector.
+    meridian : float
+        Of longitude 0, degrees east of Greenwich.
+    unit : float
+        Meters.
+    parameters : tuple of floats
+        Degrees and meters, in the order that the method has them.
+    """
+
+    method: str
+    ellipsoid: Ellipsoid = WGS84
+    shift: tuple[float, ...] = (0.0,) * 7
+    meridian: float = 0.0
+    unit: float = 1.0
+    parameters: tuple[float, ...] = ()
+
+    @cached_property
+    def ways(self) -> tuple[Callable[..., _Pair], Callable[..., _Pair], float]:
+        """From longitude and latitude, back, and the meridian that longitudes count from, degrees."""
+        if self.method == "geo":
+            return lambda *place: np.degrees(place), lambda *place: np.radians(place), 0.0
+        (east, north), angles = self.parameters[-2:], np.radians(self.parameters[:-2])
+        if self.method in _SCALED:
+            angles[-1] = self.parameters[-3]
+        # Web Mercator takes figures of the ellipsoid for those of a sphere.
+        ell = Ellipsoid(self.ellipsoid.a, inf) if self.method == "web" else self.ellipsoid
+        forward, backward = METHODS[self.method](ell, *angles.tolist())
+        equal = self.method in ("aea", "laea")
+        latitudes = (ell.authalic, ell.of_authalic) if equal else (ell.isometric, ell.of_isometric)
+
+        def there(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+            place = forward(latitudes[0](latitude) + 1j * longitude)
+            return (place.imag + east) / self.unit, (place.real + north) / self.unit
+
+        def back(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
+            place = backward(y * self.unit - north + 1j * (x * self.unit - east))
+            return place.imag, latitudes[1](place.real)
+
+        return there, back, self.parameters[1] + self.meridian
+
+    @property
+    def _turned(self) -> NDArray[np.float64]:
+        """Matrix (3, 3) of the turn and the scale of the shift."""
+        x, y, z = np.radians(np.array(self.shift[3:6]) / 3600.0)
+        return (1.0 + 1e-6 * self.shift[6]) * np.array([[1.0, -z, y], [z, 1.0, -x], [-y, x, 1.0]])
+
+    def to_wgs84(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+        """Longitude and latitude on WGS 84 of those on the own datum."""
+        if not any(self.shift):
+            return longitude, latitude
+        return WGS84.of(self.ellipsoid.at(longitude, latitude) @ self._turned.T + self.shift[:3])
+
+    def from_wgs84(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+        """Longitude and latitude on the own datum of those on WGS 84."""
+        if not any(self.shift):
+            return longitude, latitude
+        places = WGS84.at(longitude, latitude) - self.shift[:3]
+        return self.ellipsoid.of(np.linalg.solve(self._turned, places.T).T)
+
+
+def _transverse(ell: Ellipsoid, foot: float, _meridian: float, scale: float) -> tuple[_Way, _Way]:
+    """Transverse Mercator."""
+    n = 1.0 / (2.0 * ell.inverse - 1.0)
+    radius = scale * ell.a / (1.0 + n) * (1.0 + n**2 / 4.0 + n**4 / 64.0)
+    alphas = (
+        n / 2 - 2 * n**2 / 3 + 5 * n**3 / 16 + 41 * n**4 / 180,
+        13 * n**2 / 48 - 3 * n**3 / 5 + 557 * n**4 / 1440,
+        61 * n**3 / 240 - 103 * n**4 / 140,
+        49561 * n**4 / 161280,
+    )
+    betas = (
+        n / 2 - 2 * n**2 / 3 + 37 * n**3 / 96 - n**4 / 360,
+        n**2 / 48 + n**3 / 15 - 437 * n**4 / 1440,
+        17 * n**3 / 480 - 37 * n**4 / 840,
+        4397 * n**4 / 161280,
+    )
+
+    def northing(q: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        zeta = np.arctan(np.sinh(q))
+        return radius * (zeta + sum(alpha * np.sin(2 * j * zeta) for j, alpha in enumerate(alphas, 1)))
+
+    start = float(northing(ell.isometric(np.array([foot])) + 0j)[0].real)
+
+    def backward(p: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        zeta = (p + start) / radius
+        return np.arcsinh(np.tan(zeta - sum(beta * np.sin(2 * j * zeta) for j, beta in enumerate(betas, 1))))
+
+    return lambda q: np.where(np.abs(q.imag) < np.radians(MOST_OFF), northing(q) - start, np.nan), backward
+
+
+def _cone(n: float, size: float, middle: float) -> tuple[_Way, _Way]:
+    """A conformal cone, whose apex is so far north of y = 0."""
+    # The apex itself has no logarithm.
+    return lambda q: middle - size * np.exp(-n * q), lambda p: -np.log((middle - p) / size + 1e-99) / n
+
+
+def _lambert(ell: Ellipsoid, foot: float, _meridian: float, *others: float) -> tuple[_Way, _Way]:
+    """Lambert's conformal cone, with one parallel and a scale, or with two."""
+    first, second = others if len(others) == 2 else (foot, foot)
+    scale = 1.0 if len(others) == 2 else others[0]
+    n, (psi, other, base) = sin(first), ell.isometric(np.array([first, second, foot])).tolist()
+    if abs(first - second) > 1e-9:
+        n = log(ell.cosine(first) / ell.cosine(second)) / (other - psi)
+    size = scale * ell.a * ell.cosine(first) * exp(n * psi) / n
+    return _cone(n, size, size * exp(-n * base))
+
+
+def _albers(ell: Ellipsoid, foot: float, _meridian: float, first: float, second: float) -> tuple[_Way, _Way]:
+    """Albers' cone, true to area; latitudes are authalic."""
+    m1, m2 = ell.cosine(first) ** 2, ell.cosine(second) ** 2
+    q1, q2, base = ell.authalic(np.array([first, second, foot])).tolist()
+    n = (m1 - m2) / (q2 - q1) if abs(first - second) > 1e-9 else sin(first)
+    c, size = m1 + n * q1, ell.a / n
+    middle = size * sqrt(c - n * base)
+
+    def backward(p: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        off = (middle - p) / size
+        return (c - np.abs(off) ** 2) / n - 1j * np.angle(off) / n
+
+    return lambda q: middle - size * np.sqrt(c - n * q.real) * np.exp(-1j * n * q.imag), backward
+
+
+def _mercator(ell: Ellipsoid, latitude: float, _meridian: float, scale: float | None = None) -> tuple[_Way, _Way]:
+    """Mercator, with a scale or a parallel that is true to it."""
+    radius = ell.a * (ell.cosine(latitude) if scale is None else scale)
+    return lambda q: radius * q, lambda p: p / radius
+
+
+def _double(ell: Ellipsoid, foot: float, _meridian: float, scale: float) -> tuple[_Way, _Way]:
+    """Oblique stereographic projection of a sphere, onto which the ellipsoid is projected before."""
+    e2, s = ell.e2, sin(foot)
+    size = 2.0 * scale * ell.a * sqrt(1.0 - e2) / (1.0 - e2 * s * s)
+    n = sqrt(1.0 + e2 * cos(foot) ** 4 / (1.0 - e2))
+    psi = float(ell.isometric(np.array(foot)))
+    start = tanh(n * psi)
+    shift = log((n + s) * (1.0 - start) / ((n - s) * (1.0 + start))) / 2.0
+    opposite = exp(-n * psi - shift)
+    return (
+        lambda q: size * np.expm1(n * (q - psi)) / (np.exp(n * q + shift) + opposite),
+        lambda p: (np.log((size + p * opposite) / (size * opposite - p)) - shift) / n,
+    )
+
+
+def _polar(ell: Ellipsoid, latitude: float, _meridian: float, scale: float | None = None) -> tuple[_Way, _Way]:
+    """Polar stereographic projection, with a scale or a parallel that is true to it."""
+    rim = sqrt((1.0 + ell.e) ** (1.0 + ell.e) * (1.0 - ell.e) ** (1.0 - ell.e))
+    if scale is None:
+        scale = ell.cosine(latitude) * rim * exp(abs(float(ell.isometric(np.array(latitude))))) / 2.0
+    side = -1.0 if latitude < 0.0 else 1.0
+    return _cone(side, side * 2.0 * ell.a * scale / rim, 0.0)
+
+
+def _azimuthal(ell: Ellipsoid, foot: float, _meridian: float) -> tuple[_Way, _Way]:
+    """Lambert's azimuthal projection, true to area; latitudes are authalic."""
+    whole, q = ell.authalic(np.array([_HALF_PI, foot])).tolist()
+    sine = q / whole
+    cosine, radius = sqrt(1.0 - sine**2), ell.a * sqrt(whole / 2.0)
+    d = ell.a * ell.cosine(foot) / (radius * cosine)
+
+    def forward(q: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        s = q.real / whole
+        flat = np.sqrt(np.maximum(1.0 - s * s, 0.0)) * np.exp(1j * q.imag)
+        b = radius * np.sqrt(2.0 / (1.0 + sine * s + cosine * flat.real))
+        return b / d * (cosine * s - sine * flat.real) + 1j * b * d * flat.imag
+
+    def backward(p: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        p = p.real * d + 1j * p.imag / d
+        off = 2.0 * np.arcsin(np.clip(np.abs(p) / (2.0 * radius), -1.0, 1.0))
+        p = p * np.sin(off) / np.maximum(np.abs(p), 1e-12)
+        turn = np.arctan2(p.imag, cosine * np.cos(off) - p.real * sine)
+        return whole * (np.cos(off) * sine + p.real * cosine) + 1j * turn
+
+    return forward, backward
+
+
+def _oblique(
+    ell: Ellipsoid, foot: float, _meridian: float, azimuth: float, skew: float, scale: float, middle: bool = False
+) -> tuple[_Way, _Way]:
+    """Hotine's oblique Mercator: that of a sphere, onto which the ellipsoid is projected before, turned about the point
+    where the initial line crosses the equator. ``middle``: lengths count from the center (variant B), not from there.
+    """
+    e2, side = ell.e2, 1.0 if foot >= 0.0 else -1.0
+    b = sqrt(1.0 + e2 * cos(foot) ** 4 / (1.0 - e2))
+    radius = ell.a * scale * sqrt(1.0 - e2) / (1.0 - e2 * sin(foot) ** 2)
+    d = max(b * sqrt(1.0 - e2) / ell.cosine(foot) / (1.0 - e2 * sin(foot) ** 2), 1.0)
+    f = d + side * sqrt(d * d - 1.0)
+    tilt = asin(sin(azimuth) / d)
+    across = abs(azimuth - _HALF_PI) < 1e-9
+    # To the meridian in which the initial line crosses the equator.
+    lead = side * _HALF_PI if across else asin(max(min((f - 1.0 / f) / 2.0 * tan(tilt), 1.0), -1.0))
+    start = radius * lead if across else side * radius * atan2(sqrt(d * d - 1.0), cos(azimuth))
+    shift = log(f) - b * float(ell.isometric(np.array(foot))) + 1j * lead
+    start, turn, skewed = start * middle, complex(sin(tilt), cos(tilt)), complex(cos(skew), sin(skew))
+    return (
+        lambda q: skewed * (-2j * radius * np.arctanh(turn * np.tanh((b * q + shift) / 2.0)) - start),
+        lambda p: (2.0 * np.arctanh(np.tanh((p / skewed + start) * 0.5j / radius) / turn) - shift) / b,
+    )
+
+
+#: Functions that make the two ways of a method from its ellipsoid and angles, a factor last.
+METHODS: dict[str, Callable[..., tuple[_Way, _Way]]] = {
+    "tm": _transverse,
+    "lcc1": _lambert,
+    "lcc2": _lambert,
+    "aea": _albers,
+    "sterea": _double,
+    "stereA": _polar,
+    "stereB": _polar,
+    "mercA": _mercator,
+    "mercB": _mercator,
+    "web": lambda ell, *_: _mercator(ell, 0.0, 0.0),
+    "laea": _azimuthal,
+    "omercA": _oblique,
+    "omercB": lambda *given: _oblique(*given, True),
+}
+#: Those whose last parameter before the lengths is a factor.
+_SCALED = {"tm", "lcc1", "sterea", "stereA", "mercA", "omercA", "omercB"}
+#: Those that keep angles, and lengths to some thousandths where anybody uses them.
+TRUE = {"tm", "lcc1", "lcc2", "sterea", "omercA", "omercB"}
+
+
+@dataclass(frozen=True)
+class System:
+    """A coordinate system.
+
+    Attributes
+    ----------
+    epsg : int
+        EPSG; 0 for a plane in meters of which nobody knows where on Earth it lies, -1 for one about a place, -2 for one
+        that a file defines by itself.
+    longitude, latitude : float
+        The place, degrees.
+    own : Definition, optional
+        Of the file.
+    unit : float
+        Meters of plain coordinates, or of those that are taken for meters of the system.
+    """
+
+    epsg: int = 0
+    longitude: float = 0.0
+    latitude: float = 0.0
+    own: Definition | None = field(default=None, repr=False)
+    unit: float = 1.0
+
+    @property
+    def definition(self) -> Definition:
+        """Figures of a system that lies on Earth."""
+        if self.own is not None:
+            return self.own
+        if self.epsg == -1:
+            return _about(self.longitude, self.latitude)
+        return known_systems()[self.epsg]
+
+    @property
+    def geographic(self) -> bool:
+        """Whether coordinates are longitude and latitude."""
+        return self.epsg != 0 and self.definition.method == "geo"
+
+    @property
+    def metric(self) -> bool:
+        """Whether coordinates are true meters, but for some parts in a thousand."""
+        return self.epsg == -1 or (self.epsg > 0 and self.definition.method in TRUE and self.definition.unit == 1.0)
+
+    @property
+    def name(self) -> str:
+        """For messages."""
+        if self.epsg > 0:
+            return f"EPSG:{self.code}"
+        return {
+            0: "plain meters" if self.unit == 1.0 else f"plain units of {self.unit:g} m",
+            -2: "the system that the file defines",
+        }.get(self.epsg, f"the plane about {self.latitude:.5f}, {self.longitude:.5f}")
+
+
+@cache
+def _about(longitude: float, latitude: float) -> Definition:
+    """Transverse Mercator about a place."""
+    return Definition("tm", parameters=(latitude, longitude, 1.0, 0.0, 0.0))
+
+
+@cache
+def known_systems() -> dict[int, Definition]:
+    """All systems that have an EPSG code here."""
+    data = table("systems")
+    ellipsoids, shifts = [Ellipsoid(*e) for e in data["ellipsoids"]], [tuple(s) for s in data["shifts"]]
+    found = {}
+    for method, ellipsoid, shift, meridian, unit, rows in data["systems"]:
+        own = Definition(method, ellipsoids[ellipsoid], shifts[shift], meridian, data["units"][unit])
+        for parameters, codes, *run in rows:
+            number, step = run or (1, [0.0] * len(parameters))
+            for k in range(number):
+                figures = tuple(round(a + k * b, 9) for a, b in zip(parameters, step, strict=True))
+                found.update(dict.fromkeys([epsg + k for epsg in codes], replace(own, parameters=figures)))
+    return found | {epsg: found[flat] for epsg, flat in _HEIGHTS.items()}
+
+
+def system_of(epsg: int, what: str = "") -> System:
+    """The system of an EPSG code, if it is known here.
+
+    Raises
+    ------
+    SceneError
+        It is none of those that are known here; says what to do.
+    """
+    if epsg in known_systems():
+        return System(epsg)
+    raise SceneError(
+        f"{what}EPSG:{code} is none of the coordinate systems that TetFlora reads. Set Coordinate System to another "
+        "code, reproject the file, for example with gdalwarp or ogr2ogr and -t_srs EPSG:4326, or turn on Plain Meters"
+    )
+
+
+def chosen_system(epsg: int, own: System, what: str) -> System:
+    """The system of what an artist chose, which is an EPSG code, `PLAIN`, or 0 for the file's own."""
+    return System() if epsg == PLAIN else system_of(epsg or own.epsg, what) if epsg or own.epsg > 0 else own
+
+
+def may_be_degrees(points: ArrayLike) -> bool:
+    """Whether points (n, 2), of which there is one at least, can be longitude and latitude."""
+    points = np.array(points, np.float64).reshape(-1, 2)
+    return bool(len(points) and (np.abs(points) <= [360.0, 90.0]).all())
+
+
+def code_in(text: str) -> int | None:
+    """The EPSG code in a name such as ``urn:ogc:def:crs:EPSG::25832`` or an address; None where there is none."""
+    if re.search(r"CRS84h?\b", text):
+        return LONGITUDE_LATITUDE
+    found = re.search(r"\bEPSG\b[^\w]{1,2}(?:[\d.]*[:/#])?(?:[a-z]+#)?(\d{4,6})\W*$", text.strip(), re.IGNORECASE)
+    found = found or re.search(r"\bepsg\.xml#(\d{4,6})$|/epsg/(\d{4,6})/?$|\bEPSG:(\d{4,6})\b", text, re.IGNORECASE)
+    return int(next(filter(None, found.groups()))) if found else None
+
+
+def to_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Longitude and latitude on WGS 84 in degrees, (n, 2), of points (n, 2) in a system that lies on Earth."""
+    points, own = system.unit * np.asarray(points, np.float64), system.definition
+    if own.method == "geo" and not any(own.shift):
+        return points
+    _, back, meridian = own.ways
+    longitude, latitude = back(*points.T)
+    return np.degrees(np.stack(own.to_wgs84(longitude + np.radians(meridian), latitude), axis=1))
+
+
+def from_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (n, 2) of a system that lies on Earth, from longitude and latitude in degrees on WGS 84, (n, 2).
+
+    What is too far from the system's meridian is nan.
+    """
+    points, own = np.asarray(points, np.float64), system.definition
+    if own.method == "geo" and not any(own.shift):
+        return points
+    longitude, latitude = own.from_wgs84(*np.radians(points).T)
+    there, _, meridian = own.ways
+    off = longitude - np.radians(meridian)
+    off = np.where(np.abs(off) <= np.pi, off, (off + np.pi) % (2.0 * np.pi) - np.pi)
+    return np.stack(there(off, latitude), axis=1) / system.unit
+
+
+def between(points: NDArray[np.float64], source: System, target: System) -> NDArray[np.float64]:
+    """Points (n, 2) of one system in another; both lie on Earth, or both are plain."""
+    if source == target or source.epsg == target.epsg == 0:
+        return points * (source.unit / target.unit)
+    return from_degrees(target, to_degrees(source, points))
+
+
+@dataclass(frozen=True)
+class MapOrigin:
+    """Where on a map the world's origin is.
+
+    Attributes
+    ----------
+    system : System
+    east, north : float
+        Coordinates of the origin in the system.
+    """
+
+    system: System
+    east: float
+    north: float
+
+    def local(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
+        """Meters from the origin, (n, 2), of points (n, 2) of a system.
+
+        Raises
+        ------
+        SceneError
+            Nobody can tell where they lie, or they are too far away; ``what`` begins the message.
+        """
+        local = self.offsets(points, system, what)
+        far = np.abs(local).max(initial=0.0)
+        if not far < MOST_AWAY:
+            away = f"{far / 1000.0:,.0f} km" if np.isfinite(far) else "too far"
+            raise SceneError(
+                f"{what}it reaches {away} from the middle of the scene; set Coordinate System to the EPSG code of the "
+                "file, or turn on New Origin to put it in the middle by itself"
+            )
+        return local
+
+    def offsets(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
+        """Meters from the origin, (n, 2), of points (n, 2) of a system, however far.
+
+        Raises
+        ------
+        SceneError
+            Nobody can tell where they lie; ``what`` begins the message.
+        """
+        if (system.epsg == 0) != (self.system.epsg == 0):
+            known, other = ("the scene", "the file") if system.epsg == 0 else ("the file", "the scene")
+            raise SceneError(
+                f"{what}{known} lies on Earth, and the coordinate system of {other} is not known; set Coordinate "
+                "System to its EPSG code, or turn on New Origin"
+            )
+        return between(points, system, self.system) - [self.east, self.north]
+
+
+#: Meters from the origin within which all of a scene must lie.
+MOST_AWAY = 250_000.0
+
+
+def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float64], what: str = "") -> MapOrigin:
+    """The place for a scene whose first data lie between two corners, (2,) each; in whole meters.
+
+    Raises
+    ------
+    SceneError
+        They are no places on Earth.
+    """
+    middle = (np.asarray(low, np.float64) + high) / 2.0
+    if system.metric or system.epsg == 0:
+        east, north = np.round(system.unit * middle).tolist()
+        place = MapOrigin(system if system.epsg else System(), east, north)
+    else:
+        longitude, latitude = np.round(to_degrees(system, middle[None])[0], 6).tolist()
+        if not (abs(longitude) <= 360.0 and abs(latitude) < 89.0):
+            raise SceneError(
+                readable(f"{what}{longitude:g}, {latitude:g} is no longitude and latitude with room about it")
+            )
+        place = MapOrigin(System(-1, longitude, latitude), 0.0, 0.0)
+    sides = between(
+        np.array([[low[0], middle[1]], [high[0], middle[1]], [middle[0], low[1]], [middle[0], high[1]]]),
+        system,
+        place.system,
+    )
+    width, depth = np.linalg.norm(sides[1::2] - sides[::2], axis=1) / 1000.0
+    if not max(width, depth) < 2.0 * MOST_AWAY / 1000.0:
+        raise SceneError(
+            f"{what}it is {width:,.0f} by {depth:,.0f} km large; choose a Crop, or crop it to "
+            f"{MOST_AWAY / 500.0:,.0f} km or less"
+        )
+    return place

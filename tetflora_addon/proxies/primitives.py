@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What renderers draw for facets: triangles or spheres, in the precision in which meshes and point clouds keep them.
+
+They take half of the memory of facets, or less, which matters where another process has made them.
+
+Microspheres are opaque spheres, the particles of the paper's volumes (section 7). A facet covers the more the more it
+faces the eye; a sphere covers the same from everywhere. A sphere can therefore cover what its facet covers for the
+camera, but not for all lights as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, Floats
+from ..buffers import MeshBuffers, PointBuffers
+from ..camera.camera import Camera
+from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets
+
+#: Minimum fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
+LEAST_COVER = 0.1
+#: Mean of |cos| over all directions.
+MEAN_COVER = 0.5
+
+
+@dataclass(frozen=True)
+class Triangles(Arrays):
+    """Equilateral triangles.
+
+    Attributes
+    ----------
+    corners : (n, 3, 3) float32
+        World space, meters.
+    color : (n, 3) float32
+    transmission : (n,) float32
+    velocity : (n, 3) float32 or None
+        Meters a second; None for plants at rest.
+    roughness : (n,) float32 or None
+        As of facets.
+    """
+
+    corners: NDArray[np.float32]
+    color: NDArray[np.float32]
+    transmission: NDArray[np.float32]
+    velocity: NDArray[np.float32] | None = None
+    roughness: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True)
+class Spheres(Arrays):
+    """Spheres.
+
+    Attributes
+    ----------
+    center : (n, 3) float32
+        World space, meters.
+    radius : (n,) float32
+    color : (n, 3) float32
+    transmission : (n,) float32
+    velocity, roughness : (n, 3) float32 or None, (n,) float32 or None
+        As of triangles.
+    """
+
+    center: NDArray[np.float32]
+    radius: NDArray[np.float32]
+    color: NDArray[np.float32]
+    transmission: NDArray[np.float32]
+    velocity: NDArray[np.float32] | None = None
+    roughness: NDArray[np.float32] | None = None
+
+
+#: Facets, or what is drawn in their place.
+Primitive = Facets | Triangles | Spheres
+_Drawn = TypeVar("_Drawn", Facets, Triangles, Spheres)
+
+
+def triangle_corners(facets: Facets) -> NDArray[np.float32]:
+    """Corners (n, 3, 3) of a triangle for each facet."""
+    reach = CIRCUMRADIUS * facets.side[:, None]
+    longer = 1.0 if facets.stretch is None else facets.stretch[:, None]
+    a, b = reach / longer * facets.across, reach * longer * facets.along
+    corners = [facets.center + b, facets.center - SIN_60 * a - b / 2, facets.center + SIN_60 * a - b / 2]
+    return np.stack([c.astype(np.float32) for c in corners], 1)
+
+
+def triangles_of(facets: Facets) -> Triangles:
+    """A triangle for each facet.
+
+    Triangles take half of a renderer's memory and time for squares of the same area.
+    """
+    return Triangles(triangle_corners(facets), *_shaded(facets))
+
+
+def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi) -> Spheres:
+    """A sphere for each facet.
+
+    Parameters
+    ----------
+    facets : Facets of n
+    camera : Camera or None
+        That for which each sphere covers what its facet covers. Without, it covers the mean of that over all
+        directions: for facets that only cast shadows and light up others.
+    disc : float
+        Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than a circle has.
+    """
+    radius = facets.side * np.sqrt(cover_of(facets, camera) / disc)
+    return Spheres(facets.center.astype(np.float32), radius.astype(np.float32), *_shaded(facets))
+
+
+def joined(parts: Sequence[_Drawn]) -> _Drawn:
+    """One or more parts of one kind as one, in their order."""
+    if len(parts) == 1:
+        return parts[0]
+    if any(part.velocity is not None for part in parts):  # meshes from elsewhere stand still beside plants that move
+        still = [np.zeros((len(part), 3), part.color.dtype) for part in parts]
+        parts = [replace(p, velocity=zero) if p.velocity is None else p for p, zero in zip(parts, still, strict=True)]
+    return type(parts[0]).concatenate(parts)
+
+
+def triangle_mesh(triangles: Triangles) -> MeshBuffers:
+    """Triangles as a mesh with the attributes that the material of proxies reads."""
+    n = len(triangles)
+    every = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
+    more = {}
+    if triangles.velocity is not None:
+        more["velocity"] = "POINT", np.repeat(triangles.velocity, 3, axis=0)
+    if triangles.roughness is not None:
+        more["tf_roughness"] = "FACE", triangles.roughness
+    return MeshBuffers(
+        positions=triangles.corners.reshape(-1, 3),
+        edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
+        corner_verts=every.ravel(),
+        corner_edges=every.ravel().copy(),
+        face_offsets=np.arange(n + 1, dtype=np.int32) * np.int32(3),
+        attributes={
+            "tf_color": ("FACE", triangles.color),
+            "tf_transmission": ("FACE", triangles.transmission),
+            **more,
+        },
+    )
+
+
+def sphere_points(spheres: Spheres) -> PointBuffers:
+    """Spheres as points with the attributes that the material of proxies reads."""
+    return PointBuffers(
+        positions=spheres.center,
+        radius=spheres.radius,
+        attributes={
+            "tf_color": spheres.color,
+            "tf_transmission": spheres.transmission,
+            **({} if spheres.velocity is None else {"velocity": spheres.velocity}),
+            **({} if spheres.roughness is None else {"tf_roughness": spheres.roughness}),
+        },
+    )
+
+
+def facet_mesh(facets: Facets) -> MeshBuffers:
+    """Facets as a mesh of triangles."""
+    return triangle_mesh(triangles_of(facets))
+
+
+def cover_of(facets: Facets, camera: Camera | None) -> Floats:
+    """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over all directions."""
+    if camera is None:
+        return np.full(len(facets), MEAN_COVER)
+    return np.maximum(facing(facets, camera), LEAST_COVER)
+
+
+def facing(facets: Facets, camera: Camera) -> Floats:
+    """Fraction (n,) of its area that each facet shows to the camera, 0 to 1."""
+    if camera.kind == "ORTHO":
+        return np.abs(facets.normal @ camera.frame[:, 2])
+    ray = facets.center - camera.eye
+    return np.abs(np.einsum("ni,ni->n", facets.normal, ray)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-300)
+
+
+def _shaded(
+    facets: Facets,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32] | None, NDArray[np.float32] | None]:
+    more = (None if own is None else own.astype(np.float32) for own in (facets.velocity, facets.roughness))
+    return facets.color.astype(np.float32), facets.transmission.astype(np.float32), *more

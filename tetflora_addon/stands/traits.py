@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Species of a stand as numbers: how large plants of a basal diameter are, one row for each species.
+
+The *basal diameter* of a plant is the diameter of its trunk near the ground: what it is at 1.3 m, and a little more, so
+that seedlings have one too. Results of exponentials are rounded once, here: all that follows is plain arithmetic, which
+is the same on every machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..errors import TetFloraError
+from ..species.ages import ages_of
+from ..species.ecology import Ecology
+from ..species.species import Species
+
+BREAST_HEIGHT = 1.3
+#: Heights in a table, up to so many of the largest diameter.
+_HEIGHTS, _UPTO = 1000, 1.6
+#: Girth that trunks have at breast height, meters, at least and at most; and that of which its slope is taken.
+_LEAST, _MOST, _SLOPE = 0.004, 0.03, 0.01
+#: Crowns as long as this fraction of the height have all leaves of a free one.
+FULL = 0.75
+_DIGITS = 5
+
+
+@lru_cache(maxsize=256)
+def ecology_of(species: Species) -> Ecology:
+    """What a species needs; without a description, as plants of its size are.
+
+    Heights and basal diameters follow from its orders: what is described is taken to be three quarters as tall as the
+    largest.
+    """
+    if species.ecology is not None:
+        return species.ecology
+    lengths = np.cumprod([order.length.mean for order in species.orders])
+    first = species.orders[0]
+    # Stems of a stool are longer than it; leaves stand up beyond stems that are next to nothing.
+    stool = len(lengths) > 1 and lengths[1] > lengths[0]
+    leaf = max((order.leaf_size.mean for order in species.orders if order.leaves.high > 0), default=0.0)
+    tall = float(lengths[0] + (lengths[1] if stool else 0.0))
+    height = 1.33 * max(tall, leaf)
+    if height < 3.0:
+        # Herbs and low shrubs: the crown is as wide as two thirds of the height, whatever the diameter is.
+        thick = 0.01 * height
+        return Ecology(
+            shade=3.0, fecundity=200.0, dispersal=5.0, height=height, diameter=thick, height_curve=(2.0 / thick, 1.0),
+            crown_width=(0.35 * height, 0.35 * height / thick), crown_conicity=0.0, leaves=2.5,
+            wood_density=300.0, light_use_efficiency=0.3,
+            diameter_increment=thick / 3.0, source="Not published: as plants of this size are",
+        )  # fmt: skip
+    thick = 2.0 * first.thickness.mean * lengths[0] if not stool else 0.02 * height
+    largest = float(np.clip(2.2 * thick, 0.01 * height, 0.06 * height))
+    shrub = height < 9.0
+    return Ecology(
+        height=height,
+        diameter=largest,
+        height_curve=(2.2 / (0.5 * largest), 0.9),
+        crown_width=(0.3 + 0.02 * height, min(20.0, 0.8 * height / largest)),
+        diameter_increment=min(largest / (0.35 * ages_of(species).lifespan), 0.02),
+        light_use_efficiency=0.5 if shrub else 0.9,
+        leaves=4.0 if shrub else 6.0,
+        source="Not published: as plants of this size are",
+    )
+
+
+@dataclass(frozen=True)
+class StandSpecies:
+    """One species in a stand.
+
+    Attributes
+    ----------
+    species : Species
+    planted : float
+        Share of what is planted, over those of the others.
+    incoming_seeds : float
+        Seeds that come from outside, over those where a tenth of the ground beyond is below its crowns.
+    ecology : Ecology, optional
+        In place of that of the species.
+    """
+
+    species: Species
+    planted: float = 1.0
+    incoming_seeds: float = 1.0
+    ecology: Ecology | None = None
+
+    @property
+    def needs(self) -> Ecology:
+        """Its ecology."""
+        return ecology_of(self.species) if self.ecology is None else self.ecology
+
+
+class StandTraits:
+    """Numbers of all species; each of `Ecology` is an array (g,) or (g, 2) here.
+
+    Attributes
+    ----------
+    first : (g,) float64
+        Girth at which a trunk is 1.3 m high, meters, or a quarter of the height that it can reach.
+    breast : (g,) float64
+        Height of that.
+    free : (g,) float64
+        Light that a free crown takes beyond what its leaves cost, for each square meter below it.
+    lifespan, mature : (g,) float64
+        Years.
+    """
+
+    def __init__(self, species: Sequence[StandSpecies]) -> None:
+        if not species:
+            raise TetFloraError("A stand needs at least one species; add one to the list")
+        if not all(
+            np.isfinite(one.planted) and np.isfinite(one.incoming_seeds) and min(one.planted, one.incoming_seeds) >= 0
+            for one in species
+        ):
+            raise TetFloraError("Shares of species must be 0 or greater")
+        self.needs = [one.needs for one in species]
+        for name in (one for one in Ecology.__dataclass_fields__ if one != "source"):
+            setattr(self, name, np.array([getattr(one, name) for one in self.needs]))
+        self.planted = np.array([one.planted for one in species])
+        self.incoming_seeds = np.array([one.incoming_seeds for one in species])
+        ages = [ages_of(one.species) for one in species]
+        self.lifespan = np.array([one.lifespan for one in ages])
+        self.mature = np.array([min(one.flowers, 0.5 * one.lifespan) for one in ages])
+        self.breast = np.minimum(BREAST_HEIGHT, 0.25 * self.height)
+        rate, power = self.height_curve.T
+        self.cost = 0.35 * self.light_compensation
+        self.free = np.round(
+            -np.expm1(-self.extinction * self.leaves) - self.cost * self.extinction * self.leaves, _DIGITS
+        )
+        # As slender below breast height as just above it.
+        near = np.minimum(_SLOPE, 0.05 * self.diameter)
+        slope = (self.height - self.breast) * (-np.expm1(-rate * near)) ** power / near
+        self.first = np.round(np.clip(self.breast / slope, np.minimum(_LEAST, near), _MOST), 2 * _DIGITS)
+        self._step = _UPTO * self.diameter / _HEIGHTS
+        basal = self._step[:, None] * np.arange(_HEIGHTS + 1)
+        dbh = np.maximum(basal - self.first[:, None], 0.0)
+        grown = (
+            self.breast[:, None]
+            + (self.height - self.breast)[:, None] * (-np.expm1(-rate[:, None] * dbh)) ** power[:, None]
+        )
+        self._heights = np.round(grown, _DIGITS)
+        # Dry mass is this × basal² × height.
+        self.mass_factor = np.round(self.form_factor * self.wood_density * np.pi / 4, _DIGITS)
+
+    def heights(self, species: NDArray, basal: NDArray) -> Floats:
+        """Heights (n,) in a closed stand, meters."""
+        first = np.take(self.first, species)
+        place = np.minimum(basal / np.take(self._step, species), _HEIGHTS - 0.001)
+        index = place.astype(np.int64)
+        flat, start = self._heights.ravel(), species * (_HEIGHTS + 1) + index
+        low = np.take(flat, start)
+        tall = low + (np.take(flat, start + 1) - low) * (place - index)
+        return np.where(basal < first, np.take(self.breast, species) * basal / first, tall)
+
+    def radii(self, species: NDArray, basal: NDArray) -> Floats:
+        """Radii (n,) of crowns that stand free, meters."""
+        first = np.take(self.first, species)
+        at_first, slope = np.take(self.crown_width[:, 0], species), np.take(self.crown_width[:, 1], species)
+        return 0.5 * np.where(basal < first, at_first * basal / first, at_first + slope * (basal - first))
+
+    def diameters(self, species: NDArray, basal: NDArray) -> Floats:
+        """Diameters (n,) of trunks at breast height, meters."""
+        return np.maximum(basal - np.take(self.first, species), 0.0)
+
+    def masses(self, species: NDArray, basal: NDArray, height: NDArray) -> Floats:
+        """Dry mass (n,) of the wood above ground, kg."""
+        return np.take(self.mass_factor, species) * basal**2 * height
