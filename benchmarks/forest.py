@@ -175,7 +175,7 @@ def one(given: argparse.Namespace) -> dict:
     for name, value in given.set:
         set_named(scene.tetflora, name, value)
     figures = {"case": given.case, "what": given.what, "planted": planted}
-    figures |= build_instances(scene) if given.what == "instances" else refined(scene, given.run_to_end)
+    figures |= build_instances(scene) if given.what == "instances" else refined(scene, given.at_once)
     if not given.no_render:
         with tempfile.TemporaryDirectory() as folder:
             figures |= rendered(scene, Path(folder), given.samples)
@@ -301,7 +301,7 @@ def watching(look: Callable[[Refinement], None]) -> Iterator[None]:
 def refined(scene: bpy.types.Scene, run_to_end: bool = False) -> dict:
     """Refine as the operator does; figures of the job and of what the loop left.
 
-    at_once: as scripts and renders do, without a thread; steps are then those of the engine, which nobody waits for.
+    run_to_end: as scripts and renders do, without a thread; steps are then those of the engine, which nobody waits for.
     """
     kept: list[Refinement] = []
     taken: list[tuple[float, str]] = []
@@ -364,7 +364,7 @@ def left_open(refinement: Refinement) -> dict[str, float]:
     parts, points = refinement.plants.parts, refinement.plants.points
     # Plants grow from the first row of their species.
     trunks = np.flatnonzero(np.diff(refinement.plants.flora.rows["species"], prepend=-1))
-    whole = ~parts.alone & np.isin(parts.branches.row, trunks)
+    whole = ~parts.branch_only & np.isin(parts.branches.row, trunks)
     area = points.optical_area.astype(np.float64)
     share = area / np.maximum(np.bincount(points.part, area, len(parts)), 1e-300)[points.part]
     share[whole[points.part]] = 0.0

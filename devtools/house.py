@@ -3,7 +3,8 @@
 """House rules that ruff does not know: ``python -m devtools.house`` lists what breaks them.
 
 Each source file names its license and stays short, and no file names the machine that it was written on. The check
-runs in ``make lint``. Rules about rooms, imports and sizes are in `devtools.rooms`.
+runs in ``make lint``. Rules about rooms, imports and sizes are in `devtools.rooms`, those about names in
+`devtools.words`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from . import rooms
+from . import rooms, words
 
 ROOT = Path(__file__).resolve().parent.parent
 LONGEST = 800  # lines; a file has one subject, however long that is
@@ -57,6 +58,7 @@ def problems() -> list[str]:
                 found.append(f"{name}:1: no SPDX header")
             if len(lines) > LONGEST:
                 found.append(f"{name}: {len(lines)} lines; split it by subject, {LONGEST} is the most")
+        found += words.problems(name, lines)
         for what, pattern in _FOREIGN.items():
             if (name, what) in _ALLOWED:
                 continue

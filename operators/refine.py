@@ -227,4 +227,6 @@ class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
     bl_options = {'REGISTER'}
 
     def run(self, _context: bpy.types.Context) -> set[str]:
-        return self.done(f"{counted(storage.clear() + kept.clear(), 'file')} deleted from {storage.current_folder()}")
+        return self.done(
+            f"{counted(storage.clear() + asset_cache.clear(), 'file')} deleted from {storage.current_folder()}"
+        )

@@ -138,13 +138,13 @@ def geotiff(
     cell: float = 1.0,
     west: float = EAST,
     north: float = NORTH,
-    code: int = CODE,
+    epsg: int = CODE,
     nothing: bytes | None = b"-9999\0",
     **options: Any,
 ) -> bytes:
     """A GeoTIFF with square cells, whose first one has its upper left corner at a place."""
-    model = 2 if code == 4326 else 1
-    keys = [1, 1, 0, 3, 1024, 0, 1, model, 1025, 0, 1, 1, 2048 if model == 2 else 3072, 0, 1, code]
+    model = 2 if epsg == 4326 else 1
+    keys = [1, 1, 0, 3, 1024, 0, 1, model, 1025, 0, 1, 1, 2048 if model == 2 else 3072, 0, 1, epsg]
     extra = {
         33550: (12, [cell, cell, 0.0]),
         33922: (12, [0.0, 0.0, 0.0, west, north, 0.0]),
@@ -236,14 +236,14 @@ def dbase(**columns: list[str]) -> bytes:
     return head + fields + b"\r" + rows + b"\x1a"
 
 
-def geopackage(table: str, *rows: tuple[bytes, dict[str, str]], code: int = CODE) -> bytes:
+def geopackage(table: str, *rows: tuple[bytes, dict[str, str]], epsg: int = CODE) -> bytes:
     """A GeoPackage with a layer of geometries in well-known binary, and a text of each under some names."""
     names = list(rows[0][1])
     with closing(sqlite3.connect(":memory:")) as base:
         base.execute(
             "CREATE TABLE gpkg_spatial_ref_sys (srs_name, srs_id, organization, organization_coordsys_id, definition)"
         )
-        base.execute("INSERT INTO gpkg_spatial_ref_sys VALUES ('x', 7, 'EPSG', ?, '')", (code,))
+        base.execute("INSERT INTO gpkg_spatial_ref_sys VALUES ('x', 7, 'EPSG', ?, '')", (epsg,))
         base.execute("CREATE TABLE gpkg_geometry_columns (table_name, column_name, geometry_type_name, srs_id, z, m)")
         base.execute("INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', 'GEOMETRY', 7, 0, 0)", (table,))
         base.execute(f'CREATE TABLE "{table}" (fid, geom, {", ".join(names)})')

@@ -73,7 +73,7 @@ def _compared(found: Inventory, expected: dict[str, Any]) -> list[str]:
         "species": ["" if m is None or m.certainty == KIND else m.species for m in matches],
         "left_out": found.left_out.total(),
         "skipped": found.skipped,
-        "code": found.system.code,
+        "epsg": found.system.epsg,
     }
     numbers = {**found.sizes, "points": found.points, "girth": np.pi * found.sizes["diameter"]}
     wrong = []

@@ -67,7 +67,7 @@ def _raster(path: Path, canopy: bool) -> dict[str, Any]:
     return {
         "range": [float(np.nanmin(raster.values)), float(np.nanmax(raster.values))],
         "nothing": int(np.isnan(raster.values).sum()),
-        "code": system.code,
+        "epsg": system.epsg,
         "cell": np.linalg.norm(middle[1:] - middle[0], axis=1).tolist(),
         "told": "; ".join(raster.notes),
     }
@@ -81,7 +81,7 @@ def _outlines(path: Path) -> dict[str, Any]:
         "kinds": [outline.kind for outline in found],
         "heights": [outline.height for outline in found],
         "widths": [outline.width for outline in found],
-        "code": system.code,
+        "epsg": system.epsg,
         "told": "; ".join(notes),
     }
 

@@ -95,7 +95,7 @@ class PointBuffers:
 
 
 def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
-    """Several meshes as one, with the attributes of the first, 0 where another has none. None where there are none."""
+    """Several meshes as one, with the attributes of all, 0 where one has none. None where there are none."""
     parts = [p for p in parts if p.polygons]
     if len(parts) < 2:
         return parts[0] if parts else None
@@ -104,7 +104,7 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
         sizes = np.cumsum([0] + [len(getattr(p, offset_by)) for p in parts[:-1]])
         return np.concatenate([getattr(p, name) + np.int32(s) for p, s in zip(parts, sizes, strict=True)])
 
-    first = parts[0].attributes.items()
+    every = {name: own for part in reversed(parts) for name, own in part.attributes.items()}
     corners = np.cumsum([0] + [len(p.corner_verts) for p in parts]).astype(np.int32)
     starts = [p.face_offsets[:-1] + c for p, c in zip(parts, corners[:-1], strict=True)]
     return MeshBuffers(
@@ -113,7 +113,9 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
         corner_verts=joined("corner_verts", "positions"),
         corner_edges=joined("corner_edges", "edge_verts"),
         face_offsets=np.concatenate([*starts, corners[-1:]]),
-        attributes={name: (own[0], np.concatenate([_values(p, name, *own) for p in parts])) for name, own in first},
+        attributes={
+            name: (own[0], np.concatenate([_values(p, name, *own) for p in parts])) for name, own in every.items()
+        },
         smooth=parts[0].smooth,
     )
 

@@ -141,9 +141,9 @@ class FileReader:
     def number(self, value: Any, key: str, low: float, high: float) -> float:
         """A number within limits."""
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(key, f"must be a number from {low:g} to {high:g}, not {shown(value)}")
+            raise self.fail(key, f"must be a number from {low:g} to {high:g}, not {quoted(value)}")
         if not low <= value <= high:  # false for NaN as well
-            raise self.fail(key, f"must be from {low:g} to {high:g}, not {shown(value)}")
+            raise self.fail(key, f"must be from {low:g} to {high:g}, not {quoted(value)}")
         return float(value)
 
     def range(self, value: Any, key: str, low: float, high: float) -> Range:
@@ -151,7 +151,7 @@ class FileReader:
         if isinstance(value, int | float) and not isinstance(value, bool):
             return Range(self.number(value, key, low, high))
         if not isinstance(value, list | Range) or len(value) != 2:
-            raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, not {shown(value)}")
+            raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, not {quoted(value)}")
         mean = self.number(value[0], f"{key}[0] (mean)", low, high)
         variation = self.number(value[1], f"{key}[1] (variation)", 0, high - low)
         if mean - variation < low - 1e-12 or mean + variation > high + 1e-12:
@@ -169,32 +169,32 @@ class FileReader:
             and len(value) == 2
             and all(isinstance(v, list | tuple) and len(v) == 3 for v in value)
         ):
-            raise self.fail(key, f"must be {form} with numbers from 0 to 1, not {shown(value)}")
+            raise self.fail(key, f"must be {form} with numbers from 0 to 1, not {quoted(value)}")
         channels = [self.range([m, v], f"{key}.{c}", 0, 1) for m, v, c in zip(*value, "rgb", strict=True)]
         return Color(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
 
     def rgb(self, value: Any, key: str) -> tuple[float, float, float]:
         """A color."""
         if not isinstance(value, list | tuple) or len(value) != 3:
-            raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, not {shown(value)}")
+            raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, not {quoted(value)}")
         return tuple(self.number(v, f"{key}.{c}", 0, 1) for v, c in zip(value, "rgb", strict=True))
 
     def truth(self, value: Any, key: str) -> bool:
         """True or false."""
         if not isinstance(value, bool):
-            raise self.fail(key, f"must be true or false, not {shown(value)}")
+            raise self.fail(key, f"must be true or false, not {quoted(value)}")
         return value
 
     def choice(self, value: Any, key: str, choices: tuple[str, ...]) -> str:
         """One of a few names."""
         if value not in choices:
-            raise self.fail(key, f"must be one of {', '.join(choices)}, not {shown(value)}")
+            raise self.fail(key, f"must be one of {', '.join(choices)}, not {quoted(value)}")
         return value
 
     def keys(self, value: Any, key: str, allowed: Mapping[str, Any] | tuple[str, ...]) -> None:
         """Refuse what is no object, and keys that are not allowed."""
         if not isinstance(value, dict):
-            raise self.fail(key, f"must be an object {{…}}, not {shown(value)}")
+            raise self.fail(key, f"must be an object {{…}}, not {quoted(value)}")
         for name in value:
             if name not in allowed:
                 name = readable(name, NAME)
@@ -206,13 +206,13 @@ class FileReader:
         """A text that people read."""
         text = readable(value) if isinstance(value, str) else ""
         if not isinstance(value, str) or len(text.strip()) < least or len(value) > 1000:
-            raise self.fail(key, f"must be a string of {least} to 1000 characters, not {shown(value)}")
+            raise self.fail(key, f"must be a string of {least} to 1000 characters, not {quoted(value)}")
         return text
 
     def pair(self, value: Any, key: str, low: Any, high: Any) -> tuple[float, float]:
         """Two numbers; limits are for both, or two as well."""
         if not isinstance(value, list | tuple) or len(value) != 2:
-            raise self.fail(key, f"must be a pair of numbers, [first, second], not {shown(value)}")
+            raise self.fail(key, f"must be a pair of numbers, [first, second], not {quoted(value)}")
         lows, highs = (limit if isinstance(limit, tuple) else (limit, limit) for limit in (low, high))
         first, second = (self.number(value[i], f"{key}[{i}]", lows[i], highs[i]) for i in (0, 1))
         return first, second
@@ -221,7 +221,7 @@ class FileReader:
         """A whole number within limits."""
         number = self.number(value, key, low, high)
         if number != int(number):
-            raise self.fail(key, f"must be a whole number, not {shown(value)}")
+            raise self.fail(key, f"must be a whole number, not {quoted(value)}")
         return int(number)
 
     def value(self, key: Key, value: Any, where: str) -> Any:

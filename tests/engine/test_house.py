@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from devtools import house, rooms
+from devtools import house, rooms, words
 
 ROOT = house.ROOT
 ADDON = ROOT / "tetflora_addon"
@@ -177,3 +177,19 @@ def test_house_rules_can_fail(text: str, tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_no_example_of_a_property_is_timed() -> None:
     assert settings.default.deadline is None
+
+
+def test_words_that_gave_way_are_found_and_those_of_others_are_not() -> None:
+    gone = ["col" + "our", "Met" + "res", "Proxy" + "Form", "PAIRS_AT" + "_ONCE", "thrown" + " shadow", "guil" + "ds"]
+    for word in gone:
+        assert words.problems("a.py", ["", f"x = {word}  # and"])[0].startswith(f'a.py:2: "{word[:3]}'), word
+    kept = [
+        'LENGTHUNIT["met' + 're", 1.0]',
+        "diametre_houppier",
+        "https://x.org/col" + "our",
+        "at once",
+        "color",
+        "misguided",
+    ]
+    assert words.problems("a.py", kept) == []
+    assert words.problems("tests/data/a.csv", gone) == []

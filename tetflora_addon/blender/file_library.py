@@ -86,7 +86,7 @@ class OwnFiles:
             It would not lie in the folder, or there is no folder.
         """
         if not is_identifier(identifier):
-            raise self.error(f"{shown(identifier)} cannot name a {self.noun}. Use only {IDENTIFIER_RULE}")
+            raise self.error(f"{quoted(identifier)} cannot name a {self.noun}. Use only {IDENTIFIER_RULE}")
         try:
             return path_in(self.folder(), identifier + ENDING)
         except OSError as error:

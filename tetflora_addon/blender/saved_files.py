@@ -23,10 +23,11 @@ import bpy
 
 from ..errors import SceneError, quoted
 from ..files import IDENTIFIER_RULE, PART, is_identifier, replace
+from ..formats import FORMATS
 from .runtime import Handlers, complain
 
-#: Version of the layout of properties; a later one adds steps from earlier ones to `migrate`.
-VERSION = 2
+#: Of the properties of an object or a scene. Steps from earlier ones stand in `migrate`, when there are any.
+VERSION = FORMATS["properties"]
 _COMPRESSED = b"\x28\xb5\x2f\xfd"
 _END = b"\xb1\xea\x92\x8f"
 
@@ -141,7 +142,7 @@ def clear_unreadable() -> None:
     odd = [identifier for identifier in edits if identifier and not is_identifier(identifier)]
     if odd:
         print(
-            f"TetFlora: warning: this file has species of its own that are ignored: {shown(odd[0])} cannot name a "
+            f"TetFlora: warning: this file has species of its own that are ignored: {quoted(odd[0])} cannot name a "
             f"species. Use only {IDENTIFIER_RULE}",
             file=sys.stderr,
         )

@@ -122,7 +122,7 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
             sound, limits = all(prop.hard_min <= n <= prop.hard_max for n in numbers), limits_of(prop)
         if not sound:
             raise SceneError(
-                f"{readable(owner)}: {prop.name} is {shown(value)}; it must be {limits}. Set it again in the TetFlora "
+                f"{readable(owner)}: {prop.name} is {quoted(value)}; it must be {limits}. Set it again in the TetFlora "
                 "tab of the sidebar"
             )
 
@@ -297,7 +297,7 @@ def years_of(scene: bpy.types.Scene) -> float:
 def date_text(day: float) -> str:
     """A day of the year as ``14 October``; days of other years are those of one year."""
     quoted = date(2001, 1, 1) + timedelta(days=int((day - 1.0) % DAYS))  # no leap year
-    return f"{shown.day} {iface(MONTHS[shown.month - 1])}"
+    return f"{quoted.day} {iface(MONTHS[quoted.month - 1])}"
 
 
 def season_name(season: Season) -> str:

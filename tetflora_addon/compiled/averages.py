@@ -8,8 +8,9 @@ how far outside in the crown a sub-plant sits is known at three places, `NODES`,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from ..growth.axes import profile, profile_integral
 from ..growth.foliage import YOUTH
 from ..growth.grown_rows import NOW, fullness_of, lengths, spread_children
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
+from ..leaves.levels import hidden_gloss
 from ..leaves.models import LeafModel
 from ..species.growing import EVEN
 from ..species.members import dead_vigor, expected_forks
@@ -40,6 +42,8 @@ class RowLeaves:
     polygons, width, reach : (r,) float64
         Faces, width and farthest vertex of such a leaf; of the reach the greatest.
     transmission : (r,) float64
+    dull : (r,) float64
+        Part of their gloss that leaves for which such a leaf stands hide from each other.
     """
 
     area: Floats
@@ -47,6 +51,7 @@ class RowLeaves:
     width: Floats
     reach: Floats
     transmission: Floats
+    dull: Floats
 
 
 @dataclass(frozen=True)
@@ -98,12 +103,12 @@ def row_leaves(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]], tran
     """Means over the forms of leaves of species and kinds; ``transmission`` is (species, kinds)."""
     kind = rows["species"], rows["leaf_kind"]
 
-    def by_row(name: str, function: object) -> Floats:
-        table = [[function([getattr(m, name) for m in kinds]) if kinds else 0.0 for kinds in one] for one in forms]
+    def by_row(value: Callable[[LeafModel], float], function: Callable = np.mean) -> Floats:
+        table = [[function(list(map(value, kinds))) if kinds else 0.0 for kinds in one] for one in forms]
         return np.array(table, dtype=np.float64)[kind]
 
-    means = (by_row(name, np.mean) for name in ("shown_area", "polygons", "width"))
-    return RowLeaves(*means, by_row("reach", np.max), transmission[kind])
+    means = map(by_row, map(attrgetter, ("shown_area", "polygons", "width")))
+    return RowLeaves(*means, by_row(attrgetter("reach"), np.max), transmission[kind], by_row(hidden_gloss))
 
 
 def own_leaf_integrals(

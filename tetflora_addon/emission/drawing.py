@@ -555,4 +555,5 @@ def _facets_of_faces(
         moving = buffers.attributes["velocity"][1].astype(np.float64)
         every = np.minimum(np.arange(corners.shape[1]), size[:, None] - 1) + buffers.face_offsets[faces, None]
         velocity = middle(moving[buffers.corner_verts[every]])
-    return Facets(center, across, along, np.sqrt(area), color, through, velocity, stretch=np.ones(len(area)))
+    one, none = np.ones(len(area)), np.zeros(len(area))
+    return Facets(center, across, along, np.sqrt(area), color, through, velocity, stretch=one, dull=none)

@@ -179,7 +179,7 @@ class BakedLight:
     def of_facets(self, facets: Facets, sheets: NDArray[np.integer]) -> tuple[NDArray, NDArray]:
         """Radiance (n, 3) of the fronts and of the backs of facets, which are these sheets (n,) of the list."""
         surface = facets.center, facets.normal, facets.color, facets.transmission
-        return self.illumination.facet_radiance(*surface, self.cell[sheets], self.camera, sheets)
+        return self.illumination.facet_radiance(*surface, self.cell[sheets], self.camera, sheets, facets.dull)
 
     def of_spheres(self, facets: Facets, sheets: NDArray[np.integer]) -> NDArray:
         """Radiance (n, 3) of spheres in the place of facets, which are these sheets (n,) of the list.

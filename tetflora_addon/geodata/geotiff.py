@@ -170,7 +170,7 @@ class _Tags:
         if value is None:
             raise SceneError(f"{self.name}: tag {tag} ({_NUMBERS[tag]}) is missing; export the file again")
         if int(value) != value or value < 0:
-            raise self.broken(tag, f"is {shown(value)}")
+            raise self.broken(tag, f"is {quoted(value)}")
         return int(value)
 
     def broken(self, tag: str, text: str) -> SceneError:
@@ -279,7 +279,7 @@ class _Tags:
             except ValueError:
                 value = math.nan
             if not abs(value) < 1e6:
-                raise self.broken("GDAL_METADATA", f"has a {role} of {shown(found[1])}")
+                raise self.broken("GDAL_METADATA", f"has a {role} of {quoted(found[1])}")
             out.append(np.float32(value))
         return out[0], out[1]
 
@@ -357,7 +357,7 @@ class _Tags:
         try:
             return float(text.split("\0")[0]) if text.strip("\0 ") else None
         except ValueError:
-            raise self.broken("GDAL_NODATA", f"is {shown(text)}, which is not a number; correct it") from None
+            raise self.broken("GDAL_NODATA", f"is {quoted(text)}, which is not a number; correct it") from None
 
 
 def _decoded(rows: NDArray[np.uint8], dtype: np.dtype[Any], samples: int, predictor: int) -> NDArray[Any]:

@@ -154,9 +154,9 @@ def _chosen(table_: Table, columns: Mapping[str, str]) -> dict[str, Title]:
         meters = read_title(f"height {unit}").unit if unit else 0.0
         why = "no such column" if title not in table_.columns else ""
         if name not in FIELDS or (unit and not meters):
-            why = why or f"{shown(text)} is none of {', '.join(filter(None, FIELDS))}"
+            why = why or f"{quoted(text)} is none of {', '.join(filter(None, FIELDS))}"
         if why:
-            raise SceneError(f"{table_.name}: column {shown(title)}: {why}; correct Columns")
+            raise SceneError(f"{table_.name}: column {quoted(title)}: {why}; correct Columns")
         told = read_title(title)
         found[title] = Title(name, meters or told.unit, told.doubt if told.field == name else -1)
     return found
@@ -323,7 +323,7 @@ class _Reading:
         title, what, values, units, kinds = chosen
         texts = self._texts(title)
         self.found[name].sort(key=lambda pair: pair[0] != title)  # messages name the one that counts
-        self._refuse(np.isnan(values), name, lambda i: f"{shown(str(texts[i]))} is not a number")
+        self._refuse(np.isnan(values), name, lambda i: f"{quoted(str(texts[i]))} is not a number")
         words = kinds == WORD
         if words.any():
             example = quoted(str(texts[np.argmax(words)]))
@@ -339,7 +339,7 @@ class _Reading:
         self._refuse(
             ~((values >= 0.0) & (values <= most)),
             name,
-            lambda i: f"{shown(str(texts[i]))} is not from 0 to {most:,.0f} {'years' if name == 'age' else 'm'}",
+            lambda i: f"{quoted(str(texts[i]))} is not from 0 to {most:,.0f} {'years' if name == 'age' else 'm'}",
         )
         return np.where(self.good, values, 0.0)
 
@@ -440,7 +440,7 @@ class _Reading:
         texts = self._texts(title)
         found = np.array([place_in(text) for text in texts.tolist()], np.float64).reshape(-1, 3)
         points, plain = found[:, :2], found[:, 2] < 0.0
-        self._refuse(np.isnan(points).any(axis=1), "place", lambda i: f"{shown(str(texts[i]))} is no place")
+        self._refuse(np.isnan(points).any(axis=1), "place", lambda i: f"{quoted(str(texts[i]))} is no place")
         points = np.where(np.isnan(points), 0.0, points)
         some = np.abs(points[plain & self.good])
         first = bool(re.match(r"(?i).*lon.*lat|.*\bx.*y\b", title)) or (len(some) > 0 and (some[:, 0] > 90.0).any())
@@ -456,7 +456,7 @@ class _Reading:
         values, _, kinds = cells(texts)
         self._refuse(np.isin(kinds, (NOTHING, WORD)), column, lambda _: "a tree without coordinates")
         bad = np.isnan(values) | (kinds == RANGE) | ~(np.abs(values) < 1e9)
-        self._refuse(bad, column, lambda i: f"{shown(str(texts[i]))} is not a coordinate")
+        self._refuse(bad, column, lambda i: f"{quoted(str(texts[i]))} is not a coordinate")
         return np.where(self.good, values, 0.0) * (what.unit or 1.0)
 
     def _names(self) -> tuple[tuple[tuple[str, ...], ...], NDArray[np.int64]]:

@@ -77,7 +77,7 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
     elif kind == "Feature":
         data = {"features": [data]}
     elif kind != "FeatureCollection":
-        raise SceneError(f'{name}: "type" is {shown(kind)}; a GeoJSON file is a FeatureCollection; export it again')
+        raise SceneError(f'{name}: "type" is {quoted(kind)}; a GeoJSON file is a FeatureCollection; export it again')
     features = data.get("features")
     if not isinstance(features, list) or len(features) > MAX_ROWS:
         raise SceneError(f'{name}: "features" must be a list of at most {MAX_ROWS:,}')
@@ -112,7 +112,7 @@ def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]
     for part in parts:
         kind, values = part["type"], part.get("coordinates")
         if kind not in _GEOMETRIES:
-            raise SceneError(f"{where}: {shown(kind)} is no geometry of GeoJSON; export it again")
+            raise SceneError(f"{where}: {quoted(kind)} is no geometry of GeoJSON; export it again")
         many = kind.startswith("Multi")
         yield from ((kind.removeprefix("Multi"), each) for each in (list_of(values, where) if many else [values]))
 
@@ -126,7 +126,7 @@ def list_of(value: Any, where: str) -> list[Any]:
         They are none; ``where`` begins the message.
     """
     if not isinstance(value, list):
-        raise SceneError(f"{where}: its coordinates are {shown(value)}, not a list; correct them")
+        raise SceneError(f"{where}: its coordinates are {quoted(value)}, not a list; correct them")
     return value
 
 
@@ -161,7 +161,7 @@ def _code(crs: Any, name: str) -> int:
     if (code := code_in(text)) is not None:
         return code
     raise SceneError(
-        f'{name}: "crs" is {shown(text)}, which is no EPSG code; set Coordinate System to the code, or write the file '
+        f'{name}: "crs" is {quoted(text)}, which is no EPSG code; set Coordinate System to the code, or write the file '
         "with -t_srs EPSG:4326"
     )
 

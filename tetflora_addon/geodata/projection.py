@@ -384,7 +384,7 @@ class System:
     def name(self) -> str:
         """For messages."""
         if self.epsg > 0:
-            return f"EPSG:{self.code}"
+            return f"EPSG:{self.epsg}"
         return {
             0: "plain meters" if self.unit == 1.0 else f"plain units of {self.unit:g} m",
             -2: "the system that the file defines",
@@ -424,7 +424,7 @@ def system_of(epsg: int, what: str = "") -> System:
     if epsg in known_systems():
         return System(epsg)
     raise SceneError(
-        f"{what}EPSG:{code} is none of the coordinate systems that TetFlora reads. Set Coordinate System to another "
+        f"{what}EPSG:{epsg} is none of the coordinate systems that TetFlora reads. Set Coordinate System to another "
         "code, reproject the file, for example with gdalwarp or ogr2ogr and -t_srs EPSG:4326, or turn on Plain Meters"
     )
 

@@ -192,7 +192,7 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
         if words:
             if key not in _HEADER or len(words) != 2:
                 raise SceneError(
-                    f"{name}: line {line}: {shown(' '.join(words))} is no header line of an ASCII grid; correct it"
+                    f"{name}: line {line}: {quoted(' '.join(words))} is no header line of an ASCII grid; correct it"
                 )
             header[key] = _number(words[1], f"{name}: line {line}: {key}")
         start += len(text) + 1
@@ -252,7 +252,7 @@ def numbers_in(piece: bytes, name: str, line: int) -> NDArray[np.float64]:
         if text.strip() and _split(text) is None:
             words = text.decode("latin-1").split()
             bad = next((w for w in words if _split(w.encode()) is None), words[0])
-            raise SceneError(f"{name}: line {line + number}: {shown(bad)} is not a number; correct it")
+            raise SceneError(f"{name}: line {line + number}: {quoted(bad)} is not a number; correct it")
     raise SceneError(f"{name}: line {line}: not a list of numbers; correct it")
 
 
@@ -273,9 +273,9 @@ def _number(text: str, what: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise SceneError(f"{what} is {shown(text)}, which is not a number; correct it") from None
+        raise SceneError(f"{what} is {quoted(text)}, which is not a number; correct it") from None
     if not abs(value) < 1000 * _LIMIT and "nodata" not in what:
-        raise SceneError(f"{what} is {shown(text)}, which is too large; correct it")
+        raise SceneError(f"{what} is {quoted(text)}, which is too large; correct it")
     return value
 
 

@@ -73,7 +73,7 @@ class Table:
     def where(self, index: int, column: str = "") -> str:
         """A place in the file, for messages."""
         text = f"{self.name}: {self.row} {self.numbers[index]:,}"
-        return f"{text}, column {shown(column)}" if column else text
+        return f"{text}, column {quoted(column)}" if column else text
 
 
 def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:

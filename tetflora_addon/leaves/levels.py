@@ -21,7 +21,7 @@ from .blades import blade_surface
 from .bodies import closed_parts, rounded, spined
 from .compounds import Compound, compound_surface
 from .models import LeafModel, mean_silhouette
-from .needles import SPARSE, Needles, needle_surface
+from .needles import FLAT, SPARSE, Needles, needle_surface
 from .outlines import Blade, distance_to_links
 from .surfaces import LeafSurface
 
@@ -40,8 +40,6 @@ _STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
 _FITS, _FITTED, _GROWTH = 3, 0.01, 0.75
 #: Factors of thickness and width at most, and that of a width by which is seen how the area grows with it.
 _THINNEST, _THICKEST, _WIDER = 0.2, 8.0, 1.5
-#: Part of the light that a shoot sends on, about, and what needles are brighter by at most.
-_SCATTERED, _BRIGHTEST = 0.15, 2.0
 #: Divisions of closed parts, one more than at most.
 _ROUNDEST = 5
 #: Points on each edge of a coarse model at which its distance from the shape is measured.
@@ -64,12 +62,29 @@ class LeafLevel:
         Largest distance of the margin from that of the shape, in lengths of the leaf.
     tint : (f, 3) float32
         What the color of a leaf is times that of each face: shoots are brown, petioles pale.
+    again : (f,) float32
+        Probability that light which a face scatters meets another: needles on a shoot hide each other.
+    solid : bool
+        Whether light that enters a face comes out of another, as of prisms: all others are sheets.
     """
 
     model: LeafModel
     shapes: NDArray[np.float32]
     error: float
     tint: NDArray[np.float32]
+    again: NDArray[np.float32]
+    solid: bool = False
+
+    def colors(self, whole: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Colors (n, f, 3) of faces, from those of leaves: that of a species with needles is that of its shoots.
+
+        A shoot sends back w (1 - p) / (1 - p w) where its needles send back w: p of what one scatters meets another
+        (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform broadleaved and
+        coniferous canopies", 2005).
+        """
+        whole = np.minimum(whole * self.tint, 1.0)
+        again = self.again[:, None]
+        return whole / (1.0 - again * (1.0 - whole)) if again.any() else whole
 
 
 def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: float = 1.0) -> LeafSurface:
@@ -166,20 +181,24 @@ def _each_level(model: LeafModel, shape: Shape) -> Iterator[LeafLevel]:
             break
         stem = made.uv[made.face_offsets[:-1] + 1, 1] < -_STEM
         stem |= made.uv[made.face_offsets[:-1], 1] < -_STEM
-        tint = np.where(stem[:, None], _TINTS[isinstance(shape, Needles)], _brighter(shape, made)).astype(np.float32)
-        yield LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error, tint)
+        tint = np.where(stem[:, None], _TINTS[isinstance(shape, Needles)], 1.0).astype(np.float32)
+        again = np.where(stem, 0.0, _recollision(shape, made)).astype(np.float32)
+        solid = isinstance(shape, Needles) and tolerance <= FLAT
+        yield LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error, tint, again, solid)
         error = made.error
 
 
-def _brighter(shape: Shape, made: LeafSurface) -> float:
-    """What single leaves are brighter by than the polygons that stand for them all, as light is lost between them.
+def _recollision(shape: Shape, made: LeafSurface) -> float:
+    """Probability that light which one of the polygons of a shape scatters meets another."""
+    return max(1.0 - shown_area(shape, made) / float(made.areas().mean()), 0.0)
 
-    A shoot sends back w (1 - p) / (1 - p w) where its needles send back w: p of what one scatters meets another
-    (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform broadleaved and coniferous
-    canopies", 2005). The color of a species is that of its shoots.
-    """
-    again = 1.0 - shown_area(shape, made) / float(made.areas().mean())
-    return min(1.0 / (1.0 - again * (1.0 - _SCATTERED)), _BRIGHTEST)
+
+@lru_cache(maxsize=128)
+def hidden_gloss(model: LeafModel) -> float:
+    """Part of the gloss of leaves that those for which a model stands hide from each other."""
+    if not isinstance(model.shape, Needles):
+        return 0.0
+    return _recollision(model.shape, fitted(model.shape, TOLERANCES[0], model.area, model.reach))
 
 
 def leaf_levels(model: LeafModel, number: int = 1 << 10) -> tuple[LeafLevel, ...]:
@@ -249,11 +268,12 @@ def _round_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
         made, error = rounded(model, times)
         if made.polygons > MOST_POLYGONS:
             break
-        tint = np.ones((made.polygons, 3), np.float32)
-        found.append(LeafLevel(made, made.positions[None].astype(np.float32), error, tint))
+        tint, again = np.ones((made.polygons, 3), np.float32), np.zeros(made.polygons, np.float32)
+        found.append(LeafLevel(made, made.positions[None].astype(np.float32), error, tint, again))
     if found and model.spines is not None:  # only up close: before, they are much thinner than pixels
         made, tint = spined(found[-1].model, model.spines, closed_parts(found[-1].model))
-        found[-1] = replace(found[-1], model=made, shapes=made.positions[None].astype(np.float32), tint=tint)
+        again, shapes = np.zeros(made.polygons, np.float32), made.positions[None].astype(np.float32)
+        found[-1] = replace(found[-1], model=made, shapes=shapes, tint=tint, again=again)
     return tuple(found)
 
 

@@ -19,7 +19,7 @@ _GOLDEN_ANGLE = np.radians(137.508)
 #: What is not seen of the gaps between needles, of their distance along the shoot.
 _GAP = 0.6
 #: Error from which on there are fewer needles, needles are flat, and prisms have three sides.
-SPARSE, _FLAT, _THREE = 0.05, 0.004, 0.0012
+SPARSE, FLAT, _THREE = 0.05, 0.004, 0.0012
 #: One of so many needles stands for them all where there are fewer; what is not seen of the gaps then.
 _OF, _SPARSE_GAP = 3, 2.4
 #: Radius of shoots over that of needles, and of both at their ends.
@@ -27,7 +27,7 @@ _TAPER = 0.55
 #: Places along a needle and its widths there, for errors above the first number.
 _PROFILES = (
     (SPARSE, (0.0, 1.0), (1.0, 0.0)),
-    (_FLAT, (0.0, 0.35, 1.0), (0.55, 1.0, 0.0)),
+    (FLAT, (0.0, 0.35, 1.0), (0.55, 1.0, 0.0)),
     (_THREE, (0.0, 0.45, 0.88, 1.0), (0.5, 1.0, 0.8, 0.0)),
     (0.0, (0.0, 0.3, 0.6, 0.88, 1.0), (0.5, 0.95, 1.0, 0.7, 0.0)),
 )
@@ -70,7 +70,7 @@ def needle_surface(needles: Needles, tolerance: float, factor: float = 1.0) -> L
         frame = np.stack([across, along, np.cross(across, along)], axis=1)
         parts.append(_shoot(needles, i, tolerance, factor).moved(frame, np.zeros(3)))
     error = needles.gap * (_SPARSE_GAP if tolerance > SPARSE else 1.0)
-    error = error if tolerance > _FLAT else min(tolerance, error)
+    error = error if tolerance > FLAT else min(tolerance, error)
     return replace(joined(parts), error=error)
 
 
@@ -102,7 +102,7 @@ def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Le
     start = place[..., None] * needles.shoot * axis
     toward = axis - (direction * axis).sum(-1, keepdims=True) * direction
     made = [_needles(start, direction, toward, length, needles, tolerance, factor)]
-    rings = 2 if tolerance > _FLAT else 5
+    rings = 2 if tolerance > FLAT else 5
     stem = np.zeros((VARIANTS, rings, 3))
     stem[..., 1] = np.linspace(0.0, needles.shoot, rings)
     radius = needles.stem / 2.0 * np.linspace(1.0, _TAPER, rings)
@@ -115,7 +115,7 @@ def _needles(
     start: Floats, direction: Floats, toward: Floats, length: Floats, needles: Needles, tolerance: float, factor: float
 ) -> LeafSurface:
     """Needles from starts (k, n, 3) in directions, of lengths (k, n), bent toward vectors (k, n, 3)."""
-    flat, three = tolerance > _FLAT, tolerance > _THREE
+    flat, three = tolerance > FLAT, tolerance > _THREE
     along, wide = next((np.array(along), np.array(wide)) for error, along, wide in _PROFILES if tolerance > error)
     rings, (variants, count) = len(along), length.shape
     reach = length[..., None, None]

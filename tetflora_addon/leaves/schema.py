@@ -64,7 +64,7 @@ def _read_leaf(reader: FileReader, data: Any, where: str) -> LeafModel | str:
         return replace(_read_leaf(reader, rest, where), shape=shape)
     if "model" in data:
         if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
-            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {shown(data['model'])}")
+            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {quoted(data['model'])}")
         return LEAF_MODELS[data["model"]]
     if "object" in data:
         return reader.text(data["object"], f"{where}.object")

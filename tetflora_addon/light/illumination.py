@@ -133,6 +133,7 @@ class Illumination:
         cells: Integers,
         camera: Camera | None = None,
         sheets: Integers | None = None,
+        dull: Floats | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Outgoing radiance of facets or leaves.
 
@@ -150,6 +151,8 @@ class Illumination:
             For the gloss; without, it is even.
         sheets : (m,) int, optional
             As for `direct`.
+        dull : (m,) float64, optional
+            Part of the gloss that is lost.
 
         Returns
         -------
@@ -159,7 +162,8 @@ class Illumination:
         front, back = np.zeros((2, len(center), 3), np.float32)
         for start in range(0, len(center), _BATCH):
             part = slice(start, start + _BATCH)
-            fractions = scattering.scattered_fractions(color[part], transmission[part])
+            hidden = 0.0 if dull is None else dull[part]
+            fractions = scattering.scattered_fractions(color[part], transmission[part], hidden)
             view = None if camera is None else to_eye(camera, center[part])
             sides = scattering.facet_ambient(normal[part], fractions, self.around(center[part], cells[part]), view)
             on = None if sheets is None else sheets[part]

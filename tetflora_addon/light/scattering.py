@@ -87,10 +87,13 @@ def fluence(light: Floats) -> Floats:
     return light[..., 0, :] * np.sqrt(4.0 * np.pi)
 
 
-def scattered_fractions(color: Floats, transmission: Floats) -> Fractions:
-    """Fractions of light that sheets reflect (n, 3) and transmit (n, 3) diffusely, and that they mirror (n,)."""
+def scattered_fractions(color: Floats, transmission: Floats, dull: Floats | float = 0.0) -> Fractions:
+    """Fractions of light that sheets reflect (n, 3) and transmit (n, 3) diffusely, and that they mirror (n,).
+
+    ``dull`` (n,) is the part of the gloss of leaves that these hide from each other.
+    """
     through = transmission[:, None]
-    gloss = np.where(transmission > 0.0, GLOSS, 0.0)
+    gloss = np.where(transmission > 0.0, GLOSS * (1.0 - dull), 0.0)
     rest = (1.0 - gloss)[:, None]
     return rest * (1.0 - through) * color, rest * through * np.minimum(color * THROUGH_TINT, 1.0), gloss
 

@@ -29,7 +29,7 @@ _ROUNDING = 1e-6  # a hair of tolerance: level ground passes a slope limit of 0 
 
 
 class SiteDraw(IntEnum):
-    """What a number is drawn for; of the first ones, arrangements of earlier versions are made."""
+    """What a number is drawn for."""
 
     TRIANGLE = 1
     SIDE = 2

@@ -71,6 +71,8 @@ class Facets(Arrays):
         Of the gloss of assets; None where the material knows.
     stretch : (n,) float64 or None
         Length along ``along`` over that of an equilateral triangle of the same area; None for 1.
+    dull : (n,) float64 or None
+        Part of the gloss of leaves that these hide from each other, 0 to 1; None for 0.
     """
 
     center: Floats
@@ -82,6 +84,7 @@ class Facets(Arrays):
     velocity: Floats | None = None
     roughness: Floats | None = None
     stretch: Floats | None = None
+    dull: Floats | None = None
 
     @property
     def normal(self) -> Floats:
@@ -278,6 +281,7 @@ def _leaves_of_subplants(
         facet_albedo(color, owner, weight, hotspot_factor),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, center),
+        dull=_dull(flora, leaf_row, owner, weight, hotspot_factor),
     )
     return made if of_day is None else made.take(np.flatnonzero(of_day > 0))
 
@@ -333,7 +337,8 @@ def _leaves_of_pieces(
     if own.later is not None:
         there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
         velocity = (there.position - leaves.position) / moment(rows)
-    return Facets(center, across, along, np.sqrt(area * weight[owner]), color, transmission, velocity)
+    side, dull = np.sqrt(area * weight[owner]), _dull(flora, row[owner], owner, weight, hotspot_factor)
+    return Facets(center, across, along, side, color, transmission, velocity, dull=dull)
 
 
 def _wood_of_subplants(
@@ -372,7 +377,7 @@ def _strips(
     # Turned about their axes at random, since closed tubes face all ways around.
     aside, turn = perpendicular(axis), 2 * np.pi * uniform(key, _TURN)[:, None]
     across = np.cos(turn) * aside + np.sin(turn) * np.cross(axis, aside)
-    return Facets(center, across, axis, side, color, none, velocity, stretch=stretch)
+    return Facets(center, across, axis, side, color, none, velocity, stretch=stretch, dull=none)
 
 
 def _carried(flora: Flora, subplants: Branches, owner: Integers, center: Floats) -> Floats | None:
@@ -441,6 +446,12 @@ def facet_albedo(color: NDArray, owner: NDArray, weight: NDArray, hotspot_factor
     """Colors (m, 3) of facets of owners (m,), by the weights of these (n,) and what light and eye share of them."""
     color = recollision_albedo(color, weight[owner])
     return color if hotspot_factor is None else balanced_colors(color, hotspot_factor[owner])
+
+
+def _dull(flora: Flora, row: NDArray, owner: NDArray, weight: NDArray, hotspot_factor: NDArray | None) -> Floats:
+    """Part (m,) of the gloss of leaves that facets lack: what is mirrored and meets another leaf is lost as such."""
+    left = np.minimum(weight if hotspot_factor is None else weight * hotspot_factor, 1.0)
+    return 1.0 - left[owner] * (1.0 - flora.leaf.dull[row])
 
 
 def recollision_albedo(color: Floats, weight: Floats) -> Floats:

@@ -41,7 +41,7 @@ class Triangles(Arrays):
     transmission : (n,) float32
     velocity : (n, 3) float32 or None
         Meters a second; None for plants at rest.
-    roughness : (n,) float32 or None
+    roughness, dull : (n,) float32 or None
         As of facets.
     """
 
@@ -50,6 +50,7 @@ class Triangles(Arrays):
     transmission: NDArray[np.float32]
     velocity: NDArray[np.float32] | None = None
     roughness: NDArray[np.float32] | None = None
+    dull: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Spheres(Arrays):
     radius : (n,) float32
     color : (n, 3) float32
     transmission : (n,) float32
-    velocity, roughness : (n, 3) float32 or None, (n,) float32 or None
+    velocity, roughness, dull : (n, 3) float32 or None, (n,) float32 or None, (n,) float32 or None
         As of triangles.
     """
 
@@ -73,6 +74,7 @@ class Spheres(Arrays):
     transmission: NDArray[np.float32]
     velocity: NDArray[np.float32] | None = None
     roughness: NDArray[np.float32] | None = None
+    dull: NDArray[np.float32] | None = None
 
 
 #: Facets, or what is drawn in their place.
@@ -127,11 +129,9 @@ def triangle_mesh(triangles: Triangles) -> MeshBuffers:
     """Triangles as a mesh with the attributes that the material of proxies reads."""
     n = len(triangles)
     every = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
-    more = {}
+    more = {name: ("FACE", values) for name, values in _mirrored(triangles).items()}
     if triangles.velocity is not None:
         more["velocity"] = "POINT", np.repeat(triangles.velocity, 3, axis=0)
-    if triangles.roughness is not None:
-        more["tf_roughness"] = "FACE", triangles.roughness
     return MeshBuffers(
         positions=triangles.corners.reshape(-1, 3),
         edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
@@ -155,7 +155,7 @@ def sphere_points(spheres: Spheres) -> PointBuffers:
             "tf_color": spheres.color,
             "tf_transmission": spheres.transmission,
             **({} if spheres.velocity is None else {"velocity": spheres.velocity}),
-            **({} if spheres.roughness is None else {"tf_roughness": spheres.roughness}),
+            **_mirrored(spheres),
         },
     )
 
@@ -180,8 +180,13 @@ def facing(facets: Facets, camera: Camera) -> Floats:
     return np.abs(np.einsum("ni,ni->n", facets.normal, ray)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-300)
 
 
-def _shaded(
-    facets: Facets,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32] | None, NDArray[np.float32] | None]:
-    more = (None if own is None else own.astype(np.float32) for own in (facets.velocity, facets.roughness))
+def _mirrored(drawn: Triangles | Spheres) -> dict[str, NDArray[np.float32]]:
+    """Attributes of their gloss, where these differ from face to face."""
+    attributes = {"tf_roughness": drawn.roughness, "tf_dull": drawn.dull}
+    return {name: values for name, values in attributes.items() if values is not None}
+
+
+def _shaded(facets: Facets) -> tuple[NDArray[np.float32] | None, ...]:
+    optional = facets.velocity, facets.roughness, facets.dull
+    more = (None if own is None else own.astype(np.float32) for own in optional)
     return facets.color.astype(np.float32), facets.transmission.astype(np.float32), *more

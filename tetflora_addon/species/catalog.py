@@ -71,7 +71,7 @@ def checked_identifier(text: str) -> str:
         It could name no file of a species.
     """
     if not is_identifier(text):
-        raise SpeciesError(f"{shown(text)} cannot name a species. Use only {IDENTIFIER_RULE}")
+        raise SpeciesError(f"{quoted(text)} cannot name a species. Use only {IDENTIFIER_RULE}")
     return text
 
 

@@ -20,11 +20,11 @@ from math import cos, hypot, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
 
+from ..formats import FORMATS
 from ..leaves.models import LeafModel
 from ..leaves.needles import Needles
 from ..leaves.outlines import Blade
 from ..leaves.schema import MAX_FORMS
-from .schema import FORMAT
 from .species import LEAF_KINDS, Species
 from .year import DAYS, LeafYear
 
@@ -186,7 +186,7 @@ def _dried(form: LeafModel | str, own: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _page(species: Species, kind: str, description: str, orders: list[dict[str, Any]]) -> dict[str, Any]:
     name, transmission = f"{species.name} {kind}"[:1000], species.leaf_transmission
-    page = {"format": FORMAT, "name": name, "description": description[:1000], "bark": species.bark}
+    page = {"format": FORMATS["species"], "name": name, "description": description[:1000], "bark": species.bark}
     return page | {"leaf": [], "leaf_transmission": transmission, "orders": orders}
 
 

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from .. import formats
 from ..errors import SpeciesError, quoted
 from ..files import parse_json, read_whole
 from ..leaves.schema import read_forms
@@ -23,7 +24,6 @@ from .skeletons import MAX_ORDERS
 from .species import LEAF_KINDS, Bud, Dead, Order, Species
 from .year import DAYS, MAX_AUTUMN, LeafYear, Year
 
-FORMAT = 1
 MAX_FILE_BYTES = 4_000_000
 MAX_POLYGONS = 20_000_000
 LENGTH_HIGH = 20.0
@@ -117,13 +117,16 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     """
     reader = FileReader(source)
     if not isinstance(data, dict):
-        raise reader.fail("species", f"must be an object {{…}}, not {shown(data)}")
+        raise reader.fail("species", f"must be an object {{…}}, not {quoted(data)}")
+    if "format" in data:
+        try:
+            data = formats.newest("species", data, data["format"])
+        except ValueError as error:
+            raise reader.fail("format", str(error)) from None
     reader.keys(data, "", SPECIES_KEYS)
     for key in ("format", "name", "orders", "leaf"):
         if key not in data:
             raise reader.fail(key, "missing; add this key")
-    if data["format"] != FORMAT or isinstance(data["format"], bool):
-        raise reader.fail("format", f"must be {FORMAT} for this version of TetFlora, not {shown(data['format'])}")
     orders = data["orders"]
     if not isinstance(orders, list) or not 1 <= len(orders) <= MAX_ORDERS:
         found = len(orders) if isinstance(orders, list) else quoted(orders)

@@ -38,7 +38,7 @@ from ..growth.hashing import Draw, uniform
 from ..growth.seasons import is_seasonal
 from ..growth.wind import moment
 from ..leaves.kites import KITE, LeafKites, leaf_kites
-from ..leaves.levels import LeafLevel, chosen_level, leaf_levels
+from ..leaves.levels import LeafLevel, chosen_level, hidden_gloss, leaf_levels
 from ..leaves.models import LeafModel
 from .pieces import chunks
 
@@ -59,8 +59,10 @@ class LeafCopies:
         Whether they have velocities.
     """
 
-    def __init__(self, model: LeafModel, number: int, transmission: float, moving: bool = False) -> None:
-        self.model = model
+    def __init__(
+        self, model: LeafModel, number: int, transmission: float, moving: bool = False, dull: float = 0.0
+    ) -> None:
+        self.model, self.dull = model, dull
         self.done = 0
         self.transmission = transmission
         self.positions = np.zeros((number, 3 * len(model.positions)), np.float32)
@@ -114,6 +116,8 @@ class LeafCopies:
         index = self._materials()
         materials = {} if index is None else {"material_index": ("FACE", index)}
         motion = {} if self.velocity is None else {"velocity": ("POINT", self.velocity.reshape(-1, 3))}
+        faces = n * model.polygons
+        dull = {"tf_dull": ("FACE", np.full(faces, self.dull, np.float32))} if self.dull else {}
         return MeshBuffers(
             positions=self.positions.reshape(-1, 3),
             edge_verts=_stepped(edges.reshape(-1), vertices, n).reshape(-1, 2),
@@ -123,7 +127,8 @@ class LeafCopies:
             attributes={
                 "UVMap": ("CORNER", self._texture()),
                 "tf_color": ("FACE", self.color.reshape(-1, 3)),
-                "tf_transmission": ("FACE", np.full(n * model.polygons, self.transmission, np.float32)),
+                "tf_transmission": ("FACE", np.full(faces, self.transmission, np.float32)),
+                **dull,
                 **materials,
                 **motion,
             },
@@ -150,8 +155,10 @@ class KiteCopies(LeafCopies):
         As of `LeafCopies`.
     """
 
-    def __init__(self, kites: LeafKites, number: int, transmission: float, moving: bool = False) -> None:
-        super().__init__(KITE, number, transmission, moving)
+    def __init__(
+        self, kites: LeafKites, number: int, transmission: float, moving: bool = False, dull: float = 0.0
+    ) -> None:
+        super().__init__(KITE, number, transmission, moving, dull)
         self.kites = kites
         self.plane = np.zeros(number, np.int8)
 
@@ -179,7 +186,7 @@ class LevelCopies(LeafCopies):
 
     def __init__(self, level: LeafLevel, number: int, transmission: float, moving: bool = False) -> None:
         super().__init__(level.model, number, transmission, moving)
-        self.shapes, self.tint = level.shapes.transpose(1, 2, 0), level.tint
+        self.level, self.shapes = level, level.shapes.transpose(1, 2, 0)
 
     def _shapes(self, key: Keys, new: slice) -> NDArray[np.float32]:
         variants = self.shapes.shape[2]
@@ -187,8 +194,25 @@ class LevelCopies(LeafCopies):
 
     def buffers(self) -> MeshBuffers:
         """The mesh, once all copies are placed."""
-        np.minimum(self.color * self.tint, 1.0, out=self.color)
+        self.color[:] = self.level.colors(self.color)
+        if self.level.solid:
+            self.transmission = self._through()
         return replace(super().buffers(), smooth=True)
+
+    def _through(self) -> float:
+        """Transmission of the faces of solid needles, which light passes twice; their colors are changed to it.
+
+        A sheet of color c reflects (1 - T) c and lets T c through. Faces that reflect r and let t through send
+        r + t² / (1 - r) on together: what is within meets faces until it comes out.
+        """
+        color, part = self.color, self.transmission
+        reflected, passed = (1.0 - part) * color, part * color
+        entering = float(np.sqrt(passed * (1.0 - reflected)).mean(dtype=np.float64))
+        through = entering / max(entering + float(reflected.mean(dtype=np.float64)), 1e-9)
+        a, b = 1.0 - through, through**2 - (1.0 - through) ** 2
+        root = np.sqrt(np.maximum((a * (1.0 + color)) ** 2 + 4.0 * b * color, 0.0))
+        np.minimum(2.0 * color / np.maximum(a * (1.0 + color) + root, 1e-9), 1.0, out=color)
+        return through
 
 
 def _placed(
@@ -291,8 +315,8 @@ def _copies(model: LeafModel, step: int, number: int, transmission: float, movin
     if step > 0:
         return LevelCopies(leaf_levels(model, step)[step - 1], number, transmission, moving)
     if step == _KITE and not model.textured:
-        return KiteCopies(leaf_kites(model), number, transmission, moving)
-    return LeafCopies(model, number, transmission, moving)
+        return KiteCopies(leaf_kites(model), number, transmission, moving, hidden_gloss(model))
+    return LeafCopies(model, number, transmission, moving, hidden_gloss(model))
 
 
 def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_LeafBearers]:

@@ -106,8 +106,8 @@ def test_what_a_file_does_not_say_is_as_in_a_new_scene(tmp_path):
     [
         (lambda d: d.pop("version"), 'the file has no "version"'),
         (lambda d: d.update(format="else"), '"format" is'),
-        (lambda d: d.update(version=2), '"version" is 2'),
-        (lambda d: d.update(version=True), '"version" is True'),
+        (lambda d: d.update(version=2), '"version" must be 1'),
+        (lambda d: d.update(version=True), "not True"),
         (lambda d: d.update(more=1), 'the file has an unknown key "more"'),
         (lambda d: d.update(populations={}), "populations is dict; it must be a list"),
         (lambda d: d["populations"].append(3), "population 2 is int"),

@@ -124,7 +124,7 @@ def test_its_faces_count_in_the_budget(scene, toy):
 def test_values_that_files_hold_stay_while_forms_come_and_go(scene, tmp_path):
     numbers = {'MICROSURFACES': 0, 'SHELLS': 1, 'MICROSPHERES': 2, 'AUTOMATIC': 3}
     assert items(scene) == numbers
-    assert scene.tetflora.proxy_kind == proxy_kinds.form_of(scene).identifier == 'AUTOMATIC'
+    assert scene.tetflora.proxy_kind == proxy_kinds.proxy_kind_of(scene).identifier == 'AUTOMATIC'
     scene.tetflora.proxy_kind = 'SHELLS'
     proxy_kinds.register_proxy_kind(row())
     assert (scene.tetflora.proxy_kind, items(scene)) == ('SHELLS', {**numbers, TOY: NUMBER})
@@ -134,10 +134,10 @@ def test_values_that_files_hold_stay_while_forms_come_and_go(scene, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "toy.blend"))
     scene = bpy.context.scene
     assert items(scene) == numbers
-    assert proxy_kinds.form_of(scene).identifier == 'AUTOMATIC'  # of an add-on that is not there
+    assert proxy_kinds.proxy_kind_of(scene).identifier == 'AUTOMATIC'  # of an add-on that is not there
     assert refined(scene).polygons_proxy > 0
     proxy_kinds.register_proxy_kind(row())
-    assert scene.tetflora.proxy_kind == proxy_kinds.form_of(scene).identifier == TOY
+    assert scene.tetflora.proxy_kind == proxy_kinds.proxy_kind_of(scene).identifier == TOY
     proxy_kinds.unregister_proxy_kind(TOY)
 
 
@@ -146,7 +146,7 @@ def test_forms_stay_while_the_extension_is_disabled(scene, toy):
     properties.register()
     assert items(scene)[TOY] == NUMBER
     scene.tetflora.proxy_kind = TOY
-    assert proxy_kinds.form_of(scene).identifier == TOY
+    assert proxy_kinds.proxy_kind_of(scene).identifier == TOY
 
 
 @pytest.mark.parametrize("changed", [{"identifier": 'SHELLS'}, {"number": 2}])

@@ -39,7 +39,7 @@ def asset(digest: str = "ab") -> Asset:
 def stored(folder: Path, digest: str = "ab") -> Path:
     asset_cache.keep(asset(digest))
     asset_cache.forget()
-    return folder / f"tetflora-compiled-{kept.METHOD}-{digest}.npz"
+    return folder / f"tetflora-compiled-{asset_cache.METHOD}-{digest}.npz"
 
 
 def same(one: Asset, other: Asset) -> bool:
@@ -232,7 +232,7 @@ def test_clearing_deletes_what_is_ours(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(storage, "_folder", tmp_path)
     folder = tmp_path / "assets"
     folder.mkdir()
-    own = folder / f"tetflora-compiled-{kept.METHOD}-ab12.npz"
+    own = folder / f"tetflora-compiled-{asset_cache.METHOD}-ab12.npz"
     own.write_bytes(b"one")
     (folder / "notes.txt").write_text("stays")
     assert asset_cache.clear() == 1

@@ -18,6 +18,7 @@ from tetflora_addon.leaves.levels import (
     chosen_level,
     coarse_error,
     fitted,
+    hidden_gloss,
     leaf_levels,
     level_errors,
     level_polygons,
@@ -128,8 +129,27 @@ def test_stems_have_a_tint(name: str) -> None:
     brown = np.ptp(level.tint, axis=1) > 0.0
     assert (brown == (low < -1e-6)).all()
     assert 0.001 < brown.mean() < 0.2
-    assert np.ptp(level.tint[~brown]) == 0.0
-    assert (level.tint[~brown] > 1.2).all() if name == "needles" else (level.tint[~brown] == 1.0).all()
+    assert (level.tint[~brown] == 1.0).all()
+    assert (level.again[brown] == 0.0).all() and (level.again[~brown] > 0.2).all() == (name == "needles")
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_shoots_are_as_bright_as_the_polygons_that_stand_for_them(number: int) -> None:
+    """What their needles scatter meets others as often as these hide each other."""
+    level = leaf_levels(LEAF_MODELS["needles"], number)[number - 1]
+    needles, shoots = level.again > 0.0, np.random.default_rng(3).random((20, 1, 3), np.float32)
+    shown = 2.0 * mean_silhouette(level.model)
+    color = np.repeat(shoots, level.model.polygons, axis=1)
+    one, p = level.colors(color)[:, needles], level.again[needles].max()
+    assert one * (1.0 - p) / (1.0 - p * one) == pytest.approx(color[:, needles], abs=1e-4)
+    areas = np.linalg.norm(level.model.face_vectors, axis=1)  # of closed things both sides are there
+    assert 1.0 - p == pytest.approx(shown / np.where(needles & (not level.solid), areas, areas / 2).sum(), rel=0.02)
+
+
+def test_coarse_shoots_lack_the_gloss_that_needles_hide_from_each_other() -> None:
+    model = LEAF_MODELS["needles"]
+    assert hidden_gloss(model) == pytest.approx(leaf_levels(model, 2)[1].again.max(), abs=0.01)
+    assert hidden_gloss(LEAF_MODELS["kite"]) == 0.0
 
 
 def test_needles_are_as_many_as_they_should_be() -> None:

@@ -19,6 +19,7 @@ from tetflora_addon.light.illumination import Illumination
 from tetflora_addon.light.receivers import MediumCells, SurfaceElements
 from tetflora_addon.light.scattering import (
     DIRECTIONS,
+    GLOSS,
     SOLID_ANGLE,
     harmonics,
     irradiance,
@@ -233,6 +234,17 @@ def test_white_facets_under_an_even_sky_are_white(transmission: float, seed: int
         points, np.ones((8, 3)), np.full(8, transmission), cells, camera, normal, np.full(8, 0.4)
     )
     assert seen[:, :2] == pytest.approx(1.0, abs=0.01)
+
+
+def test_dull_facets_mirror_less() -> None:
+    """Black ones, whose light is gloss alone, send back what is left of it."""
+    found = _empty()
+    points, cells = inside(3, 8, found.clouds)
+    surface = points, np.tile([0.0, 0.0, 1.0], (8, 1)), np.zeros((8, 3)), np.full(8, 0.5), cells
+    bright = found.facet_radiance(*surface)[0]
+    dull = found.facet_radiance(*surface, dull=np.full(8, 0.75))[0]
+    assert bright == pytest.approx(GLOSS, rel=0.01)
+    assert dull == pytest.approx(0.25 * bright)
 
 
 @pytest.mark.parametrize("kappa", [0.2, 2.0])

@@ -147,3 +147,6 @@ def test_a_fraction_of_the_area_is_that_and_darkens_as_a_cluster_does() -> None:
     assert (whole.transmission == 0).any()  # of wood as well as of leaves
     np.testing.assert_allclose(part_of.color, c * 0.5 / (1 - 0.5 * c))
     assert (part_of.color <= whole.color + 1e-12).all()
+    # What is mirrored is lost as what is scattered once.
+    leafy = whole.transmission > 0
+    np.testing.assert_allclose(1.0 - part_of.dull[leafy], 0.5 * (1.0 - whole.dull[leafy]))

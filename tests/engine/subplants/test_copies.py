@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,8 +13,9 @@ from hypothesis import strategies as st
 
 from tetflora_addon.growth.foliage import face_light
 from tetflora_addon.leaves.kites import leaf_kites
+from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.leaves.models import LEAF_MODELS
-from tetflora_addon.subplants.leaf_meshes import KiteCopies, LeafCopies
+from tetflora_addon.subplants.leaf_meshes import KiteCopies, LeafCopies, LevelCopies
 
 
 def frames(number: int, seed: int = 0) -> np.ndarray:
@@ -102,3 +105,19 @@ def test_no_copies_are_a_mesh_without_faces() -> None:
     copies = LeafCopies(LEAF_MODELS["ovate"], 0, 0.4)
     copies.add(np.zeros(0, np.uint64), np.zeros((0, 3)), np.zeros((0, 3, 3), np.float32), np.zeros(0), np.zeros((0, 3)))
     assert copies.buffers().polygons == 0
+
+
+@given(st.floats(0.01, 0.9), st.floats(0.05, 0.9))
+def test_solid_needles_send_on_as_much_light_as_sheets(color: float, transmission: float) -> None:
+    """Light that enters a prism meets faces from within until it comes out."""
+    level = next(level for level in leaf_levels(LEAF_MODELS["needles"]) if level.solid)
+    plain = replace(level, again=np.zeros_like(level.again))
+    copies = LevelCopies(plain, 1, transmission)
+    copies.color[:] = color
+    made = copies.buffers().attributes
+    needles = level.again > 0.0
+    face = made["tf_color"][1][needles].astype(np.float64)
+    through = made["tf_transmission"][1][needles].astype(np.float64)[:, None]
+    reflected, entering = (1.0 - through) * face, through * face
+    assert reflected + entering**2 / (1.0 - reflected) == pytest.approx(np.full_like(face, color), rel=1e-3)
+    assert (face <= 1.0).all() and (through < 1.0).all()

@@ -49,7 +49,7 @@ def check_topology(mesh: MeshBuffers) -> None:
 
 
 def check_attributes(mesh: MeshBuffers) -> None:
-    assert set(mesh.attributes) - {"tf_girth"} == {"UVMap", "tf_color", "tf_transmission"}
+    assert set(mesh.attributes) - {"tf_girth", "tf_dull"} == {"UVMap", "tf_color", "tf_transmission"}
     assert mesh.attributes["UVMap"][0] == "CORNER"
     assert mesh.attributes["UVMap"][1].shape[1] == 2
     for name in ("tf_color", "tf_transmission"):

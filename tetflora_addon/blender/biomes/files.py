@@ -18,16 +18,17 @@ import bpy
 
 from ...errors import SceneError, SpeciesError, quoted
 from ...files import IDENTIFIER_RULE, is_identifier, parse_json, read_whole
+from ...formats import FORMATS
 from ...planting.zones import Limits
 from ...species.schema import species_from_dict
 from ..file_library import MAX_FILE_BYTES, as_text
 from ..placing.population_data import (
-    check_format,
     check_keys,
     check_population,
     check_settings,
     check_species,
     check_text,
+    in_newest_format,
     list_of,
     population_data,
     refuse_constant,
@@ -44,7 +45,6 @@ from . import library
 from .properties import GROUND, TetFloraBiome, data_of
 
 FORMAT = "TetFlora biome"
-VERSION = 1
 #: What a layer is: plants that keep their distance from others and shade the ground; what grows and lies under them,
 #: and does neither; a stand that grows.
 KINDS = ("population", "cover", "stand")
@@ -112,15 +112,15 @@ def checked(data: Any, identifier: str) -> Biome:
     ValueError, SpeciesError
         Something is not as it must be; names the key.
     """
+    data = in_newest_format(data, FORMAT, "biome", "files of biomes")
     check_keys("the file", data, _KEYS, _KEYS | _MORE)
-    check_format(data, FORMAT, VERSION, "files of biomes")
     for key in ("name", "description"):
         check_text(f'"{key}"', data.get(key, ""))
     if not data["name"].strip():
         raise ValueError('"name" is empty')
     _check_limits(data.get("limits", {}))
     if not isinstance(data.get("gives_way", True), bool):
-        raise ValueError(f'"gives_way" is {shown(data["gives_way"])}; it must be true or false')
+        raise ValueError(f'"gives_way" is {quoted(data["gives_way"])}; it must be true or false')
     _check_ground(data.get("ground", {}))
     season = data.get("season", {})
     check_keys('"season"', season, set(), set(SEASON))
@@ -144,7 +144,7 @@ def biome_data(
     description: str,
 ) -> dict[str, Any]:
     """Populations as the layers of a file, with the limits of their biome and species that only this file has."""
-    data: dict[str, Any] = {"format": FORMAT, "version": VERSION, "name": name, "description": description}
+    data: dict[str, Any] = {"format": FORMAT, "version": FORMATS["biome"], "name": name, "description": description}
     stored = data_of(biome) if biome is not None else {}
     data |= {key: value for key, value in stored.items() if key in ("ground", "season") and value}
     layers = [_layer_data(population) for population in populations]
@@ -221,14 +221,14 @@ def _check_ground(ground: Any) -> None:
             _check_number(f'"ground": "{key}"', value, low, high)
             continue
         if not isinstance(value, list) or len(value) != 3:
-            raise ValueError(f'"ground": "{key}" is {shown(value)}; it must be three numbers')
+            raise ValueError(f'"ground": "{key}" is {quoted(value)}; it must be three numbers')
         for part in value:
             _check_number(f'"ground": "{key}"', part, low, high)
 
 
 def _check_number(where: str, value: Any, low: float, high: float) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise ValueError(f"{where} is {shown(value)}; it must be a number from {low:g} to {high:g}")
+        raise ValueError(f"{where} is {quoted(value)}; it must be a number from {low:g} to {high:g}")
 
 
 def _check_species(species: Any) -> None:
@@ -236,15 +236,15 @@ def _check_species(species: Any) -> None:
     for identifier, page in species.items():
         where = f'species "{identifier}"'
         if not is_identifier(identifier):
-            raise ValueError(f"{shown(identifier)} cannot name a species; use only {IDENTIFIER_RULE}")
+            raise ValueError(f"{quoted(identifier)} cannot name a species; use only {IDENTIFIER_RULE}")
         if not isinstance(page, dict):
             raise ValueError(f"{where} is {type(page).__name__}; it must be an object with keys")
         if "of" not in page:
             species_from_dict(page, identifier, where)
         elif not isinstance(page["of"], str) or not is_identifier(page["of"]):
-            raise ValueError(f'{where}: "of" is {shown(page["of"])}; use only {IDENTIFIER_RULE}')
+            raise ValueError(f'{where}: "of" is {quoted(page["of"])}; use only {IDENTIFIER_RULE}')
         elif not isinstance(page.get("every_order", {}), dict):
-            raise ValueError(f'{where}: "every_order" is {shown(page["every_order"])}; it must be an object with keys')
+            raise ValueError(f'{where}: "every_order" is {quoted(page["every_order"])}; it must be an object with keys')
 
 
 def _check_layer(where: str, layer: Any) -> None:
@@ -252,7 +252,7 @@ def _check_layer(where: str, layer: Any) -> None:
         raise ValueError(f"{where} is {type(layer).__name__}; it must be an object with keys")
     kind = layer.get("kind")
     if kind not in KINDS:
-        raise ValueError(f'{where}: "kind" is {shown(kind)}; it must be one of {", ".join(KINDS)}')
+        raise ValueError(f'{where}: "kind" is {quoted(kind)}; it must be one of {", ".join(KINDS)}')
     if kind == "stand":
         check_keys(where, layer, {"kind", "name", "species"}, {"kind", "name", "species", *stand_settings()})
         check_text(f'{where}: "name"', layer["name"])

@@ -87,10 +87,10 @@ def inventory_steps(
     made = yield from _plant(order, place, flat[kept], kinds, identifiers, sizes)
     left = " and left out" * (len(kept) < len(flat))
     made.told[1:1] = [
-        *[f"{others.total():,} of unknown species{left}: {told(others, 25)}"] * bool(others),
-        *[f"rows without a tree left out: {told(inventory.left_out)}"] * bool(inventory.left_out),
+        *[f"{others.total():,} of unknown species{left}: {name_counts(others, 25)}"] * bool(others),
+        *[f"rows without a tree left out: {name_counts(inventory.left_out)}"] * bool(inventory.left_out),
         *[f"heights of {completed:,} follow from trunk or crown"] * bool(completed),
-        *[f"{kin.total():,} stand as their nearest kin: {told(kin)}"] * bool(kin),
+        *[f"{kin.total():,} stand as their nearest kin: {name_counts(kin)}"] * bool(kin),
     ]
     made.told += [*inventory.notes, f"coordinates: {inventory.system.name}"]
     if number := inventory.skipped:

@@ -20,7 +20,7 @@ from ...light.scattering import GLOSS, THROUGH_TINT
 from .nodes import LEAF_GREEN, Graph, Term, node_group
 
 # Raise this when nodes or numbers change; `blade_version` then makes new materials as well.
-_VERSION = 2
+_VERSION = 3
 
 UNIT = (0.0, 1.0)
 #: How much more than the mean of both sides a leaf's underside reflects diffusely, and the upper side less: fewer

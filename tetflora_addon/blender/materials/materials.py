@@ -28,9 +28,9 @@ ASSET_SPHERE = "TetFlora asset microsphere"
 BAKED = "TetFlora baked"
 
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
-_PROXY_VERSION = 3
-_SPHERE_VERSION = 1
-_BAKED_VERSION = 1
+_PROXY_VERSION = 4
+_SPHERE_VERSION = 2
+_BAKED_VERSION = 2
 
 
 def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> bpy.types.Material:
@@ -53,6 +53,7 @@ def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> b
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
         color, transmission = graph.attribute("tf_color", "Color"), graph.attribute("tf_transmission", "Fac")
+        left = _gloss_left(graph)
         given = {name.replace("_", " ").title(): value for name, value in looks.items()}
         blade = graph.outputs("ShaderNodeGroup", {"Color": color, **given}, node_tree=blade_group(kind))
         near = {
@@ -60,12 +61,12 @@ def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> b
             "Transmission": transmission,
             "Reflected Tint": blade["Reflected"],
             "Through Tint": blade["Through"],
-            "Gloss": blade["Gloss"],
+            "Gloss": blade["Gloss"] * left,
             "Gloss Roughness": blade["Roughness"],
             "Normal": blade["Normal"],
         }
         normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
-        plain = {"Color": color, "Transmission": transmission, "Normal": normal}
+        plain = {"Color": color, "Transmission": transmission, "Gloss": left * GLOSS, "Normal": normal}
         scattered = graph.outputs("ShaderNodeLightPath")["Is Diffuse Ray"]
         _lead_out(graph, graph.mix(scattered, _scattered(graph, near), _scattered(graph, plain)))
         disable_bump_correction(material)
@@ -203,10 +204,15 @@ def baked_material() -> bpy.types.Material:
 
 
 def _proxy_looks(graph: Graph, normal: Any) -> dict[str, Any]:
-    """What proxies feed the scatter group with: gloss where light goes through, as in leaves."""
+    """What proxies feed the scatter group with: gloss where light goes through, as in leaves, as far as it is seen."""
     color, transmission = graph.attribute("tf_color", "Color"), graph.attribute("tf_transmission", "Fac")
-    gloss = (transmission > 0.0) * GLOSS
+    gloss = (transmission > 0.0) * GLOSS * _gloss_left(graph)
     return {"Color": color, "Transmission": transmission, "Gloss": gloss, "Normal": normal}
+
+
+def _gloss_left(graph: Graph) -> Term:
+    """The part of the gloss of leaves that these do not hide from each other."""
+    return graph.attribute("tf_dull", "Fac") * -1.0 + 1.0
 
 
 def _principled(graph: Graph) -> Term:

@@ -14,6 +14,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ... import formats
 from ...errors import NAME, quoted, readable
 from ...files import IDENTIFIER_RULE, is_identifier
 from ..settings import limits_of
@@ -91,7 +92,7 @@ def check_species(where: str, parts: Any, kind: type[bpy.types.PropertyGroup], n
         check_settings(here, part, kind, names)
         for key in _IDENTIFIERS & part.keys():
             if part[key] and not is_identifier(part[key]):
-                raise ValueError(f'{here}: "{key}" is {shown(part[key])}; use only {IDENTIFIER_RULE}')
+                raise ValueError(f'{here}: "{key}" is {quoted(part[key])}; use only {IDENTIFIER_RULE}')
 
 
 def check_settings(
@@ -133,14 +134,16 @@ def _named(kind: str, name: str | None, missing: list[str]) -> bpy.types.ID | No
     return found
 
 
-def check_format(data: dict[str, Any], expected: str, version: int, files: str) -> None:
-    """Refuse a file of another format or version with a `ValueError`."""
+def in_newest_format(data: Any, expected: str, what: str, files: str) -> Any:
+    """A decoded file in the newest format; one of another kind or of a later version is refused with a `ValueError`."""
+    if not isinstance(data, dict) or not {"format", "version"} <= data.keys():
+        return data  # keys are checked next
     if data["format"] != expected:
-        raise ValueError(f'"format" is {shown(data["format"])}; {files} have "{expected}"')
-    if data["version"] != version or isinstance(data["version"], bool):
-        raise ValueError(
-            f'"version" is {shown(data["version"])}; this version of TetFlora reads {version}; update the extension'
-        )
+        raise ValueError(f'"format" is {quoted(data["format"])}; {files} have "{expected}"')
+    try:
+        return formats.newest(what, data, data["version"])
+    except ValueError as error:
+        raise ValueError(f'"version" {error}') from None
 
 
 def check_value(where: str, prop: bpy.types.Property, value: Any) -> None:
@@ -150,11 +153,11 @@ def check_value(where: str, prop: bpy.types.Property, value: Any) -> None:
             check_text(where, value)
     elif prop.type == 'BOOLEAN':
         if not isinstance(value, bool):
-            raise ValueError(f"{where} is {shown(value)}; it must be true or false")
+            raise ValueError(f"{where} is {quoted(value)}; it must be true or false")
     elif prop.type == 'ENUM':
         known = [item.identifier for item in prop.enum_items]
         if value not in known:
-            raise ValueError(f"{where} is {shown(value)}; it must be one of {', '.join(known)}")
+            raise ValueError(f"{where} is {quoted(value)}; it must be one of {', '.join(known)}")
     elif prop.type == 'STRING':
         check_text(where, value)
     else:
@@ -164,15 +167,15 @@ def check_value(where: str, prop: bpy.types.Property, value: Any) -> None:
 def _check_number(where: str, prop: bpy.types.Property, value: Any) -> None:
     whole = prop.type == 'INT'
     if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
-        raise ValueError(f"{where} is {shown(value)}; it must be a {'whole ' if whole else ''}number")
+        raise ValueError(f"{where} is {quoted(value)}; it must be a {'whole ' if whole else ''}number")
     if not whole and not -inf < value < inf:
-        raise ValueError(f"{where} is {shown(value)}; it must be a finite number")
+        raise ValueError(f"{where} is {quoted(value)}; it must be a finite number")
     angle = prop.subtype == 'ANGLE'
     # Bounds are single-precision numbers: 0.1 as a file has it is less than 0.1 as Blender stores it.
     with np.errstate(over="ignore"):
         stored = value if whole else float(np.float32(radians(value) if angle else value))
     if not prop.hard_min <= stored <= prop.hard_max:
-        raise ValueError(f"{where} is {shown(value)}; it must be {limits_of(prop)}")
+        raise ValueError(f"{where} is {quoted(value)}; it must be {limits_of(prop)}")
 
 
 def check_keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:
@@ -197,10 +200,10 @@ def list_of(where: str, value: Any) -> list:
 def check_text(where: str, value: Any) -> None:
     """Refuse what is not one line of text with a `ValueError`."""
     if not isinstance(value, str):
-        raise ValueError(f"{where} is {shown(value)}; it must be a string")
+        raise ValueError(f"{where} is {quoted(value)}; it must be a string")
     if readable(value, MAX_TEXT) != value:
         raise ValueError(
-            f"{where} is {shown(value)}; it must be one line of at most {MAX_TEXT} characters, and none that control "
+            f"{where} is {quoted(value)}; it must be one line of at most {MAX_TEXT} characters, and none that control "
             "terminals"
         )
 

@@ -17,11 +17,12 @@ import bpy
 
 from ...errors import SceneError
 from ...files import parse_json, read_whole, write_whole
+from ...formats import FORMATS
 from .population_data import (
-    check_format,
     check_keys,
     check_population,
     fill_population,
+    in_newest_format,
     list_of,
     population_data,
     refuse_constant,
@@ -31,14 +32,17 @@ from .properties import TetFloraPopulation
 from .rules import set_grounds
 
 FORMAT = "TetFlora populations"
-VERSION = 1
 
 MAX_FILE_BYTES = 4_000_000
 
 
 def as_data(populations: Iterable[TetFloraPopulation]) -> dict[str, Any]:
     """Populations as what a file of them holds."""
-    return {"format": FORMAT, "version": VERSION, "populations": [population_data(p) for p in populations]}
+    return {
+        "format": FORMAT,
+        "version": FORMATS["populations"],
+        "populations": [population_data(p) for p in populations],
+    }
 
 
 def write_populations(populations: Iterable[TetFloraPopulation], path: Path) -> Path:
@@ -109,8 +113,8 @@ def _checked(data: Any) -> list[dict[str, Any]]:
     ValueError
         Something is not as it must be; names the key.
     """
+    data = in_newest_format(data, FORMAT, "populations", "population files")
     check_keys("the file", data, {"format", "version", "populations"}, {"format", "version", "populations"})
-    check_format(data, FORMAT, VERSION, "population files")
     entries = list_of("populations", data["populations"])
     for number, entry in enumerate(entries, 1):
         check_population(f"population {number}", entry)
