@@ -125,7 +125,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--cover", action="store_true", help="with ground cover")
     add("--size", type=size_of, default=(WIDTH, HEIGHT), metavar="WxH")
     add("--set", type=setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")
-    add("--at-once", action="store_true", help="as scripts and renders refine, not in steps as the window does")
+    add("--run-to-end", action="store_true", help="as scripts and renders refine, not in steps as the window does")
     add("--no-render", action="store_true")
     add("--samples", type=int, default=TIMED, help="of images that are timed, beside one with one sample")
 
@@ -145,7 +145,7 @@ def run(given: argparse.Namespace) -> dict[str, float] | None:
         for what in WHATS:
             records[case, what] = measured(folder, case, "--what", what, *small)
     if not given.quick:
-        records["million", "refine"] = measured(folder, "million", "--no-render", "--at-once")
+        records["million", "refine"] = measured(folder, "million", "--no-render", "--run-to-end")
         for limit in LIMITS:
             limited = ("--set", f"max_memory={limit}", "--samples", "1")
             records["birch", f"limit_{limit}"] = measured(folder, "birch", *limited)
@@ -175,7 +175,7 @@ def one(given: argparse.Namespace) -> dict:
     for name, value in given.set:
         set_named(scene.tetflora, name, value)
     figures = {"case": given.case, "what": given.what, "planted": planted}
-    figures |= build_instances(scene) if given.what == "instances" else refined(scene, given.at_once)
+    figures |= build_instances(scene) if given.what == "instances" else refined(scene, given.run_to_end)
     if not given.no_render:
         with tempfile.TemporaryDirectory() as folder:
             figures |= rendered(scene, Path(folder), given.samples)
