@@ -49,7 +49,7 @@ NO_USE = {"test_house.py"}
 #: CPU seconds of tests, by what they took in their last run, that a mutant gets in the engine and in Blender.
 BUDGET = {ENGINE_TESTS: 40.0, BLENDER_TESTS: 12.0}
 #: A run that takes so many times as many CPU seconds as its tests did, and so many more, hangs.
-PATIENCE, STARTING = 2, 30
+PATIENCE, STARTING = 6, 60
 #: Seconds by the clock after which a run waits for something that does not come; long, as others may be at work beside.
 ASLEEP = 7200.0
 
