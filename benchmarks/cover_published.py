@@ -77,7 +77,7 @@ def _variants(scene: bpy.types.Scene) -> tuple[dict[str, list[bpy.types.Mesh]], 
     area = {"leaf": 0.0, "bark": 0.0}
     for number in range(VARIANTS):
         parts = plant_parts(flora, single_seed("birch", number))
-        bare = [part for part in parts if part.kind == "bark"]
+        bare = [part for part in parts if part[0] == "bark"]
         for season, own in (("summer", parts), ("winter", bare)):
             meshes[season].append(plant_mesh(scene, f"{season} {number}", species, own))
         wood = _area(meshes["winter"][-1])
