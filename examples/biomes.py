@@ -15,7 +15,6 @@ import argparse
 import json
 import sys
 from dataclasses import dataclass, replace
-from math import radians
 from pathlib import Path
 
 import bpy
@@ -25,6 +24,7 @@ from PIL import Image
 
 from devtools import session
 
+from . import stage
 from .close_ups import render
 from .paper.pictures import save_sheet
 from .seasons import LOOKS, Look, Rgb, sky
@@ -128,15 +128,11 @@ def build(identifier: str, view: View) -> None:
     if view.water:
         _brook(scene, ground, biome, view.water)
     print(identifier, ", ".join(f"{name} {number:,}" for name, number in added.layers), *added.bare, flush=True)
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.data.clip_start, camera.data.clip_end = view.lens, 0.05, 3000.0
     eye, ahead = (
         Vector((x, y, z + float(ground.heights(np.array(x), np.array(y), biome.ground))))
         for x, y, z in (_clear(scene, view), view.ahead)
     )
-    camera.location, camera.rotation_euler = eye, (ahead - eye).to_track_quat('-Z', 'Y').to_euler()
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+    stage.camera(scene, eye, ahead, lens=view.lens, near=0.05)
     _light(scene, view, around)
     scene.tetflora.hidden = _HIDDEN
 
@@ -220,12 +216,9 @@ def _mean(land: bpy.types.Object) -> list[float]:
 
 
 def _light(scene: bpy.types.Scene, view: View, around: bpy.types.Object) -> None:
-    from .daylight import add_daylight
     from .haze import add_haze
 
-    add_daylight(scene, elevation=view.sun[0], azimuth=view.sun[1] - 180.0)
-    sun = next(o for o in scene.objects if o.type == 'LIGHT').data
-    sun.energy, sun.color, sun.angle = 5.0 * view.light, view.tint, radians(0.8)
+    stage.sun(scene, view.sun[0], view.sun[1] - 180.0, 5.0 * view.light, view.tint, 0.8)
     look: Look = replace(LOOKS["summer"], clouds=view.clouds, strength=LOOKS["summer"].strength * view.light)
     scene.world = sky(look)
     around.name = "Ground"

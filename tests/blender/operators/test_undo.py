@@ -16,8 +16,8 @@ import bpy
 import pytest
 
 import operators
-from benchmarks import places_files
 from devtools import session
+from tests import places_files
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender import compat

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devtools.formats import set_format
+from tetflora_addon.blender.job import refine
 
 
 def read_picture(path: Path) -> NDArray[np.float32]:
@@ -84,6 +86,22 @@ def render(
     set_format(scene.render.image_settings, form)
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
+
+
+def timed_refine(scene: bpy.types.Scene, **settings: object) -> tuple[object, float]:
+    """Refine with some settings of the scene changed; returns the statistics and the seconds."""
+    for name, value in settings.items():
+        setattr(scene.tetflora, name, value)
+    start = time.perf_counter()
+    statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
+    return statistics, time.perf_counter() - start
+
+
+def timed_render(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, engine: str = 'CYCLES') -> float:
+    """Render what the scene holds; returns seconds."""
+    start = time.perf_counter()
+    render(scene, path, samples, seed, engine)
+    return time.perf_counter() - start
 
 
 def plant_mask(scene: bpy.types.Scene, path: Path, samples: int = 8, threshold: float = 0.05) -> NDArray[np.bool_]:
