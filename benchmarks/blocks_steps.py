@@ -40,7 +40,7 @@ def steps(ui):
         bpy.ops.tetflora.populate('INVOKE_DEFAULT')
     yield from ui.until(lambda: not ui.window.modal_operators, 300, "plants")
     ui.values["populate_s"] = time.perf_counter() - begin
-    ui.values["plants"] = sum(population.made for population in scene.tetflora.populations)
+    ui.values["plants"] = sum(population.made for population in scene.tetflora.layers)
     yield 1.0
     found["populate"] = calls.longest()
 

@@ -77,5 +77,5 @@ def run(quick: bool) -> dict[str, float]:
         "panels": len(panels),
         "panels_ms": sum(panels.values()),
         "panel_ms": panels[slowest],
-        "preview_panel_ms": panels["TETFLORA_PT_preview"],
+        "preview_panel_ms": panels["TETFLORA_PT_developer"],
     }

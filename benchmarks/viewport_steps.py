@@ -128,11 +128,16 @@ def levels(ui, scene, state, redraws):
 def panels(ui, draws):
     """Milliseconds of each panel's draw in a real redraw; panels that are closed are opened by copies of them."""
     shown = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
+    shown = [
+        cls for cls in shown if 'INSTANCED' not in getattr(cls, "bl_options", ())
+    ]  # popovers draw when they are opened
+    bpy.context.scene.tetflora.species_editor.shown = True
     spent = {}
     for cls in shown:
         bpy.utils.unregister_class(cls)
     for cls in shown:
         members = {"bl_options": set(), "bl_idname": f"{cls.__name__}_open", "draw": timed(cls, spent)}
+        members |= {"bl_space_type": 'VIEW_3D', "bl_region_type": 'UI', "bl_category": "TetFlora", "bl_context": ""}
         bpy.utils.register_class(type(f"{cls.__name__}_open", (cls,), members))
     plant = next(obj for obj in bpy.context.scene.objects if obj.tetflora.is_plant)
     plant.select_set(True)
