@@ -257,7 +257,7 @@ def build(scene: bpy.types.Scene, case: Case, size: tuple[int, int] = (WIDTH, HE
     render.resolution_x, render.resolution_y, render.resolution_percentage = *size, 100
     scene.tetflora.refine_at_render = False
     bpy.context.view_layer.update()
-    return sum(population.made for population in scene.tetflora.populations)
+    return sum(population.made for population in scene.tetflora.layers)
 
 
 def add_camera(scene: bpy.types.Scene, case: Case) -> None:

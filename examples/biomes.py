@@ -106,6 +106,7 @@ VIEWS = {
 def build(identifier: str, view: View) -> None:
     """Fill an empty scene with a biome, its land, sun and sky."""
     from tetflora_addon.blender.biomes import adding, files, ground
+    from tetflora_addon.blender.placing.zones import biomes_in
     from tetflora_addon.blender.worker import run_to_end
 
     scene = bpy.context.scene
@@ -124,7 +125,7 @@ def build(identifier: str, view: View) -> None:
     else:
         around.data.materials.append(land.data.materials[0])
     if view.beside:
-        run_to_end(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.biomes[0]))
+        run_to_end(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biomes_in(scene)[0]))
     if view.water:
         _brook(scene, ground, biome, view.water)
     print(identifier, ", ".join(f"{name} {number:,}" for name, number in added.layers), *added.bare, flush=True)
@@ -147,7 +148,7 @@ def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     canopy, _ = canopy_of(scene, depsgraph)
     plants, reach = [canopy.position[:, :2]], [view.free + 0.3 * canopy.radius]
-    covers = {population.uid for population in scene.tetflora.populations if is_cover(population)}
+    covers = {population.uid for population in scene.tetflora.layers if is_cover(population)}
     for field in fields_of([obj for obj in scene.objects if obj.tetflora.population in covers]):
         read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
         high = np.array([crown_for(scene, kind).height for kind in read.identifiers])[read.species] * read.scale

@@ -69,7 +69,7 @@ def test_plants_of_both_kinds_count_alike(as_field):
     assert found.plants == 300
     empties = {'EMPTIES': found}.get(as_field)
     if empties is None:
-        bpy.ops.tetflora.split_field()
+        bpy.ops.tetflora.convert_plants(to='OBJECTS')
         empties = _forecast()
     assert found.primitives == pytest.approx(empties.primitives, rel=0.01)
     assert found.primitives > 10_000
@@ -176,7 +176,7 @@ def test_the_automatic_limit_is_told(monkeypatch):
     monkeypatch.setattr(memory, "total", lambda: 23_400_000_000)
     assert forecast.memory_text(scene) == "Automatic: 11.7 GB"
     scene.tetflora.max_memory = 4.0
-    assert forecast.memory_text(scene) == ""
+    assert forecast.memory_text(scene) == "4.0 GB by the preferences"
     scene.tetflora.max_memory = 0.0
     monkeypatch.setattr(memory, "total", lambda: None)
     assert forecast.memory_text(scene) == "Automatic: no limit"

@@ -41,7 +41,7 @@ from ..scene.looks import LayerLooks
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants
 from ..scene.skeletons import plain_kind
-from ..settings import check_limits, season_of, wind_of, years_of
+from ..settings import check_limits, most_memory, season_of, wind_of, years_of
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,8 @@ def settings_from(scene: bpy.types.Scene) -> RefinementSettings:
     group = scene.tetflora
     # A field without a property keeps the engine's value.
     names = [f.name for f in fields(RefinementSettings) if f.name in group.bl_rna.properties]
-    return RefinementSettings(**{name: getattr(group, name) for name in names})
+    given = {name: getattr(group, name) for name in names}
+    return RefinementSettings(**(given | {"max_memory": most_memory(scene)}))
 
 
 def picture_bytes(scene: bpy.types.Scene, camera: Camera) -> int:
@@ -232,7 +233,7 @@ def memory_left(scene: bpy.types.Scene, camera: Camera | None = None) -> float:
 
     What other processes of TetFlora will take is kept for them.
     """
-    most = scene.tetflora.max_memory
+    most = most_memory(scene)
     picture = 0 if camera is None else picture_bytes(scene, camera)
     return memory.allowance(most, picture + pool.share(memory.limit(most)))
 
@@ -248,7 +249,7 @@ def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
 def use_machine(scene: bpy.types.Scene) -> None:
     """Let what follows work with as many threads, and processes with as much memory, as the artist wants."""
     parallel.set_threads(wanted_threads(scene))
-    pool.set_memory_limit(memory.limit(scene.tetflora.max_memory))
+    pool.set_memory_limit(memory.limit(most_memory(scene)))
 
 
 def check_fits(what: str, faces: Floats, left: float, remedy: str) -> None:

@@ -34,7 +34,7 @@ from ..scene.objects import objects_within, renderable_objects
 from ..scene.own_ages import AGE, sound_ages
 from ..scene.sizes import ages_of_heights
 from ..scene.skeletons import species_of
-from ..settings import season_of
+from ..settings import most_memory, season_of
 from ..species.edits import display_height, species_for
 from .contents import check_settings, memory_left, picture_bytes, settings_from
 
@@ -74,7 +74,7 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
         camera = read_camera(scene, depsgraph)
     except TetFloraError:
         return None
-    others = pool.share(memory.limit(scene.tetflora.max_memory))
+    others = pool.share(memory.limit(most_memory(scene)))
     used = (memory.resident() or 0) + others + picture_bytes(scene, camera)
     allowed = memory_left(scene, camera)
     everything = scene.tetflora.expand_everything
@@ -102,9 +102,9 @@ def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> st
 
 
 def memory_text(scene: bpy.types.Scene) -> str:
-    """``Automatic: 11.7 GB`` where the artist sets no limit of memory, else an empty text."""
-    if scene.tetflora.max_memory > 0.0:
-        return ""
+    """``Automatic: 11.7 GB`` where the artist sets no limit of memory, else that limit."""
+    if (own := most_memory(scene)) > 0.0:
+        return f"{own:.1f} GB by the preferences"
     most = memory.limit(0.0)
     return f"Automatic: {most / _GIGA:.1f} GB" if np.isfinite(most) else "Automatic: no limit"
 

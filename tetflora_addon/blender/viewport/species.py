@@ -13,6 +13,7 @@ import time
 from dataclasses import dataclass, replace
 
 import bpy
+from bpy.props import BoolProperty
 
 from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
@@ -178,12 +179,23 @@ _HANDLERS = Handlers(
 
 def register() -> None:
     """Listen to changes of species, undo and loading."""
+    bpy.types.WindowManager.tetflora_species = BoolProperty(
+        name="Preview",
+        description=(
+            "Show one plant of the species in the editor at the 3D cursor, updated with every change. It is never "
+            "rendered or saved"
+        ),
+        get=lambda _: bpy.context.scene is not None and shown_in(bpy.context.scene),
+        set=lambda _, on: show(bpy.context.scene, on),
+        options={'SKIP_SAVE'},
+    )
     edits.listeners.append(schedule)
     _HANDLERS.register()
 
 
 def unregister() -> None:
     """Take the preview and all that listens away."""
+    del bpy.types.WindowManager.tetflora_species
     _remove()
     _state.scene = None
     call_off(_on_timer)
