@@ -71,7 +71,7 @@ quick: environment
 # branch and polygon by polygon, which has to come out the same on every Python and numpy.
 LTS_ENGINE_TESTS = $(addprefix tests/engine/,growth/test_growth.py growth/test_hashing.py subplants/test_copies.py \
 	subplants/test_pieces.py emission/test_emission.py)
-LTS_LEFT_OUT = placing biomes places stands species test_asset_trees.py test_full_disk.py test_manual.py \
+LTS_LEFT_OUT = placing biomes geodata stands species test_asset_trees.py test_full_disk.py test_manual.py \
 	$(addprefix job/test_,cycles.py far.py first_look.py forecast.py frame_cache.py long_animation.py view_cells.py)
 LTS_BLENDER_TESTS = tests/blender tests/packaging $(addprefix --ignore=tests/blender/,$(LTS_LEFT_OUT))
 
