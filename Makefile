@@ -23,7 +23,7 @@ help:
 	@echo 'make test         all tests that need no full Blender, on bpy'
 	@echo 'make quick        the tests that took little time when they were last run, in about a minute'
 	@echo 'make test-lts     tests of what depends on the version of Blender, on Blender 4.5 LTS'
-	@echo 'make lint         style, and the rules of the house'
+	@echo 'make lint         style, the rules of the house, and near-copies'
 	@echo 'make build        the extension for Blender: dist/tetflora-VERSION.zip'
 	@echo 'make bench        benchmarks against their targets'
 	@echo 'make docs-images  the pictures of the documentation, made anew'
@@ -67,10 +67,11 @@ quick: environment
 
 # On 4.5 again: what depends on Blender's version. That is rendering, materials, nodes, files, undo, handlers,
 # properties, packaging, and each button once (operators/test_undo.py). It is not where plants stand, nor what a
-# refinement makes of them: both are numpy on numbers that Blender gives. Of the engine, plants themselves, which have
-# to come out the same on every Python and numpy.
-LTS_ENGINE_TESTS = tests/engine/growth tests/engine/subplants tests/engine/emission/test_emission.py
-LTS_LEFT_OUT = placing biomes places stands species test_asset_trees.py test_full_disk.py test_manual.py \
+# refinement makes of them: both are numpy on numbers that Blender gives. Of the engine, what plants are, branch by
+# branch and polygon by polygon, which has to come out the same on every Python and numpy.
+LTS_ENGINE_TESTS = $(addprefix tests/engine/,growth/test_growth.py growth/test_hashing.py subplants/test_copies.py \
+	subplants/test_pieces.py emission/test_emission.py)
+LTS_LEFT_OUT = placing biomes geodata stands species test_asset_trees.py test_full_disk.py test_manual.py \
 	$(addprefix job/test_,cycles.py far.py first_look.py forecast.py frame_cache.py long_animation.py view_cells.py)
 LTS_BLENDER_TESTS = tests/blender tests/packaging $(addprefix --ignore=tests/blender/,$(LTS_LEFT_OUT))
 
@@ -83,6 +84,7 @@ lint: environment
 	$(PY) -m ruff check . || code=1; \
 	$(PY) -m ruff format --check . || code=1; \
 	$(PY) -m devtools.house || code=1; \
+	$(PY) -m devtools.duplicates tests benchmarks examples devtools farm || code=1; \
 	exit $$code
 
 build: environment

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Command line of the benchmarks; exit code 0 when every target holds, 1 when one does not."""
+"""Questions that are measured: ``python -m benchmarks NAME [--quick] [--json PATH]``, or ``all`` of them.
+
+Exit code 0 when every target holds, 1 when one does not. ``python -m benchmarks NAME --help`` tells what else a
+benchmark can be asked for.
+"""
 
 from __future__ import annotations
 
@@ -14,96 +18,84 @@ from pathlib import Path
 
 from devtools import session
 
-#: Benchmarks by name, in the order of ``all``.
-NAMES = (
-    "row80",
-    "time_to_picture",
-    "plants",
-    "bounds",
-    "averages",
-    "forms_published",
-    "cover_published",
-    "extinction",
-    "looks",
-    "leaf_looks",
-    "leaf_instances",
-    "tetrahedra",
-    "landscape",
-    "scaling",
-    "instances",
-    "growth",
-    "budget",
-    "stages",
-    "forest",
-    "curves",
-    "foreign",
-    "assets",
-    "closed_form",
-    "edited_species",
-    "exact",
-    "fidelity",
-    "rami",
-    "above",
-    "populate",
-    "viewport",
-    "blocks",
-    "animation",
-    "wind",
-    "year",
-    "stands",
-    "places",
-    "biomes",
-    "dolly",
-    "endurance",
-    "limits",
-    "farm",
-    "attack",
-)
-#: Modules that are not called as their benchmark.
-MODULES = {"curves": "forest_curves"}
+#: Benchmarks in the order of ``all``: where docs have their answers of today, and what they ask.
+NAMES = {
+    "exact": (
+        "results.md#a-forest-beside-its-truth",
+        "Does a wood look like the same plants expanded, and what does it cost?",
+    ),
+    "forest": ("results.md#a-real-forest-at-full-hd", "Seconds and memory of woods at full HD, beside instances"),
+    "fidelity": (
+        "results.md#how-close-proxies-are-to-the-plants",
+        "How far are proxies from plants, by height, light and form?",
+    ),
+    "rami": ("results.md#a-referee-from-outside", "Do canopies reflect as much light as is published?"),
+    "assets": ("results.md#assets-that-others-scatter", "Are other people's trees as they were, and faster?"),
+    "year": ("results.md#the-year-and-ages", "Does the year go by without jumps, and at what cost?"),
+    "animation": ("results.md#later-frames-of-an-animation", "What does a later frame of an animation cost?"),
+    "dolly": ("results.md#plants-up-close", "Does anything jump from 400 m to a leaf?"),
+    "stands": ("results.md#forests-that-grew", "Do stands grow as in nature?"),
+    "places": ("results.md#forests-that-grew", "Do real places arrive as they are?"),
+    "forms_published": ("species.md#shipped-species-against-published-figures", "Are trees as they are published?"),
+    "cover_published": ("results.md#plants-up-close", "Does a birch stand cover as much ground as is published?"),
+    "endurance": ("results.md#two-hundred-frames", "Does memory or time grow over many frames?"),
+    "limits": ("results.md#the-limit-of-memory", "What is refused rather than tried?"),
+    "attack": ("results.md#an-attack", "Does anything break, write elsewhere, or take long?"),
+}
 
 
 def main() -> int:
-    """Run the benchmarks that the command line names."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("name", choices=(*NAMES, "all"))
+    """Run the benchmark that the command line names."""
+    width = max(map(len, NAMES))
+    listed = "\n".join(f"  {name:{width}}  {question}" for name, (_, question) in NAMES.items())
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description=f"{__doc__}\n{listed}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("name", choices=(*NAMES, "all"), metavar="NAME")
     parser.add_argument("--quick", action="store_true", help="smaller pictures and fewer samples, about a minute each")
     parser.add_argument("--json", type=Path, metavar="PATH", help="write the record here (a list for all)")
-    arguments = parser.parse_args()
-    if arguments.name == "all":
-        return _each_in_its_own_process(arguments)
+    name = next((word for word in sys.argv[1:2] if word in NAMES), "")
+    if not name:
+        return _each_in_its_own_process(parser.parse_args())
     session.start()
-    from .report import missed, report, table  # after the session has prepared Blender
-
-    module = importlib.import_module(f"{__package__}.{MODULES.get(arguments.name, arguments.name)}")
     session.clean_file()
-    targets = module.QUICK_TARGETS if arguments.quick else module.TARGETS
-    record = report(arguments.name, module.run(arguments.quick), targets)
+    from .report import missed, report, table, write  # after the session has prepared Blender
+
+    module = importlib.import_module(f"{__package__}.{name}")
+    own = hasattr(module, "options")
+    if own:
+        parser.description = module.__doc__
+        module.options(parser)
+    given = parser.parse_args()
+    figures = module.run(given) if own else module.run(given.quick)
+    if figures is None:  # a part of it, which has said what it found
+        return 0
+    record = report(name, figures, module.QUICK_TARGETS if given.quick else module.TARGETS)
     print(table(record), flush=True)
-    if arguments.json:
-        arguments.json.parent.mkdir(parents=True, exist_ok=True)
-        arguments.json.write_text(json.dumps(record, indent=1) + "\n")
-    failures = [f"{arguments.name}: {text}" for text in missed(record)]
+    write(given.json, record)
+    failures = missed(record)
     for text in failures:
-        print("missed:", text, file=sys.stderr)
+        print(f"missed: {name}: {text}", file=sys.stderr)
     return 1 if failures else 0
 
 
-def _each_in_its_own_process(arguments: argparse.Namespace) -> int:
+def _each_in_its_own_process(given: argparse.Namespace) -> int:
     """Run all, so that the memory of one is not that of those before it; their records as a list."""
+    from .report import write
+
     records, code = [], 0
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "record.json"
         for name in NAMES:
-            quick = ["--quick"] if arguments.quick else []
+            quick = ["--quick"] if given.quick else []
             command = [sys.executable, "-m", __package__, name, "--json", str(path), *quick]
             code = max(code, subprocess.run(command, check=False).returncode)
             if path.exists():
                 records.append(json.loads(path.read_text()))
                 path.unlink()
-    if arguments.json:
-        arguments.json.parent.mkdir(parents=True, exist_ok=True)
-        arguments.json.write_text(json.dumps(records, indent=1) + "\n")
+    write(given.json, records)
     return code
 
 

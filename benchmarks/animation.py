@@ -8,12 +8,10 @@ it: reading the scene, refining, writing meshes, and what is kept.
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import itertools
 import json
-import os
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -27,8 +25,8 @@ from tetflora_addon.blender.job import contents, frame_cache, refine
 from tetflora_addon.blender.job.render import on_render_end, on_render_pre
 from tetflora_addon.blender.results.output import result_collections
 
-from .compare import flip_map, read_picture, render
-from .report import Targets, peak_mb
+from .pictures import flip_map, read_picture, render
+from .report import Targets, peak_mb, records_of
 
 #: Frames that are timed: five seconds of animation, in which the camera goes some seven meters.
 FRAMES = 120
@@ -48,21 +46,31 @@ TARGETS: Targets = {
 QUICK_TARGETS: Targets = TARGETS
 
 
-def run(quick: bool) -> dict[str, float]:
+def options(parser: argparse.ArgumentParser) -> None:
+    """What may be asked for beside everything."""
+    parser.add_argument("--alone", type=int, metavar="FRAME", help="only this frame's fingerprint, as a line of JSON")
+
+
+def run(given: argparse.Namespace) -> dict[str, float] | None:
     """Measure; see the table in ``docs/results.md`` for what the figures mean."""
+    if given.alone:
+        print(json.dumps(frame_alone(given.alone)), flush=True)
+        return None
     figures: dict[str, float] = {}
     for name in fly_through.SCENES:
         session.clean_file()
         figures |= {f"{key}_{name}": value for key, value in _timed(name).items()}
     session.clean_file()
     figures |= _flight()
-    chosen = np.linspace(1, FRAMES, QUICK_ALONE if quick else ALONE).round().astype(int).tolist()
+    chosen = np.linspace(1, FRAMES, QUICK_ALONE if given.quick else ALONE).round().astype(int).tolist()
     session.clean_file()
     sequence, refined_at = _film(chosen)
     figures["frames_alone"] = len(chosen)
-    figures["frames_differ"] = sum(_alone(frame) != sequence[frame] for frame in chosen)
+    figures["frames_differ"] = sum(
+        records_of(["animation", "--alone", str(frame)])[-1] != sequence[frame] for frame in chosen
+    )
     session.clean_file()
-    return figures | _flicker(refined_at, QUICK_AROUND if quick else AROUND)
+    return figures | _flicker(refined_at, QUICK_AROUND if given.quick else AROUND)
 
 
 def _timed(name: str) -> dict[str, float]:
@@ -149,26 +157,6 @@ def _film(chosen: list[int]) -> tuple[dict[int, dict[str, list]], int]:
     on_render_end(scene)
     changes = [n for n in range(1, FRAMES) if names[n] != names[n - 1]]
     return found, (changes[0] if changes else FRAMES // 2) + 1
-
-
-_ALONE_PROGRAM = """
-import json, sys
-from devtools import session
-session.start()
-session.clean_file()
-from benchmarks.animation import frame_alone
-print("fingerprint " + json.dumps(frame_alone(int(sys.argv[1]))), flush=True)
-session.stop()
-"""
-
-
-def _alone(frame: int) -> dict[str, list]:
-    """A frame's fingerprint from a process that has made no other."""
-    command = [sys.executable, "-c", _ALONE_PROGRAM, str(frame)]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
-    line = next(line for line in done.stdout.splitlines() if line.startswith("fingerprint "))
-    return json.loads(line.removeprefix("fingerprint "))
 
 
 def _flicker(changes_at: int, around: int) -> dict[str, float]:

@@ -1,16 +1,14 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trees of the benchmark `assets` as Blender objects, as other tools write them.
+"""Trees of the benchmark `assets`, as other tools make them: branches, tubes, leaves, cards. None is a plant of ours.
 
 ``leaves``: a mesh of 1.2 million triangles, bark and closed leaves. ``cards``: bark and 6,000 quads with a painted
-texture of leaves and holes. ``nodes``: a skeleton on which geometry nodes instance leaf objects. All are about 12 m
-high. `different` makes as many trees of the first kind as one likes, each with shapes of its own.
+texture of leaves and holes. Both are about 12 m high.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -18,24 +16,281 @@ from numpy.typing import NDArray
 
 from tetflora_addon.blender import compat
 
-from .asset_shapes import (
-    Order,
-    Stalks,
-    Surface,
-    branches,
-    cards,
-    closed_leaves,
-    joined,
-    open_leaf,
-    sprigs,
-    stalks,
-    tubes,
-)
-from .forest_instances import placing_nodes
+Array = NDArray[np.float64]
 
-KINDS = ("leaves", "cards", "nodes")
-TRIANGLES, QUICK_TRIANGLES = 1_200_000, 300_000
-CARDS, LEAVES = 6_000, 20_000
+#: Closed leaf of 16 triangles: a rim of six points, two above and two below the midrib. Along, across, up, for a length
+#: of 1; the width comes in when it is placed.
+_RIM = ((0.0, 0.0), (0.28, 0.42), (0.64, 0.4), (1.0, 0.0), (0.64, -0.4), (0.28, -0.42))
+_RIBS = (0.3, 0.66)
+_THICK = 0.012
+#: Half of one side: rim 0 to 3, and the two points of the midrib as 6 and 7.
+_HALF = ((0, 1, 6), (6, 1, 2), (6, 2, 7), (7, 2, 3))
+KINDS = ("leaves", "cards")
+TRIANGLES, QUICK_TRIANGLES, CARDS = 1_200_000, 300_000, 6_000
+
+
+@dataclass(frozen=True)
+class Order:
+    """Branches of one order.
+
+    Attributes
+    ----------
+    number : int
+        Of each branch of the order before.
+    length : float
+        Relative to the parent's; of the trunk meters.
+    first : float
+        Where along the parent they begin, 0 to 1.
+    lean : tuple of float
+        Least and greatest angle to the parent, degrees.
+    rise : float
+        How much each segment turns up; negative hangs.
+    segments, sides : int
+        Of tubes.
+    thick : float
+        Radius relative to the parent's where it begins.
+    """
+
+    number: int
+    length: float
+    first: float
+    lean: tuple[float, float]
+    rise: float
+    segments: int
+    sides: int
+    thick: float = 0.5
+
+
+@dataclass(frozen=True)
+class Branches:
+    """Polylines of one order.
+
+    Attributes
+    ----------
+    points : (n, s + 1, 3) float64
+        Meters.
+    radius : (n, s + 1) float64
+        Meters.
+    """
+
+    points: Array
+    radius: Array
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles with what a mesh needs.
+
+    Attributes
+    ----------
+    positions : (v, 3) float64
+    triangles : (t, 3) int64
+    uv : (t, 3, 2) float64
+        Of each corner.
+    material : (t,) int64
+    """
+
+    positions: Array
+    triangles: NDArray[np.int64]
+    uv: Array
+    material: NDArray[np.int64]
+
+
+def joined(surfaces: list[Surface]) -> Surface:
+    """All of some surfaces in one."""
+    first = np.cumsum([0] + [len(s.positions) for s in surfaces[:-1]])
+    return Surface(
+        np.concatenate([s.positions for s in surfaces]),
+        np.concatenate([s.triangles + f for s, f in zip(surfaces, first, strict=True)]),
+        np.concatenate([s.uv for s in surfaces]),
+        np.concatenate([s.material for s in surfaces]),
+    )
+
+
+def branches(orders: tuple[Order, ...], rng: np.random.Generator, radius: float = 0.2) -> list[Branches]:
+    """A tree of so many orders; the first is the trunk, from the origin upward."""
+    base, heading = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
+    length, thick = np.array([orders[0].length]), np.array([radius])
+    made: list[Branches] = []
+    for number, order in enumerate(orders):
+        if number:
+            parent = made[-1]
+            base, heading, length, thick = _children(parent, order, rng, crown=number == 1)
+        points = [base]
+        for _ in range(order.segments):
+            heading = _unit(heading + rng.normal(0.0, 0.11, heading.shape) + [0.0, 0.0, order.rise / order.segments])
+            points.append(points[-1] + heading * (length / order.segments)[:, None])
+        taper = 1.0 - 0.85 * np.linspace(0.0, 1.0, order.segments + 1) ** 0.9
+        made.append(Branches(np.stack(points, axis=1), np.maximum(thick[:, None] * taper, 0.0012)))
+    return made
+
+
+def _children(parent: Branches, order: Order, rng: np.random.Generator, crown: bool) -> tuple[Array, ...]:
+    """Where branches begin, where to, their lengths and radii; those of a crown are longest in its lower middle."""
+    number = len(parent.points)
+    of = np.repeat(np.arange(number), order.number)
+    rank = np.tile((np.arange(order.number) + 0.5) / order.number, number)
+    t = np.clip(order.first + (1.0 - order.first) * (rank + rng.uniform(-0.5, 0.5, len(of)) / order.number), 0.0, 0.999)
+    points, along = on(parent, of, t)
+    turn = 2.399963 * np.arange(len(of)) + rng.uniform(-0.5, 0.5, len(of))
+    side, up = _across(along)
+    out = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * up
+    lean = np.radians(rng.uniform(*order.lean, len(of)) * (1.0 - 0.35 * t if crown else 1.0))[:, None]
+    whole = np.linalg.norm(np.diff(parent.points, axis=1), axis=2).sum(axis=1)[of]
+    shape = np.sqrt(np.clip(1.0 - ((rank - 0.3) / 0.72) ** 2, 0.06, 1.0)) if crown else 1.0 - 0.55 * t
+    length = order.length * whole * shape * rng.uniform(0.8, 1.15, len(of))
+    cell = np.minimum((t * (parent.radius.shape[1] - 1)).astype(int), parent.radius.shape[1] - 2)
+    return points, np.cos(lean) * along + np.sin(lean) * out, length, order.thick * parent.radius[of, cell]
+
+
+def on(parent: Branches, of: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    """Points at fractions of the lengths of branches, and the unit vectors along there."""
+    cells = parent.points.shape[1] - 1
+    cell = np.minimum((t * cells).astype(int), cells - 1)
+    a, b = parent.points[of, cell], parent.points[of, cell + 1]
+    return a + (b - a) * (t * cells - cell)[:, None], _unit(b - a)
+
+
+def tubes(made: list[Branches], orders: tuple[Order, ...], material: int = 0) -> Surface:
+    """Bark around branches, open at both ends."""
+    return joined([_tubes(some, order.sides, material) for some, order in zip(made, orders, strict=True)])
+
+
+def _tubes(some: Branches, sides: int, material: int) -> Surface:
+    number, rings = some.radius.shape
+    heading = _unit(some.points[:, -1] - some.points[:, 0])
+    a, b = _across(heading)
+    turn = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    ring = np.cos(turn)[:, None] * a[:, None] + np.sin(turn)[:, None] * b[:, None]
+    positions = some.points[:, :, None] + some.radius[:, :, None, None] * ring[:, None]
+    i, j = np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij")
+    cell = np.stack([i, i, i + 1, i, i + 1, i + 1], axis=-1).reshape(-1, 3)
+    beside = np.stack([j, j + 1, j + 1, j, j + 1, j], axis=-1).reshape(-1, 3)
+    one = cell * sides + beside % sides
+    triangles = (one + (np.arange(number) * rings * sides)[:, None, None]).reshape(-1, 3)
+    uv = np.broadcast_to(np.stack([beside / sides, cell / (rings - 1)], axis=-1), (number, len(one), 3, 2))
+    return Surface(positions.reshape(-1, 3), triangles, uv.reshape(-1, 3, 2), np.full(len(triangles), material))
+
+
+@dataclass(frozen=True)
+class Stalks:
+    """Where leaves or cards are.
+
+    Attributes
+    ----------
+    base : (n, 3) float64
+        Meters.
+    along, across, up : (n, 3) float64
+        Unit vectors of each: where its tip is, its width, what it turns to the sky.
+    """
+
+    base: Array
+    along: Array
+    across: Array
+    up: Array
+
+    @property
+    def frames(self) -> Array:
+        """(n, 3, 3), the axes as columns."""
+        return np.stack([self.along, self.across, self.up], axis=2)
+
+
+def stalks(twigs: Branches, number: int, rng: np.random.Generator, first: float = 0.15, droop: float = 0.25) -> Stalks:
+    """So many on twigs, alternating along each, most of them level and somewhat hanging."""
+    each = -(-number // len(twigs.points))
+    of = np.repeat(np.arange(len(twigs.points)), each)
+    rank = np.tile(np.arange(each), len(twigs.points))
+    t = first + (1.0 - first) * (rank + rng.uniform(0.1, 0.9, len(of))) / each
+    base, heading = on(twigs, of, np.minimum(t, 0.999))
+    keep = np.sort(rng.permutation(len(of))[:number])
+    of, rank, base, heading = of[keep], rank[keep], base[keep], heading[keep]
+    side = _unit(np.cross(heading, [0.0, 0.0, 1.0]) + rng.normal(0.0, 0.15, heading.shape))
+    along = _unit(0.6 * heading + np.where(rank % 2, 1.0, -1.0)[:, None] * side + [0.0, 0.0, -droop])
+    along = _unit(along + rng.normal(0.0, 0.22, along.shape))
+    across = _unit(np.cross([0.0, 0.0, 1.0] + rng.normal(0.0, 0.45, along.shape), along))
+    return Stalks(base, along, across, np.cross(along, across))
+
+
+def closed_leaves(places: Stalks, size: Array, material: int = 1) -> Surface:
+    """Thin closed bodies of 16 triangles; size (n, 2): length and width, meters."""
+    rim = np.array([(x, y, 0.05 * abs(y) - 0.1 * x * x) for x, y in _RIM])
+    ribs = np.array([(x, 0.0, 0.02 + sign * _THICK - 0.1 * x * x) for sign in (1.0, -1.0) for x in _RIBS])
+    half = np.array(_HALF)
+    mirrored = np.array([0, 5, 4, 3, 0, 0, 6, 7])[half][:, ::-1]
+    above = np.concatenate([half, mirrored])[:, ::-1]
+    below = np.where(above >= 6, above + 2, above)[:, ::-1]
+    return _placed(np.concatenate([rim, ribs]), np.concatenate([above, below]), places, size, material)
+
+
+def cards(places: Stalks, size: Array, tile: NDArray[np.int64], tiles: int = 2, material: int = 1) -> Surface:
+    """Quads that show a tile of a square texture of ``tiles²`` each; size (n, 2): length and width, meters."""
+    corners = np.array([(0.0, -0.5, 0.0), (1.0, -0.5, 0.0), (1.0, 0.5, 0.0), (0.0, 0.5, 0.0)])
+    made = _placed(corners, np.array([(0, 1, 2), (0, 2, 3)]), places, size, material)
+    own = np.array([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])[[[0, 1, 2], [0, 2, 3]]]
+    origin = np.stack([tile % tiles, tile // tiles], axis=1)
+    uv = (own[None] + origin[:, None, None, :]) / tiles
+    return Surface(made.positions, made.triangles, uv.reshape(-1, 3, 2), made.material)
+
+
+def _placed(points: Array, triangles: NDArray, places: Stalks, size: Array, material: int) -> Surface:
+    """Copies of a leaf; its first coordinate is along, the second across, and both are its UV."""
+    number = len(size)
+    scale = np.stack([size[:, 0], size[:, 1], size[:, 0]], axis=1)
+    frames = places.frames * scale[:, None, :]
+    positions = np.einsum("nij,kj->nki", frames, points) + places.base[:, None]
+    whole = (triangles[None] + (np.arange(number) * len(points))[:, None, None]).reshape(-1, 3)
+    one = np.stack([0.5 + points[:, 1], points[:, 0]], axis=1)[triangles]
+    uv = np.broadcast_to(one, (number, *one.shape)).reshape(-1, 3, 2)
+    return Surface(positions.reshape(-1, 3), whole, uv, np.full(len(whole), material))
+
+
+def sprigs(pixels: int = 1024, leaves: int = 13) -> NDArray[np.float32]:
+    """A painted texture (pixels, pixels, 4), linear and alpha: four sprigs, from old and dark to young and light.
+
+    Each is a stem with pairs of leaves, transparent between them; in each, leaves grow lighter toward the tip.
+    """
+    half = pixels // 2
+    tints = (((0.10, 0.16, 0.05), (0.20, 0.27, 0.08)), ((0.12, 0.22, 0.06), (0.28, 0.38, 0.10)))
+    tints += (((0.17, 0.30, 0.07), (0.42, 0.52, 0.15)), ((0.30, 0.33, 0.10), (0.62, 0.58, 0.22)))
+    painted = [_sprig(half, leaves, np.random.default_rng(n), *tint) for n, tint in enumerate(tints)]
+    return np.concatenate([np.concatenate(painted[:2], axis=1), np.concatenate(painted[2:], axis=1)]).astype(np.float32)
+
+
+def _sprig(size: int, leaves: int, rng: np.random.Generator, dark: tuple, light: tuple) -> Array:
+    """A tile (size, size, 4); row 0 is where the stem begins, v grows along it."""
+    v, u = np.meshgrid((np.arange(size) + 0.5) / size, (np.arange(size) + 0.5) / size - 0.5, indexing="ij")
+    dark, light = np.array(dark), np.array(light)
+    color = np.broadcast_to(0.6 * dark + [0.12, 0.06, 0.02], (size, size, 3)).copy()
+    edge = 1.5 / size
+    alpha = np.clip((0.006 - np.abs(u - 0.03 * np.sin(5 * v))) / edge, 0, 1) * (v < 0.9)
+    for n in range(leaves):
+        t, side = 0.05 + 0.82 * n / (leaves - 1), 1 if n % 2 else -1
+        angle = np.radians(0.0 if n == leaves - 1 else rng.uniform(42, 68)) * side
+        long = (0.16 if n == leaves - 1 else rng.uniform(0.28, 0.36)) * (1.0 - 0.3 * t)
+        x, y = u - 0.03 * np.sin(5 * t), v - t
+        along, across = np.sin(angle) * x + np.cos(angle) * y, np.cos(angle) * x - np.sin(angle) * y
+        s = along / long
+        width = 0.27 * long * np.sin(np.pi * np.clip(s, 0, 1) ** 0.85)
+        inside = np.clip((width - np.abs(across)) / edge, 0, 1) * ((s > 0) & (s < 1))
+        vein = 1.0 + 0.35 * np.exp(-((across / (0.01 * 1.5)) ** 2)) + 0.12 * np.cos(60 * s + 220 * np.abs(across))
+        mix = np.clip(t + 0.2 * rng.uniform(-1, 1) + 0.25 * (s - 0.5), 0, 1)[..., None]
+        leaf = (dark + (light - dark) * mix) * vein[..., None] * rng.uniform(0.85, 1.1)
+        color = np.where(inside[..., None] > 0, leaf, color)
+        alpha = np.maximum(alpha, inside)
+    return np.concatenate([np.clip(color, 0, 1), alpha[..., None]], axis=2)
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _across(heading: Array) -> tuple[Array, Array]:
+    """Two unit vectors that are square to each of some."""
+    other = np.where(np.abs(heading[:, :1]) < 0.8, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    side = _unit(np.cross(heading, other))
+    return side, np.cross(heading, side)
+
+
 #: Trunk, boughs, branches, twigs.
 ORDERS = (
     Order(1, 11.0, 0.0, (0, 0), 0.3, 14, 12),
@@ -44,17 +299,15 @@ ORDERS = (
     Order(9, 0.42, 0.12, (30, 62), 0.1, 4, 3, 0.5),
 )
 #: Length of leaves of each kind and width relative to it, meters.
-_LEAF, _NODE_LEAF, _CARD = (0.095, 0.62), 0.13, (0.42, 0.8)
+_LEAF, _CARD = (0.095, 0.62), (0.42, 0.8)
 _BARK, _GREEN = (0.17, 0.12, 0.08), (0.10, 0.24, 0.05)
-#: Fraction of light that goes through leaves that are one sheet.
-_THROUGH = 0.35
 
 
 def make(kind: str, quick: bool = False, seed: int = 7) -> bpy.types.Object:
     """A tree of a kind, of no scene yet; quick: a quarter of the triangles of ``leaves``."""
     if kind == "leaves":
         return leafy(f"Tree {seed}", QUICK_TRIANGLES if quick else TRIANGLES, seed)
-    return {"cards": carded, "nodes": noded}[kind](f"Tree of {kind}", seed)
+    return carded(f"Tree of {kind}", seed)
 
 
 def leafy(name: str, triangles: int, seed: int = 7) -> bpy.types.Object:
@@ -86,80 +339,9 @@ def carded(name: str, seed: int = 7) -> bpy.types.Object:
     return bpy.data.objects.new(name, mesh_of(name, surface, materials, quads=CARDS))
 
 
-def noded(name: str, seed: int = 7, number: int = LEAVES, realized: bool = False) -> bpy.types.Object:
-    """Kind ``nodes``: a mesh of bark with loose points, on which nodes instance three leaf objects.
-
-    realized: what nodes give is one mesh of all leaves.
-    """
-    rng = np.random.default_rng(seed)
-    made = branches(ORDERS, rng)
-    bark = tubes(made, ORDERS)
-    places = stalks(made[-1], number, rng)
-    material = image_material("Node leaf", leaf_image(), 0.5, _THROUGH)
-    leaves = bpy.data.collections.new(f"{name}: leaves")
-    shape = open_leaf()
-    for i in range(3):
-        bent = shape.positions * [1.0, 1.0 - 0.15 * i, 1.0 + 0.5 * i]
-        mesh = mesh_of(f"{name}: leaf {i}", Surface(bent, shape.triangles, shape.uv, shape.material), [material])
-        leaves.objects.link(bpy.data.objects.new(mesh.name, mesh))
-    mesh = mesh_of(name, bark, [image_material("Node bark", bark_image(), 0.9)], places.base)
-    size = _sizes(places, rng, _NODE_LEAF, 1.0)[:, 0]
-    _place_attributes(mesh, len(bark.positions), places, size, rng)
-    tree = bpy.data.objects.new(name, mesh)
-    tree.modifiers.new("Leaves", 'NODES').node_group = _leaf_nodes(leaves, realized)
-    return tree
-
-
-def different(number: int, triangles: int, first: int = 100) -> Iterator[bpy.types.Object]:
-    """Trees of kind ``leaves``, one after another, all with shapes and colors of their own."""
-    for seed in range(first, first + number):
-        tree = leafy(f"Tree {seed}", triangles, seed)
-        materials = tree.data.materials
-        materials[1] = image_material(f"Leaf {seed}", leaf_image(f"Leaf {seed}", seed), 0.5)
-        yield tree
-
-
-def grown(number: int, triangles: int, first: int = 100) -> Iterator[bpy.types.Object]:
-    """Different trees as well, whose nodes make so many triangles of what takes a tenth of the memory in a file."""
-    for seed in range(first, first + number):
-        tree = noded(f"Tree {seed}", seed, 1, True)
-        bark = len(tree.data.polygons)
-        mesh = tree.data
-        bpy.data.objects.remove(tree)
-        bpy.data.meshes.remove(mesh)
-        yield noded(f"Tree {seed}", seed, max((triangles - bark) // 40, 1), True)
-
-
-def store_libraries(folder: Path, number: int, triangles: int) -> list[Path]:
-    """Save different trees each in a file of its own, as a collection of the file's name; files that exist are kept."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"tree{seed}.blend" for seed in range(100, 100 + number)]
-    for seed, path in enumerate(paths, 100):
-        if path.exists():
-            continue
-        (tree,) = different(1, triangles, seed)
-        held = bpy.data.collections.new(path.stem)
-        held.objects.link(tree)
-        bpy.data.libraries.write(str(path), {held}, compress=False)
-        mesh = tree.data
-        bpy.data.collections.remove(held)
-        bpy.data.objects.remove(tree)
-        bpy.data.meshes.remove(mesh)
-    return paths
-
-
-def mesh_of(
-    name: str,
-    surface: Surface,
-    materials: list[bpy.types.Material],
-    loose: NDArray[np.float64] | None = None,
-    quads: int = 0,
-) -> bpy.types.Mesh:
-    """A mesh of triangles with a UV map.
-
-    loose: (n, 3) vertices after those of the surface; quads: so many pairs of its last triangles are one face each.
-    """
-    positions = surface.positions if loose is None else np.concatenate([surface.positions, loose])
+def mesh_of(name: str, surface: Surface, materials: list[bpy.types.Material], quads: int = 0) -> bpy.types.Mesh:
+    """A mesh of triangles with a UV map; so many pairs of the last ones are one face each."""
+    positions = surface.positions
     alone = len(surface.triangles) - 2 * quads
     # Triangles 0 1 2 and 0 2 3 of a quad.
     kept = np.concatenate([np.arange(3 * alone), (3 * alone + 6 * np.arange(quads)[:, None] + [0, 1, 2, 5]).ravel()])
@@ -192,15 +374,14 @@ def image_of(name: str, pixels: NDArray[np.float32]) -> bpy.types.Image:
     return image
 
 
-def leaf_image(name: str = "Leaf", seed: int = 1, size: int = 256) -> bpy.types.Image:
+def leaf_image(size: int = 256) -> bpy.types.Image:
     """A leaf's two sides: veins, blotches, lighter toward its tip."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     v, u = np.meshgrid(np.linspace(0, 1, size), np.linspace(-0.5, 0.5, size), indexing="ij")
     blotches = np.kron(rng.normal(0.0, 0.12, (16, 16)), np.ones((size // 16, size // 16)))
     veins = 0.5 * np.exp(-((u / 0.015) ** 2)) + 0.2 * np.exp(-((((v - 0.7 * np.abs(u)) % 0.1) / 0.012) ** 2))
     shade = (0.8 + 0.35 * v + blotches + veins)[..., None]
-    tint = np.array(_GREEN) * (1.0 if seed == 1 else rng.uniform([0.7, 0.75, 0.6], [2.0, 1.25, 1.4]))
-    return image_of(name, _stored(shade * tint))
+    return image_of("Leaf", _stored(shade * np.array(_GREEN)))
 
 
 def bark_image(size: int = 256) -> bpy.types.Image:
@@ -210,10 +391,8 @@ def bark_image(size: int = 256) -> bpy.types.Image:
     return image_of("Bark", _stored(furrows[..., None] * np.array(_BARK)))
 
 
-def image_material(
-    name: str, image: bpy.types.Image, roughness: float, through: float = 0.0, alpha: bool = False
-) -> bpy.types.Material:
-    """Principled with an image, with Translucent, cut out by the image; the same one when asked again."""
+def image_material(name: str, image: bpy.types.Image, roughness: float, alpha: bool = False) -> bpy.types.Material:
+    """Principled with an image, cut out by the image; the same one when asked again."""
     if name in bpy.data.materials:
         return bpy.data.materials[name]
     material = bpy.data.materials.new(name)
@@ -222,20 +401,10 @@ def image_material(
     texture = new("ShaderNodeTexImage")
     texture.image = image
     principled = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
-    output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
     principled.inputs["Roughness"].default_value = roughness
     link(texture.outputs["Color"], principled.inputs["Base Color"])
-    surface = principled.outputs[0]
-    if through:
-        sheet, mix = new("ShaderNodeBsdfTranslucent"), new("ShaderNodeMixShader")
-        link(texture.outputs["Color"], sheet.inputs["Color"])
-        mix.inputs[0].default_value = through
-        link(surface, mix.inputs[1])
-        link(sheet.outputs[0], mix.inputs[2])
-        surface = mix.outputs[0]
     if alpha:
         link(texture.outputs["Alpha"], principled.inputs["Alpha"])
-    link(surface, output.inputs["Surface"])
     return material
 
 
@@ -251,46 +420,3 @@ def _stored(linear: NDArray[np.float64]) -> NDArray[np.float32]:
     stored = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     alpha = linear[..., 3:] if linear.shape[2] == 4 else np.ones((*stored.shape[:2], 1))
     return np.concatenate([stored, alpha], axis=2).astype(np.float32)
-
-
-def _place_attributes(
-    mesh: bpy.types.Mesh, first: int, places: Stalks, size: NDArray[np.float64], rng: np.random.Generator
-) -> None:
-    """What the nodes of leaves read: which vertices are places, their turns, sizes and leaves."""
-    n = len(mesh.vertices)
-    frame = places.frames
-    turn = np.zeros((n, 3))
-    turn[first:, 0] = np.arctan2(frame[:, 2, 1], frame[:, 2, 2])
-    turn[first:, 1] = -np.arcsin(np.clip(frame[:, 2, 0], -1.0, 1.0))
-    turn[first:, 2] = np.arctan2(frame[:, 1, 0], frame[:, 0, 0])
-    sizes, variant, is_leaf = np.zeros(n), np.zeros(n), np.zeros(n)
-    sizes[first:], variant[first:], is_leaf[first:] = size, rng.integers(0, 3, len(size)), 1
-    for name, kind, key, values in (
-        ("turned", 'FLOAT_VECTOR', "vector", turn.astype(np.float32)),
-        ("size", 'FLOAT', "value", sizes.astype(np.float32)),
-        ("variant", 'INT', "value", variant.astype(np.int32)),
-        ("is_leaf", 'BOOLEAN', "value", is_leaf.astype(bool)),
-    ):
-        mesh.attributes.new(name, kind, 'POINT').data.foreach_set(key, values.ravel())
-
-
-def _leaf_nodes(leaves: bpy.types.Collection, realized: bool) -> bpy.types.GeometryNodeTree:
-    """The mesh in, the mesh and instances of leaves out."""
-    named = (("turned", 'FLOAT_VECTOR', "Rotation"), ("size", 'FLOAT', "Scale"), ("variant", 'INT', "Instance Index"))
-    tree, members, placed = placing_nodes("GeometryNodeCollectionInfo", (*named, ("is_leaf", 'BOOLEAN', "Selection")))
-    members.inputs["Collection"].default_value = leaves
-    members.inputs["Separate Children"].default_value = True
-    members.inputs["Reset Children"].default_value = True
-    placed.inputs["Pick Instance"].default_value = True
-    given = next(node for node in tree.nodes if node.type == 'GROUP_INPUT')
-    made = next(node for node in tree.nodes if node.type == 'GROUP_OUTPUT')
-    both = tree.nodes.new("GeometryNodeJoinGeometry")
-    tree.links.new(given.outputs[0], both.inputs[0])
-    tree.links.new(placed.outputs[0], both.inputs[0])
-    last = both.outputs[0]
-    if realized:
-        whole = tree.nodes.new("GeometryNodeRealizeInstances")
-        tree.links.new(last, whole.inputs[0])
-        last = whole.outputs[0]
-    tree.links.new(last, made.inputs[0])
-    return tree

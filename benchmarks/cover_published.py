@@ -24,7 +24,7 @@ from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, singl
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.species.catalog import load_species
 
-from .compare import coverage
+from .pictures import coverage
 from .report import Targets
 
 #: Trees on a hectare, their basal area on it, m², and the share of ground that they cover.
@@ -77,7 +77,7 @@ def _variants(scene: bpy.types.Scene) -> tuple[dict[str, list[bpy.types.Mesh]], 
     area = {"leaf": 0.0, "bark": 0.0}
     for number in range(VARIANTS):
         parts = plant_parts(flora, single_seed("birch", number))
-        bare = [part for part in parts if part.kind == "bark"]
+        bare = [part for part in parts if part[0] == "bark"]
         for season, own in (("summer", parts), ("winter", bare)):
             meshes[season].append(plant_mesh(scene, f"{season} {number}", species, own))
         wood = _area(meshes["winter"][-1])

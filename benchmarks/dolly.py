@@ -18,10 +18,9 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
 from numpy.typing import NDArray
 
-from examples.daylight import add_daylight
+from examples import stage
 from tetflora_addon import memory
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.job.plant_mesh import single_seed
@@ -33,7 +32,7 @@ from tetflora_addon.leaves.outlines import distance_to_links
 from tetflora_addon.species import catalog
 from tetflora_addon.subplants.leaf_meshes import LevelCopies
 
-from .compare import flip_map, read_picture, render
+from .pictures import flip_map, read_picture, render
 from .report import Targets, forget_peak, peak_mb
 
 FRAMES, QUICK_FRAMES = 60, 6
@@ -116,20 +115,10 @@ def build(scene: bpy.types.Scene, size: tuple[int, int]) -> tuple[NDArray[np.flo
     places = np.stack([away * np.cos(turn), away * np.sin(turn), np.zeros(NUMBER)], axis=1)
     places = places[places @ toward < -4.0]  # behind it, as seen from the camera
     for i, (x, y, z) in enumerate([(0.0, 0.0, 0.0), *places]):
-        empty = bpy.data.objects.new(f"Tree {i}", None)
-        empty.location, empty.rotation_euler.z = (x, y, z), 0.0 if i == 0 else turn[i]
-        empty.tetflora.is_plant, empty.tetflora.seed = True, 1 + i
-        empty.tetflora.species = BEHIND[i % len(BEHIND)] if i else TREE
-        scene.collection.objects.link(empty)
+        stage.plant(scene, BEHIND[i % len(BEHIND)] if i else TREE, 1 + i, (x, y, z), turn[i] if i else 0.0)
     bpy.ops.mesh.primitive_plane_add(size=2000.0)
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.data.clip_start, camera.data.clip_end = 50.0, 0.01, 2000.0
-    camera.rotation_euler = Vector(-toward).to_track_quat('-Z', 'Y').to_euler()
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    add_daylight(scene, elevation=40.0, azimuth=-60.0)
-    scene.render.resolution_x, scene.render.resolution_y = size
-    scene.render.resolution_percentage = 100
+    stage.camera(scene, toward, (0.0, 0.0, 0.0), size, lens=50.0, near=0.01, far=2000.0)
+    stage.daylight(scene, elevation=40.0, azimuth=-60.0)
     scene.tetflora.refine_at_render = False
     return leaf_of(TREE, toward), toward
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether *Max Memory* holds: the sum of what Blender and its other processes hold, refinement and render together.
 
-    python -m benchmarks limits [--quick]              # everything, with targets
-    python -m benchmarks.limits birch --gigabytes 2    # one case, as a line of JSON
+    python -m benchmarks limits [--quick]                     # everything, with targets
+    python -m benchmarks limits --case birch --gigabytes 2    # one case, as a line of JSON
 
 Each case is a process of its own with a camera at the height of eyes in the middle of its plants. Memory is looked at
 fifty times a second; pages that processes share count for each of them. At the end *Expand Everything* has to be
@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import tempfile
 import threading
 import time
@@ -22,8 +21,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-
-from devtools import session
 
 from .report import Targets, records_of
 
@@ -38,12 +35,21 @@ TARGETS: Targets = {"limit_ratio_max": {"max": 1.0}, "expanded_refused": {"min":
 QUICK_TARGETS: Targets = {**TARGETS, "expanded_refused": {"min": 3}}
 
 
-def run(quick: bool) -> dict[str, float]:
+def options(parser: argparse.ArgumentParser) -> None:
+    """What may be asked for beside everything."""
+    parser.add_argument("--case", choices=(*STANDS, BIOME), help="only this, as a line of JSON")
+    parser.add_argument("--gigabytes", type=float, default=LIMITS[0])
+
+
+def run(given: argparse.Namespace) -> dict[str, float] | None:
     """Measure all cases."""
+    if given.case:
+        print(json.dumps(measure(given.case, given.gigabytes)), flush=True)
+        return None
     found: dict[str, float] = {"limit_ratio_max": 0.0, "expanded_refused": 0, "expanded_growth_mb": 0.0}
     for name in (*STANDS, BIOME):
-        for limit in QUICK_LIMITS if quick else LIMITS:
-            (case,) = records_of(["benchmarks.limits", name, "--gigabytes", str(limit)])
+        for limit in QUICK_LIMITS if given.quick else LIMITS:
+            (case,) = records_of(["limits", "--case", name, "--gigabytes", str(limit)])
             found[f"{name}_{limit:g}_ratio"] = case["ratio"]
             found["limit_ratio_max"] = max(found["limit_ratio_max"], case["ratio"])
             found["expanded_refused"] += case["refused"]
@@ -128,23 +134,3 @@ def _plant(scene, name: str) -> None:
     middle = sum((np.array(land.matrix_world @ land.data.vertices[i].co) for i in (0, -1)), np.zeros(3)) / 2.0
     _, at, *_ = scene.ray_cast(depsgraph, (*middle[:2], 1e4), (0.0, 0.0, -1.0))
     add_camera(location=(at[0], at[1], at[2] + EYES))
-
-
-def main() -> int:
-    """Measure one case and print a line of JSON."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.limits", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("name", choices=(*STANDS, BIOME))
-    parser.add_argument("--gigabytes", type=float, default=LIMITS[0])
-    arguments = parser.parse_args()
-    session.start()
-    session.clean_file()
-    print(json.dumps(measure(arguments.name, arguments.gigabytes)), flush=True)
-    return 0
-
-
-if __name__ == "__main__":
-    code = main()
-    session.stop()
-    sys.exit(code)

@@ -52,22 +52,36 @@ def forget_peak() -> None:
         CLEAR_PEAK.write_text("5")
 
 
-def records_of(command: list[str]) -> list[dict]:
-    """What a module of this repository prints as lines of JSON, called with arguments in a process of its own.
+def records_of(words: list[str], timeout: float = 3600.0, **variables: str) -> list[dict]:
+    """What ``python -m benchmarks`` prints as lines of JSON, called with words in a process of its own.
+
+    timeout: seconds; variables: of its environment.
 
     Raises
     ------
     RuntimeError
         It has failed, with the end of what it says.
     """
-    whole = [sys.executable, "-m", *command]
-    done = subprocess.run(whole, cwd=ROOT, capture_output=True, text=True, timeout=3600, check=False)
-    if done.returncode:
-        raise RuntimeError(f"{' '.join(command)} failed:\n{done.stderr[-2000:]}")
+    command, own = [sys.executable, "-m", __package__, *words], os.environ | variables
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=timeout, check=False, env=own)
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    if done.returncode or not lines:
+        raise RuntimeError(f"{' '.join(words)} failed with {done.returncode}:\n{done.stderr[-3000:]}")
     for line in lines:
-        print(*command, line, flush=True)
+        print(line, flush=True)
     return [json.loads(line) for line in lines]
+
+
+def size_of(text: str) -> tuple[int, int]:
+    """Width and height in a word: ``960x540``."""
+    width, height = text.lower().split("x")
+    return int(width), int(height)
+
+
+def setting(text: str) -> tuple[str, str]:
+    """A name and its value in a word: ``max_memory=2``."""
+    name, value = text.split("=")
+    return name, value
 
 
 def machine() -> str:
@@ -106,6 +120,13 @@ def report(name: str, figures: dict[str, float], targets: Targets) -> dict:
         "blender": bpy.app.version_string,
         "commit": commit(),
     }
+
+
+def write(path: Path | None, record: object) -> None:
+    """Keep a record, or a list of them, where that is asked for."""
+    if path:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
 def missed(record: dict) -> list[str]:

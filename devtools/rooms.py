@@ -72,8 +72,8 @@ _TABLE = {
     "blender/cli": ". blender blender/scene blender/job",
     "operators": ". species assets camera refinement preview planting geodata blender blender/species blender/scene "
     f"blender/assets {_HIGH} {_LAND} blender/viewport",
-    "panels": f". species blender blender/species blender/scene blender/assets {_HIGH} {_LAND} blender/viewport "
-    "operators",
+    "panels": f". species blender blender/species blender/scene blender/assets {_HIGH} "
+    "blender/geodata blender/biomes blender/viewport operators",
 }
 ARROWS = {room: tuple(others.split()) for room, others in _TABLE.items()}
 #: Rooms of the engine: numpy and the standard library only, never Blender.

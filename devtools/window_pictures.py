@@ -25,20 +25,17 @@ WINDOWS = ("first-forest", "populated", "add-menu", "progress", "refined", "prev
 
 # The panel of each picture, and its sections that are open.
 PANELS = {
-    "plants": ("TETFLORA_PT_plants",),
-    "populate": ("TETFLORA_PT_populate", "Species"),
-    "populate-where": ("TETFLORA_PT_populate", "Placement", "Spacing", "Size and Age"),
-    "brush": ("TETFLORA_PT_brush",),
-    "refinement": ("TETFLORA_PT_refine", "Proxies", "Assets", "Visibility", "Limits"),
-    "year": ("TETFLORA_PT_year",),
-    "wind": ("TETFLORA_PT_wind",),
-    "animation": ("TETFLORA_PT_refine", "Animation", "Leaf Objects"),
-    "output": ("TETFLORA_PT_output", "Ray Visibility", "Passes and Materials"),
-    "preview": ("TETFLORA_PT_preview",),
-    "statistics": ("TETFLORA_PT_statistics",),
+    "plants": ("TETFLORA_PT_plant",),
+    "brush": ("brush",),
+    "refinement": ("TETFLORA_PT_refine",),
+    "season": ("TETFLORA_PT_season",),
+    "animation": ("TETFLORA_PT_render", "Animation", "Leaf Objects"),
+    "output": ("TETFLORA_PT_view_layer", "Ray Visibility", "By Species"),
+    "preview": ("TETFLORA_PT_developer", "Levels"),
+    "statistics": ("TETFLORA_PT_developer", "Passes"),
     "species": ("TETFLORA_PT_species", "Name, Leaf and Bark"),
-    "stand": ("TETFLORA_PT_stand", "Site"),
-    "biomes": ("TETFLORA_PT_biomes", "Where"),
+    "stand": ("TETFLORA_PT_layers", "Site", "Where"),
+    "layers": ("TETFLORA_PT_layers", "Where", "Spacing and Size"),
 }
 
 
@@ -92,17 +89,22 @@ def steps(ui: Any) -> Iterator[float | None]:
     leaf.species = "broadleaf_tree"
     own = scene.tetflora.output.species.add()
     own.species = "conifer"
+    scene.tetflora.species_editor.shown = bpy.context.preferences.view.show_developer_ui = True
     registered = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
     for cls in registered:
+        if 'INSTANCED' in getattr(cls, "bl_options", ()):
+            continue
         bpy.utils.unregister_class(cls)
     for name, (shown, *sections) in PANELS.items():
         if name == "stand":
             yield from _stand(ui, scene)
-        elif name == "biomes":
+        elif name == "layers":
+            scene.tetflora.layers_index = 0
             with ui.override():
-                bpy.ops.tetflora.add_biome('INVOKE_DEFAULT', biome="dead_forest")
-            yield from ui.until(lambda: not ui.window.modal_operators, 60, "biome")
-        opened = _register_open(next(cls for cls in registered if cls.__name__ == shown), name, sections)
+                bpy.ops.tetflora.ground_cover('INVOKE_DEFAULT')
+            yield from ui.until(lambda: not ui.window.modal_operators, 60, "cover")
+        panel = _brush_panel() if shown == "brush" else next(cls for cls in registered if cls.__name__ == shown)
+        opened = _register_open(panel, name, sections)
         yield from ui.show_sidebar("TetFlora")
         yield from ui.picture(f"panel-{name}")
         bpy.utils.unregister_class(opened)
@@ -182,6 +184,20 @@ def _hill(scene: Any) -> None:
         entry.species, entry.weight = species, weight
 
 
+def _brush_panel() -> Any:
+    """The settings of the brush as a panel, as the Tool tab shows them."""
+    import bpy
+
+    tools = next(module for name, module in sys.modules.items() if name.endswith("tetflora.panels.tools"))
+    base = sys.modules[f"{tools.__name__.rpartition('.')[0]}.base"]
+
+    def draw(self: Any, context: Any) -> None:
+        tools.PaintTool.draw_settings(context, base.split_layout(self), None)
+
+    members = {"bl_label": "Paint Plants", "draw": draw, "__module__": tools.__name__}
+    return type("TETFLORA_PT_brush", (bpy.types.Panel,), members)
+
+
 def _register_open(cls: Any, picture: str, sections: list[str]) -> Any:
     """Register a copy of a panel that is open; under another name, because Blender remembers what was closed."""
     import bpy
@@ -191,7 +207,8 @@ def _register_open(cls: Any, picture: str, sections: list[str]) -> Any:
         layout, title, title not in sections, switch
     )
     name = f"{cls.__name__}_{picture.replace('-', '_')}"
-    made = type(name, (cls,), {"bl_options": set(), "bl_idname": name})
+    place = {"bl_space_type": 'VIEW_3D', "bl_region_type": 'UI', "bl_category": "TetFlora", "bl_context": ""}
+    made = type(name, (cls,), {"bl_options": set(), "bl_idname": name, **place})
     bpy.utils.register_class(made)
     return made
 

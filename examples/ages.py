@@ -10,11 +10,10 @@ All six have the same seed: it is the same individual throughout.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from itertools import pairwise
-from math import pi, radians, tan
+from math import radians, tan
 from pathlib import Path
 
 import bpy
@@ -23,6 +22,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from devtools import session
 
+from . import stage
 from .close_ups import render
 from .seasons import LOOKS, sky
 
@@ -64,7 +64,6 @@ def build(scene: bpy.types.Scene, size: tuple[int, int]) -> list[tuple[float, st
     from tetflora_addon.compiled.crowns import crown_of
     from tetflora_addon.species import ages, catalog
 
-    from .daylight import add_daylight
     from .haze import add_haze
 
     species = catalog.load_species(SPECIES)
@@ -73,23 +72,17 @@ def build(scene: bpy.types.Scene, size: tuple[int, int]) -> list[tuple[float, st
     middle = np.cumsum(np.concatenate([[_BESIDE + radius[0] + 2.6], radius[:-1] + radius[1:] + _BETWEEN]))
     width = middle[-1] + radius[-1] + _BESIDE
     for age, x in zip(AGES, (middle - width / 2).tolist(), strict=True):
-        _plant(scene, SPECIES, SEED, (x, 0.0), age)
+        stage.plant(scene, SPECIES, SEED, (x, 0.0, 0.0), age=age)
     first, second = (middle[:2] - width / 2).tolist()
     scene.collection.objects.link(_figure((first - 1.7 - float(radius[0]), -0.6)))
     _pole((second - 1.1 - float(radius[1]), -0.3))
     _close_view(scene)
     distance = width / 2 / tan(_VIEW / 2)
     _meadow(scene, distance)
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.sensor_fit, camera.data.angle, camera.data.clip_end = 'HORIZONTAL', _VIEW, 2000.0
-    camera.location, camera.rotation_euler = (0.0, -distance, _EYE), (pi / 2, 0.0, 0.0)
+    camera = stage.camera(scene, (0.0, -distance, _EYE), (0.0, 0.0, _EYE), view=_VIEW, far=2000.0)
     # The trees' feet are a fifth above the lower edge.
     camera.data.shift_y = 0.3 * size[1] / size[0] - _EYE / width
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    add_daylight(scene, elevation=44.0, azimuth=50.0)
-    sun = next(o for o in scene.objects if o.type == 'LIGHT').data
-    sun.energy, sun.color = 5.0, (1.0, 0.94, 0.85)
+    stage.sun(scene, 44.0, 50.0)
     scene.world = sky(LOOKS["summer"])
     ground = next(o for o in scene.objects if o.type == 'MESH' and o.name.startswith("Grid"))
     ground.name = "Ground"
@@ -101,21 +94,14 @@ def build(scene: bpy.types.Scene, size: tuple[int, int]) -> list[tuple[float, st
     ]
 
 
-def _plant(scene: bpy.types.Scene, species: str, seed: int, place: tuple[float, float], age: float = 0.0) -> None:
-    plant = bpy.data.objects.new(f"{species} {age:g}", None)
-    plant.location = (*place, 0.0)
-    plant.tetflora.is_plant, plant.tetflora.species, plant.tetflora.seed = True, species, seed
-    plant.tetflora.age = age
-    scene.collection.objects.link(plant)
-
-
 def _close_view(scene: bpy.types.Scene) -> None:
     """Trees behind the meadow, as a loose front that becomes denser."""
     u, v = np.mod(0.5 + np.arange(1, _MANY + 1)[:, None] * [0.7548776662, 0.5698402910], 1.0).T
     y = _AWAY[0] + (_AWAY[1] - _AWAY[0]) * np.sqrt(u)
     x = (v - 0.5) * 1.15 * _SIDE
     for i in range(_MANY):
-        _plant(scene, _BEHIND[i % len(_BEHIND)], i, (float(x[i]), float(y[i] + 8.0 * np.sin(0.06 * x[i]))))
+        place = float(x[i]), float(y[i] + 8.0 * np.sin(0.06 * x[i])), 0.0
+        stage.plant(scene, _BEHIND[i % len(_BEHIND)], i, place)
 
 
 def _meadow(scene: bpy.types.Scene, distance: float) -> None:
@@ -208,14 +194,10 @@ def render_ages(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES
 
 def main() -> int:
     """Render the picture of the documentation, or a smaller one."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images" / "ages.jpg")
-    parser.add_argument("--width", type=int, default=SIZE[0])
-    parser.add_argument("--samples", type=int, default=SAMPLES)
-    arguments = parser.parse_args()
+    given = stage.words(__doc__, ROOT / "docs" / "images" / "ages.jpg", SIZE, SAMPLES).parse_args()
     session.start()
     session.clean_file()
-    render_ages(arguments.out, (arguments.width, round(arguments.width * SIZE[1] / SIZE[0])), arguments.samples)
+    render_ages(given.out, stage.size_of(given, SIZE), given.samples)
     return 0
 
 

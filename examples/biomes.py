@@ -15,7 +15,6 @@ import argparse
 import json
 import sys
 from dataclasses import dataclass, replace
-from math import radians
 from pathlib import Path
 
 import bpy
@@ -25,6 +24,7 @@ from PIL import Image
 
 from devtools import session
 
+from . import stage
 from .close_ups import render
 from .paper.pictures import save_sheet
 from .seasons import LOOKS, Look, Rgb, sky
@@ -106,6 +106,7 @@ VIEWS = {
 def build(identifier: str, view: View) -> None:
     """Fill an empty scene with a biome, its land, sun and sky."""
     from tetflora_addon.blender.biomes import adding, files, ground
+    from tetflora_addon.blender.placing.zones import biomes_in
     from tetflora_addon.blender.worker import run_to_end
 
     scene = bpy.context.scene
@@ -124,19 +125,15 @@ def build(identifier: str, view: View) -> None:
     else:
         around.data.materials.append(land.data.materials[0])
     if view.beside:
-        run_to_end(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.biomes[0]))
+        run_to_end(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biomes_in(scene)[0]))
     if view.water:
         _brook(scene, ground, biome, view.water)
     print(identifier, ", ".join(f"{name} {number:,}" for name, number in added.layers), *added.bare, flush=True)
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.data.clip_start, camera.data.clip_end = view.lens, 0.05, 3000.0
     eye, ahead = (
         Vector((x, y, z + float(ground.heights(np.array(x), np.array(y), biome.ground))))
         for x, y, z in (_clear(scene, view), view.ahead)
     )
-    camera.location, camera.rotation_euler = eye, (ahead - eye).to_track_quat('-Z', 'Y').to_euler()
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+    stage.camera(scene, eye, ahead, lens=view.lens, near=0.05)
     _light(scene, view, around)
     scene.tetflora.hidden = _HIDDEN
 
@@ -151,7 +148,7 @@ def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     canopy, _ = canopy_of(scene, depsgraph)
     plants, reach = [canopy.position[:, :2]], [view.free + 0.3 * canopy.radius]
-    covers = {population.uid for population in scene.tetflora.populations if is_cover(population)}
+    covers = {population.uid for population in scene.tetflora.layers if is_cover(population)}
     for field in fields_of([obj for obj in scene.objects if obj.tetflora.population in covers]):
         read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
         high = np.array([crown_for(scene, kind).height for kind in read.identifiers])[read.species] * read.scale
@@ -220,12 +217,9 @@ def _mean(land: bpy.types.Object) -> list[float]:
 
 
 def _light(scene: bpy.types.Scene, view: View, around: bpy.types.Object) -> None:
-    from .daylight import add_daylight
     from .haze import add_haze
 
-    add_daylight(scene, elevation=view.sun[0], azimuth=view.sun[1] - 180.0)
-    sun = next(o for o in scene.objects if o.type == 'LIGHT').data
-    sun.energy, sun.color, sun.angle = 5.0 * view.light, view.tint, radians(0.8)
+    stage.sun(scene, view.sun[0], view.sun[1] - 180.0, 5.0 * view.light, view.tint, 0.8)
     look: Look = replace(LOOKS["summer"], clouds=view.clouds, strength=LOOKS["summer"].strength * view.light)
     scene.world = sky(look)
     around.name = "Ground"

@@ -10,7 +10,6 @@ Every plant stands among others of its kind on covered ground, and every picture
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Callable
@@ -21,11 +20,12 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
-from mathutils import Vector
 from numpy.typing import NDArray
 
 from devtools import session
 from devtools.formats import set_format
+
+from . import stage
 
 if TYPE_CHECKING:
     from tetflora_addon.compiled.flora import Flora
@@ -136,8 +136,6 @@ class Subject:
         from tetflora_addon.blender.placing.cover import cover_steps
         from tetflora_addon.blender.worker import run_to_end
 
-        from .daylight import add_daylight
-
         scene = bpy.context.scene
         number = np.arange(_AROUND + 1)
         step = max(2.4 * self.crown.radius, 1.0)
@@ -145,17 +143,11 @@ class Subject:
         for i, (x, y) in enumerate(zip(away * np.cos(turn), away * np.sin(turn), strict=True)):
             if i and y < 0.0 and abs(x) < 1.2 * step:
                 continue  # leaves room for the camera and the sun
-            empty = bpy.data.objects.new(f"{self.identifier} {i}", None)
-            empty.location, empty.rotation_euler.z = (x, y, 0.0), (turn[i] % tau) if i else 0.0
-            empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, self.planted, 1 + i
-            scene.collection.objects.link(empty)
+            stage.plant(scene, self.planted, 1 + i, (x, y, 0.0), (turn[i] % tau) if i else 0.0)
         bpy.ops.mesh.primitive_grid_add(x_subdivisions=60, y_subdivisions=60, size=_SIDE)
         ground = bpy.context.object
-        camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-        camera.data.clip_start, camera.data.clip_end = 0.01, 1000.0
-        scene.collection.objects.link(camera)
-        scene.camera = camera
-        add_daylight(scene, elevation=ELEVATION, azimuth=AZIMUTH - 180.0)
+        stage.camera(scene, (0.0, -10.0, 1.6), (0.0, 0.0, 1.6), near=0.01, far=1000.0)
+        stage.sun(scene, ELEVATION, AZIMUTH - 180.0)
         scene.world = first_forest.sky("Close-up sky")
         background = next(n for n in scene.world.node_tree.nodes if n.type == 'BACKGROUND')
         background.inputs["Strength"].default_value = _SKY
@@ -168,8 +160,7 @@ class Subject:
     ) -> None:
         """Look from one place to another; ``blur`` is the aperture of a lens that is focused on the target."""
         camera = bpy.context.scene.camera
-        camera.location = eye
-        camera.rotation_euler = Vector(target - eye).to_track_quat('-Z', 'Y').to_euler()
+        stage.look(bpy.context.scene, eye, target)
         camera.data.lens = lens
         camera.data.dof.use_dof = blur is not None
         camera.data.dof.focus_distance = float(np.linalg.norm(np.asarray(target) - eye))
@@ -309,19 +300,16 @@ def store_sheet(rows: list[list[Path]], path: Path) -> None:
 
 def main() -> int:
     """Render the sheet of the documentation, or single pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = stage.words(__doc__, ROOT / "out" / "looks", SIZE, SAMPLES)
     parser.add_argument("species", nargs="*")
-    parser.add_argument("--out", type=Path, default=ROOT / "out" / "looks")
     parser.add_argument("--views", nargs="+", help="only these")
-    parser.add_argument("--width", type=int, default=SIZE[0])
-    parser.add_argument("--samples", type=int, default=SAMPLES)
     arguments = parser.parse_args()
     session.start()
     if not arguments.species:
         render_sheet(ROOT / "docs" / "images" / "close_ups.jpg")
         return 0
     arguments.out.mkdir(parents=True, exist_ok=True)
-    size = (arguments.width, round(0.75 * arguments.width))
+    size = stage.size_of(arguments, SIZE)
     only = tuple(arguments.views) if arguments.views else None
     for identifier in arguments.species:
         for path in render_views(identifier, arguments.out, size, arguments.samples, only):

@@ -11,18 +11,16 @@ stand, at four places of the slider.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
-from math import radians
 from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 from devtools import session
 
+from . import stage
 from .close_ups import render
 from .paper.pictures import save_sheet
 from .seasons import LOOKS, sky
@@ -72,17 +70,9 @@ def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
     grown = run_to_end(new_stand_steps(scene, bpy.context.evaluated_depsgraph_get(), [plot]))
     print(f"{grown.plants:,} plants after {grown.years} years, {grown.records:,} records", flush=True)
     run_to_end(cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[land]))
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.data.clip_end = _LENS, 2000.0
-    camera.location = _EYE
-    camera.rotation_euler = (Vector(_AHEAD) - Vector(_EYE)).to_track_quat('-Z', 'Y').to_euler()
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+    stage.camera(scene, _EYE, _AHEAD, lens=_LENS, far=2000.0)
     scene.tetflora.hidden = _HIDDEN
-    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", 'SUN'))
-    sun.data.energy, sun.data.angle, sun.data.color = 5.0, radians(0.6), (1.0, 0.94, 0.85)
-    sun.rotation_euler = (radians(90 - _SUN[0]), 0.0, radians(180.0 - _SUN[1]))
-    scene.collection.objects.link(sun)
+    stage.sun(scene, _SUN[0], _SUN[1] - 180.0)
     scene.world = sky(LOOKS["summer"])
     add_haze(scene, 0.00025, LOOKS["summer"].haze[1])
     return grown.field
@@ -117,17 +107,13 @@ def render_grown(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
         save_sheet(list(zip(made, names, strict=True)), 2, path)
 
 
-def main(arguments: list[str]) -> int:
+def main() -> int:
     """Render the sheet."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images" / "grown.jpg")
-    parser.add_argument("--width", type=int, default=SIZE[0], help="of one picture, pixels")
-    parser.add_argument("--samples", type=int, default=SAMPLES)
-    chosen = parser.parse_args(arguments)
+    given = stage.words(__doc__, ROOT / "docs" / "images" / "grown.jpg", SIZE, SAMPLES).parse_args()
     session.start()
-    render_grown(chosen.out, (chosen.width, round(chosen.width * SIZE[1] / SIZE[0])), chosen.samples)
+    render_grown(given.out, stage.size_of(given, SIZE), given.samples)
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

@@ -18,7 +18,7 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import plant_objects, terrain
 from tetflora_addon.planting import places, rules
 
-from .daylight import add_daylight
+from . import stage
 from .terrain import Terrain, elevation
 
 PLANTS = 8_636
@@ -68,18 +68,9 @@ def build(scene: bpy.types.Scene, plants: int = PLANTS, pixels: int = 512) -> No
     eye.z = float(ground.height(eye.x, 0.0)) + 38.0
     target = Vector((width / 2, min(length, _ACROSS) * 0.4, 0.0))
     target.z = float(ground.height(target.x, target.y)) - 6.0
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.data.clip_end = 32.0, 20_000.0
-    camera.location = eye
-    camera.rotation_euler = (target - eye).to_track_quat('-Z', 'Y').to_euler()
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    add_daylight(scene, elevation=35.0, azimuth=75.0)
-    scene.view_settings.exposure = 0.8
-    scene.view_settings.look = 'AgX - Medium High Contrast'
-    render = scene.render
-    render.resolution_x = render.resolution_y = pixels
-    render.resolution_percentage = 100
+    stage.camera(scene, eye, target, (pixels, pixels), lens=32.0, far=20_000.0)
+    stage.daylight(scene, elevation=35.0, azimuth=75.0)
+    stage.film(scene)
 
 
 def render_landscape(path: Path, width: int = 960, samples: int = 64) -> None:

@@ -25,7 +25,7 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import plant_objects, terrain
 from tetflora_addon.planting import places, rules
 
-from .daylight import add_daylight
+from . import stage
 from .haze import add_haze
 from .terrain import Terrain
 
@@ -48,18 +48,10 @@ def build(scene: bpy.types.Scene, plants: int = PLANTS, width: int = 960) -> Non
     across = land.size[0]
     eye = Vector((across / 2, 40.0, 0.0))
     eye.z = float(land.height(eye.x, eye.y)) + 48.0
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.data.clip_end = 30.0, 20_000.0
-    camera.location = eye
-    camera.rotation_euler = (Vector((0.0, 1.0, -0.13))).to_track_quat('-Z', 'Y').to_euler()
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    add_daylight(scene, elevation=28.0, azimuth=-75.0)
+    stage.camera(scene, eye, eye + Vector((0.0, 1.0, -0.13)), (width, width * 9 // 16), lens=30.0, far=20_000.0)
+    stage.daylight(scene, elevation=28.0, azimuth=-75.0)
     add_haze(scene, EXTINCTION, AIRLIGHT)
-    scene.view_settings.exposure = 0.8
-    scene.view_settings.look = 'AgX - Medium High Contrast'
-    render = scene.render
-    render.resolution_x, render.resolution_y, render.resolution_percentage = width, width * 9 // 16, 100
+    stage.film(scene)
 
 
 def _plant(scene: bpy.types.Scene, surface: bpy.types.Object, land: Terrain, plants: int) -> None:

@@ -10,10 +10,8 @@ The files are made here: elevation as an ASCII grid, an inventory as CSV, canopy
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
-from math import radians
 from pathlib import Path
 
 import bpy
@@ -21,9 +19,10 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from benchmarks import places_files as files
 from devtools import session
+from tests import places_files as files
 
+from . import stage
 from .close_ups import render
 from .seasons import LOOKS, sky
 
@@ -124,28 +123,16 @@ def build(scene: bpy.types.Scene, folder: Path) -> None:
         getattr(bpy.ops.tetflora, f"import_{name}")(filepath=str(folder / file), **options)
     origin = scene["tetflora_place"]
     shift = Vector((EAST - origin["east"], NORTH - origin["north"], 0.0))
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.data.clip_end = 32.0, 3000.0
-    camera.location = Vector((262.0, -50.0, 492.0)) + shift
-    ahead = Vector((190.0, 190.0, 434.0)) + shift
-    camera.rotation_euler = (ahead - camera.location).to_track_quat('-Z', 'Y').to_euler()
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", 'SUN'))
-    sun.data.energy, sun.data.angle, sun.data.color = 5.0, radians(0.6), (1.0, 0.94, 0.85)
-    sun.rotation_euler = (radians(90 - _SUN[0]), 0.0, radians(180.0 - _SUN[1]))
-    scene.collection.objects.link(sun)
+    stage.camera(scene, Vector((262.0, -50.0, 492.0)) + shift, Vector((190.0, 190.0, 434.0)) + shift, lens=32.0)
+    stage.sun(scene, _SUN[0], _SUN[1] - 180.0)
     scene.world = sky(LOOKS["summer"])
 
 
-def main(arguments: list[str]) -> int:
+def main() -> int:
     """Make the files, and the picture."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("out/place.png"))
+    parser = stage.words(__doc__, Path("out/place.png"), (640, 360), 24)
     parser.add_argument("--data", type=Path, help="write the files here, and nothing else")
-    parser.add_argument("--width", type=int, default=640)
-    parser.add_argument("--samples", type=int, default=24)
-    chosen = parser.parse_args(arguments)
+    chosen = parser.parse_args()
     session.start()
     if chosen.data:
         chosen.data.mkdir(parents=True, exist_ok=True)
@@ -162,6 +149,6 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    code = main(sys.argv[1:])
+    code = main()
     session.stop()
     sys.exit(code)

@@ -27,7 +27,7 @@ import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
-from benchmarks import compare as images  # noqa: E402
+from benchmarks import pictures as images  # noqa: E402
 from devtools.formats import set_format  # noqa: E402
 from examples import stands  # noqa: E402
 from tetflora_addon.blender.job import refine  # noqa: E402

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from .daylight import add_daylight
+from . import stage
 from .terrain import Terrain
 
 COUNT = 80
@@ -50,16 +50,8 @@ def build(scene: bpy.types.Scene, count: int = COUNT, species: str = "broadleaf_
     eye.z = float(ground.height(eye.x, eye.y)) + 3.2
     target = Vector((_ROW_X - 2.0, _FIRST_Y + 50.0, 0.0))
     target.z = float(ground.height(target.x, target.y)) + 7.0
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.data.clip_end = 35.0, 3000.0
-    camera.location = eye
-    camera.rotation_euler = (target - eye).to_track_quat('-Z', 'Y').to_euler()
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    add_daylight(scene, elevation=38.0, azimuth=70.0)
-    render = scene.render
-    scene.view_settings.exposure = 0.8
-    scene.view_settings.look = 'AgX - Medium High Contrast'
+    stage.camera(scene, eye, target, (800, 450))
+    stage.daylight(scene, elevation=38.0, azimuth=70.0)
+    stage.film(scene)
     scene.eevee.use_raytracing = True  # or the sky would shine through crowns
     scene.eevee.fast_gi_thickness_near = 3.0
-    render.resolution_x, render.resolution_y, render.resolution_percentage = 800, 450, 100

@@ -34,12 +34,11 @@ def render(scene: bpy.types.Scene, path: Path) -> Image.Image:
 
 def pair(instances: int, width: int, samples: int) -> Image.Image:
     """Both pictures, one above the other."""
-    from benchmarks import asset_scenes
+    from benchmarks import assets
     from tetflora_addon.blender.job.refine import refine
 
     scene, size = bpy.context.scene, (width, width * 9 // 20)
-    instancer = asset_scenes.build(scene, asset_scenes.Scatter("leaves", instances, "near", size=size))
-    asset_scenes.prepare(scene)
+    instancer = assets.build(scene, assets.Scatter("leaves", instances, "near", size=size))
     scene.render.engine = 'CYCLES'
     scene.cycles.samples, scene.cycles.use_denoising = samples, True
     with tempfile.TemporaryDirectory() as folder:

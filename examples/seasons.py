@@ -10,11 +10,9 @@ The sun stands as high as it does in each of the seasons, in the morning or in t
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from dataclasses import dataclass
-from math import radians
 from pathlib import Path
 
 import bpy
@@ -24,6 +22,7 @@ from numpy.typing import NDArray
 
 from devtools import session
 
+from . import stage
 from .close_ups import among_others, render, store_sheet
 from .wood import grid
 
@@ -130,36 +129,23 @@ def build(scene: bpy.types.Scene) -> None:
     """Fill an empty scene with land, trees and what covers the ground; `dress` gives it a season."""
     _add_cherry(scene)
     for species, seed, (x, y), scale, age in _LONE:
-        plant = bpy.data.objects.new(f"{species} {seed}", None)
-        plant.location = (x, y, float(height(np.float64(x), np.float64(y))))
-        plant.rotation_euler.z, plant.scale = 2.4 * seed, (scale,) * 3
-        plant.tetflora.is_plant, plant.tetflora.species, plant.tetflora.seed = True, species, seed
-        plant.tetflora.age = age
-        scene.collection.objects.link(plant)
+        stage.plant(scene, species, seed, (x, y, float(height(np.float64(x), np.float64(y)))), 2.4 * seed, scale, age)
     for name, side, step, hole in (("Near", _NEAR, 2.0, 0.0), ("Far", _LAND, 5.0, _NEAR)):
         ground = _ground(name, side, step, hole)
         scene.collection.objects.link(ground)
         _plant(scene, ground)
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.data.clip_start, camera.data.clip_end = _LENS, 0.05, 3000.0
     eye, ahead = (Vector((x, y, z + float(height(np.float64(x), np.float64(y))))) for x, y, z in (_EYE, _AHEAD))
-    camera.location, camera.rotation_euler = eye, (ahead - eye).to_track_quat('-Z', 'Y').to_euler()
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+    stage.camera(scene, eye, ahead, lens=_LENS, near=0.05)
     scene.tetflora.refine_at_render = False
 
 
 def dress(scene: bpy.types.Scene, look: Look) -> None:
     """Give the place a season; the one that it had goes."""
-    from .daylight import add_daylight
-
     year = scene.tetflora.year
     year.enabled, year.day, year.snow = True, look.day, look.snow
     for old in [o for o in scene.objects if o.type == 'LIGHT' or o.name.startswith("Haze")]:
         bpy.data.objects.remove(old)
-    add_daylight(scene, elevation=look.sun[0], azimuth=look.sun[1] - 180.0)
-    sun = next(o for o in scene.objects if o.type == 'LIGHT').data
-    sun.energy, sun.color, sun.angle = look.energy, look.tint, radians(0.8)
+    stage.sun(scene, look.sun[0], look.sun[1] - 180.0, look.energy, look.tint, 0.8)
     scene.world = sky(look)
     _air(scene, look)
 
@@ -299,15 +285,12 @@ def render_sheet(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
 
 def main() -> int:
     """Render the sheet of the documentation, or single pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, help="leave pictures of single seasons here instead")
-    parser.add_argument("--only", nargs="+", choices=tuple(LOOKS), default=tuple(LOOKS))
-    parser.add_argument("--width", type=int, default=SIZE[0])
-    parser.add_argument("--samples", type=int, default=SAMPLES)
+    parser = stage.words(__doc__, None, SIZE, SAMPLES)
+    parser.add_argument("--only", nargs="+", choices=tuple(LOOKS), default=tuple(LOOKS), help="with --out: these alone")
     arguments = parser.parse_args()
     session.start()
     session.clean_file()
-    given = (arguments.width, round(arguments.width * 9 / 16)), arguments.samples
+    given = stage.size_of(arguments, SIZE), arguments.samples
     if arguments.out:
         arguments.out.mkdir(parents=True, exist_ok=True)
         build(bpy.context.scene)

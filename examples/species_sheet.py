@@ -21,6 +21,7 @@ from tetflora_addon.species import catalog
 from tetflora_addon.subplants import leaf_meshes, tubes
 from tetflora_addon.subplants.pieces import open_branches
 
+from . import stage
 from .studio import render_cells, save_sheet
 
 COLUMNS, WIDTH, HEIGHT = 8, 240, 290
@@ -42,9 +43,7 @@ def species_cell(
 
     def build() -> tuple[np.ndarray, str]:
         scene = bpy.context.scene
-        empty = bpy.data.objects.new(identifier, None)
-        empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, seed
-        scene.collection.objects.link(empty)
+        empty = stage.plant(scene, identifier, seed, (0.0, 0.0, 0.0))
         bpy.context.view_layer.update()
         steps = plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty])
         (plant,) = run_to_end(steps)

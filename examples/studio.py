@@ -17,7 +17,7 @@ from devtools import session
 from devtools.formats import set_format
 from tetflora_addon.blender import compat
 
-from .daylight import add_daylight
+from . import stage
 
 #: Degrees by which the camera looks down, and by which plants stand to its side of the sun.
 _PITCH, _SUN = 9.0, -40.0
@@ -83,7 +83,7 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
     tree.links.new(black.outputs[0], output.inputs[0])
     text.materials.append(ink)
     scene.collection.objects.link(label)
-    add_daylight(scene, elevation=48.0, azimuth=180.0 - _SUN)
+    stage.daylight(scene, elevation=48.0, azimuth=180.0 - _SUN)
     # The light of a clouded sky around the sun: colored shadows would color the plants.
     background = next(n for n in scene.world.node_tree.nodes if n.type == 'BACKGROUND')
     for link in list(background.inputs["Color"].links):

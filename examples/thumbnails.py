@@ -31,18 +31,15 @@ def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> N
     """Render one plant of a species, full-grown or on a day of the year, as a PNG with a transparent background."""
     import bpy
     import numpy as np
-    from mathutils import Vector
 
     from tetflora_addon.blender.job import plant_mesh
     from tetflora_addon.jobs import run_to_end
 
-    from .daylight import add_daylight
+    from . import stage
 
     session.clean_file()
     scene = bpy.context.scene
-    empty = bpy.data.objects.new(identifier, None)
-    empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, SEED
-    scene.collection.objects.link(empty)
+    empty = stage.plant(scene, identifier, SEED, (0.0, 0.0, 0.0))
     bpy.context.view_layer.update()
     graph = bpy.context.evaluated_depsgraph_get()
     (plant,) = run_to_end(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))
@@ -56,20 +53,13 @@ def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> N
         scene.tetflora.year.enabled, scene.tetflora.year.day = True, day
         run_to_end(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))
     middle, side = (low + high) / 2, max(float((high - low).max()), math.hypot(*(high - low)[:2])) * 1.06
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera = stage.camera(scene, middle + side * np.array([1.2, -2.4, 0.55]), middle, (SIDE, SIDE), far=10.0 * side)
     camera.data.type, camera.data.ortho_scale = 'ORTHO', side
-    eye = Vector(middle.tolist()) + side * Vector((1.2, -2.4, 0.55))
-    camera.location = eye
-    camera.rotation_euler = (Vector(middle.tolist()) - eye).to_track_quat('-Z', 'Y').to_euler()
-    camera.data.clip_end = 10.0 * side
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    add_daylight(scene, elevation=45.0, azimuth=215.0)
+    stage.daylight(scene, elevation=45.0, azimuth=215.0)
     scene.tetflora.refine_at_render = False
     scene.render.engine, scene.render.film_transparent = 'CYCLES', True
     scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, False
     scene.view_settings.exposure = 1.1
-    scene.render.resolution_x = scene.render.resolution_y = SIDE
     image = scene.render.image_settings
     set_format(image, 'PNG')
     image.color_mode, image.color_depth, image.compression = 'RGBA', '8', 100

@@ -24,6 +24,7 @@ from PIL import Image
 
 from devtools import session
 
+from . import stage
 from .close_ups import among_others, face_on_leaf, render, store_sheet
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -68,17 +69,12 @@ def build(scene: bpy.types.Scene) -> None:
     """Fill an empty scene with land, wood, meadow, an oak of its own at the origin, sun and sky."""
     from tetflora_addon.blender.placing import first_forest
 
-    from .daylight import add_daylight
-
-    oak = bpy.data.objects.new("The oak", None)
-    oak.location = (0.0, 0.0, float(height(np.zeros(1), np.zeros(1))[0]))
-    oak.tetflora.is_plant, oak.tetflora.species, oak.tetflora.seed = True, "oak", 1
-    scene.collection.objects.link(oak)
+    stage.plant(scene, "oak", 1, (0.0, 0.0, float(height(np.zeros(1), np.zeros(1))[0])), name="The oak")
     for name, side, step, hole in (("Near", NEAR, 2.5, 0.0), ("Far", LAND, 5.0, NEAR)):
         ground = _ground(name, side, step, hole)
         scene.collection.objects.link(ground)
         _plant(scene, ground)
-    add_daylight(scene, elevation=_ELEVATION, azimuth=_AZIMUTH - 180.0)
+    stage.sun(scene, _ELEVATION, _AZIMUTH - 180.0)
     scene.world = first_forest.sky("Sky over the wood")
     background = next(node for node in scene.world.node_tree.nodes if node.type == 'BACKGROUND')
     links, nodes = scene.world.node_tree.links, scene.world.node_tree.nodes
@@ -86,10 +82,7 @@ def build(scene: bpy.types.Scene) -> None:
     seen.inputs["To Min"].default_value, seen.inputs["To Max"].default_value = _SKY, _SKY * _SEEN
     links.new(path.outputs["Is Camera Ray"], seen.inputs["Value"])
     links.new(seen.outputs[0], background.inputs["Strength"])
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.clip_start, camera.data.clip_end = 0.01, 2000.0
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+    stage.camera(scene, _EYE, _AHEAD, near=0.01, far=2000.0)
     scene.view_settings.look = 'AgX - Medium High Contrast'
     scene.tetflora.refine_at_render = False
 
@@ -148,9 +141,8 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
 
 def aim(scene: bpy.types.Scene, target: Vector, eye: Vector, lens: float) -> None:
     """Look from one place to another."""
-    camera = scene.camera
-    camera.location, camera.data.lens = eye, lens
-    camera.rotation_euler = (target - eye).to_track_quat('-Z', 'Y').to_euler()
+    scene.camera.data.lens = lens
+    stage.look(scene, eye, target)
     bpy.context.view_layer.update()
 
 

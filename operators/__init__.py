@@ -10,19 +10,18 @@ from ..tetflora_addon.blender.runtime import classes_in
 from . import (
     add,
     assets,
-    biomes,
     brush,
     ground_tools,
+    growing,
+    layers,
     marks,
     places,
     plants,
-    populations,
     preview,
     refine,
     report,
     species,
-    stands,
-    year,
+    view,
 )
 
 CLASSES = classes_in(tuple(vars().values()), bpy.types.Operator)

@@ -27,8 +27,8 @@ from ..tetflora_addon.blender.species.edits import catalog, unknown_text
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.planting.rules import Rules
-from .base import Reporting, counted, in_object_mode, need, select_only, selected_plants
-from .populations import Placing, ground_selected, selected_grounds
+from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, selected_plants, show_shapes
+from .layers import ground_found, grounds_to_plant, tell_placed
 
 
 class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
@@ -159,14 +159,14 @@ _RULES = properties_of(Rules, options={'SKIP_SAVE'})
 _SHARED = ("by_density", "count", "as_field", "seed", "slope_max", "min_distance", "scale_min", "scale_max")
 
 
-class TETFLORA_OT_populate(Placing, bpy.types.Operator):
-    """Scatter plants over the selected meshes as a new population, which can be changed later.
+class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
+    """Scatter plants over the selected meshes as a new layer, which can be changed later.
 
     Each plant is an empty, or a vertex of one mesh if there are many.
     """
 
-    bl_label = "Populate"
-    needs = (in_object_mode, ground_selected)
+    bl_label = "Scatter"
+    needs = (in_object_mode, ground_found)
 
     by_density: _RULES.by_density
     count: _RULES.count
@@ -198,8 +198,8 @@ class TETFLORA_OT_populate(Placing, bpy.types.Operator):
                 f"{self.count:,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
                 "set Create As to Field, or use fewer plants"
             )
-        active = scene.tetflora.populations_index
-        population = self._population(scene, selected_grounds(context), weights)
+        active = scene.tetflora.layers_index
+        population = self._population(scene, grounds_to_plant(context), weights)
         uid = population.uid
         try:
             return (yield from make_plants_steps(scene, context.evaluated_depsgraph_get(), population))
@@ -208,11 +208,12 @@ class TETFLORA_OT_populate(Placing, bpy.types.Operator):
             raise
 
     def finish(self, context: bpy.types.Context, result: PlacedPlants) -> set[str]:
-        grounds = selected_grounds(context)
+        grounds = grounds_to_plant(context)
         select_only(context, [*result.objects, *grounds])
         # The terrain stays selected and active, so that Populate can follow Populate.
         context.view_layer.objects.active = grounds[0]
-        return super().finish(context, result)
+        show_shapes(context.scene)
+        return tell_placed(self, result)
 
     def _population(
         self, scene: bpy.types.Scene, grounds: list[bpy.types.Object], weights: dict[str, float]

@@ -90,6 +90,8 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
             context.scene.tetflora.brush.mode = self.mode
         self._done, self._changed = "", False
         self.point(context, event)
+        if (event.type, event.value) == ('LEFTMOUSE', 'PRESS'):  # as the tool of the toolbar begins
+            self._key(context, event)
         self._show(context, event)
         return {'RUNNING_MODAL'}
 

@@ -190,6 +190,8 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
         self._chosen, self._turn, self._scale, self._height = chosen, 0.0, 1.0, display_height(chosen)
         self._changed = False
         self.point(context, event)
+        if (event.type, event.value) == ('LEFTMOUSE', 'PRESS'):  # as the tool of the toolbar begins
+            self._key(context, event)
         self._show(context)
         return {'RUNNING_MODAL'}
 

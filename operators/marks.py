@@ -1,14 +1,18 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mark objects as refined meshes, occluders or fields of plants, convert fields, and edit the lists of the panels."""
+"""What objects are to TetFlora: marks; convert fields; edit the lists of the panels."""
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
+from ..tetflora_addon.blender.assets.marks import scattered
+from ..tetflora_addon.blender.biomes.layers import forget_gone
 from ..tetflora_addon.blender.placing.plant_objects import (
     field_from_plants,
+    note_field,
     plants_from_field,
     plants_of,
     prepare_scene,
@@ -16,66 +20,17 @@ from ..tetflora_addon.blender.placing.plant_objects import (
 from ..tetflora_addon.blender.placing.populations import adopt, collection_of, owner_of
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
-from ..tetflora_addon.blender.scene.objects import SURFACE_TYPES, may_instance
+from ..tetflora_addon.blender.scene.objects import (
+    SURFACE_TYPES,
+    is_scatter,
+    mark_scatter,
+    may_instance,
+    may_scatter,
+)
 from ..tetflora_addon.blender.species.catalog import default_species
 from ..tetflora_addon.blender.species.edits import catalog
-from .base import Reporting, counted, in_object_mode, need, plants_selected, select_only, selected_plants
-
-
-def action_property(mark: str, unmark: str) -> Any:
-    """The property that says what happens to the mark, from descriptions of both outcomes."""
-    return EnumProperty(
-        name="Action",
-        description="How to change the mark",
-        items=(
-            ('TOGGLE', "Toggle", "Mark all, or unmark them if all are marked"),
-            ('MARK', "Mark", mark),
-            ('UNMARK', "Unmark", unmark),
-        ),
-        default='TOGGLE',
-        options={'SKIP_SAVE'},
-    )
-
-
-class Marking(Reporting):
-    """Mix-in for operators with an ``action``.
-
-    Attributes
-    ----------
-    mark : str
-        Property of objects, in ``tetflora``, that is the mark.
-    nothing : str
-        Why the operator cannot be used where nothing that fits is selected.
-    marked : str
-        Report, with ``{}`` for the number of objects.
-    """
-
-    mark: str
-    nothing: str
-    marked: str
-
-    @staticmethod
-    def fits(obj: bpy.types.Object) -> bool:
-        """Whether an object may bear the mark."""
-        raise NotImplementedError
-
-    @classmethod
-    def _chosen(cls, context: bpy.types.Context) -> list[bpy.types.Object]:
-        # Something marked that has since become something else can still be unmarked.
-        return [o for o in context.selected_objects if cls.fits(o) or getattr(o.tetflora, cls.mark)]
-
-    @classmethod
-    def missing(cls, context: bpy.types.Context) -> str:
-        return "" if cls._chosen(context) else cls.nothing
-
-    def run(self, context: bpy.types.Context) -> set[str]:
-        chosen = self._chosen(context)
-        all_marked = all(getattr(o.tetflora, self.mark) for o in chosen)
-        wanted = self.action == 'MARK' or (self.action == 'TOGGLE' and not all_marked)
-        for obj in chosen:
-            setattr(obj.tetflora, self.mark, wanted and self.fits(obj))
-        number = counted(len(chosen), "object")
-        return self.done(self.marked.format(number) if wanted else f"{number} unmarked")
+from ..tetflora_addon.errors import SceneError
+from .base import Reporting, counted, in_object_mode, plants_or_fields_selected, select_only, selected_plants
 
 
 def can_be_explicit(obj: bpy.types.Object) -> bool:
@@ -84,81 +39,193 @@ def can_be_explicit(obj: bpy.types.Object) -> bool:
     return not (group.is_plant or group.is_field) and (obj.type in SURFACE_TYPES or may_instance(obj))
 
 
-class TETFLORA_OT_mark_explicit(Marking, bpy.types.Operator):
-    """Refine the polygons of the selected objects together with the plants: imported trees, rocks, scans, and objects
-    that instance them.
-
-    Use again to unmark.
-    """
-
-    bl_label = "Refine These Meshes"
-    mark, nothing, marked = "is_explicit", "Select meshes, or objects that instance them, first", "{} will be refined"
-
-    action: action_property("Refine the polygons of the objects", "Leave the objects unchanged")
-
-    fits = staticmethod(can_be_explicit)
-
-
-class TETFLORA_OT_mark_occluder(Marking, bpy.types.Operator):
-    """Mark the selected meshes, such as terrain and buildings, as occluders: plants behind them count as hidden and
-    cost next to nothing.
-
-    Use again to unmark.
-    """
-
-    bl_label = "Mark as Occluder"
-    mark, nothing, marked = "is_occluder", "Select meshes first", "{} marked as occluder"
-
-    action: action_property("Plants behind the meshes count as hidden", "The meshes do not affect refinement")
-
-    @staticmethod
-    def fits(obj: bpy.types.Object) -> bool:
-        return obj.type == 'MESH'
-
-
 def can_be_field(obj: bpy.types.Object | None) -> bool:
     """Whether an object has points that could be plants, or is marked as a field although it has none any more."""
     return obj is not None and (obj.type in FIELD_TYPES or obj.tetflora.is_field)
 
 
-class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
-    """Use each point of the active mesh or point cloud, after modifiers, as a plant.
+@dataclass(frozen=True)
+class _Mark:
+    """A property of objects that is a mark, which objects may bear it, and what is said."""
 
-    The attributes species, seed, rotation and scale define the plants. Use again to turn it off.
-    """
+    name: str
+    fits: Callable[[bpy.types.Object], bool]
+    nothing: str
+    marked: str
 
-    bl_label = "Use as Field of Plants"
-    needs = (
-        need(
-            lambda context: can_be_field(context.active_object),
-            "The active object must be a mesh or point cloud; select it last",
+
+_MARKS = {
+    'OCCLUDER': _Mark("is_occluder", lambda obj: obj.type == 'MESH', "Select meshes first", "{} marked as occluder"),
+    'EXPLICIT': _Mark(
+        "is_explicit",
+        can_be_explicit,
+        "Select meshes, or objects that instance them, first",
+        "{} will be refined",
+    ),
+}
+
+
+class TETFLORA_OT_mark(Reporting, bpy.types.Operator):
+    """Let selected objects be something to TetFlora, or no more."""
+
+    bl_label = "Use Selected Objects As"
+    needs = (in_object_mode,)
+
+    what: EnumProperty(
+        name="What",
+        description="What the objects are",
+        items=(
+            (
+                'OCCLUDER',
+                "Occluder",
+                "Plants behind the selected meshes, such as terrain and buildings, count as hidden and cost next to "
+                "nothing. Use again to unmark",
+            ),
+            (
+                'EXPLICIT',
+                "Meshes to Refine",
+                "Refine the polygons of the selected objects together with the plants: imported trees, rocks, scans, "
+                "and objects that instance them. Use again to unmark",
+            ),
+            (
+                'SCATTER',
+                "Scatter to Refine",
+                "Refine what the modifiers or particles of the selected objects scatter, where it stands; they go on "
+                "scattering by their own rules. Use again to keep the scatter plain",
+            ),
+            (
+                'FIELD',
+                "Field of Plants",
+                "Each point of the active mesh or point cloud, after modifiers, is a plant, defined by the attributes "
+                "species, seed, rotation and scale. Use again to turn it off",
+            ),
         ),
     )
+    action: EnumProperty(
+        name="Action",
+        description="How to change the mark",
+        items=(
+            ('TOGGLE', "Toggle", "Mark all, or unmark them if all are marked"),
+            ('MARK', "Mark", "Mark all"),
+            ('UNMARK', "Unmark", "Unmark all"),
+        ),
+        default='TOGGLE',
+        options={'SKIP_SAVE'},
+    )
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        return properties.bl_rna.properties["what"].enum_items[properties.what].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
+        if self.what == 'FIELD':
+            return self._mark_field(context)
+        if self.what == 'SCATTER':
+            return self._mark_scatters(context)
+        mark = _MARKS[self.what]
+        # Something marked that has since become something else can still be unmarked.
+        chosen = [o for o in context.selected_objects if mark.fits(o) or getattr(o.tetflora, mark.name)]
+        if not chosen:
+            return self.failed(mark.nothing)
+        wanted = self._wanted(all(getattr(o.tetflora, mark.name) for o in chosen))
+        for obj in chosen:
+            setattr(obj.tetflora, mark.name, wanted and mark.fits(obj))
+        number = counted(len(chosen), "object")
+        return self.done(mark.marked.format(number) if wanted else f"{number} unmarked")
+
+    def _wanted(self, marked: bool) -> bool:
+        return self.action == 'MARK' or (self.action == 'TOGGLE' and not marked)
+
+    def _mark_field(self, context: bpy.types.Context) -> set[str]:
         obj = context.active_object
+        if not can_be_field(obj):
+            return self.failed("The active object must be a mesh or point cloud; select it last")
         field = obj.tetflora
-        field.is_field = not field.is_field
+        field.is_field = self._wanted(field.is_field)
         if not field.is_field:
+            forget_gone(context.scene)
             return self.done(f'"{obj.name}" is no longer a field of plants')
         field.is_plant = False
         if not field.field_species:
             field.field_species.add().species = field.species or default_species()
+        note_field(context.scene, obj)
         prepare_scene(context.scene)
         return self.done(f'The points of "{obj.name}" are now plants')
 
+    def _mark_scatters(self, context: bpy.types.Context) -> set[str]:
+        found = _scatterers(context)
+        if not found:
+            return self.failed(
+                "Select an object that scatters others first, by geometry nodes, particles, instancing or as a "
+                "collection instance"
+            )
+        if not self._wanted(all(is_scatter(o) for o in found)):
+            for obj in found:
+                mark_scatter(context.scene, obj, False)
+            return self.done(f"The scatter of {counted(len(found), 'object')} stays plain")
+        depsgraph = context.evaluated_depsgraph_get()
+        instances, assets, left, wrong, done = 0, set(), 0, [], 0
+        for obj in found:
+            try:
+                scatter = scattered(obj, depsgraph)
+            except SceneError as error:
+                wrong.append(str(error))
+                continue
+            mark_scatter(context.scene, obj, True)
+            done += 1
+            assets.update(one.target for one in scatter.places)
+            instances += sum(len(one) for one in scatter.places)
+            left += sum(scatter.left.values())
+        if not done:
+            return self.failed(wrong[0])
+        prepare_scene(context.scene)
+        text = f"{counted(instances, 'instance')} of {counted(len(assets), 'asset')} will be refined"
+        text += f"; {counted(left, 'instance')} without faces will not show in results" if left else ""
+        return self.done(f"{text}; {wrong[0]}" if wrong else text)
 
-class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
-    """Replace the selected plants with one object whose vertices are the same plants.
 
-    This keeps Blender fast with many plants; parents, constraints and animation of single plants are lost.
-    """
+def _scatterers(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Selected objects that scatter, or else the active one: results hide it, and nobody can select it then."""
+    for objects in (context.selected_objects, [context.view_layer.objects.active]):
+        if found := [o for o in objects if o is not None and (may_scatter(o) or is_scatter(o))]:
+            return found
+    return []
 
-    bl_label = "Convert Plants to Field"
-    needs = (in_object_mode, plants_selected)
+
+class TETFLORA_OT_convert_plants(Reporting, bpy.types.Operator):
+    """Replace the selected plants with one object whose vertices are the same plants, or take fields apart again."""
+
+    bl_label = "Convert Plants"
+    needs = (in_object_mode, plants_or_fields_selected)
+
+    to: EnumProperty(
+        name="To",
+        description="What the plants become",
+        items=(
+            (
+                'FIELD',
+                "Field",
+                "Replace the selected plants with one object whose vertices are the same plants. This keeps Blender "
+                "fast with many plants; parents, constraints and animation of single plants are lost",
+            ),
+            (
+                'OBJECTS',
+                "Objects",
+                f"Replace the selected fields with one empty per plant. At most {MOST_EMPTIES:,} plants",
+            ),
+        ),
+    )
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        return properties.bl_rna.properties["to"].enum_items[properties.to].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        selected = plants_of(context.selected_objects)
+        return self._to_field(context) if self.to == 'FIELD' else self._to_objects(context)
+
+    def _to_field(self, context: bpy.types.Context) -> set[str]:
+        if not (selected := plants_of(context.selected_objects)):
+            return self.refused("Select plants first")
         plants = [o for o in selected_plants(context) if o.tetflora.enabled and not o.hide_render]
         if not plants:
             return self.refused("The selected plants are disabled, hidden in renders, or linked; enable them first")
@@ -172,18 +239,7 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
         rest = f"; {counted(left, 'plant')} not converted: disabled, hidden in renders, or linked" if left else ""
         return self.done(f'{counted(len(plants), "plant")} converted to the field "{field.name}"{rest}')
 
-
-class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
-    """Make an empty of each plant of the selected fields."""
-
-    bl_label = "Convert Field to Objects"
-    needs = (
-        in_object_mode,
-        need(lambda context: fields_of(context.selected_objects), "Select a field of plants first"),
-    )
-    bl_description = f"Replace the selected fields with one empty per plant. At most {MOST_EMPTIES:,} plants"
-
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def _to_objects(self, context: bpy.types.Context) -> set[str]:
         depsgraph = context.evaluated_depsgraph_get()
         made: list[bpy.types.Object] = []
         for field in [o for o in fields_of(context.selected_objects) if o.library is None]:
@@ -194,7 +250,8 @@ class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
                 adopt(context.scene, owner, plants)
             made += plants
         if not made:
-            return self.refused("The selected fields are linked; make them local first")
+            return self.refused("Select a field of plants first; those that are linked must be made local")
+        forget_gone(context.scene)
         select_only(context, made)
         return self.done(f"{counted(len(made), 'plant')} made")
 

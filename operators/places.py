@@ -28,7 +28,7 @@ from ..tetflora_addon.geodata.outlines import KINDS
 from ..tetflora_addon.geodata.projection import PLAIN
 from .add import mix_in, parse_weights
 from .base import ModalJob, in_object_mode, select_only
-from .populations import selected_grounds
+from .layers import selected_grounds
 
 _LAYERS = ";".join(f"*{ending}" for ending in ENDINGS)
 #: Settings that the next import does not begin with.
@@ -292,7 +292,7 @@ class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
         name="Species",
         description=(
             "Comma-separated identifiers of species with optional weights: beech:3, spruce. Empty for the species of "
-            "Populate"
+            "new layers"
         ),
     )
     min_height: _Float(

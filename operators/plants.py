@@ -7,6 +7,7 @@ from collections.abc import Generator
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
+from ..tetflora_addon.blender.biomes.layers import active_layer, children_of, forget_gone
 from ..tetflora_addon.blender.placing.dropping import DropResult, drop_steps
 from ..tetflora_addon.blender.placing.field_edits import assign_field_species, editable, reseed_field
 from ..tetflora_addon.blender.placing.plant_objects import (
@@ -16,8 +17,9 @@ from ..tetflora_addon.blender.placing.plant_objects import (
     remove_plants,
     reseed,
 )
-from ..tetflora_addon.blender.placing.populations import recount
+from ..tetflora_addon.blender.placing.populations import own_objects, recount
 from ..tetflora_addon.blender.scene.fields import fields_of, stored_size
+from ..tetflora_addon.blender.settings import SCATTER
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
 from ..tetflora_addon.jobs import Progress
 from .base import LINKED, ModalJob, Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
@@ -66,10 +68,10 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
         return self.done(f"{counted(number, 'plant')} re-rolled")
 
 
-class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
-    """Select all plants of the same species as the active plant."""
+class TETFLORA_OT_select_plants(Reporting, bpy.types.Operator):
+    """Select all plants of the same species as the active plant, or those of the active layer."""
 
-    bl_label = "Select Species"
+    bl_label = "Select Plants"
     needs = (in_object_mode,)
 
     species: StringProperty(
@@ -77,21 +79,36 @@ class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
         description="Identifier of the species, which need not be in the catalog; that of the active plant if not set",
         options={'SKIP_SAVE'},
     )
+    layer: BoolProperty(name="Of Layer", description="Those of the active layer, or its fields", options={'SKIP_SAVE'})
     extend: BoolProperty(name="Extend", description="Extend the current selection", options={'SKIP_SAVE'})
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        if not self.species:
+        if self.layer:
+            found = self._of_layer(context.scene)
+            if not found:
+                return self.refused("The layer has no plants; click Update")
+        else:
             active = context.active_object
-            if active is None or not active.tetflora.is_plant:
+            if not self.species and (active is None or not active.tetflora.is_plant):
                 return self.failed("The active object must be a plant; select one")
-            self.species = active.tetflora.species
-        found = [o for o in plants_of(context.view_layer.objects) if o.tetflora.species == self.species]
+            self.species = self.species or active.tetflora.species
+            found = [o for o in plants_of(context.view_layer.objects) if o.tetflora.species == self.species]
         if not self.extend:
             for obj in context.selected_objects:
                 obj.select_set(False)
+        within = set(context.view_layer.objects)
         for obj in found:
-            obj.select_set(True)
-        return self.done(f'{counted(len(found), "plant")} of species "{self.species}" selected')
+            if obj in within:
+                obj.select_set(True)
+        of = "" if self.layer else f' of species "{self.species}"'
+        return self.done(f"{counted(len(found), 'plant')}{of} selected")
+
+    @staticmethod
+    def _of_layer(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+        layer, found = active_layer(scene), []
+        for one in () if layer is None else (layer, *children_of(layer)):
+            found += own_objects(scene, one) if one.kind == SCATTER else [one.field] if one.field else []
+        return found
 
 
 class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
@@ -132,6 +149,7 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
             return self.refused(f"{none[self.which]}; nothing removed")
         number = remove_plants(plants) + remove_fields(fields)
         recount(context.scene)
+        forget_gone(context.scene)
         return self.done(f"{counted(number, 'plant')} removed")
 
 

@@ -13,7 +13,7 @@ from ..tetflora_addon.blender.job.assets import asset_warnings
 from ..tetflora_addon.blender.job.forecast import forecast, learn
 from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
 from ..tetflora_addon.blender.job.render import forget_render_errors
-from ..tetflora_addon.blender.placing.plant_objects import plants_of, prepare_scene
+from ..tetflora_addon.blender.placing.plant_objects import prepare_scene
 from ..tetflora_addon.blender.results import hiding
 from ..tetflora_addon.blender.results.collection import has_results, result_collections
 from ..tetflora_addon.blender.results.hiding import keep_results
@@ -21,6 +21,7 @@ from ..tetflora_addon.blender.results.proxy_kinds import few_bounces
 from ..tetflora_addon.blender.runtime import is_there, redraw, stop_jobs
 from ..tetflora_addon.blender.scene.lights import read_world
 from ..tetflora_addon.blender.viewport import auto
+from ..tetflora_addon.blender.viewport.warnings import cut_off
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.refinement.statistics import Statistics
@@ -76,7 +77,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         self.report({'INFO'}, _made(context.scene, statistics))
         if not statistics.complete and statistics.passes:
             self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
-        outside = _cut_off(context.scene) or _unseen(context.scene, statistics)
+        outside = cut_off(context.scene)[0] or _unseen(context.scene, statistics)
         for warning in (
             *_few_of(asset_warnings),
             statistics.left_out,
@@ -128,25 +129,6 @@ def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
     return (
         f'The camera "{scene.camera.name}" sees no plants. Press Numpad 0 to look through it, and check that it '
         "points at the plants and is not inside an object"
-    )
-
-
-def _cut_off(scene: bpy.types.Scene) -> str:
-    """A warning if the camera's range ends before some plants, else an empty text.
-
-    A new file's camera ends at 100 m: a forest then renders as nothing, and nobody sees why.
-    """
-    if scene.camera is None:  # it was deleted with the last step
-        return ""
-    camera, plants = scene.camera, [o for o in plants_of(scene.objects) if o.tetflora.enabled and not o.hide_render]
-    to_camera = camera.matrix_world.normalized().inverted_safe()
-    end = camera.data.clip_end
-    beyond = sum(-(to_camera @ obj.matrix_world.translation).z > end for obj in plants)
-    if not beyond:
-        return ""
-    return (
-        f"{beyond:,} of {counted(len(plants), 'plant')} are beyond the camera range and invisible; "
-        f'raise the Clip End of "{camera.name}", which is {end:g} m'
     )
 
 

@@ -9,12 +9,12 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
+from ..tetflora_addon.blender.biomes import library
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
 from ..tetflora_addon.blender.placing.plant_objects import assign_species
 from ..tetflora_addon.blender.species.catalog import (
     OWN_FILES,
     load_species_file,
-    own_file,
     save_species,
     write_species,
 )
@@ -28,7 +28,6 @@ from ..tetflora_addon.blender.species.edits import (
     species_data,
     store_species,
 )
-from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.schema import DEFAULT_SPUR
 from ..tetflora_addon.species.skeletons import MAX_ORDERS
 from .base import FileTool, Reporting, counted, need, selected_plants
@@ -214,35 +213,22 @@ class TETFLORA_OT_export_species(FileTool, bpy.types.Operator, ExportHelper):
         return self.done(f"Written to {write_species(context.scene, identifier, self.path)}")
 
 
-class TETFLORA_OT_delete_species(Reporting, bpy.types.Operator):
-    """Delete the file of the species from your species folder. Built-in species remain. This cannot be undone."""
+class TETFLORA_OT_delete_file(Reporting, bpy.types.Operator):
+    """Delete the file of the shown species, or of the chosen biome, from your folder. Built-in ones remain. This cannot
+    be undone.
+    """
 
-    bl_label = "Delete from My Species"
-    needs = (need(lambda context: own_file(shown(context)), "The species has no file in your species folder"),)
+    bl_label = "Delete from My Files"
     bl_options = {'REGISTER'}
+
+    biome: BoolProperty(name="Biome", description="The chosen biome instead of the species", options={'SKIP_SAVE'})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_confirm(self, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        path = OWN_FILES.delete(shown(context))
-        return self.done(f"{path.name} deleted")
-
-
-class TETFLORA_OT_preview_species(Reporting, bpy.types.Operator):
-    """Show one plant of the species at the 3D cursor, updated with every change.
-
-    It is never rendered or saved. Use again to hide it.
-    """
-
-    bl_label = "Preview Species"
-    needs = (lambda context: "" if species.shown_in(context.scene) else species_shown(context),)
-    # No undo: the preview is no part of the file.
-    bl_options = {'REGISTER'}
-
-    def run(self, context: bpy.types.Context) -> set[str]:
-        species.show(context.scene, not species.shown_in(context.scene))
-        return {'FINISHED'}
+        chosen = context.scene.tetflora.new_biome if self.biome else shown(context)
+        return self.done(f"{(library.OWN_FILES if self.biome else OWN_FILES).delete(chosen).name} deleted")
 
 
 class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):

@@ -19,6 +19,13 @@ class SidebarPanel:
     bl_category = "TetFlora"
 
 
+class PropertiesPanel:
+    """Mix-in for panels in the Properties editor; ``bl_context`` names the tab."""
+
+    bl_space_type = 'PROPERTIES'
+    bl_region_type = 'WINDOW'
+
+
 def split_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
     """The panel's layout with labels to the left of values, as elsewhere in Blender."""
     panel.layout.use_property_split = True
@@ -41,9 +48,16 @@ def section(
     return body
 
 
-def draw_message(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = 'ERROR') -> None:
-    """A text over several lines, because Blender does not wrap; a letter is some 7 pixels wide at a scale of 1."""
-    letters = context.region.width / (7.0 * (context.preferences.system.ui_scale or 1.0))  # 0 without a window
+def draw_message(
+    context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = 'ERROR', width: int = 0
+) -> None:
+    """A text over several lines, because Blender does not wrap; a letter is some 7 pixels wide at a scale of 1.
+
+    ``width`` is that of a popover at a scale of 1; that of the region if not given.
+    """
+    letters = (
+        width / 7.0 if width else context.region.width / (7.0 * (context.preferences.system.ui_scale or 1.0))
+    )  # 0 without a window
     column = layout.column(align=True)
     for n, line in enumerate(wrap(text, max(int(letters) - 4, 16))):
         column.label(text=line, icon='BLANK1' if n else icon)
@@ -55,10 +69,12 @@ def thumbnail(identifier: str) -> dict[str, str | int]:
     return {"icon_value": number} if number else {"icon": FALLBACK_ICON}
 
 
-def draw_below(layout: bpy.types.UILayout, text: str) -> None:
-    """A note under a property, where its value is."""
+def draw_below(layout: bpy.types.UILayout, text: str, name: str = "") -> None:
+    """A note where values are, under a property or with a name of its own."""
     row = layout.split(factor=0.4)
-    row.label()
+    left = row.row()
+    left.alignment = 'RIGHT'
+    left.label(text=name)
     row.label(text=text)
 
 
@@ -75,29 +91,40 @@ def draw_properties(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, *na
 
 
 def draw_where(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> None:
-    """Draw where on its ground a population, biome or stand is: masks, limits and curves, as far as it has them."""
-    known = owner.bl_rna.properties
+    """Draw what limits where on its grounds something grows, and the menu of what can: the same for all that grows."""
+    known, shown = owner.bl_rna.properties, owner.limits
     ground = next((entry.object for entry in owner.grounds if entry.object is not None), None)
-    row = layout.row(align=True)
-    _draw_search(row, owner, "vertex_group", ground, "vertex_groups")
-    if "image" in known:
-        row.prop(owner, "invert_group", text="", icon='ARROW_LEFTRIGHT')
+    layout.prop_menu_enum(owner, "limits", icon='ADD')
+    if 'GROUP' in shown:
+        row = layout.row(align=True)
+        _draw_search(row, owner, "vertex_group", ground, "vertex_groups")
+        if "invert_group" in known:
+            row.prop(owner, "invert_group", text="", icon='ARROW_LEFTRIGHT')
+    if 'IMAGE' in shown:
         row = layout.row(align=True)
         row.prop(owner, "image")
         row.prop(owner, "invert_image", text="", icon='ARROW_LEFTRIGHT')
-        if owner.image is not None:
-            mesh = ground.data if ground is not None and ground.type == 'MESH' else None
-            _draw_search(layout, owner, "uv_layer", mesh, "uv_layers")
-    if "use_altitude" in known:
-        layout.prop(owner, "use_altitude")
-        if owner.use_altitude:
-            _draw_limits(layout, owner, "altitude")
-    _draw_limits(layout, owner, "slope")
-    _draw_limits(layout, owner, "wetness")
-    draw_properties(layout, owner, *(name for name in ("areas", "paths") if name in known))
-    if owner.paths is not None:
-        _draw_limits(layout, owner, "path")
-        draw_properties(layout, owner, *({"path_distance"} & set(known.keys())))
+        mesh = ground.data if ground is not None and ground.type == 'MESH' else None
+        _draw_search(layout, owner, "uv_layer", mesh, "uv_layers")
+    for limit in ("slope", "altitude", "wetness"):
+        if limit.upper() in shown:
+            _draw_limits(layout, owner, limit)
+    if 'ALTITUDE' in shown and "scale_at_top" in known:
+        layout.prop(owner, "scale_at_top")
+    if 'FACING' in shown:
+        column = layout.column(align=True)
+        column.prop(owner, "aspect")
+        column.prop(owner, "aspect_spread", text="Spread")
+    if 'EDGE' in shown:
+        layout.prop(owner, "edge_falloff")
+    if 'AREAS' in shown:
+        layout.prop(owner, "areas")
+    if 'PATHS' in shown:
+        layout.prop(owner, "paths")
+        if getattr(owner, "kind", "") == 'BIOME':
+            _draw_limits(layout, owner, "path")
+        else:
+            layout.prop(owner, "path_distance")
 
 
 def _draw_search(
@@ -111,19 +138,17 @@ def _draw_search(
 
 
 def _draw_limits(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str) -> None:
-    """Draw the limits of something as far as they are there, and how soft they are; that only matters to limits."""
+    """Draw the limits of something as far as they are there, and how soft they are."""
     known, column = owner.bl_rna.properties, layout.column(align=True)
     ends = [f"{name}_{end}" for end in ("min", "max") if f"{name}_{end}" in known]
-    softness = f"{name}_softness"
     draw_properties(column, owner, *ends[:1])
     for part in ends[1:]:
         column.prop(owner, part, text="Max")
-    if softness in known:
-        row = column.row()
-        row.active = any(getattr(owner, end) != getattr(known[end], f"hard_{end[-3:]}") for end in ends)
-        row.prop(owner, softness, text="Softness")
-    if f"{name}_falloff" in known:
-        column.prop(owner, f"{name}_falloff", text="Falloff")
+    # Biomes blend; of others, only the edges of some limits are soft.
+    soft = ("softness",) if getattr(owner, "kind", "") == 'BIOME' or name == "wetness" else ("falloff",)
+    for part in soft:
+        if f"{name}_{part}" in known:
+            column.prop(owner, f"{name}_{part}", text=part.title())
 
 
 class Button(NamedTuple):
@@ -167,84 +192,35 @@ def draw_list(
     return column
 
 
-class LayerList:
-    """Mix-in for lists of what grows on the ground: a name, how many plants, and an icon for what they are in."""
+class TETFLORA_UL_species(bpy.types.UIList):
+    """Species of a list, each with another property beside it; of fields, with its number."""
 
-    icon: str
+    #: Property beside the species, by the name of the list's owner's active index; width of the species.
+    beside = {
+        "mix_index": ("weight", 0.7),
+        "leaf_objects_index": ("leaf", 0.5),
+        "field_species_index": ("", 0.12),
+        "output_index": ("pass_index", 0.7),
+        "stand_index": ("planted", 0.7),
+    }
 
-    @staticmethod
-    def state(item: bpy.types.PropertyGroup) -> tuple[int, str]:
-        """Number of plants, and an icon."""
-        raise NotImplementedError
-
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
-        row = layout.row(align=True)
-        row.prop(item, "name", text="", emboss=False, icon=self.icon)
-        right = row.row()
-        right.alignment = 'RIGHT'
-        number, icon = self.state(item)
-        right.label(text=f"{number:,}", icon=icon)
-
-
-class _SpeciesList:
-    """Mix-in for lists of entries with a species, and one more property beside it.
-
-    Attributes
-    ----------
-    entries : str
-        Name of the owner's collection; that of the active index ends in ``_index``.
-    beside : str
-        Name of the other property.
-    fraction : float
-        Width of the species.
-    """
-
-    entries: str
-    beside = ""
-    fraction = 0.7
-
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, index, _flag) -> None:
-        row = layout.split(factor=self.fraction, align=True)
-        if not self.beside:
+    def draw_item(self, _context, layout, data, item, _icon, _active_data, active_property, index, _flag) -> None:
+        if active_property == "species_index":
+            active_property = "stand_index" if "planted" in item.bl_rna.properties else "output_index"
+        beside, fraction = self.beside[active_property]
+        row = layout.split(factor=fraction, align=True)
+        if not beside:
             row.label(text=str(index))
         row.prop(item, "species_choice", text="", emboss=False)
-        if self.beside:
-            row.prop(item, self.beside, text="")
-
-    @classmethod
-    def draw_in(cls, layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> None:
-        """Draw the list of an owner, with buttons to add and remove."""
-        place = "scene" if isinstance(owner.id_data, bpy.types.Scene) else "active_object"
-        given = {"owner": f"{place}.{owner.path_from_id()}", "entries": cls.entries}
-        buttons = (Button("edit_list", action, "", {**given, "action": action}) for action in ('ADD', 'REMOVE'))
-        draw_list(layout, cls, owner, cls.entries, *buttons)
+        if beside:
+            row.prop(item, beside, text="")
 
 
-class TETFLORA_UL_mix(_SpeciesList, bpy.types.UIList):
-    """A species and its weight."""
-
-    entries, beside = "mix", "weight"
-
-
-class TETFLORA_UL_leaf_objects(_SpeciesList, bpy.types.UIList):
-    """A species and the mesh that replaces its leaf."""
-
-    entries, beside, fraction = "leaf_objects", "leaf", 0.5
-
-
-class TETFLORA_UL_field_species(_SpeciesList, bpy.types.UIList):
-    """A number of the attribute species, and the species that it means."""
-
-    entries, fraction = "field_species", 0.12
-
-
-class TETFLORA_UL_output_species(_SpeciesList, bpy.types.UIList):
-    """A species with output settings of its own."""
-
-    entries, beside = "species", "pass_index"
-
-
-class TETFLORA_UL_stand_species(_SpeciesList, bpy.types.UIList):
-    """A species of a stand and its share of what is planted."""
-
-    entries, beside = "species", "planted"
+def draw_species(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, entries: str = "species") -> None:
+    """Draw a list of species of an owner, with buttons to add and remove."""
+    place = "scene"
+    if not isinstance(owner.id_data, bpy.types.Scene):
+        place = f'blend_data.objects["{bpy.utils.escape_identifier(owner.id_data.name)}"]'
+    given = {"owner": f"{place}.{owner.path_from_id()}", "entries": entries}
+    buttons = (Button("edit_list", action, "", {**given, "action": action}) for action in ('ADD', 'REMOVE'))
+    draw_list(layout, TETFLORA_UL_species, owner, entries, *buttons)

@@ -8,8 +8,7 @@ from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalog
 from ..tetflora_addon.species.catalog import FIRST
 from .base import Button, draw_buttons, thumbnail
-from .biomes import FALLBACK_ICON, TETFLORA_MT_add_biome
-from .places import IMPORTS
+from .layers import FALLBACK_ICON, TETFLORA_MT_add_biome, TETFLORA_MT_layers
 from .preferences import PIE
 
 
@@ -52,7 +51,7 @@ class TETFLORA_MT_place_plant(_SpeciesMenu, bpy.types.Menu):
     operator = "place_plant"
 
 
-_POPULATE = Button("populate", 'OUTLINER_OB_POINTCLOUD', "Populate with Plants")
+_POPULATE = Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter Plants")
 _PAINT = Button("paint_plants", 'BRUSH_DATA')
 _DROP = Button("drop_to_ground", 'TRIA_DOWN_BAR')
 _FIRST_FOREST = Button("first_forest", 'WORLD')
@@ -77,50 +76,56 @@ def draw_in_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.menu(TETFLORA_MT_add_plant.__name__, icon='OUTLINER_OB_FORCE_FIELD')
 
 
+class TETFLORA_MT_marks(bpy.types.Menu):
+    """What selected objects are to TetFlora."""
+
+    bl_label = "Use Selected As"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_buttons(
+            self.layout,
+            Button("mark", 'MOD_MASK', "Occluder, or Not", {"what": 'OCCLUDER'}),
+            Button("mark", 'MESH_ICOSPHERE', "Meshes to Refine, or Not", {"what": 'EXPLICIT'}),
+            Button("mark", 'OUTLINER_OB_POINTCLOUD', "Scatter to Refine, or Not", {"what": 'SCATTER'}),
+            Button("mark", 'POINTCLOUD_DATA', "Field of Plants, or Not", {"what": 'FIELD'}),
+            Button("use_as_skeleton", 'CURVE_DATA'),
+            Button("use_as_species", 'ASSET_MANAGER'),
+            Button("use_as_species", 'X', "Species No More", {"stop": True}),
+        )
+
+
 class TETFLORA_MT_object(bpy.types.Menu):
     """Operators for plants and ground, also because Blender's search (F3) finds only what a menu lists."""
 
     bl_label = "TetFlora"
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        draw_buttons(
-            layout,
-            _POPULATE,
-            Button("grow_stand", 'TIME'),
-            Button("mark_occluder", 'MOD_MASK', "Mark or Unmark as Occluder"),
-            Button("mark_explicit", 'MESH_ICOSPHERE', "Refine or Ignore These Meshes"),
-            Button("use_as_species", 'ASSET_MANAGER'),
-            Button("stop_using_as_species", 'X'),
-            Button("refine_scatter", 'OUTLINER_OB_POINTCLOUD', "Refine Scatter or Keep It Plain"),
-            Button("use_as_skeleton", 'CURVE_DATA'),
-            Button("mark_field", 'POINTCLOUD_DATA', "Use or Stop Using as Field of Plants"),
-            Button("make_field", 'POINTCLOUD_DATA'),
-            Button("split_field", 'OUTLINER_OB_EMPTY'),
-            None,
-            _PAINT,
-        )
-        draw_place_menu(layout)
-        draw_buttons(
-            layout,
-            _DROP,
-            Button("ground_cover", 'OUTLINER_OB_CURVES'),
-            Button("add_biome", FALLBACK_ICON),
-            Button("import_populations", 'IMPORT', "Import Populations..."),
-            Button("export_populations", 'EXPORT', "Export Populations..."),
-            None,
-            *IMPORTS,
-            None,
-        )
         draw_species_menu(layout)
         draw_buttons(
             layout,
             Button("reseed", 'FILE_REFRESH'),
-            Button("select_species", 'RESTRICT_SELECT_OFF', "Select All of This Species"),
+            _DROP,
+            Button("select_plants", 'RESTRICT_SELECT_OFF', "Select All of This Species"),
+            Button("convert_plants", 'POINTCLOUD_DATA', "Convert Plants to Field", {"to": 'FIELD'}),
+            Button("convert_plants", 'OUTLINER_OB_EMPTY', "Convert Field to Objects", {"to": 'OBJECTS'}),
             Button("make_plant_mesh", 'OUTLINER_OB_MESH'),
             Button("remove_plants", 'X', "Remove Selected Plants", {"which": 'SELECTED'}),
             Button("remove_plants", 'TRASH', "Remove All Plants", {"which": 'ALL'}),
             None,
+        )
+        layout.menu(TETFLORA_MT_marks.__name__)
+        layout.menu(TETFLORA_MT_layers.__name__)
+        draw_buttons(
+            layout, _POPULATE, Button("grow_stand", 'TIME'), Button("ground_cover", 'OUTLINER_OB_CURVES'), _PAINT
+        )
+        draw_place_menu(layout)
+        layout.prop(context.scene.tetflora.species_editor, "shown", text="Species Editor")
+        draw_buttons(
+            layout,
+            None,
+            Button("look", 'VIEW_CAMERA'),
+            Button("daylight", 'LIGHT_SUN'),
             Button("preview_levels", 'MOD_REMESH'),
             Button("refine", 'MOD_DECIM', "Refine Plants"),
             Button("keep_results", 'MESH_DATA'),
@@ -140,7 +145,7 @@ def draw_in_outliner(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     draw_buttons(
         menu.layout,
         Button("use_as_species", 'ASSET_MANAGER', "Use as TetFlora Species"),
-        Button("stop_using_as_species", 'X', "Stop Using as TetFlora Species"),
+        Button("use_as_species", 'X', "Stop Using as TetFlora Species", {"stop": True}),
     )
 
 

@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Real Places: what can be imported, and where on Earth the scene is; the same in Blender's File > Import."""
+"""What can be imported of real places, also in Blender's File > Import, and the table of an inventory's columns."""
 
 import bpy
 
 from ..operators.places import column_row
-from ..tetflora_addon.blender.geodata.origin import origin_of
-from ..tetflora_addon.errors import TetFloraError
-from .base import Button, SidebarPanel, draw_buttons, draw_message
+from .base import Button
 
 #: In the order in which a place is built.
 IMPORTS = (
@@ -25,24 +23,6 @@ class TETFLORA_UL_inventory_columns(bpy.types.UIList):
         row = column_row(layout, item.name, item.values)
         row.prop(item, "field", text="")
         row.prop(item, "unit", text="")
-
-
-class TETFLORA_PT_places(SidebarPanel, bpy.types.Panel):
-    """Real places."""
-
-    bl_label = "Real Places"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        draw_buttons(self.layout.column(), *IMPORTS)
-        try:
-            place = origin_of(context.scene)
-        except TetFloraError as error:
-            draw_message(context, self.layout, str(error))
-            return
-        if place is not None:
-            where = f"{place.east:,.0f}, {place.north:,.0f} of " if place.system.code >= 0 else ""
-            draw_message(context, self.layout, f"Origin: {where}{place.system.name}", 'WORLD')
 
 
 def draw_in_import_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

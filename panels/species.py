@@ -38,7 +38,7 @@ class TETFLORA_MT_species_files(bpy.types.Menu):
             Button("load_species", 'IMPORT'),
             Button("export_species", 'EXPORT'),
             None,
-            Button("delete_species", 'TRASH'),
+            Button("delete_file", 'TRASH', "Delete from My Species"),
             None,
             Button("create_asset_library", 'ASSET_MANAGER'),
         )
@@ -47,8 +47,12 @@ class TETFLORA_MT_species_files(bpy.types.Menu):
 class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
     """Species."""
 
-    bl_label = "Species Editor"  # Populate has a panel Species, which chooses them
-    bl_options = {'DEFAULT_CLOSED'}
+    bl_label = "Species Editor"
+    bl_category = "Species"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.scene.tetflora.species_editor.shown
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
@@ -74,7 +78,7 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         shown = species.shown_in(scene)
         row = layout.row(align=True)
         row.use_property_split = False
-        Button("preview_species", 'HIDE_OFF' if shown else 'HIDE_ON', "Preview").draw(row, depress=shown)
+        row.prop(context.window_manager, "tetflora_species", icon='HIDE_OFF' if shown else 'HIDE_ON', toggle=True)
         row.prop(editor, "preview_seed")
         text, failed = species.message()
         if shown and text and text != problem:

@@ -18,7 +18,11 @@ from tests.durations import Durations
 # Nothing is timed in a test: by itself an example may take 200 ms, which it exceeds where other processes are at work.
 # Examples are drawn at random on a desk; what CI says follows from the commit alone.
 settings.register_profile(
-    "untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize="CI" in os.environ
+    "untimed",
+    max_examples=50,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize="CI" in os.environ,
 )
 settings.load_profile("untimed")
 

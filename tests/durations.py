@@ -18,12 +18,13 @@ from pathlib import Path
 import pytest
 
 #: Of so many tests of a run the cost is shown.
-SHOWN = 15
+SHOWN = 10
 #: CPU seconds that a test may have taken to be one of the quick ones: these are most, and take a minute together.
-QUICK = 0.1
+QUICK = 0.06
 
 
-def _cpu() -> float:
+def cpu_s() -> float:
+    """Seconds of processors so far, of this process and of those it waited for."""
     return sum(os.times()[:4])
 
 
@@ -36,29 +37,38 @@ class Durations:
     def __init__(self, folder: Path) -> None:
         self.path = folder / f"durations-{sys.version_info.major}.{sys.version_info.minor}.json"
         self.seconds: dict[str, float] = defaultdict(float)
-        self._last = _cpu()
+        self._last = cpu_s()
 
     def kept(self) -> dict[str, float]:
-        """Those of earlier runs; of tests that are in no run any more as well."""
+        """Those of earlier runs; of tests that their files do not have any more as well."""
         return json.loads(self.path.read_text(encoding="utf-8")) if self.path.is_file() else {}
 
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
-        """Leave out what took long the last time; what nobody has run yet is run."""
+        """Files that took longest the last time begin, so that no process is left alone with one of them at the end.
+
+        A quick run leaves out what took long; what nobody has run yet is run.
+        """
+        kept, files = self.kept(), defaultdict(float)
+        for name, seconds in kept.items():
+            files[name.split("::")[0]] += seconds
+        items.sort(
+            key=lambda item: -files[item.nodeid.split("::")[0]]
+        )  # those of a file stay together: sorts are stable
         if not config.getoption("quick"):
             return
-        slow = {name for name, seconds in self.kept().items() if seconds > QUICK}
+        slow = {name for name, seconds in kept.items() if seconds > QUICK}
         config.hook.pytest_deselected(items=[item for item in items if item.nodeid in slow])
         items[:] = [item for item in items if item.nodeid not in slow]
 
     def pytest_runtest_logstart(self) -> None:
         """Begin to count: collecting is nobody's."""
-        self._last = _cpu()
+        self._last = cpu_s()
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self) -> Generator[None, pytest.TestReport, pytest.TestReport]:
         """Mark a report with what it cost; reports travel from the processes of xdist with all they carry."""
         report = yield
-        now = _cpu()
+        now = cpu_s()
         report.cpu_seconds, self._last = now - self._last, now
         return report
 
@@ -78,6 +88,8 @@ class Durations:
                 terminalreporter.line(f"{seconds:7.1f}  {name}")
             terminalreporter.line(f"all of them: {self.path}")
         known = self.kept() | {name: round(seconds, 3) for name, seconds in slowest}
+        root = self.path.parent.parent
+        known = {name: seconds for name, seconds in known.items() if (root / name.split("::")[0]).exists()}
         self.path.parent.mkdir(parents=True, exist_ok=True)
         new = self.path.with_suffix(f".{os.getpid()}")  # two runs may end at once
         new.write_text(json.dumps(known, indent=1), encoding="utf-8")

@@ -25,3 +25,8 @@ def setting(default: bool | int | float, label: str, description: str, /, **opti
         ``subtype``, ``unit``; and ``default``, where an artist starts with another value than the engine.
     """
     return field(default=default, metadata={"name": label, "description": description, **options})
+
+
+def script_setting(default: bool | int | float, /, **options: Any) -> Any:
+    """The same for what only scripts set, as its value follows from others: panels do not show it."""
+    return field(default=default, metadata={"options": {'HIDDEN', 'ANIMATABLE'}, **options})

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import bpy
 
-from benchmarks.compare import difference, plant_mask
+from benchmarks.pictures import difference, plant_mask
 from tetflora_addon.blender import compat
 
 from .pictures import save_sheet

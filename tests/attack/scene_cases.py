@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Attacks in Blender: population files, species that a .blend brings, scenes of any numbers, commands, and jobs."""
+"""Attacks in Blender: layers of files, species that a .blend brings, scenes of any numbers, commands, and jobs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tests.engine import support
 from tetflora_addon.blender import preferences
 from tetflora_addon.blender.cli import command
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.placing import population_files
+from tetflora_addon.blender.placing import population_data
 from tetflora_addon.blender.species import catalog, edits
 from tetflora_addon.errors import TetFloraError
 
@@ -48,25 +48,20 @@ def _fit(text: str) -> str:
     return text.encode(errors="replace").decode().replace("\0", "?")
 
 
-def populations(rng: random.Random, jail: Jail) -> None:
-    """A file with other values: all of its populations are added, or none."""
+def populations(rng: random.Random, _jail: Jail) -> None:
+    """A layer of a file with other values: it is refused, or can be added."""
     group = bpy.context.scene.tetflora
-    group.populations.clear()
-    population = group.populations.add()
+    group.layers.clear()
+    population = group.layers.add()
     population.name = "grove"
     population.mix.add().species = "bush"
-    data = population_files.as_data([population, population])
-    group.populations.clear()
-    path = jail.inside / "p.json"
-    content = material.json_text(rng) if rng.random() < 0.2 else json.dumps(material.mutated(rng, data))
-    path.write_bytes(content if isinstance(content, bytes) else content.encode(errors="surrogatepass"))
+    data = json.loads(json.dumps(material.mutated(rng, population_data.population_data(population))))
     try:
-        number, _ = population_files.read_populations(bpy.context.scene, path)
-    except TetFloraError:
-        assert not len(group.populations)
-        raise
-    assert len(group.populations) == number
-    population_files.write_populations(group.populations, jail.inside / "again.json")
+        population_data.check_population("layer 1", data)
+    except ValueError as error:
+        raise TetFloraError(str(error)) from None
+    population_data.fill_population(population, data, bpy.context.scene, [])
+    json.dumps(population_data.population_data(population))
 
 
 def brought(rng: random.Random, jail: Jail) -> None:
@@ -90,7 +85,7 @@ def brought(rng: random.Random, jail: Jail) -> None:
         catalog.items_for(identifier)
         edits.problem_of(scene, identifier)
         buttons = bpy.ops.tetflora
-        for button in rng.sample(["save_species", "delete_species", "revert_species", "duplicate_species"], 3):
+        for button in rng.sample(["save_species", "delete_file", "revert_species", "duplicate_species"], 3):
             _said(getattr(buttons, button))
         _said(buttons.edit_orders, action=rng.choice(['ADD', 'REMOVE', 'SPUR']))
         _said(buttons.export_species, filepath=str(jail.inside / f"{rng.randrange(9)}.json"))
@@ -183,7 +178,7 @@ def scenes(rng: random.Random, _jail: Jail) -> None:
     with suppress(TetFloraError):
         refine.refine(scene, depsgraph())
         made = True
-    for button in rng.sample(["refine", "clear", "keep_results", "mark_explicit", "make_field", "reseed", "refine"], 3):
+    for button in rng.sample(["refine", "clear", "keep_results", "mark", "convert_plants", "reseed", "refine"], 3):
         _said(getattr(buttons, button))
     if not made:
         raise TetFloraError("refused")

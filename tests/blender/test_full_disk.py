@@ -14,7 +14,7 @@ import pytest
 from devtools import session
 from devtools.formats import set_format
 from farm import write_job
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
+from tests.blender.scenes import add_camera, add_plant, datablocks, tiny_render
 from tests.limits import full_disk
 from tetflora_addon.blender import preferences
 from tetflora_addon.blender.cli import command
@@ -50,10 +50,6 @@ def _loaded_species_to(path: Path) -> None:
     bpy.ops.tetflora.load_species(filepath=str(shipped), replace=True)
 
 
-def _populations_to(path: Path) -> None:
-    bpy.ops.tetflora.export_populations(filepath=str(path))
-
-
 def _assets_to(path: Path) -> None:
     bpy.ops.tetflora.create_asset_library(directory=str(path.parent))
 
@@ -64,15 +60,12 @@ def _assets_to(path: Path) -> None:
         (_species_to, "bush.json", 1000),
         (_own_species_to, "bush.json", 1000),
         (_loaded_species_to, "bush.json", 1000),
-        (_populations_to, "rules.json", 300),
         (_assets_to, "tetflora_plants.blend", 20_000),
     ],
-    ids=["species", "own species", "loaded species", "populations", "asset library"],
+    ids=["species", "own species", "loaded species", "asset library"],
 )
 def test_an_earlier_file_stays(own_folder, write, name, most):
     own_folder.mkdir()
-    select(add_mesh("ground"))
-    bpy.ops.tetflora.add_population()
     write(own_folder / name)
     if name.endswith(".json"):  # another sound file of that name
         path = own_folder / name

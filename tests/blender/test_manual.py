@@ -12,9 +12,8 @@ import pytest
 from devtools import build
 from farm import write_job
 from tetflora_addon.blender import preferences, properties
-from tetflora_addon.blender.biomes.properties import TetFloraBiome
 from tetflora_addon.blender.cli.command import main
-from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraMixEntry, TetFloraPopulation
+from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraLayer, TetFloraMixEntry
 from tetflora_addon.blender.results import collection
 from tetflora_addon.blender.settings import TetFloraWind, TetFloraYear
 from tetflora_addon.blender.stands.properties import TetFloraStand, TetFloraStandEntry
@@ -30,9 +29,8 @@ LABELS = {
 GROUPS = (
     properties.TetFloraScene,
     properties.TetFloraLeafObject,
-    TetFloraPopulation,
+    TetFloraLayer,
     TetFloraMixEntry,
-    TetFloraBiome,
     collection.TetFloraOutput,
     collection.TetFloraSpeciesOutput,
     state.TetFloraPreview,
@@ -58,7 +56,7 @@ def test_every_default_is_the_one_that_is_told(clean_file):
     settings = properties.TetFloraScene.bl_rna.properties
     rows = dict(re.findall(r"^\| \*\*(.+?)\*\* \| [^|]+ \| ([\d,.]+) \|", MANUAL, flags=re.MULTILINE))
     told = {p.identifier: rows[p.name] for p in settings if p.name in rows}
-    assert {"cutoff", "leaf_limit", "block", "hidden", "max_tetrahedra"} <= set(told)
+    assert {"cutoff", "shadow_cutoff", "max_polygons"} <= set(told)
     for identifier, text in told.items():
         default = settings[identifier].default
         if settings[identifier].subtype == 'ANGLE':

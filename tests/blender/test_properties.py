@@ -15,7 +15,7 @@ from tetflora_addon import blender
 from tetflora_addon.blender import preferences, properties, saved_files
 from tetflora_addon.blender.biomes import library
 from tetflora_addon.blender.job import contents
-from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraPopulation
+from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraLayer
 from tetflora_addon.blender.results import leaf_objects
 from tetflora_addon.blender.settings import TetFloraWind, TetFloraYear
 from tetflora_addon.blender.species import catalog, edits
@@ -51,7 +51,7 @@ def _without_labels(settings_class):
     ("engine", "group", "engine_only"),
     [
         (settings.RefinementSettings, properties.TetFloraScene, {"hidden_block", "proxy_block", "margin"}),
-        (rules.Rules, TetFloraPopulation, {"density", "weights", "companions"}),
+        (rules.Rules, TetFloraLayer, {"density", "weights", "companions"}),
         (strokes.Brush, TetFloraBrush, {"density", "scale_min", "scale_max", "weights"}),
         (wind.Wind, TetFloraWind, {"time", "loop", "moving", "origin"}),
         (seasons.Season, TetFloraYear, set()),
@@ -63,7 +63,10 @@ def test_properties_are_made_from_the_fields_of_the_engine(engine, group, engine
     for field in fields(engine):
         if field.metadata:
             made = group.bl_rna.properties[field.name]
-            assert (made.name, made.description) == (field.metadata["name"], field.metadata["description"])
+            if made.is_hidden:
+                assert "name" not in field.metadata
+            else:
+                assert (made.name, made.description) == (field.metadata["name"], field.metadata["description"])
             assert made.default == pytest.approx(field.metadata.get("default", field.default), rel=1e-6)
             assert field.type in {"bool", "int", "float"}
             assert made.type == {"bool": 'BOOLEAN'}.get(field.type, field.type.upper())

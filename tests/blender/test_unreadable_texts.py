@@ -45,16 +45,15 @@ def test_texts_that_are_no_text_are_emptied_and_told(tmp_path, capfd):
     assert "'../secret' cannot name a species" in said
     assert "Traceback" not in said
     group = bpy.context.scene.tetflora
-    population = group.populations[0]
+    population = group.layers[0]
     assert (population.name, population.uv_layer, population.erased, population.mix[0].companion) == ("",) * 4
     assert group.wind.loop == 7
     assert len(population.uid) == 32
     assert "oak" in edits.catalog()
     assert catalog.items_for(bpy.data.objects["plant"].tetflora.species)
-    bpy.ops.tetflora.export_populations(filepath=str(tmp_path / "p.json"))
     with pytest.raises(RuntimeError, match='"plant", "field": unknown species ""'):
         bpy.ops.tetflora.refine()
     select(bpy.data.objects["ground"])
     bpy.data.objects.remove(bpy.data.objects["field"])
     bpy.data.objects["plant"].tetflora.species = population.mix[0].species = "bush"
-    bpy.ops.tetflora.update_population()
+    bpy.ops.tetflora.update_layers(which='ACTIVE')

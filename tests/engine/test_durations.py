@@ -14,7 +14,9 @@ from tests.durations import QUICK, Durations
 
 def run(folder: Path, quick: bool = False, **seconds: float) -> list[str]:
     """The tests that run, of those named, if each takes so long."""
-    plugin, left_out, said = Durations(folder), [], []
+    plugin, left_out, said = Durations(folder / "out"), [], []
+    for name in seconds:
+        (folder / name.split("::")[0]).touch()
     hook = SimpleNamespace(pytest_deselected=lambda items: left_out.extend(items))
     config = SimpleNamespace(getoption={"quick": quick}.get, hook=hook)
     items = [SimpleNamespace(nodeid=name) for name in seconds]
@@ -44,4 +46,18 @@ def test_a_quick_run_leaves_out_what_was_slow(tmp_path: Path) -> None:
 def test_nothing_is_left_out_by_itself(tmp_path: Path) -> None:
     run(tmp_path, slow=1.5 * QUICK)
     assert run(tmp_path, slow=0.0) == ["slow"]
-    assert [path.name for path in tmp_path.iterdir()] == [Durations(tmp_path).path.name]
+    path = Durations(tmp_path / "out").path
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_files_that_took_longest_begin(tmp_path: Path) -> None:
+    run(tmp_path, **{"a::one": 0.1, "b::one": 0.2, "b::two": 0.9, "c::one": 0.3})
+    again = {"new::one": 0.0, "a::one": 0.0, "b::one": 0.0, "b::two": 0.0, "c::one": 0.0}
+    assert run(tmp_path, **again) == ["b::one", "b::two", "c::one", "a::one", "new::one"]
+
+
+def test_tests_whose_file_has_gone_are_forgotten(tmp_path: Path) -> None:
+    run(tmp_path, gone=1.0, there=1.0)
+    (tmp_path / "gone").unlink()
+    run(tmp_path, other=0.0)
+    assert set(Durations(tmp_path / "out").kept()) == {"there", "other"}

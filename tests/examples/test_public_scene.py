@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from benchmarks import compare as images
+from benchmarks import pictures as images
 from examples import public_scene
 
 

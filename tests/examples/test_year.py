@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks import year_costs, year_frames, year_scene
+from benchmarks import year
 from tetflora_addon.blender.job import refine
 
 STATES = tuple((day, 0.0) for day in (1.0, 6.0, 11.0))
-SERIES = year_frames.Series("year", lambda scene: None, STATES, 1)
-TIMES = {f"{kind}_{what}": 1 for kind in year_frames.KINDS for what in ("s", "render_s", "polygons", "facets")}
+SERIES = year.Series("year", lambda scene: None, STATES, 1)
+TIMES = {f"{kind}_{what}": 1 for kind in year.KINDS for what in ("s", "render_s", "polygons", "facets")}
 
 
 def frames(folder, refined, expanded):
@@ -22,9 +22,9 @@ def frames(folder, refined, expanded):
     for gray, kind in ((refined, "refined"), (expanded, "expanded")):
         for state, value in zip(STATES, gray, strict=True):
             picture = Image.fromarray(np.full((16, 16, 3), value, np.uint8))
-            picture.save(year_frames._path(folder, state, kind))
+            picture.save(year._path(folder, state, kind))
     Image.fromarray(np.full((16, 16, 3), 255, np.uint8)).save(folder / "nothing.png")
-    return year_frames.figures(folder, SERIES, {year_frames._key(state): TIMES for state in STATES})
+    return year.figures(folder, SERIES, {year._key(state): TIMES for state in STATES})
 
 
 def test_what_plants_do_does_not_count(tmp_path, clean_file):
@@ -48,16 +48,10 @@ def test_a_pop_of_proxies_counts_where_it_is(tmp_path, clean_file):
 
 def test_digests_are_of_what_was_made(clean_file):
     scene = bpy.context.scene
-    year_scene.lone(scene, "bush", 2.0, (64, 64), age=0.0)
+    year.lone(scene, "bush", 2.0, (64, 64), age=0.0)
     digests = []
     for day in (None, None, 15.0):
-        year_scene.set_day(scene, day)
+        year.set_day(scene, day)
         refine.refine(scene, bpy.context.evaluated_depsgraph_get())
-        digests.append(year_scene.digest(scene))
+        digests.append(year.digest(scene))
     assert digests[0] == digests[1] != digests[2]
-
-
-def test_arrays_that_are_shared_count_once():
-    one = np.zeros(10)
-    assert year_costs.nbytes((one, one[2:], [one])) == one.nbytes
-    assert year_costs.nbytes((one, one.copy())) == 2 * one.nbytes

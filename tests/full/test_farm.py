@@ -15,7 +15,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from benchmarks.compare import difference
+from benchmarks.pictures import difference
 from devtools import session
 from examples import row80
 from tetflora_addon.blender.job import frame_cache, refine

@@ -62,8 +62,8 @@ def test_translations_reach_the_interface(run: Run) -> None:
     """Only a full Blender has languages; a text that Blender has too would be in its words."""
     code = (
         "import bpy; view = bpy.context.preferences.view; view.language = 'de_DE'; "
-        "view.use_translate_interface = True; print('said:', bpy.app.translations.pgettext('Leaf Limit'))"
+        "view.use_translate_interface = True; print('said:', bpy.app.translations.pgettext('Shadow Cutoff'))"
     )
     done = run("-b", "--python-exit-code", "1", "--python-expr", code)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "said: Kleinste Blattbreite" in done.stdout
+    assert "said: Schwelle für Schatten" in done.stdout

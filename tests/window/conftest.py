@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from devtools import build
+from devtools import build, window
 
 
 @pytest.fixture(scope="session")
@@ -29,6 +29,16 @@ def resources(full_blender: str, extension_zip: Path, tmp_path_factory: pytest.T
 def pictures() -> Path:
     """Where pictures of the window go, a folder for each script."""
     return Path(os.environ.get("TETFLORA_PICTURES", build.ROOT / "out" / "window"))
+
+
+@pytest.fixture(scope="module")
+def seen(request: pytest.FixtureRequest, full_blender: str, resources: Path, pictures: Path) -> dict:
+    """What the steps of a file of tests have seen in the window: its ``STEPS``."""
+    steps, folder, seconds = request.module.STEPS
+    path = Path(__file__).parent / f"{steps}.py"
+    result = window.run_in_window(full_blender, path, pictures / folder, seconds, resources)
+    assert result["ok"], result["error"]
+    return result["values"]
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,8 @@ def steps(ui):
     yield from ui.show_sidebar("TetFlora")
     ui.values["bare"] = state()
 
-    yield from press_button(ui, "tetflora.populate")
+    with ui.override():
+        bpy.ops.tetflora.populate('INVOKE_DEFAULT')
     yield from ui.until(lambda: len(plants()) > 0 and not running(ui), 10, "plants")
     ui.values["populated"] = state()
     ui.values["locked"] = scene.render.use_lock_interface
@@ -68,7 +69,7 @@ def steps(ui):
     bpy.data.objects["Hill"].select_set(True)
     before = len(plants())
     yield from press_key(ui, 'F3')
-    ui.type_text("populate with")
+    ui.type_text("scatter plants")
     yield 1.0
     yield from ui.picture("search")
     ui.press('RET')
@@ -131,15 +132,15 @@ def press_button(ui, operator):
     """
     manager = bpy.context.window_manager
     region = next(r for r in ui.area().regions if r.type == 'UI')
-    x = region.x + region.width // 3
-    for y in range(region.y + region.height - STEP, region.y, -STEP):
+    places = [(x, y) for x in (region.width // 3, region.width * 2 // 3) for y in range(region.height - STEP, 0, -STEP)]
+    for x, y in places:
         manager.clipboard = ""
-        ui.move(x, y)
+        ui.move(region.x + x, region.y + y)
         yield 0.03
         ui.press('C', ctrl=True)
         yield 0.03
         if manager.clipboard.startswith(f"bpy.ops.{operator}("):
-            ui.values.setdefault("below_top", {})[operator] = region.y + region.height - y
+            ui.values.setdefault("below_top", {})[operator] = region.height - y
             break
     else:
         raise LookupError(f"the sidebar shows no button for {operator}")

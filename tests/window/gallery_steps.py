@@ -12,21 +12,22 @@ sys.path.append(str(Path(__file__).resolve().parents[2]))
 from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
-from panels.biomes import TETFLORA_PT_biomes  # noqa: E402  (found only now)
+from panels.layers import TETFLORA_PT_add_layer  # noqa: E402  (found only now)
 from panels.species import TETFLORA_PT_species  # noqa: E402
 
 GALLERIES = {
-    "biomes": (TETFLORA_PT_biomes, "new_biome", lambda group: (group, "biome_file")),
+    "biomes": (TETFLORA_PT_add_layer, "new_biome", lambda group: (group, "biome_file")),
     "species": (TETFLORA_PT_species, "species_choice", lambda group: (group.species_editor, "species")),
 }
 
 
 def steps(ui):
     """See devtools/window_driver.py."""
+    bpy.context.scene.tetflora.species_editor.shown = True
     for name, (panel, choice, place) in GALLERIES.items():
         # Alone and open at the top of a tab of its own, so that the picture lies below the panel's header.
         bpy.utils.unregister_class(panel)
-        panel.bl_category, panel.bl_options = name, set()
+        panel.bl_category, panel.bl_options, panel.bl_region_type = name, set(), 'UI'
         bpy.utils.register_class(panel)
         yield from ui.show_sidebar(name)
         group, stored = place(bpy.context.scene.tetflora)

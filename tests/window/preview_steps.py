@@ -34,7 +34,7 @@ def through_the_year(ui, scene):
 
     tall, before = size(), made()
     with ui.override():
-        bpy.ops.tetflora.set_season(season='WINTER')
+        scene.tetflora.year.season = 'WINTER'
     yield from ui.until(lambda: made() > before, 20, "winter")
     ui.values["winter"] = [year.enabled, year.day]
     for frame, years in ((1, 0.0), (2, 3.0)):
@@ -66,7 +66,7 @@ def steps(ui):
     yield from ui.picture("panel")
     ui.values["before"] = names()
 
-    yield from press_button(ui, "tetflora.look_through")
+    yield from press_button(ui, "tetflora.look")
     ui.values["through"] = space.region_3d.view_perspective
     yield from ui.picture("bare")
 
@@ -138,7 +138,7 @@ def steps(ui):
     scene.camera.location = (60.0, 0.0, 3.0)
     yield 0.5
     ui.values["outdated_frozen"] = state.is_outdated(scene)
-    yield from press_button(ui, "tetflora.look_through")
+    yield from press_button(ui, "tetflora.look")
     eye = space.region_3d.view_matrix.inverted().translation
     ui.values["looks_from"] = [round(value, 3) for value in eye]
     yield from ui.picture("frozen_view")
@@ -146,7 +146,8 @@ def steps(ui):
     yield 0.5
     ui.values["outdated"] = state.is_outdated(scene)
     yield from ui.picture("outdated")
-    yield from press_button(ui, "tetflora.forget_levels")
+    with ui.override():
+        bpy.ops.tetflora.preview_levels('INVOKE_DEFAULT', clear=True)
     yield 0.5
     ui.values["forgotten"] = state.find(scene).levels is None
     yield from ui.picture("forgotten")
@@ -172,12 +173,14 @@ def build(scene):
 
 
 def only_panel():
-    """Show the panel Preview alone, open: a copy under another name, because Blender remembers which were closed."""
+    """Show the panel of levels alone, open, in the sidebar: a copy under another name, as Blender keeps closed ones."""
     shown = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
-    ours = next(cls for cls in shown if cls.__name__ == "TETFLORA_PT_preview")
+    ours = next(cls for cls in shown if cls.__name__ == "TETFLORA_PT_developer")
     for cls in shown:
         bpy.utils.unregister_class(cls)
     members = {"bl_options": set(), "bl_idname": "TETFLORA_PT_preview_open"}
+    members["poll"] = classmethod(lambda cls, context: True)
+    members |= {"bl_space_type": 'VIEW_3D', "bl_region_type": 'UI', "bl_category": "TetFlora", "bl_context": ""}
     bpy.utils.register_class(type("TETFLORA_PT_preview_open", (ours,), members))
 
 

@@ -6,10 +6,7 @@ import addon_utils
 import bpy
 
 MODULE = "bl_ext.user_default.tetflora"
-MENUS = (
-    *("VIEW3D_MT_add", "TETFLORA_MT_object", "TETFLORA_MT_species_files", "TETFLORA_MT_populations"),
-    "TETFLORA_MT_seasons",
-)
+MENUS = (*("VIEW3D_MT_add", "TETFLORA_MT_object", "TETFLORA_MT_species_files", "TETFLORA_MT_layers"),)
 
 
 def steps(ui):

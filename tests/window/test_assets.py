@@ -4,20 +4,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import pytest
-
-from devtools import window
-
-HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
-    result = window.run_in_window(full_blender, HERE / "asset_steps.py", pictures / "assets", 180, resources)
-    assert result["ok"], result["error"]
-    return result["values"]
+#: What is done in the window, where its pictures go, and the seconds that it may take.
+STEPS = "asset_steps", "assets", 180
 
 
 def test_the_library_is_known_to_blender(seen: dict) -> None:

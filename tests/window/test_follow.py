@@ -4,20 +4,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import pytest
-
-from devtools import window
-
-HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
-    result = window.run_in_window(full_blender, HERE / "follow_steps.py", pictures / "follow", 300, resources)
-    assert result["ok"], result["error"]
-    return result["values"]
+#: What is done in the window, where its pictures go, and the seconds that it may take.
+STEPS = "follow_steps", "follow", 300
 
 
 def test_plants_are_refined_for_the_view_without_a_camera(seen: dict) -> None:

@@ -4,20 +4,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from devtools import window
-
-HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
-    result = window.run_in_window(full_blender, HERE / "gallery_steps.py", pictures / "gallery", 120, resources)
-    assert result["ok"], result["error"]
-    return result["values"]
+#: What is done in the window, where its pictures go, and the seconds that it may take.
+STEPS = "gallery_steps", "gallery", 120
 
 
 @pytest.mark.parametrize("gallery", ["biomes", "species"])

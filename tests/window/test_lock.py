@@ -4,20 +4,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import pytest
-
-from devtools import window
-
-HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
-    result = window.run_in_window(full_blender, HERE / "lock_steps.py", pictures / "lock", 300, resources)
-    assert result["ok"], result["error"]
-    return result["values"]
+#: What is done in the window, where its pictures go, and the seconds that it may take.
+STEPS = "lock_steps", "lock", 300
 
 
 def test_a_locked_window_leaves_the_work_to_the_thread_of_the_render(seen: dict) -> None:

@@ -4,20 +4,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import pytest
-
-from devtools import window
-
-HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
-    result = window.run_in_window(full_blender, HERE / "modal_steps.py", pictures / "modal", 240, resources)
-    assert result["ok"], result["error"]
-    return result["values"]
+#: What is done in the window, where its pictures go, and the seconds that it may take.
+STEPS = "modal_steps", "modal", 240
 
 
 def test_steps_in_the_window_give_what_the_script_gives(seen: dict) -> None:

@@ -9,16 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from devtools import window
-
-HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
-    result = window.run_in_window(full_blender, HERE / "paint_steps.py", pictures / "paint", 420, resources)
-    assert result["ok"], result["error"]
-    return result["values"]
+#: What is done in the window, where its pictures go, and the seconds that it may take.
+STEPS = "paint_steps", "paint", 420
 
 
 def test_three_clicks_make_a_rendered_forest(seen: dict) -> None:

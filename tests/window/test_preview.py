@@ -9,18 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from devtools import window
-
-HERE = Path(__file__).parent
 Pictures = dict[str, np.ndarray]
 WIRES = ("wires_form", "wires_level", "wires_visibility", "wires_contribution")
 
 
-@pytest.fixture(scope="module")
-def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
-    result = window.run_in_window(full_blender, HERE / "preview_steps.py", pictures / "preview", 300, resources)
-    assert result["ok"], result["error"]
-    return result["values"]
+#: What is done in the window, where its pictures go, and the seconds that it may take.
+STEPS = "preview_steps", "preview", 300
 
 
 @pytest.fixture(scope="module")

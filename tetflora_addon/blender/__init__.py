@@ -3,12 +3,12 @@
 """Everything below the operators that uses bpy: properties, reading scenes, writing results, rendering."""
 
 from . import main_thread, preferences, properties, runtime, saved_files, translations, worker
-from .biomes import library
+from .biomes import layers, library
 from .cli import command
 from .job import forecast, render
 from .placing import assets
 from .species import catalog, edits
-from .viewport import auto, levels, overlay, points
+from .viewport import auto, levels, overlay, points, warnings
 from .viewport import species as species_preview  # or the room of that name could not be read as an attribute
 
 # Handlers and commands read properties, so those come first.
@@ -29,7 +29,9 @@ _PARTS = (
     overlay,
     species_preview,
     points,
+    warnings,
     assets,
+    layers,
     command,
     translations,
 )

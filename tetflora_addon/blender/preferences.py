@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on's preferences: folder of the user's own species, defaults of new scenes, and the cache on disk."""
+"""The add-on's preferences: the user's own species, limits of the machine, quality of new scenes, the cache on disk."""
 
 import os
 from pathlib import Path
@@ -48,13 +48,24 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
         items=QUALITY_ITEMS,
         default='FINAL',
     )
-    new_memory: FloatProperty(
-        name="Max Memory of New Scenes",
+    max_memory: FloatProperty(
+        name="Max Memory",
         description=(
-            "Max Memory of new scenes, in gigabytes: what Blender may take to refine plants and render them. Plants "
-            "that would not fit become coarser. 0 is automatic: half of the machine's memory"
+            "Gigabytes that Blender may take to refine plants and render them. Plants that would not fit become "
+            "coarser. 0 is automatic: half of the machine's memory"
         ),
         default=0.0,
+        min=0.0,
+        soft_max=64.0,
+        precision=1,
+    )
+    kept_memory: FloatProperty(
+        name="Frame Cache",
+        description=(
+            "Maximum size of the frame cache in gigabytes. A render keeps meshes for frames in which the camera "
+            "returns; the least recently used go first. The current frame itself is not limited"
+        ),
+        default=1.0,
         min=0.0,
         soft_max=64.0,
         precision=1,

@@ -15,7 +15,6 @@ from bpy.props import (
 
 from . import settings
 from .biomes import library
-from .biomes import properties as biome_properties
 from .geodata import columns
 from .placing import properties
 from .placing.plant_objects import show_age
@@ -24,7 +23,7 @@ from .results.proxy_kinds import proxy_kind_property
 from .runtime import Listeners
 from .scene import objects
 from .scene.explicit import EXPLICIT_PROPERTY
-from .scene.field_sizes import STAND_SMOOTH, STAND_YEAR
+from .scene.field_sizes import STAND_SMOOTH, STAND_YEAR, stored_now
 from .scene.own_ages import AGE_PROPERTY
 from .scene.skeletons import SKELETON_TYPES
 from .settings import AnimationProperties, RefinementProperties
@@ -59,6 +58,8 @@ def _on_year(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
     last = self.id_data.tetflora.stand.last_year
     if 0.0 < last < self.stand_year:  # all plants are gone after their last records
         self.stand_year = last
+    if self.stand.is_grown:
+        self.stand.plants = len(stored_now(self.id_data))
     self.id_data.update_tag()
     state.listeners.notify()
 
@@ -231,22 +232,17 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
             "Create every polygon of every plant, for comparison. Eighty trees have about 4 million polygons; a forest "
             "does not fit into memory"
         ),
+        options={'HIDDEN', 'ANIMATABLE'},
     )
 
-    populate: PointerProperty(type=properties.TetFloraPopulation)
-    populations: CollectionProperty(
-        name="Populations",
-        description="Plants that were placed together, with the rules to place them again",
-        type=properties.TetFloraPopulation,
+    populate: PointerProperty(type=properties.TetFloraLayer)
+    layers: CollectionProperty(
+        name="Layers",
+        description="What grows on the grounds of the scene, each with the rules to grow it again",
+        type=properties.TetFloraLayer,
     )
-    populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
+    layers_index: IntProperty(name="Active Layer", options={'HIDDEN', 'SKIP_SAVE'})
     stand: PointerProperty(type=stand_properties.TetFloraStand)
-    biomes: CollectionProperty(
-        name="Biomes",
-        description="Biomes of the scene; those above come first where several with limits meet",
-        type=biome_properties.TetFloraBiome,
-    )
-    biomes_index: IntProperty(name="Active Biome", options={'HIDDEN', 'SKIP_SAVE'})
     output: PointerProperty(type=collection.TetFloraOutput)
     brush: PointerProperty(type=properties.TetFloraBrush)
     wind: PointerProperty(type=settings.TetFloraWind)
@@ -285,7 +281,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
 
 
 _MODULES = (
-    *(properties, stand_properties, biome_properties, collection, state),
+    *(properties, stand_properties, collection, state),
     *(editor, edits, asset_species, objects, settings, columns),
 )
 CLASSES = (

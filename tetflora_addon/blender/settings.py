@@ -56,13 +56,20 @@ def properties_of(settings: type, **common: Any) -> SimpleNamespace:
     made = SimpleNamespace()
     for f in fields(settings):
         if f.metadata:
-            setattr(made, f.name, _MAKERS[type(f.default)](**{"default": f.default, **f.metadata, **common}))
+            given = {"name": f.name.replace("_", " ").title(), "default": f.default, **f.metadata, **common}
+            given["options"] = f.metadata.get("options", given.get("options", {'ANIMATABLE'}))
+            setattr(made, f.name, _MAKERS[type(f.default)](**given))
     return made
 
 
 def settings_in(settings: type, **common: Any) -> type:
     """A mix-in for property groups with all settings of a dataclass, as `properties_of`."""
     return type(settings.__name__, (), {"__annotations__": vars(properties_of(settings, **common))})
+
+
+#: What a layer is: plants placed by rules, which are a cover where it says what it covers; a group of layers from a
+#: file; an object whose points are plants that were grown, painted or imported.
+SCATTER, BIOME, FIELD = 'SCATTER', 'BIOME', 'FIELD'
 
 
 def with_identity(groups: Iterable[bpy.types.PropertyGroup], uid: str) -> bpy.types.PropertyGroup | None:
@@ -132,13 +139,13 @@ _WIND = properties_of(Wind)
 _SEASON = properties_of(Season)
 
 
-def _factor(name: str, description: str, default: float) -> Any:
-    """A property from 0 to 1."""
-    return FloatProperty(name=name, description=description, default=default, min=0.0, max=1.0, subtype='FACTOR')
+_SHELL = {"min": 0.0, "max": 1.0, "options": {'HIDDEN', 'ANIMATABLE'}}
 
 
 def quality_number(group: bpy.types.PropertyGroup) -> int:
-    """Index of the quality whose values the settings have; the last one is that of others."""
+    """Index of the quality whose values the settings have; then that of others, and that of every polygon."""
+    if group.expand_everything:
+        return len(QUALITIES) + 1
     for number, values in enumerate(QUALITIES.values()):
         if all(abs(getattr(group, name) - value) < 1e-6 * max(value, 1) for name, value in values.items()):
             return number
@@ -147,6 +154,7 @@ def quality_number(group: bpy.types.PropertyGroup) -> int:
 
 def set_quality(group: bpy.types.PropertyGroup, number: int) -> None:
     """Give the settings the values of a quality; beyond the last one they stay as they are."""
+    group.expand_everything = number > len(QUALITIES)
     for name, value in list(QUALITIES.values())[number].items() if number < len(QUALITIES) else ():
         setattr(group, name, value)
 
@@ -156,30 +164,28 @@ class RefinementProperties(settings_in(RefinementSettings)):
 
     quality: EnumProperty(
         name="Quality",
-        description="How fine the result is; sets Cutoff, Leaf Limit, Facet Size and Visibility Resolution",
-        items=(*QUALITY_ITEMS, ('CUSTOM', "Custom", "Your own values")),
+        description="How fine the result is: Cutoff, and the sizes of leaves and facets that go with it",
+        items=(
+            *QUALITY_ITEMS,
+            ('CUSTOM', "Custom", "Your own values"),
+            (
+                'EVERYTHING',
+                "Every Polygon",
+                "Create every polygon of every plant, for comparison. Eighty trees have about 4 million polygons; a "
+                "forest does not fit into memory",
+            ),
+        ),
         get=quality_number,
         set=set_quality,
     )
-    # The paper's shading of shells (section 7).
-    shell_diffuse: _factor(
-        "Diffuse (p)", "Fraction of light that shells scatter evenly (p in the paper). Smaller values are darker", 1.0
-    )
-    shell_gloss: _factor(
-        "Gloss (s)", "Fraction of light that shells of coplanar leaves reflect as a highlight (s in the paper)", 0.04
-    )
-    shell_spear: FloatProperty(
-        name="Sharpness (spear)",
-        description="Exponent of the highlight (spear in the paper). Larger values make it smaller and brighter",
-        default=7.5,
-        min=0.0,
-        soft_max=100.0,
-        max=1000.0,
-    )
-    shell_roundness: _factor(
-        "Roundness", "How round the contents of shells are shaded: 1 as spheres, 0 as flat discs facing the camera", 1.0
-    )
-    shell_variation: _factor("Variation", "Random variation of brightness between shells", 0.05)
+    # The paper's shading of shells (section 7), for scripts: the fraction of light that they scatter evenly (p), that
+    # which those of coplanar leaves reflect as a highlight (s), the exponent of that (spear), how round contents are
+    # shaded, and random variation of brightness.
+    shell_diffuse: FloatProperty(name="Shell Diffuse", default=1.0, **_SHELL)
+    shell_gloss: FloatProperty(name="Shell Gloss", default=0.04, **_SHELL)
+    shell_spear: FloatProperty(name="Shell Spear", default=7.5, **{**_SHELL, "max": 1000.0})
+    shell_roundness: FloatProperty(name="Shell Roundness", default=1.0, **_SHELL)
+    shell_variation: FloatProperty(name="Shell Variation", default=0.05, **_SHELL)
 
 
 class AnimationProperties:
@@ -195,17 +201,6 @@ class AnimationProperties:
     )
     cell_length: _CELLS.length
     cell_turn: _CELLS.turn
-    kept_memory: FloatProperty(
-        name="Frame Cache",
-        description=(
-            "Maximum size of the frame cache in gigabytes. A render keeps meshes for frames in which the camera "
-            "returns; the least recently used go first. The current frame itself is not limited"
-        ),
-        default=1.0,
-        min=0.0,
-        soft_max=64.0,
-        precision=1,
-    )
 
 
 class TetFloraWind(bpy.types.PropertyGroup):
@@ -251,6 +246,20 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
     return Wind(group.speed, group.direction, group.gusts, frame / rate, group.loop / rate, blurred)
 
 
+#: Days in the middle of the seasons of a temperate wood, in the north, as `SEASONS`; and half a year.
+_MIDDLES, _HALF = (20.0, 125.0, 196.0, 293.0), 182.0
+
+
+def _season_number(year: bpy.types.PropertyGroup) -> int:
+    return SEASONS.index(season_name(Season(year.day % DAYS, year.latitude)))
+
+
+def _go_to_season(year: bpy.types.PropertyGroup, number: int) -> None:
+    day = _MIDDLES[number] + (0.0 if year.latitude >= 0.0 else _HALF)
+    year.enabled, year.day = True, (day - 1.0) % 365.0 + 1.0
+    year.id_data.update_tag()  # as a slider does: previews and Refine Automatically listen
+
+
 class TetFloraYear(bpy.types.PropertyGroup):
     """The day of the year, and the years that have passed; all but the switch can be animated."""
 
@@ -261,6 +270,19 @@ class TetFloraYear(bpy.types.PropertyGroup):
             "Results of Refine do not follow the day; with Refine at Render, each frame of an animation has its own"
         ),
         options=set(),
+    )
+    season: EnumProperty(
+        name="Season",
+        description="Go to the middle of a season at the latitude of the scene, and turn on Seasons",
+        items=(
+            ('WINTER', "Winter", "Bare branches of January"),
+            ('SPRING', "Spring", "Fresh leaves of early May, some still growing"),
+            ('SUMMER', "Summer", "Full leaves of July"),
+            ('AUTUMN', "Autumn", "Leaves of late October, most of them turned"),
+        ),
+        get=_season_number,
+        set=_go_to_season,
+        options={'SKIP_SAVE'},
     )
     day: _SEASON.day
     latitude: _SEASON.latitude
@@ -307,16 +329,20 @@ def season_name(season: Season) -> str:
     return SEASONS[(month + (0 if north else 6)) % 12 // 3]
 
 
+def most_memory(scene: bpy.types.Scene) -> float:
+    """Gigabytes that Blender may take: what a script set for a scene, else the preferences' limit; 0 is automatic."""
+    own = preferences()
+    return scene.tetflora.max_memory or (own.max_memory if own is not None else 0.0)
+
+
 def begin(scene: bpy.types.Scene) -> None:
-    """Give a scene that has no plants yet the quality and memory limit of the preferences, unless it has its own."""
+    """Give a scene that has no plants yet the quality of the preferences, unless it has its own."""
     group, chosen = scene.tetflora, preferences()
     if chosen is None:
         return
     values = QUALITIES[chosen.new_quality]
     if not any(group.is_property_set(name) for name in values):
         set_quality(group, list(QUALITIES).index(chosen.new_quality))
-    if chosen.new_memory > 0.0 and not group.is_property_set("max_memory"):
-        group.max_memory = chosen.new_memory
 
 
 CLASSES = (TetFloraWind, TetFloraYear)

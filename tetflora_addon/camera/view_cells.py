@@ -19,7 +19,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ..setting import setting
+from ..setting import script_setting, setting
 from .camera import Camera
 
 #: How far beyond a cell, as fractions of it in place and angle, its camera still sees enough: while the shutter is
@@ -46,7 +46,8 @@ _FRACTIONS = 64.0
 
 @dataclass(frozen=True)
 class ViewCells:
-    """How large the cells are. Both are properties of a scene, and documented by their tooltips.
+    """How large the cells are. ``length`` is documented by its tooltip; ``turn`` is how far the camera turns before
+    plants are refined again, in radians, by which the view is widened too.
 
     Across the line of sight cells are shorter than ``length``, since there the image changes faster.
     """
@@ -62,15 +63,7 @@ class ViewCells:
         soft_min=0.1,
         soft_max=50.0,
     )
-    turn: float = setting(
-        np.radians(3.0).item(),
-        "Within Angle",
-        "How far the camera turns before plants are refined again. The view is widened by the same angle",
-        subtype='ANGLE',
-        min=np.radians(0.05),
-        soft_max=np.radians(20.0),
-        max=np.radians(40.0),
-    )
+    turn: float = script_setting(np.radians(3.0).item(), subtype='ANGLE', min=np.radians(0.05), max=np.radians(40.0))
 
 
 @dataclass(frozen=True)

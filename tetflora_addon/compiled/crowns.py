@@ -4,18 +4,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import GOLDEN_ANGLE, GOLDEN_TURN, Arrays, Floats, Integers, column, spiral
+from ..growth.envelopes import envelope_reach
 from ..growth.growth import trunks
 from ..growth.seeds import Seeds
-from ..leaves.levels import chosen_polygons
+from ..leaves.levels import level_errors
 from ..leaves.models import LeafModel
 from ..species.members import expected_polygons
 from ..species.species import Species
-from .flora import compile_species
+from .flora import Flora, compile_species
+from .samples import Points
 
 _WITHIN = 0.9  # of the leaves are in what counts as the crown; single shoots beyond it take no room
 _TALLEST = 0.98  # of the leaves are lower than the plant is tall
@@ -24,8 +26,51 @@ LEVEL = 0.7  # of the area of leaves is seen from above, between those that stan
 _LOWEST = 0.03  # of the leaves are lower than the crown's base
 _PLANTS = 16  # over which the length of trunks is averaged
 _MOST = 256  # crowns that are kept
+_REACH = 0.25  # of a line's length is how far its nearer end is to one side of any point of it, on average
+_PARTS = 512  # leaves, and branches, of a crown that stand for all
 
 _known: dict[Species, Crown] = {}
+
+
+@dataclass(frozen=True)
+class CrownParts(Arrays):
+    """Some leaves and branches (n) of a plant of scale 1, each of which stands for a number of its like.
+
+    Attributes
+    ----------
+    position : (n, 3) float64
+        In the axes of the plant, meters.
+    number : (n,) float64
+        How many it stands for.
+    area : (n,) float64
+        One-sided area of one leaf, half the surface of one branch, m².
+    width, length : (n,) float64
+        Of the leaf, or the branch; meters.
+    reach : (n,) float64
+        How far the branch that bears a leaf reaches with all its leaves, and a branch itself, from any point of it and
+        turned any way; meters.
+    sides, segments : (n,) int64
+        Of the tube of a branch.
+    buds : (n,) float64
+        On a branch.
+    form : (n,) int64
+        Which of `Crown.forms` a leaf has; -1 of branches.
+    """
+
+    position: Floats = field(metadata=column(3))
+    number: Floats
+    area: Floats
+    width: Floats
+    length: Floats
+    reach: Floats
+    sides: Integers = field(metadata=column(dtype=np.int64))
+    segments: Integers = field(metadata=column(dtype=np.int64))
+    buds: Floats
+    form: Integers = field(metadata=column(dtype=np.int64))
+
+    def with_leaves(self, fraction: float) -> CrownParts:
+        """The same with a fraction of the leaves."""
+        return replace(self, number=np.where(self.form < 0, 1.0, fraction) * self.number)
 
 
 @dataclass(frozen=True)
@@ -44,10 +89,10 @@ class Crown:
         Expected one-sided area of the leaves and surface of the branches, m².
     color : tuple of float
         Mean linear RGB of both, weighted by how much of them is seen from above.
-    leaf : float
-        Mean width of a leaf, or of a trunk without leaves, meters.
-    form : LeafModel or None
-        One of its leaves, where these are known.
+    forms : tuple of LeafModel or None
+        One of its leaves and one of its blossoms, where these are known.
+    parts : CrownParts
+        Where nobody has looked, all its polygons are leaves that fill the crown evenly.
     """
 
     radius: float
@@ -57,17 +102,18 @@ class Crown:
     leaves: float = 0.0
     wood: float = 0.0
     color: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    leaf: float = 0.02
-    form: LeafModel | None = None
+    forms: tuple[LeafModel | None, ...] = (None,)
+    parts: CrownParts = field(default_factory=CrownParts.empty, compare=False)
+
+    def __post_init__(self) -> None:
+        """Leaves in place of parts that nobody knows."""
+        if not len(self.parts):
+            object.__setattr__(self, "parts", _even_parts(self))
 
     @property
     def seen(self) -> float:
         """Area that leaves and wood hide from above, counted singly, m²."""
         return LEVEL * self.leaves + self.wood / np.pi
-
-    def leaf_polygons(self, widths: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Polygons (n,) of leaves that are so many times as wide in the image as their margins may be off."""
-        return np.ones(len(widths)) if self.form is None else chosen_polygons(self.form, widths / self.form.width)
 
 
 def known_crown(species: Species) -> Crown | None:
@@ -91,6 +137,19 @@ def crown_of(species: Species) -> Crown:
     return found
 
 
+def prepare(species: Species) -> None:
+    """Find the mean crown of a species, and how finely its leaves may be drawn: what an estimate may have to wait for.
+
+    Raises
+    ------
+    SpeciesError
+        As `crown_of`.
+    """
+    for form in crown_of(species).forms:
+        if form is not None:
+            level_errors(form)
+
+
 def _crown_of(species: Species) -> Crown:
     flora = compile_species([species])
     trunk = trunks(flora.rows, Seeds.upright(_PLANTS))
@@ -107,6 +166,68 @@ def _crown_of(species: Species) -> Crown:
     colors = np.stack([flora.leaf_colors(trunk).mean(axis=0), flora.wood_color[row]])
     color = tuple((areas @ colors / areas.sum()).tolist())
     polygons = expected_polygons(flora.species[0])
-    leaf = float(flora.leaf_width[row]) if flora.leaf_count[row] > 0 else 2.0 * float(trunk.radius.mean())
-    form = next((form for forms in flora.forms[0] for form in forms), None) if flora.leaf_count[row] > 0 else None
-    return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), color, leaf, form)
+    forms = tuple(next(iter(own), None) for own in flora.forms[0])
+    parts = CrownParts.concatenate([_leaf_parts(flora, row, length), _branch_parts(flora, row, length)])
+    return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), color, forms, parts)
+
+
+def _even_parts(crown: Crown) -> CrownParts:
+    """Leaves of one polygon each, evenly in a spheroid."""
+    index, none = np.arange(_PARTS), np.zeros(_PARTS, np.int64)
+    place = spiral(1.0 - (2.0 * index + 1.0) / _PARTS, index, GOLDEN_ANGLE)
+    place *= np.cbrt((index * GOLDEN_TURN) % 1.0)[:, None]
+    half = (crown.height - crown.base) / 2.0
+    place = place * (crown.radius, crown.radius, half) + (0.0, 0.0, crown.base + half)
+    area = np.full(_PARTS, crown.leaves / max(crown.polygons, 1.0))
+    number, size = np.full(_PARTS, crown.polygons / _PARTS), np.sqrt(area)
+    return CrownParts(place, number, area, size, size, np.zeros(_PARTS), none, none, np.zeros(_PARTS), none)
+
+
+def _some(points: Points, row: int, length: float) -> tuple[Floats, Integers, Floats, Floats]:
+    """Places (n, 3) of samples of upright trunks, their rows (n,), of how many of its row (n,) each is one, and where
+    leaves point (n, 3).
+
+    Few of large branches, which have most of the samples, so that there are as many of small ones.
+    """
+    first, number = int(points.first[row, -1]), int(points.number[row, -1])
+    rows = points.row[first : first + number]
+    most = _PARTS // len(np.unique(rows))
+    chosen = np.concatenate([np.flatnonzero(rows == one)[:most] for one in np.unique(rows)])
+    rows, chosen = rows[chosen], first + chosen
+    place, along = (of[chosen].astype(np.float64) for of in (points.position, points.frame[:, :, 1]))
+    return length * place, rows, np.bincount(rows)[rows].astype(np.float64), along
+
+
+def _leaf_parts(flora: Flora, row: int, length: float) -> CrownParts:
+    if not flora.leaf_count[row] > 0:
+        return CrownParts.empty()
+    place, rows, like, along = _some(flora.samples.leaves, row, length)
+    totals, leaf = flora.averages, flora.leaf
+    number, area = totals.leaves[row][rows], totals.leaf_area[row, 1][rows]
+    area = area / np.maximum(number, 1e-300)
+    width = np.sqrt(area / np.maximum(leaf.area[rows], 1e-300)) * leaf.width[rows]
+    # The level of detail is that of the largest leaf of a branch.
+    table = flora.rows[rows]
+    size = table["leaf_size"].sum(axis=1) * np.maximum(table["leaf_size_tip"], 1.0)
+    reach = _REACH * totals.length[rows] + envelope_reach(table) * totals.length[rows] + size
+    none = np.zeros(len(rows), np.int64)
+    place = place + 0.5 * size[:, None] * along  # the middle of the leaf
+    form = table["leaf_kind"].astype(np.int64)
+    return CrownParts(place, number / like, area, width, size, reach, none, none, none.astype(float), form)
+
+
+def _branch_parts(flora: Flora, row: int, length: float) -> CrownParts:
+    place, rows, like, _ = _some(flora.samples.wood, row, length)
+    trunk_radius = float(flora.averages.radius[row]) * length / float(flora.averages.length[row])
+    totals, bud = flora.averages, flora.species[0].bud
+    sides, segments = flora.rows["sides"][rows].astype(np.int64), flora.rows["segments"][rows].astype(np.int64)
+    faces = (totals.fixed_faces + totals.full_faces)[row][rows]
+    number = faces / (sides * (segments + flora.rows["rings"][rows]))
+    leaves = totals.leaves[row][rows] / np.maximum(number, 1e-300)
+    buds = np.zeros(len(rows)) if bud is None else np.where(leaves > 0.0, 1.0 + bud.lateral * leaves, 0.0)
+    surface = (totals.fixed_wood + totals.full_wood)[row][rows] * length * trunk_radius + totals.spur_wood[row][rows]
+    # They are larger than a typical one by as much as all have more surface.
+    radius, along, surface = totals.radius[rows], totals.length[rows], surface / np.maximum(number, 1e-300)
+    larger = np.sqrt(surface / np.maximum(np.diag(totals.fixed_wood)[rows] * radius * along, 1e-300))
+    width, along, form = 2.0 * larger * radius, larger * along, np.full(len(rows), -1)
+    return CrownParts(place, number / like, surface / 2.0, width, along, _REACH * along, sides, segments, buds, form)

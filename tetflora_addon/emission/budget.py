@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..refinement.decisions import Decision, contributions
-from ..refinement.estimate import FINEST, NEVER_TOO_MANY
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
 from .drawing import HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL
@@ -24,8 +23,13 @@ from .leaf_detail import TOLERANCE
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
+#: The same of a triangle of expanded plants, whose leaves have many corners: 310 to 380 in Blender and Cycles together.
+BYTES_PER_TRIANGLE = 380
 #: Polygons and facets for each pixel that plants cover, about, with facets of a pixel.
 A_PIXEL = 6.0
+#: Polygons and facets that are never too many: facets are finer than asked for as long as there are no more, up to so
+#: many times.
+NEVER_TOO_MANY, FINEST = 1_200_000.0, 3.0
 #: What an expected number may be off by.
 RESERVE = 0.15
 #: Leaves of what is instanced are real from widths so many times smaller on than those of plants.
@@ -71,11 +75,6 @@ class Detail:
     def asset_larger(self) -> float:
         """Sides of facets of instances over those of plants, which alone gain by being much finer than asked for."""
         return max(ASSETS_FINEST / self.coarser, 1.0)
-
-
-def image_limit(camera: Camera, facet: float = 1.0) -> float:
-    """Polygons and facets that an image shows, about."""
-    return max(A_PIXEL * camera.width * camera.height / facet**2, NEVER_TOO_MANY)
 
 
 def fit_to_budget(

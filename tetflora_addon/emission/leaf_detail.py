@@ -24,7 +24,7 @@ from ..subplants.wood_detail import Pixels
 #: Pixels by which the margin of a leaf may be off.
 TOLERANCE = 0.5
 #: A leaf is no more than so many times as near as its branch, as far as this counts.
-_NEARER = 4.0
+NEARER = 4.0
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class LeafDetail:
         extent = camera.extent_around(knots.reshape(-1, 3)).reshape(len(near), -1).min(axis=1)
         between = np.linalg.norm(np.diff(knots, axis=1), axis=2).max(axis=1) / 2.0
         nearest = self._nearest(extent, between + beside[near])
-        out[near] = size[near] / np.maximum(nearest, extent / _NEARER) / self.tolerance
+        out[near] = size[near] / np.maximum(nearest, extent / NEARER) / self.tolerance
         return out
 
     def _errors(self) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers
+from ..optics import needle_color
 from .blades import blade_surface
 from .bodies import closed_parts, rounded, spined
 from .compounds import Compound, compound_surface
@@ -76,15 +77,9 @@ class LeafLevel:
     solid: bool = False
 
     def colors(self, whole: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Colors (n, f, 3) of faces, from those of leaves: that of a species with needles is that of its shoots.
-
-        A shoot sends back w (1 - p) / (1 - p w) where its needles send back w: p of what one scatters meets another
-        (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform broadleaved and
-        coniferous canopies", 2005).
-        """
+        """Colors (n, f, 3) of faces, from those of leaves: that of a species with needles is that of its shoots."""
         whole = np.minimum(whole * self.tint, 1.0)
-        again = self.again[:, None]
-        return whole / (1.0 - again * (1.0 - whole)) if again.any() else whole
+        return needle_color(whole, self.again[:, None]) if self.again.any() else whole
 
 
 def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: float = 1.0) -> LeafSurface:
@@ -217,11 +212,6 @@ def level_errors(model: LeafModel, finest: float = 0.0) -> Floats:
     return errors
 
 
-def level_polygons(model: LeafModel, finest: float = 0.0) -> Floats:
-    """Polygons (levels + 1,) of a model and its finer levels; down to an error, as above."""
-    return np.array([model.polygons, *(level.model.polygons for level in _finer(model).until(finest)[0])], float)
-
-
 def chosen_level(model: LeafModel, pixels: Floats) -> Integers:
     """Level (n,) of leaves, 0 the model itself, whose lengths are so many times the tolerated error in the image.
 
@@ -234,11 +224,12 @@ def chosen_level(model: LeafModel, pixels: Floats) -> Integers:
     return np.searchsorted(-errors, -1.0 / np.maximum(pixels, 1e-300), side="left").clip(0, len(errors) - 1)
 
 
-def chosen_polygons(model: LeafModel, pixels: Floats) -> Floats:
-    """Polygons (n,) of leaves at the levels that `chosen_level` gives them."""
+def chosen_polygons(model: LeafModel, pixels: Floats) -> tuple[Floats, Floats]:
+    """Polygons (n,) of leaves at the levels that `chosen_level` gives them, and triangles (n,) of these."""
     level = chosen_level(model, pixels)
-    polygons = level_polygons(model, 1.0 / pixels.max()) if level.any() else np.array([model.polygons], float)
-    return polygons[level]
+    finer = _finer(model).until(1.0 / pixels.max())[0] if level.any() else ()
+    counts = [(one.polygons, one.triangles) for one in (model, *(level.model for level in finer))]
+    return tuple(np.array(counts, dtype=np.float64)[level].T)
 
 
 @lru_cache(maxsize=128)

@@ -82,6 +82,11 @@ class LeafModel:
         """Number of faces."""
         return len(self.face_offsets) - 1
 
+    @property
+    def triangles(self) -> int:
+        """Number of triangles that faces consist of."""
+        return len(self.corner_verts) - 2 * self.polygons
+
     @cached_property
     def content(self) -> bytes:
         """Bytes that are equal for models that look the same from afar; what stored tables are keyed by."""

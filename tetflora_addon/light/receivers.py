@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Mask
 from ..compiled.flora import Flora
-from ..proxies.microsurfaces import recollision_albedo
+from ..optics import recollision_albedo
 from ..proxies.summaries import extinction_matrices, summarize
 from ..refinement.loop import Refinement
 from ..tetrahedra.geometry import barycentric, barycentric_gradients, volume
@@ -65,7 +65,7 @@ class MediumCells(Arrays):
         """All cells of a refinement, in the order of ``refinement.nodes``.
 
         Where ``even`` (n,) is set, nothing else stands for the leaves, and the cloud dims what they scatter as their
-        clumps do, of whose area the effective one is a fraction; see `proxies.microsurfaces.recollision_albedo`.
+        clumps do, of whose area the effective one is a fraction; see `optics.recollision_albedo`.
         """
         nodes, contents = refinement.nodes, refinement.contents
         # Large polygons are walls, not fog: they are occluders.

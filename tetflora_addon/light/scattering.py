@@ -18,6 +18,7 @@ from itertools import permutations, product
 import numpy as np
 
 from ..arrays import Floats
+from ..optics import GLOSS
 
 #: Reflected (n, 3), transmitted (n, 3) and mirrored (n,) fractions of light, see `scattered_fractions`.
 Fractions = tuple[Floats, Floats, Floats]
@@ -33,8 +34,8 @@ _SNUB = (0.8662468181078206, 0.4225186537611115, 0.2666354015167047)
 #: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
 #: absorb on the whole way. Products over 1 are cut off.
 THROUGH_TINT = np.array([1.15, 1.1, 0.55])
-#: Fraction of the waxy surface's own, colorless reflection (4 % at a refractive index of 1.5), and its roughness.
-GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
+#: Roughness of the waxy surface's own, colorless reflection.
+GLOSS_ROUGHNESS = 0.6
 
 
 def _directions() -> Floats:

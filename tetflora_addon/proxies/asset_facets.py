@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from ..arrays import perpendicular, unit
 from ..assets.asset import COUNTS
 from ..growth.hashing import signed, uniform
+from ..optics import recollision_albedo
 from ..refinement.asset_parts import AssetParts, PlacedAssets
 from ..refinement.contents import Totals
 from .facet_weights import by_number
-from .microsurfaces import Facets, facet_numbers, recollision_albedo
+from .microsurfaces import Facets, facet_numbers
 
 #: Child indices of facets of leaves and of wood start here; draws of their numbers, turns and places.
 _LEAF_PATH, _WOOD_PATH = 1 << 42, 1 << 43

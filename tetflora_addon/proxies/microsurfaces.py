@@ -31,6 +31,7 @@ from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, child_key, mix, signed, uniform
 from ..growth.seasons import AREA, PRESENT, leaf_stages
 from ..growth.wind import moment
+from ..optics import GLOSS, cluster_color
 from ..refinement.contents import piece_leaves
 from ..subplants.pieces import Pieces, Thin, wood_areas
 from .hotspots import balanced_colors
@@ -281,7 +282,7 @@ def _leaves_of_subplants(
         across,
         along,
         np.sqrt(area * weight[owner] if of_day is None else area * weight[owner] * of_day),
-        facet_albedo(color, owner, weight, hotspot_factor),
+        facet_albedo(color, owner, weight, hotspot_factor, _gloss(flora, leaf_row)),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, center),
         dull=_dull(flora, leaf_row, owner, weight, hotspot_factor),
@@ -342,7 +343,7 @@ def _leaves_of_pieces(
     color = leaf_colors_of_facets(
         flora, row[owner], key, many, *places, None if branches.year is None else (branches, owner)
     )
-    color = facet_albedo(color, owner, weight, hotspot_factor)
+    color = facet_albedo(color, owner, weight, hotspot_factor, _gloss(flora, row[owner]))
     transmission = flora.leaf.transmission[row[owner]]
     velocity = None
     if own.later is not None:
@@ -465,9 +466,15 @@ def leaf_colors_of_facets(
     return np.clip(mean + gathered(flora.rows["leaf_color"][:, 1], row) * deviation[:, None], 0, 1)
 
 
-def facet_albedo(color: NDArray, owner: NDArray, weight: NDArray, hotspot_factor: NDArray | None) -> Floats:
-    """Colors (m, 3) of facets of owners (m,), by the weights of these (n,) and what light and eye share of them."""
-    color = recollision_albedo(color, weight[owner])
+def facet_albedo(
+    color: NDArray, owner: NDArray, weight: NDArray, hotspot_factor: NDArray | None, gloss: Floats | None = None
+) -> Floats:
+    """Colors (m, 3) of facets of owners (m,), by the weights of these (n,) and what light and eye share of them.
+
+    ``gloss`` (m,) is that of leaves; wood has none.
+    """
+    gloss = np.zeros(len(owner)) if gloss is None else gloss
+    color = cluster_color(color, gloss, weight[owner])
     return color if hotspot_factor is None else balanced_colors(color, hotspot_factor[owner])
 
 
@@ -477,15 +484,9 @@ def _dull(flora: Flora, row: NDArray, owner: NDArray, weight: NDArray, hotspot_f
     return 1.0 - left[owner] * (1.0 - flora.leaf.dull[row])
 
 
-def recollision_albedo(color: Floats, weight: Floats) -> Floats:
-    """Color (n, 3) of clusters of surfaces that are seen by a fraction ``weight`` (n,) of their area.
-
-    What one surface scatters meets another of its cluster with the probability p = 1 − weight, and is dimmed again:
-    ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform
-    broadleaved and coniferous canopies", 2005).
-    """
-    p = np.clip(1.0 - weight, 0.0, 1.0)[:, None]
-    return color * (1.0 - p) / (1.0 - p * color)
+def _gloss(flora: Flora, row: NDArray) -> Floats:
+    """Fraction (m,) of light that leaves of rows (m,) mirror."""
+    return GLOSS * (1.0 - flora.leaf.dull[row])
 
 
 #: Planes of each kind of leaf: quantiles of the areas of its faces.

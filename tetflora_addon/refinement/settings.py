@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ..setting import setting
+from ..setting import script_setting, setting
 
 
 @dataclass(frozen=True)
@@ -15,10 +15,36 @@ class RefinementSettings:
     """Limits of the loop of visibility, refinement and update.
 
     Fields with a label are properties of a scene, and documented by their tooltips. Sizes are in pixels of the final
-    image. With ``anchored``, tetrahedra begin with `tetrahedra.world_root` instead of the view.
+    image.
 
     Attributes
     ----------
+    leaf_limit : float
+        Leaves narrower than so many pixels become facets; up to 2.5 times this width, a growing fraction stays real.
+        About half of ``facet``: below that, leaves cost more polygons than facets.
+    block : float
+        Visible tetrahedra larger than so many pixels are always split, even where all their contents become polygons,
+        to find hidden parts.
+    few_polygons : int
+        Tetrahedra holding fewer polygons are not split further.
+    hidden : float
+        Visibility below which a tetrahedron counts as hidden. Larger values save polygons in thickets.
+    visibility_resolution : int
+        Longer side, in pixels, of the buffer that determines what hides what; time grows with the square.
+    max_tetrahedra : int
+        Refinement stops before exceeding so many, which bounds time and memory.
+    max_levels : int
+        How often space can be halved.
+    max_passes : int
+        Stop after so many passes, to inspect an intermediate state; 0 for no limit.
+    facet : float
+        Size in pixels of the facets that stand for leaves, at most: where there are few, they are finer.
+    max_memory : float
+        Gigabytes of Blender, for refinement, its result and rendering together; 0 is half of the machine's memory.
+        Plants that would not fit become coarser.
+    anchored : bool
+        Divide space the same way in every frame of an animation, whatever the camera does: tetrahedra begin with
+        `tetrahedra.world_root` instead of the view. Always so for panoramas.
     hidden_block : float
         Longest edge, in pixels at its depth, down to which hidden tetrahedra are divided. Facets take their places from
         the plants, so that they need no such limit; a shell fills its whole tetrahedron and does.
@@ -40,82 +66,18 @@ class RefinementSettings:
         soft_max=16.0,
         max=1000.0,
     )
-    leaf_limit: float = setting(
-        0.6,
-        "Leaf Limit",
-        "Leaves narrower than this become facets; up to 2.5 times this width, a growing fraction stays real. About "
-        "half the facet size; below that, leaves cost more polygons than facets",
-        subtype='PIXEL',
-        min=0.05,
-        soft_max=4.0,
-        max=1000.0,
-    )
-    block: float = setting(
-        32.0,
-        "Block Size",
-        "Visible tetrahedra larger than this are always split, even where all their contents become polygons, to find "
-        "hidden parts. Smaller values find more of them and take longer",
-        subtype='PIXEL',
-        min=1.0,
-        soft_max=256.0,
-        max=10_000.0,
-    )
-    few_polygons: int = setting(
-        200,
-        "Split Threshold",
-        "Tetrahedra holding fewer polygons than this are not split further",
-        min=0,
-        soft_max=5_000,
-    )
-    hidden: float = setting(
-        0.02,
-        "Hidden Below",
-        "Visibility below which a tetrahedron counts as hidden. Larger values save polygons in thickets",
-        subtype='FACTOR',
-        min=0.0,
-        max=1.0,
-    )
+    leaf_limit: float = script_setting(0.6, min=0.05, max=1000.0)
+    block: float = script_setting(32.0, min=1.0, max=10_000.0)
+    few_polygons: int = script_setting(200, min=0)
+    hidden: float = script_setting(0.02, min=0.0, max=1.0)
     hidden_block: float = math.inf
     proxy_block: float = math.inf
     margin: float = 0.04
-    visibility_resolution: int = setting(
-        256,
-        "Visibility Resolution",
-        "Longer side, in pixels, of the buffer that determines what hides what. Larger values are more exact; time "
-        "grows with the square",
-        subtype='PIXEL',
-        min=16,
-        soft_min=64,
-        soft_max=1024,
-        max=4096,
-    )
-    max_tetrahedra: int = setting(
-        400_000,
-        "Max Tetrahedra",
-        "Refinement stops before exceeding this many tetrahedra, which bounds time and memory",
-        min=100,
-        soft_min=10_000,
-        soft_max=2_000_000,
-    )
-    max_levels: int = setting(60, "Max Levels", "Maximum number of times that space can be halved", min=1, max=200)
-    max_passes: int = setting(
-        0,
-        "Max Passes",
-        "Stop refinement after this many passes, to inspect an intermediate state; 0 for no limit. Tetrahedra that "
-        "would be split further become polygons or proxies as they are",
-        min=0,
-        soft_max=40,
-    )
-    facet: float = setting(
-        1.2,
-        "Facet Size",
-        "Size in pixels of the small facets that stand for leaves, at most: where there are few, they are finer. "
-        "Larger values give fewer, coarser facets",
-        subtype='PIXEL',
-        min=0.1,
-        soft_max=4.0,
-        max=100.0,
-    )
+    visibility_resolution: int = script_setting(256, min=16, max=4096)
+    max_tetrahedra: int = script_setting(400_000, min=100)
+    max_levels: int = script_setting(60, min=1, max=200)
+    max_passes: int = script_setting(0, min=0)
+    facet: float = script_setting(1.2, min=0.1, max=100.0)
     max_polygons: int = setting(
         0,
         "Max Polygons",
@@ -125,21 +87,8 @@ class RefinementSettings:
         soft_max=100_000_000,
         step=100_000,
     )
-    max_memory: float = setting(
-        0.0,
-        "Max Memory",
-        "Maximum memory of Blender in gigabytes, for refinement, its result and rendering together. 0 is automatic: "
-        "half of the machine's memory. Plants that would not fit become coarser",
-        min=0.0,
-        soft_max=256.0,
-        precision=1,
-    )
-    anchored: bool = setting(
-        False,
-        "Anchored",
-        "Divide space the same way in every frame of an animation, whatever the camera does, so that less changes "
-        "between frames. Creates somewhat more geometry. Always on for panoramas",
-    )
+    max_memory: float = script_setting(0.0, min=0.0)
+    anchored: bool = script_setting(False)
     shadow_cutoff: float = setting(
         0.0,
         "Shadow Cutoff",

@@ -17,7 +17,7 @@ from ..arrays import Mask
 from ..errors import TetFloraError
 from ..jobs import Progress
 from ..parallel import blocks, on_all_cores
-from ..setting import LENGTH, setting
+from ..setting import script_setting, setting
 from .change import MOST_PLANTS, SeedDispersal, dying, fallen, grown, planted
 from .light import LightGrid
 from .plants import DeadPlants, Plants, Records, in_order
@@ -36,16 +36,23 @@ _LEVEL = 0.5
 
 @dataclass(frozen=True)
 class StandSettings:
-    """How a stand grows. Fields with a label are properties of the scene, and documented by their tooltips."""
+    """How a stand grows. Fields with a label are properties of the scene, and documented by their tooltips.
+
+    Attributes
+    ----------
+    interval : int
+        Years between two records of the stand; 0 keeps the last year only.
+    min_height : float
+        Meters; lower plants are not part of the result.
+    cell : float
+        Width, meters, of the columns in which light is computed.
+    open_edges : bool
+        Light comes in from all sides, as at the edge of a wood. Otherwise the stand goes on beyond the ground, and what
+        grows at one side shades what grows at the opposite one.
+    """
 
     years: int = setting(80, "Years", "How long the stand grows", min=1, soft_max=300, max=2000)
-    interval: int = setting(
-        5,
-        "Interval",
-        "Years between two records of the stand, for the slider through the years; 0 keeps the last year only",
-        min=0,
-        soft_max=50,
-    )
+    interval: int = script_setting(5, min=0)
     seed: int = setting(0, "Seed", "A different seed gives a different stand")
     density: float = setting(
         2500.0,
@@ -68,23 +75,9 @@ class StandSettings:
         min=0.0,
         soft_max=10.0,
     )
-    min_height: float = setting(
-        1.0, "Min Height", "Plants lower than this are not part of the result", min=0.0, soft_max=10.0, **LENGTH
-    )
-    cell: float = setting(
-        1.0,
-        "Cell",
-        "Width of the columns in which light is computed; larger is faster and coarser",
-        min=0.1,
-        soft_max=5.0,
-        **LENGTH,
-    )
-    open_edges: bool = setting(
-        False,
-        "Open Edges",
-        "Light comes in from all sides, as at the edge of a wood. Otherwise the stand goes on beyond the ground, and "
-        "what grows at one side shades what grows at the opposite one",
-    )
+    min_height: float = script_setting(1.0, min=0.0)
+    cell: float = script_setting(1.0, min=0.1)
+    open_edges: bool = script_setting(False)
 
 
 def grow(

@@ -41,9 +41,9 @@ def bud_numbers(flora: Flora, whole: WholeBranches) -> Integers:
     return BUD_RINGS * np.bincount(owner, minlength=len(whole))
 
 
-def bud_sides(sides: int) -> int:
+def bud_sides(sides: int | Integers) -> Integers:
     """Sides of the buds on twigs of so many."""
-    return int(np.clip(2 * sides, 6, 24))
+    return np.clip(2 * sides, 6, 24)
 
 
 def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings, Integers] | None:

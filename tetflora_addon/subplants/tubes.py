@@ -96,7 +96,7 @@ class _TubeGroup:
         vertices, faces = self.sides * int(self.rings.sum()), self.sides * int((self.rings - 1).sum())
         if self.beside is None:
             return vertices, faces
-        kinds = (self.beside, root_sides(self.sides), PLACES), (self.buds, bud_sides(self.sides), BUD_RINGS)
+        kinds = (self.beside, root_sides(self.sides), PLACES), (self.buds, int(bud_sides(self.sides)), BUD_RINGS)
         for number, sides, each in kinds:
             rings = int(number.sum())
             vertices, faces = vertices + sides * rings, faces + sides * (rings - rings // each)
@@ -114,7 +114,7 @@ class _TubeGroup:
             if (foot := foot_rings(flora, whole, fine)) is not None:
                 yield foot[0], root_sides(self.sides), whole.take(foot[1])
             if (buds := bud_rings(flora, whole, fine)) is not None:
-                yield buds[0], bud_sides(self.sides), whole.take(buds[1])
+                yield buds[0], int(bud_sides(self.sides)), whole.take(buds[1])
 
 
 def _sorts(

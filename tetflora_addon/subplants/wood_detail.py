@@ -14,10 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Arrays, Floats, Integers, Mask, cross, dot, smoothstep, spread, unit
+from ..arrays import Arrays, Floats, Integers, cross, dot, smoothstep, spread, unit
 from ..compiled.flora import Flora
 from ..growth.axes import Axes
-from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, radius_at
 
 #: Pixels by which a tube may be off the round and bent branch that it stands for.
@@ -30,8 +29,8 @@ _BAND = 2.5
 _BENT = 8.0
 #: The curve leaves the straight segment by no more than this part of the radius.
 _ASIDE = 0.5
-#: Thickness of the wood of a sub-plant over that of its own branch, and how bent segments are, about.
-_WITHIN, _SAGITTA = 0.3, 0.05
+#: How bent segments are, about.
+_SAGITTA = 0.05
 # Largest value of both Hermite polynomials of tangents.
 _HERMITE = 4.0 / 27.0
 # Places on a segment at which it is asked how near it comes.
@@ -110,14 +109,10 @@ def _largest(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Floats:
     return np.maximum.reduceat(size, np.searchsorted(owner, np.arange(len(whole))))
 
 
-def finer(flora: Flora, branches: Branches, alone: Mask, pixels: Pixels) -> Floats:
-    """Expected faces (n,) over those of coarse tubes: of sub-plants, or of their own branch ``alone`` (n,)."""
-    row = branches.row
-    sides = flora.rows["sides"][row]
-    size = branches.radius * np.where(alone, 1.0, _WITHIN) / np.maximum(pixels.extent(branches.position), 1e-300)
-    around = fine_sides(sides, size) / sides
+def finer(sides: Integers, pixels: Floats) -> tuple[Integers, Floats]:
+    """Sides (n,) of branches of a radius in pixels (n,) whose species has so many (n,), and rings over those it has."""
     # Along, sagittas fall with the square of the parts.
-    return around * np.where(size > round_up_to(sides), 1.0 + np.sqrt(_SAGITTA * size), 1.0)
+    return fine_sides(sides, pixels), np.where(pixels > round_up_to(sides), 1.0 + np.sqrt(_SAGITTA * pixels), 1.0)
 
 
 @dataclass(frozen=True)

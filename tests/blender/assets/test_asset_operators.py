@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from panels import menus, plants, refine
+from devtools.layouts import Layout
+from panels import menus, plants
 from tests.blender.assets.scatters import crown, read, scene, species
-from tests.blender.layouts import Layout
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender.assets import marks
 from tetflora_addon.blender.job import frame_cache
@@ -27,27 +27,27 @@ def test_refine_scatter_says_what_it_found_and_refuses_with_a_reason(capfd):
     ground, child = add_mesh("ground"), add_mesh("child")
     select(ground)
     with pytest.raises(RuntimeError, match="Select an object that scatters others"):
-        bpy.ops.tetflora.refine_scatter()
+        bpy.ops.tetflora.mark(what='SCATTER')
     ground.instance_type = 'VERTS'
     with pytest.raises(RuntimeError, match='"ground" shows no instances now'):
-        bpy.ops.tetflora.refine_scatter()
+        bpy.ops.tetflora.mark(what='SCATTER')
     assert not ground.tetflora.is_scatter
     lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", 'POINT'))
     scene().collection.objects.link(lamp)
     lamp.parent = ground
     with pytest.raises(RuntimeError, match=r"only objects without faces \(lamp\)"):
-        bpy.ops.tetflora.refine_scatter()
+        bpy.ops.tetflora.mark(what='SCATTER')
     child.parent, ground.tetflora.is_explicit = ground, True
     capfd.readouterr()
-    assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
+    assert bpy.ops.tetflora.mark(what='SCATTER') == {'FINISHED'}
     assert (
         "4 instances of 1 asset will be refined; 4 instances without faces will not show in results"
         in capfd.readouterr().out
     )
     assert ground.tetflora.is_scatter and not ground.tetflora.is_explicit
-    assert bpy.ops.tetflora.refine_scatter(action='MARK') == {'FINISHED'}
+    assert bpy.ops.tetflora.mark(what='SCATTER', action='MARK') == {'FINISHED'}
     assert ground.tetflora.is_scatter
-    assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
+    assert bpy.ops.tetflora.mark(what='SCATTER') == {'FINISHED'}
     assert not ground.tetflora.is_scatter
 
 
@@ -58,9 +58,9 @@ def test_a_scatter_that_results_hide_can_be_left_plain_again():
     ground.hide_viewport = True  # as results do; nobody can select it then
     ground.select_set(False)
     bpy.context.view_layer.update()
-    layout = _drawn(refine.TETFLORA_PT_refine, active_object=None)  # so it is in a window
+    layout = _drawn(plants.TETFLORA_PT_object, active_object=None)  # so it is in a window
     assert "is_scatter" in layout.names("prop", 1)
-    assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
+    assert bpy.ops.tetflora.mark(what='SCATTER') == {'FINISHED'}
     assert not ground.tetflora.is_scatter
 
 
@@ -94,8 +94,8 @@ def test_operators_take_collections_by_name_and_many_objects():
         "two",
     ]
     select(bpy.data.objects["two"], bpy.data.objects["three"])
-    assert bpy.ops.tetflora.stop_using_as_species() == {'FINISHED'}
-    assert bpy.ops.tetflora.stop_using_as_species(collection="held") == {'FINISHED'}
+    assert bpy.ops.tetflora.use_as_species(stop=True) == {'FINISHED'}
+    assert bpy.ops.tetflora.use_as_species(stop=True, collection="held") == {'FINISHED'}
     assert len(scene().tetflora.asset_species) == 0
 
 
@@ -111,22 +111,22 @@ def _drawn(panel, obj=None, **given):
 
 def test_panels_offer_what_fits_the_active_object():
     rock, ground, child = crown("Rock"), add_mesh("ground"), add_mesh("child")
-    # Ground is active as often as not: what makes it a species is in menus.
-    assert "tetflora.use_as_species" not in _drawn(plants.TETFLORA_PT_plants, rock).names("operator")
+    assert _drawn(plants.TETFLORA_PT_object, rock).names("operator").count("tetflora.use_as_species") == 1
     own = species(rock)
-    shown = _drawn(plants.TETFLORA_PT_plants, rock)
-    assert "tetflora.stop_using_as_species" in shown.names("operator")
-    assert "is_scatter" not in _drawn(refine.TETFLORA_PT_refine, ground).names("prop", 1)
+    # Again after a change, and no more.
+    assert _drawn(plants.TETFLORA_PT_object, rock).names("operator").count("tetflora.use_as_species") == 2
+    assert "is_scatter" not in _drawn(plants.TETFLORA_PT_object, ground).names("prop", 1)
     child.parent, ground.instance_type = ground, 'VERTS'
-    assert "is_scatter" in _drawn(refine.TETFLORA_PT_refine, ground).names("prop", 1)
+    assert "is_scatter" in _drawn(plants.TETFLORA_PT_object, ground).names("prop", 1)
     plant = add_plant(species=own)
     bpy.data.objects.remove(rock)
     edits.look_again()
-    labels = [options["text"] for name, _, options in _drawn(plants.TETFLORA_PT_plants, plant).drawn if name == "label"]
+    drawn = _drawn(plants.TETFLORA_PT_object, plant).drawn
+    labels = [options["text"] for name, _, options in drawn if name == "label"]
     assert '"Rock" is not in the catalog' in labels
     layout = Layout()
     menus.draw_in_outliner(SimpleNamespace(layout=layout), bpy.context)
-    assert layout.names("operator") == ["tetflora.use_as_species", "tetflora.stop_using_as_species"]
+    assert layout.names("operator") == ["tetflora.use_as_species"] * 2
 
 
 def test_refine_automatically_hears_of_assets_and_scatters():

@@ -110,7 +110,7 @@ def test_dropped_collections_of_a_species_are_plants_of_it():
     found = read()
     assert [p.owner for p in found] == drops and {p.target.datablock for p in found} == {held}
     assert len({int(p.keys[0]) for p in found}) == 3 and has_contents(scene())
-    assert bpy.ops.tetflora.stop_using_as_species() == {'FINISHED'}
+    assert bpy.ops.tetflora.use_as_species(stop=True) == {'FINISHED'}
     assert read() == []
 
 

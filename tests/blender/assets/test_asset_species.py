@@ -118,7 +118,7 @@ def test_plants_are_populated_by_its_crown_and_bear_its_name():
     mix.add().species = own
     select(ground)
     assert bpy.ops.tetflora.populate() == {'FINISHED'}
-    population = scene().tetflora.populations[0]
+    population = scene().tetflora.layers[0]
     assert distance_of(population) == pytest.approx(2.4, rel=0.05)  # 1.2 radii
     made = [o for o in scene().objects if o.tetflora.is_plant]
     assert len(made) > 50 and all(o.name.startswith("Rock") for o in made)
@@ -126,7 +126,7 @@ def test_plants_are_populated_by_its_crown_and_bear_its_name():
     (found,) = read()
     assert len(found) == len(made)
     population.as_field = 'FIELD'
-    assert bpy.ops.tetflora.update_population() == {'FINISHED'}
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}
     (again,) = read()
     assert again.owner.tetflora.is_field and len(again) == len(found)
     assert sorted(map(tuple, np.round(again.matrices[:, :3, 3], 3))) == sorted(
@@ -185,11 +185,11 @@ def test_other_operators_on_plants_take_assets():
     select(plant)
     assert bpy.ops.tetflora.assign_species(species=own) == {'FINISHED'}
     assert plant.tetflora.species == own and plant.empty_display_size == pytest.approx(5.0)
-    assert bpy.ops.tetflora.select_species(species=own) == {'FINISHED'}
+    assert bpy.ops.tetflora.select_plants(species=own) == {'FINISHED'}
     assert bpy.ops.tetflora.reseed() == {'FINISHED'}
-    assert bpy.ops.tetflora.make_field() == {'FINISHED'}
+    assert bpy.ops.tetflora.convert_plants(to='FIELD') == {'FINISHED'}
     assert len(read()[0]) == 1
-    assert bpy.ops.tetflora.split_field() == {'FINISHED'}
+    assert bpy.ops.tetflora.convert_plants(to='OBJECTS') == {'FINISHED'}
     assert len(read()[0]) == 1
 
 
@@ -285,11 +285,11 @@ def test_linked_objects_are_species_and_scatter_without_overrides(linked):
     own = asset_of(tree).identifier
     add_plant(species=own)
     select(ground)
-    assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
+    assert bpy.ops.tetflora.mark(what='SCATTER') == {'FINISHED'}
     assert {p.target.datablock.name: len(p) for p in read()} == {"Linked tree": 1, "Linked child": 4}
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert {p.target.datablock.name: len(p) for p in read()} == {"Linked tree": 1, "Linked child": 4}
     select(bpy.data.objects["Linked ground"])
-    assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
+    assert bpy.ops.tetflora.mark(what='SCATTER') == {'FINISHED'}
     assert len(read()) == 1

@@ -118,30 +118,24 @@ def test_mix_with_transparent_covers_where_the_mask_is_light(by):
     np.testing.assert_allclose(found[0], expected, rtol=0.01 if by == "alpha" else 0.05)  # a fringe of one texel
 
 
-def test_translucent_half_lets_half_of_the_light_through():
+@pytest.mark.parametrize(
+    ("kind", "first", "colors", "color", "transmission"),
+    [
+        ("MixShader", 1, ((0.1, 0.2, 0.1), (0.1, 0.2, 0.1)), (0.1, 0.2, 0.1), 0.5),
+        ("AddShader", 0, ((0.3, 0.3, 0.3), (0.1, 0.1, 0.1)), (0.4, 0.4, 0.4), 0.25),
+    ],
+)
+def test_translucent_parts_let_their_light_through(kind, first, colors, color, transmission):
+    """Mixed by halves, or added."""
     paint = Paint()
-    mix, front, back = (paint.node(kind) for kind in ("MixShader", "BsdfDiffuse", "BsdfTranslucent"))
-    front.inputs["Color"].default_value = (0.1, 0.2, 0.1, 1)
-    back.inputs["Color"].default_value = (0.1, 0.2, 0.1, 1)
-    for output, socket in zip((front, back), mix.inputs[1:3], strict=True):
-        paint.link(output.outputs[0], socket)
-    paint.link(mix.outputs[0], paint.output.inputs["Surface"])
-    color, transmission, coverage, _ = look(paint)
-    np.testing.assert_allclose(color[0], (0.1, 0.2, 0.1), rtol=2e-3)
-    assert (transmission[0], coverage[0]) == (pytest.approx(0.5, abs=1e-3), 1)
-
-
-def test_added_shaders_sum_up():
-    paint = Paint()
-    add, front, back = (paint.node(kind) for kind in ("AddShader", "BsdfDiffuse", "BsdfTranslucent"))
-    front.inputs["Color"].default_value = (0.3, 0.3, 0.3, 1)
-    back.inputs["Color"].default_value = (0.1, 0.1, 0.1, 1)
-    for output, socket in zip((front, back), add.inputs, strict=True):
-        paint.link(output.outputs[0], socket)
-    paint.link(add.outputs[0], paint.output.inputs["Surface"])
-    color, transmission, coverage, _ = look(paint)
-    np.testing.assert_allclose(color[0], (0.4, 0.4, 0.4), rtol=2e-3)
-    assert (transmission[0], coverage[0]) == (pytest.approx(0.25, abs=1e-3), 1)
+    both, *sheets = (paint.node(name) for name in (kind, "BsdfDiffuse", "BsdfTranslucent"))
+    for sheet, own, socket in zip(sheets, colors, both.inputs[first : first + 2], strict=True):
+        sheet.inputs["Color"].default_value = (*own, 1)
+        paint.link(sheet.outputs[0], socket)
+    paint.link(both.outputs[0], paint.output.inputs["Surface"])
+    found = look(paint)
+    np.testing.assert_allclose(found[0][0], color, rtol=2e-3)
+    assert (found[1][0], found[2][0]) == (pytest.approx(transmission, abs=1e-3), 1)
 
 
 def _halves():

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
 from tetflora_addon.blender.biomes import adding, files, ground, library
 from tetflora_addon.blender.file_library import as_text
-from tetflora_addon.blender.placing import populations
+from tetflora_addon.blender.placing import populations, zones
 from tetflora_addon.blender.preferences import preferences
 from tetflora_addon.blender.species.edits import catalog
 from tetflora_addon.blender.stands.growing import keep_year
@@ -84,6 +84,10 @@ def small(**changes) -> files.Biome:
     return files.checked(copy.deepcopy({**SMALL, **changes}), "small")
 
 
+def biomes():
+    return zones.biomes_in(scene())
+
+
 def add(biome: files.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.BiomeResult:
     return run_to_end(adding.add_biome_steps(scene(), depsgraph(), biome, list(grounds), seed))
 
@@ -138,7 +142,7 @@ def test_a_biome_makes_what_its_file_says():
     added = add(small(), land)
     assert [name for name, _ in added.layers] == ["Bushes", "Floor"]
     assert 10 <= added.layers[0][1] <= 60 and 100 <= added.layers[1][1] <= 900
-    (biome,) = scene().tetflora.biomes
+    (biome,) = biomes()
     bushes, floor = files.layers_of(scene(), biome.uid)
     assert [entry.object for entry in bushes.grounds] == [land] and not bushes.covers and floor.covers
     assert {"blue_bush", "blue_bush_litter"} <= {edit.identifier for edit in scene().tetflora.species_edits}
@@ -146,12 +150,12 @@ def test_a_biome_makes_what_its_file_says():
     assert land.material_slots[0].material is not None
     first = places(biome.uid)
     adding.remove_biome(scene(), biome)
-    assert not scene().tetflora.populations and not [o for o in scene().objects if o is not land]
+    assert not scene().tetflora.layers and not [o for o in scene().objects if o is not land]
     add(small(), land)
-    assert np.array_equal(places(scene().tetflora.biomes[0].uid), first)
-    adding.remove_biome(scene(), scene().tetflora.biomes[0])
+    assert np.array_equal(places(biomes()[0].uid), first)
+    adding.remove_biome(scene(), biomes()[0])
     add(small(), land, seed=1)
-    assert not np.array_equal(places(scene().tetflora.biomes[0].uid), first)
+    assert not np.array_equal(places(biomes()[0].uid), first)
 
 
 def test_what_is_saved_comes_back():
@@ -159,7 +163,7 @@ def test_what_is_saved_comes_back():
     land = add_mesh("ground", size=6.0)
     given = small(limits={"slope_max": 42.0, "wetness_min": 0.25, "altitude_max": 30.0})
     add(given, land)
-    scene().tetflora.biomes[0].wetness_min = 0.0
+    biomes()[0].wetness_min = 0.0
     path = files.save_biome(scene(), "Small", "For tests", picture=False, replace=False)
     read = files.read_biome(library.biomes()["small"].path)
     assert path == library.biomes()["small"].path and library.biomes()["small"].is_own
@@ -202,7 +206,7 @@ def test_a_stand_is_a_layer():
     group.add([0, 3], 1.0, 'ADD')
     added = add(small(layers=[STAND, *SMALL["layers"]]), land)
     assert [name for name, _ in added.layers] == ["Birches", "Bushes", "Floor"] and added.layers[0][1] > 5
-    (biome,) = scene().tetflora.biomes
+    (biome,) = biomes()
     (field,) = files.stands_of(scene(), biome.uid)
     path = files.save_biome(scene(), "With a stand", "", picture=False, replace=False)
     assert files.read_biome(path).layers[0] == STAND
@@ -210,7 +214,7 @@ def test_a_stand_is_a_layer():
     number = len(field.data.vertices)
     run_to_end(adding.plant_biome_steps(scene(), depsgraph(), biome))
     assert 0 < len(field.data.vertices) < number
-    adding.remove_biome(scene(), scene().tetflora.biomes[0])
+    adding.remove_biome(scene(), biomes()[0])
     assert [o for o in scene().objects if o.tetflora.is_field] == []
 
 
@@ -218,7 +222,7 @@ def test_stands_that_are_not_the_biomes_to_change_stay():
     """One of which a year was kept, and one that came from elsewhere."""
     land = add_mesh("ground", size=10.0)
     add(small(layers=[STAND, SMALL["layers"][0]]), land)
-    (biome,) = scene().tetflora.biomes
+    (biome,) = biomes()
     (field,) = files.stands_of(scene(), biome.uid)
     keep_year(field)
     mesh, foreign = field.data, field.copy()
@@ -230,7 +234,7 @@ def test_stands_that_are_not_the_biomes_to_change_stay():
     for _ in range(4):
         next(steps)
     steps.close()
-    adding.remove_biome(scene(), scene().tetflora.biomes[0])
+    adding.remove_biome(scene(), biomes()[0])
     assert {o for o in scene().objects if o.tetflora.is_field} == {field, foreign}
 
 
@@ -241,11 +245,11 @@ def test_a_stand_that_cannot_grow_keeps_no_other_layer_from_its_plants():
     assert [name for name, _ in added.layers] == ["Bushes"]
     (said,) = added.bare
     assert "Birches" in said and "Nothing is planted" in said
-    biome = scene().tetflora.biomes[0]
+    biome = biomes()[0]
     assert files.stands_of(scene(), biome.uid) == []
     adding.remove_biome(scene(), biome)
     add(small(layers=[STAND, bushes]), land)
-    (biome,) = scene().tetflora.biomes
+    (biome,) = biomes()
     (field,) = files.stands_of(scene(), biome.uid)
     mesh = field.data
     field.tetflora.stand.grounds.clear()
@@ -269,19 +273,19 @@ def test_neighbors_blend():
     group.add([0, 3], 1.0, 'ADD')
     floor = small(layers=[SMALL["layers"][1] | {"species": [{"species": "wood_grass"}]}], species={})
     add(floor, land)
-    meadow = scene().tetflora.biomes[0].uid
+    meadow = biomes()[0].uid
     before = places(meadow)
     run_to_end(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), meadow)))
     assert np.array_equal(places(meadow), before), "planting again changes nothing"
     add(replace(floor, name="Other"), land)
-    other = scene().tetflora.biomes[1]
+    other = biomes()[1]
     other.vertex_group = "west"
     from tetflora_addon.blender.placing.rules import awaits_update
 
     assert awaits_update(files.layers_of(scene(), meadow)[0]), "the mask of one is the other's limit"
     for uid in (meadow, other.uid):
         run_to_end(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), uid)))
-    east, west = places(meadow), places(files.find_biome(scene(), scene().tetflora.biomes[1].uid).uid)
+    east, west = places(meadow), places(files.find_biome(scene(), biomes()[1].uid).uid)
     assert abs(len(east) + len(west) - len(before)) < 5.0 * np.sqrt(len(before))
     assert east[:, 0].mean() > 2.0 and west[:, 0].mean() < -2.0
     files.find_biome(scene(), meadow).gives_way = False
@@ -293,7 +297,7 @@ def test_a_biome_that_follows_lines_gets_one():
     """Its plants stand along a curve that the artist may move."""
     land = add_mesh("ground", size=15.0)
     add(small(limits={"path_max": 2.0, "path_softness": 0.5}), land)
-    (biome,) = scene().tetflora.biomes
+    (biome,) = biomes()
     assert biome.paths is not None
     found = places(biome.uid)
     assert len(found) > 20 and np.abs(found[:, 1]).max() < 8.0
@@ -384,13 +388,13 @@ def test_nothing_is_left_of_what_fails(monkeypatch):
         with pytest.raises(Exception, match=said):
             add(small(**changes), land)
         assert (datablocks(), len(scene().tetflora.species_edits)) == before
-        assert not scene().tetflora.populations and not scene().tetflora.biomes
+        assert not scene().tetflora.layers and not biomes()
     steps = adding.add_biome_steps(scene(), depsgraph(), small(layers=[STAND, *SMALL["layers"]]), [land])
     for step in steps:
         if step.message.startswith("Floor"):
             break
     steps.close()
-    assert (datablocks(), len(scene().tetflora.species_edits)) == before and not scene().tetflora.biomes
+    assert (datablocks(), len(scene().tetflora.species_edits)) == before and not biomes()
 
 
 def test_the_button_makes_land_where_there_is_none(monkeypatch):
@@ -404,6 +408,20 @@ def test_the_button_makes_land_where_there_is_none(monkeypatch):
     assert land.dimensions.x == pytest.approx(8.0) and land.tetflora.is_occluder
     select(land)
     assert bpy.ops.tetflora.add_biome(biome="small", seed=3) == {'FINISHED'}
-    assert [entry.object for entry in scene().tetflora.biomes[1].grounds] == [land]
-    assert bpy.ops.tetflora.update_biome() == {'FINISHED'}
-    assert bpy.ops.tetflora.remove_biome() == {'FINISHED'} and len(scene().tetflora.biomes) == 1
+    assert [entry.object for entry in biomes()[1].grounds] == [land]
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}
+    assert bpy.ops.tetflora.remove_layer() == {'FINISHED'} and len(biomes()) == 1
+
+
+def test_masks_and_paths_are_saved_by_their_names_and_found_again():
+    """As between two shots of one film; where a name is missing, the layer has no such limit."""
+    land = add_mesh("land", size=20.0)
+    roads = ground.make_line(scene(), "roads", [land])
+    population = populations.add_population(scene(), [land], name="Trees")
+    population.paths = roads
+    population.mix.add().species = "bush"
+    path = files.save_biome(scene(), "Masked", "", False, False)
+    read = files.read_biome(path)
+    assert read.layers[0]["paths"] == "roads"
+    add(read, land)
+    assert scene().tetflora.layers[-1].paths == roads

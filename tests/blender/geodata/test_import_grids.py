@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from benchmarks import places_files as files
 from devtools import session
+from tests import places_files as files
 from tests.blender.digests import difference, everything
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.geodata.origin import origin_of

@@ -13,10 +13,10 @@ import bpy
 import numpy as np
 import pytest
 
-from benchmarks import places_files as files
-from benchmarks import places_inventories as inventories
 from devtools import session
 from operators import places
+from tests import places_files as files
+from tests import places_inventories as inventories
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import depsgraph, select
 from tetflora_addon.blender.attributes import read

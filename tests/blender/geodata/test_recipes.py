@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 import pytest
 
-from benchmarks import places_files as files
 from devtools import build
+from tests import places_files as files
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.geodata.origin import origin_of
 from tetflora_addon.geodata.inventories import preview

@@ -7,8 +7,8 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from operators import refine
 from tests.blender.scenes import add_camera, add_plant, depsgraph
+from tetflora_addon.blender.viewport import warnings
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -28,14 +28,14 @@ def far_row():
 @pytest.mark.parametrize(("clip_end", "beyond"), [(100.0, 2), (200.0, 1)])
 def test_plants_beyond_the_range_are_counted(far_row, clip_end, beyond):
     far_row.data.clip_end = clip_end
-    text = refine._cut_off(bpy.context.scene)
+    text, _ = warnings.cut_off(bpy.context.scene)
     assert text.startswith(f"{beyond} of 3 plants")
     assert f'raise the Clip End of "camera", which is {clip_end:g} m' in text
 
 
 def test_no_warning_where_all_are_in_range(far_row):
     far_row.data.clip_end = 251.0
-    assert refine._cut_off(bpy.context.scene) == ""
+    assert warnings.cut_off(bpy.context.scene)[0] == ""
 
 
 @pytest.mark.parametrize("distance", [20.0, 250.0])

@@ -14,9 +14,9 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
 
-CYCLES = 30
+CYCLES = 16
 #: Megabytes by which the last half of the cycles may lie above the first, in the median. A result of this scene takes a
-#: third of a megabyte or more, so one that stayed behind in each of 10 cycles would lie far above; measured is .1.
+#: third of a megabyte or more, so one that stayed behind in each cycle would lie far above; measured is .1.
 MOST_GROWTH = 2.0
 
 

@@ -9,9 +9,9 @@ import re
 import bpy
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, select
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import memory
-from tetflora_addon.blender.job import contents, forecast
+from tetflora_addon.blender.job import contents, forecast, refine
 from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.processes import pool
 
@@ -69,10 +69,22 @@ def test_plants_of_both_kinds_count_alike(as_field):
     assert found.plants == 300
     empties = {'EMPTIES': found}.get(as_field)
     if empties is None:
-        bpy.ops.tetflora.split_field()
+        bpy.ops.tetflora.convert_plants(to='OBJECTS')
         empties = _forecast()
     assert found.primitives == pytest.approx(empties.primitives, rel=0.01)
     assert found.primitives > 10_000
+
+
+def test_what_is_expanded_takes_what_was_told():
+    """Plants at hand have up to a hundred times the polygons of the same ones from afar."""
+    add_camera(location=(0.0, -2.0, 1.7))
+    for number in range(3):
+        add_plant(f"p{number}", seed=number, location=(1.5 * number - 1.5, 0.0, 0.0))
+    scene = bpy.context.scene
+    scene.tetflora.expand_everything = True
+    found = _forecast()
+    made = refine.refine(scene, depsgraph()).polygons_meshed
+    assert 1 / 1.5 < found.primitives / made < 1.5
 
 
 def test_large_fields_are_known_by_a_sample():
@@ -164,7 +176,7 @@ def test_the_automatic_limit_is_told(monkeypatch):
     monkeypatch.setattr(memory, "total", lambda: 23_400_000_000)
     assert forecast.memory_text(scene) == "Automatic: 11.7 GB"
     scene.tetflora.max_memory = 4.0
-    assert forecast.memory_text(scene) == ""
+    assert forecast.memory_text(scene) == "4.0 GB by the preferences"
     scene.tetflora.max_memory = 0.0
     monkeypatch.setattr(memory, "total", lambda: None)
     assert forecast.memory_text(scene) == "Automatic: no limit"

@@ -103,8 +103,8 @@ def test_what_is_seen_again_comes_back_without_being_made_again(animation, made)
     assert len(made) == count
 
 
-def test_without_memory_only_the_frame_itself_is_there_and_comes_back_identical(animation, made):
-    animation.tetflora.kept_memory = 0.0
+def test_without_memory_only_the_frame_itself_is_there_and_comes_back_identical(animation, made, keep_memory):
+    keep_memory(0.0)
     first = at(animation, 1)
     before = {kind: len(names) for kind, names in datablocks().items()}
     for n in (FRAMES, 1, FRAMES):
@@ -114,14 +114,14 @@ def test_without_memory_only_the_frame_itself_is_there_and_comes_back_identical(
     assert at(animation, 1) == first
 
 
-def test_what_was_not_seen_for_longest_goes_first(animation, made):
+def test_what_was_not_seen_for_longest_goes_first(animation, made, keep_memory):
     sizes = []
     for n in (1, FRAMES // 2, FRAMES):
         at(animation, n)
         sizes.append(sum(entry.megabytes for entry in frame_cache._entries.values()))
     render.on_render_end(animation)
     made.clear()
-    animation.tetflora.kept_memory = (sizes[-1] - sizes[0] / 2.0) / 1e3  # room for two of three
+    keep_memory((sizes[-1] - sizes[0] / 2.0) / 1e3)  # room for two of three
     for n in (1, FRAMES // 2, 1, FRAMES):  # the one in the middle is the oldest now
         at(animation, n)
     assert made == [1, FRAMES // 2, FRAMES]

@@ -14,7 +14,7 @@ FRAMES, LEG = 24, 4
 
 
 @pytest.mark.parametrize("gigabytes", [0.0, 4.0], ids=["nothing kept", "results kept"])
-def test_frames_of_a_animation_leave_nothing_behind(clean_file, tmp_path, gigabytes):
+def test_frames_of_a_animation_leave_nothing_behind(clean_file, tmp_path, gigabytes, keep_memory):
     """The camera goes to and fro: whatever is kept from frame to frame, a third round needs no more than a second."""
     scene = tiny_render(size=24)
     for n, species in enumerate(("bush", "fern")):
@@ -28,7 +28,7 @@ def test_frames_of_a_animation_leave_nothing_behind(clean_file, tmp_path, gigaby
     scene.frame_start, scene.frame_end = 1, FRAMES
     scene.frame_set(1)
     scene.tetflora.cutoff, scene.tetflora.leaf_limit = 8.0, 0.5
-    scene.tetflora.kept_memory = gigabytes
+    keep_memory(gigabytes)
     scene.render.filepath = str(tmp_path / "frame_####")
     before, during, hidden = datablocks(), [], []
 

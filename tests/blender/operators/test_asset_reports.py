@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import bpy
 import pytest
 
-from panels import refine, results
-from tests.blender.layouts import Layout
+from devtools.layouts import Layout
+from panels import outputs, refine
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
 from tetflora_addon.blender.assets import marks
 from tetflora_addon.blender.compat import shader_tree
@@ -41,8 +42,8 @@ def test_instances_are_counted_and_said_to_stay_where_that_is_cheapest(scatter, 
     assert "4 instances of assets stay the originals, as the renderer draws these at the least cost" in out
     assert "plant" not in out
     text = scene().tetflora.statistics
-    assert results.made_of(text) == "4 instances stay the originals"
-    rows = dict(results.rows_of(text))
+    assert outputs.made_of(text) == "4 instances stay the originals"
+    rows = dict(outputs.rows_of(text))
     assert (rows["Instances"], rows["    Originals"], rows["    Clusters"]) == ("4", "4", "0")
 
 
@@ -62,7 +63,7 @@ def test_statistics_of_plants_alone_say_nothing_of_instances():
     add_plant(species="bush")
     scene().render.resolution_percentage = 5
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
-    assert "Instances" not in dict(results.rows_of(scene().tetflora.statistics))
+    assert "Instances" not in dict(outputs.rows_of(scene().tetflora.statistics))
 
 
 def test_what_is_wrong_with_an_asset_is_told_by_refine_and_by_renders(scatter, capfd):
@@ -101,5 +102,5 @@ def test_only_plants_are_missed_in_renders_of_what_is_not_refined(scatter, monke
 
 def test_the_panel_shows_the_settings_of_assets():
     layout = Layout()
-    refine._SECTIONS["Assets"](layout, bpy.context.scene)
-    assert layout.names("prop", 1) == ["asset_detail"]
+    outputs.TETFLORA_PT_render.draw(SimpleNamespace(layout=layout), bpy.context)
+    assert "asset_detail" in layout.names("prop", 1)

@@ -16,10 +16,11 @@ import pytest
 import operators
 import panels
 from devtools import build
+from devtools.layouts import Layout
+from panels.layers import TETFLORA_MT_layers
 from panels.menus import TETFLORA_MT_object, draw_in_add_menu
 from panels.places import draw_in_import_menu
 from panels.preferences import KEYMAP, KEYS
-from tests.blender.layouts import Layout
 from tests.blender.scenes import add_camera, add_plant
 from tetflora_addon.blender import preferences, properties, translations
 from tetflora_addon.blender.scene.ages import FULL_GROWN
@@ -139,7 +140,7 @@ def test_every_operator_is_registered_and_named():
 
 def test_new_tools_are_in_menus_so_that_search_finds_them():
     layout = Layout()
-    for draw in (draw_in_add_menu, TETFLORA_MT_object.draw):
+    for draw in (draw_in_add_menu, TETFLORA_MT_object.draw, TETFLORA_MT_layers.draw, draw_in_import_menu):
         draw(SimpleNamespace(layout=layout), bpy.context)
     drawn, menus = set(layout.names("operator")), layout.names("menu")
     tools = (
@@ -150,10 +151,14 @@ def test_new_tools_are_in_menus_so_that_search_finds_them():
         "grow_stand",
         "keep_results",
         "preview_levels",
+        "look",
+        "daylight",
+        "update_layers",
+        "save_biome",
     )
-    files = ("import_populations", "export_populations", *(f"import_{name}" for name in PLACES))
+    files = tuple(f"import_{name}" for name in PLACES)
     assert {f"tetflora.{name}" for name in tools + files} <= drawn <= _ids()
-    assert "TETFLORA_MT_place_plant" in menus
+    assert {"TETFLORA_MT_place_plant", "TETFLORA_MT_layers"} <= set(menus)
     assert all(hasattr(bpy.types, menu) for menu in menus)
 
 

@@ -13,7 +13,7 @@ import pytest
 import operators
 from devtools import build
 from operators import ground_tools
-from panels import results
+from panels import outputs
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tetflora_addon.blender.job import refine, render
 from tetflora_addon.blender.results.collection import has_results
@@ -50,7 +50,7 @@ def test_every_button_has_an_operator(blender):
     texts = [path.read_text(encoding="utf-8") for path in (build.ROOT / "panels").glob("*.py")]
     named = {name for text in texts for name in _NAMED.findall(text)}
     known = {cls.bl_idname.removeprefix("tetflora.") for cls in operators.CLASSES}
-    assert len(named & known) > 50
+    assert len(named & known) > 45
     assert sorted(named - known) == []
 
 
@@ -90,9 +90,9 @@ def test_species_are_selected_assigned_and_removed():
     add_plant("c", "gone")
     mesh = add_mesh("terrain")
     select(bpy.data.objects["a"])
-    _ops().select_species()
+    _ops().select_plants()
     assert [o.name for o in bpy.context.selected_objects] == ["a"]
-    _ops().select_species(species="gone", extend=True)
+    _ops().select_plants(species="gone", extend=True)
     assert {o.name for o in bpy.context.selected_objects} == {"a", "c"}
     _ops().assign_species(species="conifer")
     assert {n: p.species for n, p in _plants().items()} == {"a": "conifer", "b": "conifer", "c": "conifer"}
@@ -116,11 +116,11 @@ def test_mark_occluder_toggles_meshes_only():
     plant = add_plant()
     select(first, second, plant)
     first.tetflora.is_occluder = True
-    _ops().mark_occluder()
+    _ops().mark(what='OCCLUDER')
     assert first.tetflora.is_occluder
     assert second.tetflora.is_occluder
     assert not plant.tetflora.is_occluder
-    _ops().mark_occluder()
+    _ops().mark(what='OCCLUDER')
     assert not any(o.tetflora.is_occluder for o in bpy.data.objects)
 
 
@@ -145,7 +145,6 @@ def test_lists_grow_and_shrink():
         ("populate", "Select a mesh"),
         ("reseed", "Select plants or a field"),
         ("assign_species", "Select plants or a field"),
-        ("mark_occluder", "Select meshes first"),
         ("refine", "no active camera"),
         ("clear", "No results to clear"),
     ],
@@ -182,8 +181,8 @@ def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
     figures = json.loads(scene.tetflora.statistics)
     assert figures["plants"] == 2
     assert figures["polygons_meshed"] + figures["polygons_proxy"] > 0
-    rows = dict(results.rows_of(scene.tetflora.statistics))
-    passes = results.steps_of(scene.tetflora.statistics)
+    rows = dict(outputs.rows_of(scene.tetflora.statistics))
+    passes = outputs.steps_of(scene.tetflora.statistics)
     assert [int(row[0]) for row in passes] == list(range(1, len(passes) + 1))
     assert passes[-1][1] == rows["Tetrahedra"]
     assert passes[-1][2] == "0"
@@ -192,8 +191,8 @@ def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
     assert len(bpy.data.meshes) > 0
     assert _ops().clear() == {'FINISHED'}
     assert datablocks() == before
-    assert results.rows_of(scene.tetflora.statistics) == ()
-    assert results.steps_of(scene.tetflora.statistics) == ()
+    assert outputs.rows_of(scene.tetflora.statistics) == ()
+    assert outputs.steps_of(scene.tetflora.statistics) == ()
 
 
 def _refined_rock():

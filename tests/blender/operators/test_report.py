@@ -10,9 +10,9 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
+from devtools.layouts import Layout
 from operators import base
 from panels import preferences, refine
-from tests.blender.layouts import Layout
 from tests.blender.scenes import add_camera, add_plant
 from tetflora_addon.blender import report, runtime
 from tetflora_addon.processes import pool
@@ -88,22 +88,24 @@ def test_processes_that_were_given_up_are_in_it(monkeypatch: pytest.MonkeyPatch)
 def test_its_button_is_in_the_preferences(monkeypatch: pytest.MonkeyPatch) -> None:
     layout, own = Layout(), preferences.TetFloraPreferences
     monkeypatch.setattr(preferences, "_draw_keys", lambda *_: None)
-    names = ("species_folder", "threads", "new_quality", "new_memory", "use_cache", "cache_folder")
+    names = ("species_folder", "threads", "new_quality", "max_memory", "kept_memory", "use_cache", "cache_folder")
     known = {"layout": layout, "bl_rna": own.bl_rna, **dict.fromkeys(names, "")}
     preferences._draw(SimpleNamespace(**known), bpy.context)
     assert "tetflora.write_report" in layout.names("operator")
 
 
 @pytest.mark.parametrize(("locked", "refines", "warns"), [(True, True, 0), (False, True, 1), (False, False, 0)])
-def test_the_panel_warns_where_the_window_is_not_locked(
-    locked: bool, refines: bool, warns: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_panel_warns_where_the_window_is_not_locked(locked: bool, refines: bool, warns: int) -> None:
     scene, layout = bpy.context.scene, Layout()
     add_camera()
-    monkeypatch.setattr(refine, "forecast_text", lambda *_: "About 12 s")
+    add_plant()
     scene.render.use_lock_interface, scene.tetflora.refine_at_render = locked, refines
     names = ("scene", "view_layer", "preferences", "active_object", "mode")
     known = {name: getattr(bpy.context, name) for name in names}
     context = SimpleNamespace(region=SimpleNamespace(width=300), **known)
-    refine.TETFLORA_PT_refine.draw(SimpleNamespace(layout=layout), context)
-    assert layout.names("prop", 1).count("use_lock_interface") == warns
+    refine.TETFLORA_PT_warnings.draw(SimpleNamespace(layout=layout), context)
+    said = [options.get("text", "") for *_, options in layout.drawn]
+    assert sum("Lock Interface is off" in text for text in said) == warns
+    if warns:
+        bpy.ops.tetflora.mend(what="lock")
+        assert scene.render.use_lock_interface

@@ -16,8 +16,8 @@ import bpy
 import pytest
 
 import operators
-from benchmarks import places_files
 from devtools import session
+from tests import places_files
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender import compat
@@ -61,7 +61,7 @@ def biome_added() -> None:
 
 
 def change_biome() -> None:
-    scene().tetflora.biomes[0].wetness_max = 0.4
+    next(one for one in scene().tetflora.layers if one.kind == 'BIOME').wetness_max = 0.4
 
 
 def refined() -> None:
@@ -102,11 +102,6 @@ def stand() -> None:
     group.species.add().species = "birch"
     assert ops().grow_stand() == {'FINISHED'}
     group.years = 7
-
-
-def frozen() -> None:
-    populated()
-    assert ops().freeze_population() == {'FINISHED'}
 
 
 def edges() -> None:
@@ -150,30 +145,35 @@ def drop() -> None:
     select(shown)
 
 
+def small_scale() -> None:
+    forest()
+    scene().unit_settings.scale_length = 0.01
+
+
 Case = tuple[str, Callable[[], None], str, dict]
 
 LIST = {"owner": "scene.tetflora.populate", "entries": "mix"}
+REROLL, FORGET = {"which": 'ACTIVE', "reroll": True}, {"which": 'ACTIVE', "forget_erased": True}
 CASES: list[Case] = [
     ("add_plant", forest, "add_plant", {"species": "bush"}),
     ("populate", ground_active, "populate", {"count": 12, "species": MIX}),
     ("populate as a field", ground_active, "populate", {"count": 12, "species": MIX, "as_field": 'FIELD'}),
     ("populate again", populated, "populate", {"count": 5, "species": MIX, "seed": 3}),
     ("first_forest", lambda: None, "first_forest", {}),
-    ("set_season", forest, "set_season", {"season": 'AUTUMN'}),
     ("drop_to_ground", forest, "drop_to_ground", {}),
     ("use_as_skeleton", edges, "use_as_skeleton", {}),
     ("assign_species", forest, "assign_species", {"species": "fern"}),
     ("assign_species to a field", populated_as_field, "assign_species", {"species": "fern"}),
     ("reseed", forest, "reseed", {}),
-    ("select_species", populated, "select_species", {"species": "bush"}),
+    ("select_plants", populated, "select_plants", {"species": "bush"}),
     ("remove_plants selected", forest, "remove_plants", {}),
     ("remove_plants all", populated, "remove_plants", {"which": 'ALL'}),
-    ("mark_occluder", ground_active, "mark_occluder", {}),
-    ("mark_explicit", ground_active, "mark_explicit", {}),
+    ("mark an occluder", ground_active, "mark", {"what": 'OCCLUDER'}),
+    ("mark a mesh to refine", ground_active, "mark", {"what": 'EXPLICIT'}),
     ("use_as_species", ground_active, "use_as_species", {}),
     ("use_as_species of a collection", drop, "use_as_species", {}),
-    ("stop_using_as_species", species_of_mesh, "stop_using_as_species", {}),
-    ("refine_scatter", drop, "refine_scatter", {}),
+    ("use_as_species no more", species_of_mesh, "use_as_species", {"stop": True}),
+    ("mark a scatter", drop, "mark", {"what": 'SCATTER'}),
     ("edit_list add", forest, "edit_list", LIST | {"action": 'ADD'}),
     ("edit_list remove", listed, "edit_list", LIST | {"action": 'REMOVE'}),
     ("refine", forest, "refine", {}),
@@ -182,36 +182,38 @@ CASES: list[Case] = [
     ("clear", refined, "clear", {}),
     ("clear a mesh", refined_mesh, "clear", {}),
     ("keep_results", refined, "keep_results", {}),
-    ("mark_field", ground_active, "mark_field", {}),
-    ("make_field", forest, "make_field", {}),
-    ("make_field of a population", populated, "make_field", {}),
-    ("split_field", populated_as_field, "split_field", {}),
+    ("mark a field", ground_active, "mark", {"what": 'FIELD'}),
+    ("convert_plants", forest, "convert_plants", {"to": 'FIELD'}),
+    ("convert_plants of a layer", populated, "convert_plants", {"to": 'FIELD'}),
+    ("convert_plants of a field", populated_as_field, "convert_plants", {"to": 'OBJECTS'}),
     ("duplicate_species", species_chosen, "duplicate_species", {"name": "Shrub"}),
     ("revert_species", species_edited, "revert_species", {}),
     ("edit_orders", species_chosen, "edit_orders", {"action": 'ADD'}),
     ("edit_orders spur", species_chosen, "edit_orders", {"action": 'SPUR'}),
     ("make_plant_mesh", forest, "make_plant_mesh", {}),
-    ("add_population", ground_active, "add_population", {}),
-    ("update_population", lambda: (populated(), change_population()), "update_population", {}),
-    ("update_population of a field", lambda: (populated_as_field(), change_population()), "update_population", {}),
-    ("reroll_population", populated, "reroll_population", {}),
-    ("freeze_population", populated, "freeze_population", {}),
-    ("release a population", frozen, "freeze_population", {}),
-    ("remove_population", populated, "remove_population", {}),
-    ("remove_population, plants stay", populated, "remove_population", {"keep_plants": True}),
-    ("select_population", lambda: (populated(), select()), "select_population", {}),
-    ("forget_erased", lambda: (populated(), erase_place()), "forget_erased", {}),
+    ("duplicate_layer", populated, "duplicate_layer", {}),
+    ("update_layers", lambda: (populated(), change_population()), "update_layers", {}),
+    ("update_layers of a field", lambda: (populated_as_field(), change_population()), "update_layers", {}),
+    ("update_layers, another seed", populated, "update_layers", REROLL),
+    ("move_layer", lambda: (populated(), populated()), "move_layer", {"direction": 'UP'}),
+    ("remove_layer", populated, "remove_layer", {}),
+    ("remove_layer, plants stay", populated, "remove_layer", {"keep_plants": True}),
+    ("select_plants of a layer", lambda: (populated(), select()), "select_plants", {"layer": True}),
+    ("update_layers, erased places", lambda: (populated(), erase_place()), "update_layers", FORGET),
     ("ground_cover", populated, "ground_cover", {}),
     ("ground_cover again", lambda: (populated(), cover(), change_population()), "ground_cover", {}),
     ("ground_snow", lambda: (populated(), paint_ground()), "ground_snow", {}),
     ("grow_stand", lambda: (stand(), select(bpy.data.objects["ground"])), "grow_stand", {}),
-    ("grow_again", lambda: (stand(), change_stand()), "grow_again", {}),
+    ("update_layers of a stand", lambda: (stand(), change_stand()), "update_layers", {}),
     ("animate_growth", stand, "animate_growth", {}),
     ("keep_year", stand, "keep_year", {}),
     ("add_biome", ground_active, "add_biome", {"biome": "hedgerow"}),
-    ("update_biome", lambda: (biome_added(), change_biome()), "update_biome", {}),
-    ("remove_biome", biome_added, "remove_biome", {}),
-    ("set_population_ground", lambda: (populated(), select(add_mesh("other"))), "set_population_ground", {}),
+    ("update_layers of a biome", lambda: (biome_added(), change_biome()), "update_layers", {}),
+    ("remove_layer of a biome", biome_added, "remove_layer", {}),
+    ("look", ground_active, "look", {}),
+    ("daylight", forest, "daylight", {}),
+    ("mend", small_scale, "mend", {"what": "units"}),
+    ("set_layer_ground", lambda: (populated(), select(add_mesh("other"))), "set_layer_ground", {}),
 ]
 #: Operators with an undo step that cannot be called without a file from outside; their own case is below.
 PLACES = {
@@ -220,7 +222,7 @@ PLACES = {
     "csv": "import_inventory",
     "outlines": "import_outlines",
 }
-FROM_FILES = {"import_populations", "load_species", *PLACES.values()}
+FROM_FILES = {"load_species", *PLACES.values()}
 
 
 def mark_ground() -> None:
@@ -235,8 +237,8 @@ def paint_ground() -> None:
 
 
 def change_population() -> None:
-    scene().tetflora.populations[0].count = 7
-    scene().tetflora.populations[0].seed = 5
+    scene().tetflora.layers[0].count = 7
+    scene().tetflora.layers[0].seed = 5
 
 
 def change_stand() -> None:
@@ -248,7 +250,7 @@ def cover() -> None:
 
 
 def erase_place() -> None:
-    rules.note_erased(scene().tetflora.populations[0], [(0.0, 0.0)], 2.0)
+    rules.note_erased(scene().tetflora.layers[0], [(0.0, 0.0)], 2.0)
 
 
 @pytest.fixture
@@ -283,13 +285,6 @@ def test_each_operator_with_an_undo_step_is_tried(blender):
     assert declared == {case[2] for case in CASES} | FROM_FILES
 
 
-def test_what_comes_from_a_file_of_populations_can_be_undone(history, tmp_path):
-    path = tmp_path / "forest.json"
-    populated()
-    assert ops().export_populations(filepath=str(path)) == {'FINISHED'}
-    check("import_populations", {"filepath": str(path)})
-
-
 @pytest.mark.parametrize("kind", PLACES)
 def test_imported_places_can_be_undone(history, tmp_path, kind):
     check(PLACES[kind], {"filepath": str(places_files.write(tmp_path, kind)[1])})
@@ -308,7 +303,7 @@ def test_a_species_that_was_loaded_can_be_undone(history, tmp_path):
         OWN_FILES.delete("shrub")
 
 
-@pytest.mark.parametrize("case", ["refine", "populate", "make_field", "remove_plants"])
+@pytest.mark.parametrize("case", ["refine", "populate", "convert_plants", "remove_plants"])
 def test_a_refusal_changes_nothing_and_is_no_step(history, case):
     """An error of the artist's leaves no undo step behind, whose undo would do nothing."""
     ground_active()
@@ -317,7 +312,7 @@ def test_a_refusal_changes_nothing_and_is_no_step(history, case):
         bpy.data.objects["bush"].scale.z = 0.0
     elif case == "populate":
         options = {"count": 12, "species": "quercus"}
-    elif case == "make_field":
+    elif case == "convert_plants":
         for name in ("bush", "conifer"):
             bpy.data.objects[name].tetflora.enabled = False
         select(bpy.data.objects["bush"], bpy.data.objects["conifer"])
@@ -346,10 +341,10 @@ def test_a_chain_of_operators_is_undone_step_by_step(history):
     steps = (
         ("populate", {"count": 12, "species": MIX}),
         ("refine", {}),
-        ("reroll_population", {}),
+        ("update_layers", REROLL),
         ("refine", {}),
         ("clear", {}),
-        ("remove_population", {}),
+        ("remove_layer", {}),
     )
     for operator, options in steps:
         assert getattr(ops(), operator)('EXEC_DEFAULT', True, **options) == {'FINISHED'}
@@ -372,16 +367,16 @@ def test_a_population_on_a_collection_goes_on_after_undo(history):
     inner.objects.link(bpy.data.objects["ground"])
     populated_on = {"count": 12, "species": MIX}
     assert ops().populate('EXEC_DEFAULT', True, **populated_on) == {'FINISHED'}
-    scene().tetflora.populations[0].grounds.clear()
-    scene().tetflora.populations[0].ground_collection = grounds
+    scene().tetflora.layers[0].grounds.clear()
+    scene().tetflora.layers[0].ground_collection = grounds
     bpy.ops.ed.undo_push(message="On a collection")
     for _ in range(3):
-        assert ops().reroll_population('EXEC_DEFAULT', True) == {'FINISHED'}
+        assert ops().update_layers('EXEC_DEFAULT', True, **REROLL) == {'FINISHED'}
         assert ops().refine('EXEC_DEFAULT', True) == {'FINISHED'}
         before = everything()
-        assert ops().update_population('EXEC_DEFAULT', True) == {'FINISHED'}
+        assert ops().update_layers('EXEC_DEFAULT', True, which='ACTIVE') == {'FINISHED'}
         bpy.ops.ed.undo()
         assert difference(before, everything()) == []
         for _step in range(2):
             bpy.ops.ed.undo()
-        assert scene().tetflora.populations[0].made == 12
+        assert scene().tetflora.layers[0].made == 12

@@ -89,7 +89,7 @@ def test_a_season_has_a_picture_of_its_own_where_there_is_one(own_folder):
     year = bpy.context.scene.tetflora.year
     names = {}
     for season in ('SUMMER', 'AUTUMN', 'WINTER'):
-        bpy.ops.tetflora.set_season(season=season)
+        bpy.context.scene.tetflora.year.season = season
         catalog.thumbnails.loaded.clear()
         icon_of("mine")
         names[season] = [Path(name.partition("|")[0]).name for name in catalog.thumbnails.loaded]

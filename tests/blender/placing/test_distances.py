@@ -89,12 +89,12 @@ def test_a_copy_follows_as_its_original_does():
     _ground()
     scene = bpy.context.scene
     population = _populate(species="birch", count=5)
-    bpy.ops.tetflora.add_population()
+    bpy.ops.tetflora.duplicate_layer()
     copy = rules.active_population(scene)
-    assert copy.uid != scene.tetflora.populations[0].uid
+    assert copy.uid != scene.tetflora.layers[0].uid
     assert copy.distance_by_species
     copy.min_distance = 1.25
-    bpy.ops.tetflora.add_population()
+    bpy.ops.tetflora.duplicate_layer()
     assert not rules.active_population(scene).distance_by_species
     assert distances.distance_of(rules.active_population(scene)) == 1.25
     assert population is not None

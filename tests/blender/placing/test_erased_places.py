@@ -20,7 +20,7 @@ def _scene():
 
 
 def _population():
-    return _scene().tetflora.populations[0]
+    return _scene().tetflora.layers[0]
 
 
 def _places():
@@ -51,8 +51,8 @@ def _stroke(mode='ERASE', **changes):
     return _places()
 
 
-def _update(name="update_population"):
-    getattr(bpy.ops.tetflora, name)()
+def _update(**options):
+    bpy.ops.tetflora.update_layers(which='ACTIVE', **options)
     bpy.context.view_layer.update()
     return _places()
 
@@ -81,7 +81,7 @@ def test_the_ground_stays_bare_in_other_arrangements_too():
     _stroke()
     _population().count = 600
     assert not _inside(_update()).any()
-    assert not _inside(_update("reroll_population")).any()
+    assert not _inside(_update(reroll=True)).any()
     assert len(_places()) > 300
 
 
@@ -96,21 +96,20 @@ def test_what_is_thinned_stays_away_one_by_one(how):
 def test_plants_by_hand_and_other_populations_are_not_asked():
     _populate()
     erased = _population().erased
-    _scene().tetflora.populations.add().uid = "another"
+    _scene().tetflora.layers.add().uid = "another"
     _stroke()
     assert not erased
     assert _population().erased
-    assert not _scene().tetflora.populations[1].erased
+    assert not _scene().tetflora.layers[1].erased
     _stroke('PAINT', density=20.0)
     painted = _inside(_places()).sum()
     assert painted > 3
     assert _inside(_update()).sum() == painted
-    assert bpy.ops.tetflora.forget_erased() == {'FINISHED'}
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE', forget_erased=True) == {'FINISHED'}
 
 
 def test_places_can_be_forgotten():
     before = _populate()
     _stroke()
-    bpy.ops.tetflora.forget_erased()
-    assert np.allclose(_update(), before)
-    assert not bpy.ops.tetflora.forget_erased.poll()
+    assert np.allclose(_update(forget_erased=True), before)
+    assert not _population().erased

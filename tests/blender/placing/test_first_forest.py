@@ -11,6 +11,7 @@ import pytest
 from panels import refine
 from tests.blender.scenes import add_camera, add_mesh, datablocks
 from tetflora_addon.blender import preferences, settings
+from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.placing import first_forest
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -119,26 +120,30 @@ def test_a_world_that_was_there_is_kept():
     assert bpy.data.worlds["mine"].use_fake_user
 
 
-def test_quality_and_memory_of_new_scenes_come_from_the_preferences():
+def test_quality_of_new_scenes_and_memory_come_from_the_preferences():
     chosen = preferences.preferences()
-    chosen.new_quality, chosen.new_memory = 'DRAFT', 3.0
+    chosen.new_quality, chosen.max_memory = 'DRAFT', 3.0
     try:
         add_camera()
         bpy.ops.tetflora.add_plant(species="bush")
         group = bpy.context.scene.tetflora
         assert group.quality == 'DRAFT'
-        assert group.max_memory == pytest.approx(3.0)
         # From the first plant on the scene decides.
-        group.quality, group.max_memory = 'PREVIEW', 0.0
+        group.quality = 'PREVIEW'
         bpy.ops.tetflora.add_plant(species="bush")
-        assert (group.quality, group.max_memory) == ('PREVIEW', 0.0)
+        assert group.quality == 'PREVIEW'
+        # Memory is the machine's, and not stored in the file; a script may set it for a scene.
+        assert not group.is_property_set("max_memory")
+        assert contents.settings_from(bpy.context.scene).max_memory == pytest.approx(3.0)
+        group.max_memory = 2.0
+        assert contents.settings_from(bpy.context.scene).max_memory == pytest.approx(2.0)
         other = bpy.data.scenes.new("own")
         other.tetflora.cutoff = 7.0
         settings.begin(other)
         assert other.tetflora.cutoff == 7.0
         assert other.tetflora.leaf_limit != group.leaf_limit
     finally:
-        chosen.new_quality, chosen.new_memory = 'FINAL', 0.0
+        chosen.new_quality, chosen.max_memory = 'FINAL', 0.0
 
 
 def test_its_ground_is_selected_so_that_populate_goes_on_from_there():

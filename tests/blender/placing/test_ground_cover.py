@@ -11,7 +11,7 @@ import pytest
 from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender.attributes import values_of
 from tetflora_addon.blender.materials.soil import is_soil
-from tetflora_addon.blender.placing import population_files, populations, rules
+from tetflora_addon.blender.placing import population_data, populations, rules
 from tetflora_addon.blender.placing.canopy import canopy_of
 from tetflora_addon.blender.placing.cover import MOST, cover_steps
 from tetflora_addon.blender.scene import fields
@@ -25,7 +25,7 @@ def _group():
 
 
 def _covers():
-    return [p for p in _group().populations if p.covers]
+    return [p for p in _group().layers if p.covers]
 
 
 def _field(population=None):
@@ -65,8 +65,8 @@ def test_the_ground_of_a_population_is_covered_by_what_grows_and_falls_there():
     assert {"birch_branch", "spruce_branch"} <= set(species)
     assert species["birch_litter"].shed_by == "birch"
     assert species["wood_grass"].habitat == 'LIGHT'
-    assert cover.covers == _group().populations[0].uid
-    assert _group().populations_index == 0  # the trees stay what the panel shows
+    assert cover.covers == _group().layers[0].uid
+    assert _group().layers_index == 0  # the trees stay what the panel shows
     assert [entry.object for entry in cover.grounds] == [ground]
     assert cover.made == fields.stored_size(_field()) > 2000
     assert _field().display_type == 'BOUNDS'  # black points would hide the ground
@@ -94,7 +94,7 @@ def test_litter_lies_under_its_own_trees_and_grass_in_the_light():
 
 def test_masks_of_the_population_hold_for_its_cover():
     _wood(size=12.0)
-    population = _group().populations[0]
+    population = _group().layers[0]
     population.vertex_group = "west"
     path = bpy.data.curves.new("path", 'CURVE')
     spline = path.splines.new('POLY')
@@ -133,19 +133,19 @@ def test_again_replaces_and_keeps_what_the_artist_changed():
 def test_the_button_on_the_cover_renews_it_and_update_does_the_same():
     _wood()
     first = _cover().made
-    _group().populations_index = 1
+    _group().layers_index = 1
     _cover()
-    assert len(_group().populations) == 2
+    assert len(_group().layers) == 2
     assert _covers()[0].made == first
-    assert bpy.ops.tetflora.update_population() == {'FINISHED'}
-    assert _group().populations[1].made == first
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}
+    assert _group().layers[1].made == first
 
 
 def test_the_same_scene_gets_the_same_cover():
     _wood()
     _cover()
     before = {name: values_of(_field().data.attributes[name]).copy() for name in ("position", "seed", "species")}
-    assert bpy.ops.tetflora.update_population() == {'FINISHED'}  # the trees, at the same places
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}  # the trees, at the same places
     _cover()
     for name, values in before.items():
         assert (values_of(_field().data.attributes[name]) == values).all()
@@ -153,12 +153,12 @@ def test_the_same_scene_gets_the_same_cover():
 
 def test_cover_keeps_no_tree_away_and_casts_no_shade():
     _wood(min_distance=2.0)
-    trees = _group().populations[0].made
+    trees = _group().layers[0].made
     canopy, _ = canopy_of(bpy.context.scene, depsgraph())
     _cover()
     assert len(canopy_of(bpy.context.scene, depsgraph())[0]) == len(canopy) == trees
-    assert bpy.ops.tetflora.update_population() == {'FINISHED'}
-    assert _group().populations[0].made == trees
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}
+    assert _group().layers[0].made == trees
 
 
 def test_the_brush_paints_and_thins_through_a_cover_and_erases_it():
@@ -190,14 +190,14 @@ def test_a_frozen_cover_is_refused_and_stays():
 
 
 def test_without_population_ground_or_plants_it_says_what_to_do():
-    with pytest.raises(RuntimeError, match="Add a population first"):
+    with pytest.raises(RuntimeError, match="Add a layer first"):
         bpy.ops.tetflora.ground_cover()
     ground = _wood()
     for tree in [o for o in bpy.context.scene.objects if o.tetflora.is_plant]:
         bpy.data.objects.remove(tree)
     with pytest.raises(RuntimeError, match="no plants whose ground could be covered; click Update first"):
         bpy.ops.tetflora.ground_cover()
-    bpy.ops.tetflora.update_population()
+    bpy.ops.tetflora.update_layers(which='ACTIVE')
     bpy.data.objects.remove(ground)
     with pytest.raises(RuntimeError, match="no ground in this scene; select meshes and click Use Selected Meshes"):
         bpy.ops.tetflora.ground_cover()
@@ -208,14 +208,14 @@ def test_without_population_ground_or_plants_it_says_what_to_do():
 @pytest.mark.parametrize("until", ["Light and litter under the plants", "Planting", "Looking for places"])
 def test_closing_the_steps_leaves_everything_as_it_was(until):
     _wood()
-    before = (len(_group().populations), len(bpy.data.objects), len(bpy.data.materials), len(bpy.data.images))
-    steps = cover_steps(bpy.context.scene, depsgraph(), _group().populations[0])
+    before = (len(_group().layers), len(bpy.data.objects), len(bpy.data.materials), len(bpy.data.images))
+    steps = cover_steps(bpy.context.scene, depsgraph(), _group().layers[0])
     for progress in steps:
         assert 0.0 <= progress.fraction <= 1.0
         if progress.message == until:
             break
     steps.close()
-    after = (len(_group().populations), len(bpy.data.objects), len(bpy.data.materials), len(bpy.data.images))
+    after = (len(_group().layers), len(bpy.data.objects), len(bpy.data.materials), len(bpy.data.images))
     assert after == before
     assert not _group().species_edits
 
@@ -226,7 +226,7 @@ def test_a_cover_that_is_there_is_kept_where_its_renewal_is_stopped():
     (cover,) = _covers()
     cover.mix.remove(0)  # what a renewal adds again
     before = ([e.species for e in cover.mix], cover.density, cover.made, len(bpy.data.objects))
-    steps = cover_steps(bpy.context.scene, depsgraph(), _group().populations[0])
+    steps = cover_steps(bpy.context.scene, depsgraph(), _group().layers[0])
     next(progress for progress in steps if progress.message == "Looking for places")
     steps.close()
     (cover,) = _covers()
@@ -269,7 +269,7 @@ def test_soil_of_large_ground_is_as_green_as_if_all_were_planted(monkeypatch):
     ground = _wood(size=15.0)
     _cover()
     whole = _green(ground)
-    populations.remove_population(bpy.context.scene, list(_group().populations).index(_covers()[0]))
+    populations.remove_population(bpy.context.scene, list(_group().layers).index(_covers()[0]))
     monkeypatch.setattr("tetflora_addon.blender.placing.cover.MOST", 400)
     cover = _cover()
     assert cover.made <= 400
@@ -304,16 +304,14 @@ def test_changed_nodes_of_the_soil_stay_and_its_map_follows():
     assert first  # the map before it is gone, the new one is in its place
 
 
-def test_habitats_are_written_to_files_and_read_again(tmp_path):
+def test_habitats_are_written_to_files_and_read_again():
     _wood()
     _cover()
-    path = tmp_path / "wood.json"
-    population_files.write_populations(_group().populations, path)
-    number, _ = population_files.read_populations(bpy.context.scene, path, [])
-    assert number == 2
-    read = _group().populations[3]
+    data = population_data.population_data(_group().layers[1])
+    read = populations.add_population(bpy.context.scene)
+    population_data.fill_population(read, data, bpy.context.scene, [])
     assert [(e.species, e.habitat, e.shed_by) for e in read.mix] == [
-        (e.species, e.habitat, e.shed_by) for e in _group().populations[1].mix
+        (e.species, e.habitat, e.shed_by) for e in _group().layers[1].mix
     ]
 
 

@@ -18,7 +18,7 @@ def linked(clean_file, tmp_path):
     select(add_mesh("ground", size=10.0))
     bpy.ops.tetflora.populate(count=4, species="bush")
     path = str(tmp_path / "library.blend")
-    bpy.data.libraries.write(path, {bpy.context.scene.tetflora.populations[0].collection})
+    bpy.data.libraries.write(path, {bpy.context.scene.tetflora.layers[0].collection})
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     with bpy.data.libraries.load(path, link=True) as (found, wanted):
         wanted.collections = list(found.collections)
@@ -39,7 +39,7 @@ def _state(plants):
         ("reseed", {}),
         ("assign_species", {"species": "oak"}),
         ("make_plant_mesh", {}),
-        ("make_field", {}),
+        ("convert_plants", {"to": 'FIELD'}),
         ("drop_to_ground", {}),
     ],
 )

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _population():
-    return bpy.context.scene.tetflora.populations[0]
+    return bpy.context.scene.tetflora.layers[0]
 
 
 def _outdated():
@@ -71,20 +71,20 @@ def test_species_companions_and_grounds_count():
     assert _outdated()
 
 
-@pytest.mark.parametrize("press", ["update_population", "reroll_population"])
-def test_placing_settles_it(press):
+@pytest.mark.parametrize("options", [{}, {"which": 'ACTIVE', "reroll": True}])
+def test_placing_settles_it(options):
     _populate().count = 12
     assert _outdated()
-    getattr(bpy.ops.tetflora, press)()
+    bpy.ops.tetflora.update_layers(**options)
     assert not _outdated()
 
 
 def test_frozen_plants_are_as_they_shall_be():
     population = _populate()
-    bpy.ops.tetflora.freeze_population()
+    population.frozen = True
     population.count = 3
     assert not _outdated()
-    bpy.ops.tetflora.freeze_population()
+    population.frozen = False
     assert _outdated()
 
 
@@ -108,24 +108,23 @@ def test_the_panel_tells_the_plants_that_are_there_or_that_an_update_would_place
     waits = rules.awaits_update
     population = _populate()
     rules.note_erased(population, [(0.0, 0.0)], 5.0)
-    bpy.ops.tetflora.update_population()
+    bpy.ops.tetflora.update_layers(which='ACTIVE')
     assert 0 < population.made < 20
     assert (status(population), waits(population)) == (f"{population.made} plants, as empties", False)
     population.count = 33
     assert (status(population), waits(population)) == ("33 plants, as empties", True)
     population.by_density = True
     assert (status(population), waits(population)) == ("As many plants as fit on the ground", True)
-    bpy.ops.tetflora.forget_erased()
-    bpy.ops.tetflora.update_population()
+    bpy.ops.tetflora.update_layers(which='ACTIVE', forget_erased=True)
     assert (status(population), waits(population)) == (f"{population.made:,} plants, as empties", False)
-    bpy.ops.tetflora.add_population()
-    assert waits(bpy.context.scene.tetflora.populations[1])
+    bpy.ops.tetflora.duplicate_layer()
+    assert waits(bpy.context.scene.tetflora.layers[1])
     assert not waits(bpy.context.scene.tetflora.populate)
 
 
 def test_it_is_known_in_a_file_that_is_opened(tmp_path):
     _populate().density = 123.4
-    bpy.ops.tetflora.update_population()
+    bpy.ops.tetflora.update_layers(which='ACTIVE')
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "forest.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "forest.blend"))
     assert not _outdated()

@@ -183,7 +183,7 @@ def test_the_panels_density_and_habitats_count():
     entry.species, entry.habitat = "conifer", 'LIGHT'
     select(add_mesh("ground", size=10.0))  # 20 m to a side: .04 ha
     bpy.ops.tetflora.populate()
-    population = bpy.context.scene.tetflora.populations[0]
+    population = bpy.context.scene.tetflora.layers[0]
     assert (population.by_density, population.density) == (True, 500.0)
     assert 10 <= population.made <= 20
     assert population.mix[0].habitat == 'LIGHT'
@@ -194,7 +194,7 @@ def test_a_script_that_gives_a_number_gets_it_whatever_the_panel_says():
     settings.by_density, settings.density = True, 500.0
     select(add_mesh("ground", size=10.0))
     bpy.ops.tetflora.populate(count=3, min_distance=0.0, species="conifer")
-    assert bpy.context.scene.tetflora.populations[0].made == 3
+    assert bpy.context.scene.tetflora.layers[0].made == 3
 
 
 def test_populate_twice_leaves_the_first_plants_their_room():

@@ -18,7 +18,7 @@ def _scene():
 
 
 def _population(number=0):
-    return _scene().tetflora.populations[number]
+    return _scene().tetflora.layers[number]
 
 
 def _own(number=0):
@@ -41,27 +41,27 @@ def test_a_field_of_its_plants_is_replaced_by_an_update(chosen):
     _populate()
     home = _population().collection
     select(*_own()[:chosen])
-    bpy.ops.tetflora.make_field()
+    bpy.ops.tetflora.convert_plants(to='FIELD')
     field = bpy.context.active_object
     assert field.tetflora.is_field
     assert field in _own()
     assert list(field.users_collection) == [_population().collection] == [home]
     assert populations.own_number(_own()) == _plants() == 20
     _population().count = 12
-    bpy.ops.tetflora.update_population()
+    bpy.ops.tetflora.update_layers(which='ACTIVE')
     assert _plants() == 12
 
 
 def test_objects_of_its_field_are_replaced_by_an_update():
     _populate()
     _population().as_field = 'FIELD'
-    bpy.ops.tetflora.update_population()
+    bpy.ops.tetflora.update_layers(which='ACTIVE')
     (field,) = _own()
     select(field)
-    bpy.ops.tetflora.split_field()
+    bpy.ops.tetflora.convert_plants(to='OBJECTS')
     assert len(_own()) == _plants() == 20
     assert set(_own()) == set(_population().collection.objects)
-    bpy.ops.tetflora.update_population()
+    bpy.ops.tetflora.update_layers(which='ACTIVE')
     assert _plants() == 20
 
 
@@ -72,7 +72,7 @@ def test_a_field_of_several_owners_is_the_artists():
     _scene().collection.objects.link(copy)
     for other in (hand, copy):
         select(*_own()[:3], other)
-        bpy.ops.tetflora.make_field()
+        bpy.ops.tetflora.convert_plants(to='FIELD')
         assert bpy.context.active_object.tetflora.population == ""
         assert bpy.context.active_object not in _own()
     assert len(_own()) == 14

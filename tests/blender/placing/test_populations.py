@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, select
-from tetflora_addon.blender.placing import population_files, populations
+from tetflora_addon.blender.placing import population_data, populations
 from tetflora_addon.blender.scene import fields
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -24,7 +24,7 @@ def _settings():
 
 
 def _active():
-    return _settings().populations[_settings().populations_index]
+    return _settings().layers[_settings().layers_index]
 
 
 def _plants():
@@ -60,8 +60,8 @@ def _state():
         )
         for o in bpy.context.scene.objects
     }
-    populations = [(p.uid, p.frozen, p.made, p.message) for p in _settings().populations]
-    return objects, populations, population_files.as_data(_settings().populations), datablocks()
+    populations = [(p.uid, p.frozen, p.made, p.message) for p in _settings().layers]
+    return objects, populations, [population_data.population_data(one) for one in _settings().layers], datablocks()
 
 
 def _places(objects):
@@ -82,7 +82,7 @@ def test_populate_makes_a_population_that_knows_its_settings():
 def test_update_with_the_same_settings_gives_the_same_plants():
     _populate()
     before = _state()
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     after = _state()
     assert {k: v[:-1] for k, v in before[0].items() if k != "ground"} == {
         k: v[:-1] for k, v in after[0].items() if k != "ground"
@@ -95,7 +95,7 @@ def test_an_edit_replaces_the_plants_and_nothing_else():
     hand = add_plant("by hand", location=(0.0, 0.0, 0.0))
     _active().count, _active().min_distance = 45, 2.0
     depsgraph()
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     own = _own()
     assert len(own) == 45
     assert hand not in own
@@ -109,7 +109,7 @@ def test_other_populations_keep_their_room_and_their_plants():
     first = {o.name: tuple(o.location) for o in _plants()}
     _populate(count=40, min_distance=2.0, seed=2, as_field='FIELD')
     _active().seed = 3
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     depsgraph()
     assert {o.name: tuple(o.location) for o in _plants()} == first
     (field,) = _own()
@@ -121,37 +121,37 @@ def test_other_populations_keep_their_room_and_their_plants():
 def test_reroll_is_another_arrangement_that_can_be_repeated():
     _populate()
     first = _places(_own())
-    _ops().reroll_population()
+    _ops().update_layers(which='ACTIVE', reroll=True)
     second, seed = _places(_own()), _active().seed
     assert seed != 0
     assert not np.allclose(np.sort(first, axis=0), np.sort(second, axis=0))
     _active().seed = 0
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     assert np.allclose(_places(_own()), first)
-    _ops().reroll_population()
+    _ops().update_layers(which='ACTIVE', reroll=True)
     assert _active().seed == seed
     assert np.allclose(_places(_own()), second)
 
 
 def test_frozen_plants_stay_whatever_is_pressed():
     _populate()
-    _ops().freeze_population()
+    _active().frozen = True
     before = {o.name for o in _plants()}
-    for name in ("update_population", "reroll_population"):
+    for reroll in (False, True):
         with pytest.raises(RuntimeError, match="frozen"):
-            getattr(_ops(), name)()
-    _ops().remove_population()
+            _ops().update_layers(which='ACTIVE', reroll=reroll)
+    _ops().remove_layer()
     assert {o.name for o in _plants()} == before
     assert not any(o.tetflora.population for o in _plants())
-    assert not _settings().populations
+    assert not _settings().layers
 
 
 def test_freeze_can_be_taken_back():
     _populate(count=12)
-    _ops().freeze_population()
-    _ops().freeze_population()
+    _active().frozen = True
+    _active().frozen = False
     _active().count = 5
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     assert len(_plants()) == 5
 
 
@@ -162,13 +162,13 @@ def test_remove_takes_the_plants_and_leaves_nothing_behind(as_field):
     select(ground)
     before = datablocks()
     _populate(as_field=as_field)
-    _ops().remove_population()
+    _ops().remove_layer()
     assert datablocks() == before
 
 
 def test_remove_may_keep_the_plants():
     _populate(count=8)
-    _ops().remove_population(keep_plants=True)
+    _ops().remove_layer(keep_plants=True)
     assert len(_plants()) == 8
     assert not any(o.tetflora.population for o in _plants())
 
@@ -177,11 +177,11 @@ def test_what_is_kind_of_storage_changes_with_the_setting():
     _populate(count=20)
     places = _places(_own())
     _active().as_field = 'FIELD'
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     (field,) = _own()
     assert np.allclose([v.co for v in field.data.vertices], places, atol=1e-5)
     _active().as_field = 'EMPTIES'
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     assert np.allclose(_places(_own()), places)
 
 
@@ -197,7 +197,7 @@ def test_renamed_copied_and_deleted_plants_do_not_confuse_a_population():
     assert len(_own()) == 9
     assert copy not in _own()
     name = copy.name
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     assert len(_own()) == 10
     assert "My favorite" not in bpy.data.objects
     assert bpy.data.objects[name].tetflora.population == ""
@@ -208,7 +208,7 @@ def test_renamed_copied_and_deleted_plants_do_not_confuse_a_population():
 def test_plants_deleted_by_hand_come_back_and_it_is_said(capfd):
     _populate(count=10)
     bpy.data.batch_remove(_own()[:3])
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     assert len(_own()) == 10
     assert "3 deleted plants restored" in capfd.readouterr().out
 
@@ -217,7 +217,7 @@ def test_copies_in_the_collection_outlive_the_population():
     _populate(count=4)
     copy = _own()[0].copy()
     _active().collection.objects.link(copy)
-    _ops().remove_population()
+    _ops().remove_layer()
     assert _plants() == [copy]
     assert [c.name for c in copy.users_collection] == ["TetFlora plants"]
     assert bpy.data.objects.get(copy.name) == copy
@@ -231,7 +231,7 @@ def test_ground_that_is_gone_is_said_and_plants_stay(delete):
     else:  # as Blender's Delete does it where something still points to the object
         bpy.context.scene.collection.objects.unlink(ground)
     with pytest.raises(RuntimeError, match='"Population" has no ground in this scene; select meshes'):
-        _ops().update_population()
+        _ops().update_layers(which='ACTIVE')
     assert len(_plants()) == 6
 
 
@@ -240,7 +240,7 @@ def test_ground_without_faces_is_named_and_plants_stay():
     ground.data.clear_geometry()
     before = _state()
     with pytest.raises(RuntimeError, match='"ground" has no faces'):
-        _ops().update_population()
+        _ops().update_layers(which='ACTIVE')
     assert _state() == before
 
 
@@ -248,7 +248,7 @@ def test_a_reroll_that_fails_keeps_the_seed():
     _populate(count=6, seed=4)
     _active().mix[0].species = "quercus"
     with pytest.raises(RuntimeError, match='Unknown species "quercus"'):
-        _ops().reroll_population()
+        _ops().update_layers(which='ACTIVE', reroll=True)
     assert _active().seed == 4
 
 
@@ -261,10 +261,10 @@ def test_a_collection_of_grounds_takes_what_is_added_later():
     _active().ground_collection = grounds
     _active().grounds.clear()
     with pytest.raises(RuntimeError, match="no ground"):
-        _ops().update_population()
+        _ops().update_layers(which='ACTIVE')
     grounds.objects.link(far)
     depsgraph()
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     assert (_places(_own())[:, 0] > 400.0).all()
 
 
@@ -277,7 +277,7 @@ def test_linked_plants_are_neither_counted_nor_deleted(tmp_path):
     assert len(_plants()) == 10
     assert len(_own()) == 5
     _active().count, _active().min_distance = 3, 0.0
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     assert sum(o.library is not None for o in _plants()) == 5
     assert sum(o.library is None for o in _plants()) == 3
 
@@ -285,7 +285,7 @@ def test_linked_plants_are_neither_counted_nor_deleted(tmp_path):
 def test_density_is_by_the_hectare():
     _populate(count=5, size=100.0)  # 4 hectares
     _active().by_density, _active().density, _active().min_distance = True, 50.0, 0.0
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     assert 150 <= len(_own()) <= 250  # 200 expected
 
 
@@ -296,7 +296,7 @@ def test_companions_and_masks_reach_the_engine():
     _active().vertex_group = "wood"
     entry = _active().mix[0]
     entry.companion, entry.companion_strength, entry.companion_distance = "conifer", -1.0, 4.0
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     bpy.context.view_layer.update()
     own = _own()
     assert _places(own)[:, 0].mean() < -10.0  # vertices 0 and 3 are at -x
@@ -311,14 +311,14 @@ def test_tilted_empties_and_fields_agree():
     ground.rotation_euler = (0.4, 0.2, 0.0)
     depsgraph()
     _active().tilt = 1.0
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     graph = depsgraph()
     up = np.array([o.matrix_world.to_3x3().normalized().col[2] for o in _own()])
     normal = np.array(ground.matrix_world.to_3x3().col[2])
     assert np.allclose(up, normal, atol=1e-4)
     empties = {o.tetflora.seed: np.array(o.matrix_world.to_3x3().normalized()) for o in _own()}
     _active().as_field = 'FIELD'
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     graph = depsgraph()
     read = fields.read_field(_own()[0], graph, np.eye(4)[None])
     for seed, frame in zip(read.seed.tolist(), read.frame, strict=True):
@@ -330,17 +330,17 @@ def test_new_populations_begin_like_the_one_that_is_shown():
     _active().clumping = 0.25
     other = add_mesh("other", size=5.0)
     select(other)
-    _ops().add_population()
-    assert [p.name for p in _settings().populations] == ["Population", "Population.001"]
+    _ops().duplicate_layer(to_selected=True)
+    assert [p.name for p in _settings().layers] == ["Population", "Population.001"]
     assert _active().clumping == 0.25
     assert [e.object for e in _active().grounds] == [other]
-    assert _active().uid != _settings().populations[0].uid
+    assert _active().uid != _settings().layers[0].uid
     assert len(_plants()) == 7
-    select(_settings().populations[0].grounds[0].object)
-    _ops().set_population_ground()
+    select(_settings().layers[0].grounds[0].object)
+    _ops().set_layer_ground()
     assert [e.object.name for e in _active().grounds] == ["ground"]
-    _settings().populations_index = 0
-    _ops().select_population()
+    _settings().layers_index = 0
+    _ops().select_plants(layer=True)
     assert {o for o in _plants() if o.select_get()} == set(_own())
 
 
@@ -351,17 +351,17 @@ def test_populations_survive_save_and_load(tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     after = _state()
     assert before[1:] == after[1:]
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     assert len(_own()) == len(_plants()) == 9
 
 
-@pytest.mark.parametrize("operator", ["update_population", "reroll_population", "freeze_population", "add_population"])
-def test_undo_restores_everything_in_one_step(operator):
+@pytest.mark.parametrize("options", [{"which": 'ACTIVE'}, {"which": 'ACTIVE', "reroll": True}])
+def test_undo_restores_everything_in_one_step(options):
     bpy.ops.ed.undo_push(message="begin")
     _populate()
     bpy.ops.ed.undo_push(message="populated")
     before = _state()
-    getattr(_ops(), operator)()
-    bpy.ops.ed.undo_push(message=operator)
+    _ops().update_layers(**options)
+    bpy.ops.ed.undo_push(message="updated")
     bpy.ops.ed.undo()
     assert _state() == before

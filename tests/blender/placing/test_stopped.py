@@ -74,7 +74,7 @@ def test_a_population_that_was_deleted_meanwhile_is_named() -> None:
     scene, population = populated(40, 'EMPTIES')
     steps = populations.make_plants_steps(scene, depsgraph(), population)
     next(steps), next(steps)
-    scene.tetflora.populations.clear()
+    scene.tetflora.layers.clear()
     with pytest.raises(GoneError, match="Placing plants was stopped because its population was deleted"):
         list(steps)
     assert not [o for o in scene.objects if o.tetflora.is_plant]

@@ -143,19 +143,34 @@ def measure(obj) -> Surface:
     )
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.fixture(scope="module", params=FORMS)
+def exported(blender, request, tmp_path_factory) -> tuple[Path, dict[str, Surface], dict[str, str]]:
+    """A folder with one result in each format; its surfaces, and the parents of its objects."""
+    folder = tmp_path_factory.mktemp(request.param)
+    refined(request.param)
+    for suffix in FORMATS:
+        if not is_absent(suffix):
+            export(folder / f"forest.{suffix}")
+    return folder, surfaces(), parents()
+
+
+def parents() -> dict[str, str]:
+    return {plain(o.name): plain(o.parent.name) for o in bpy.context.scene.objects if o.parent is not None}
+
+
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_what_was_refined_comes_back(blender, tmp_path, suffix, form):
+def test_what_was_refined_comes_back(exported, suffix):
+    folder, expected, families = exported
+    assert {name.split("_")[-2] for name in expected} == {"bark", "leaf", "proxies"}
+    assert set(families.values()) == {"Bush__TetFlora_", "Conifer__TetFlora_"}
     if is_absent(suffix):
         return
-    refined(form)
-    expected = surfaces()
-    assert {name.split("_")[-2] for name in expected} == {"bark", "leaf", "proxies"}
-    path = tmp_path / f"forest.{suffix}"
-    export(path)
-    read_back(path)
+    read_back(folder / f"forest.{suffix}")
     found = surfaces()
     assert set(found) == set(expected)
+    # OBJ knows no parents; USD has one more where materials are kept.
+    back = parents()
+    assert {name: back.get(name) for name in families} == (dict.fromkeys(families) if suffix == "obj" else families)
     for name, before in expected.items():
         after = found[name]
         assert after.triangles == before.triangles, name
@@ -194,20 +209,6 @@ def test_obj_holds_the_viewport_color_of_each_material(blender, tmp_path):
     assert read
     for name, color in read.items():
         assert color == pytest.approx(colors[name], abs=1e-3), name
-
-
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_parents_of_species_come_along(blender, tmp_path, suffix):
-    if is_absent(suffix):
-        return
-    refined('MICROSURFACES')
-    expected = {plain(o.name): plain(o.parent.name) for o in bpy.context.scene.objects if o.parent is not None}
-    assert set(expected.values()) == {"Bush__TetFlora_", "Conifer__TetFlora_"}
-    export(tmp_path / f"forest.{suffix}")
-    read_back(tmp_path / f"forest.{suffix}")
-    found = {plain(o.name): plain(o.parent.name) for o in bpy.context.scene.objects if o.parent is not None}
-    # OBJ knows no parents; USD has one more where materials are kept.
-    assert {name: found.get(name) for name in expected} == (dict.fromkeys(expected) if suffix == "obj" else expected)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

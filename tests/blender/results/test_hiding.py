@@ -165,6 +165,21 @@ def test_saved_files_show_linked_objects_or_their_results(woods, tmp_path, saved
     assert [c.name for c in bpy.data.collections if c.library is None] == []
 
 
+@pytest.mark.parametrize("renamed", [False, True])
+def test_what_saved_results_replace_is_hidden_in_the_file_whatever_the_scene_is_called(clean_file, tmp_path, renamed):
+    scene, original = bpy.context.scene, add_mesh("original")
+    scene.tetflora.output.save_results = True
+    hide(original)
+    if renamed:
+        scene.name = "another"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    original, scene = bpy.data.objects["original"], bpy.context.scene
+    assert original.hide_render
+    refine.clear(scene)
+    assert not original.hide_render
+
+
 def test_kept_results_leave_linked_objects_hidden(woods):
     hide(woods.objects["scatter"])
     hiding.keep_results(bpy.context.scene)

@@ -49,7 +49,7 @@ def test_what_cannot_be_compiled_is_guessed(window: list, monkeypatch: pytest.Mo
 
     species = replace(species_for(None, "rowan"), name="With an object for a leaf")
     monkeypatch.setattr(crowns, "species_for", lambda *_: species)
-    monkeypatch.setattr(crowns, "crown_of", fails)
+    monkeypatch.setattr(crowns, "prepare", fails)
     assert crowns.crown_to_draw(bpy.context.scene, "rowan") is None
     look(window)
     asked = len(window)

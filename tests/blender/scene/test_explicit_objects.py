@@ -390,10 +390,11 @@ def test_the_operator_marks_and_unmarks():
     add_camera()
     stone, plant = add_mesh("stone"), add_plant()
     select(stone, plant)
-    bpy.ops.tetflora.mark_explicit()
+    bpy.ops.tetflora.mark(what='EXPLICIT')
     assert stone.tetflora.is_explicit
     assert not plant.tetflora.is_explicit
-    bpy.ops.tetflora.mark_explicit()
+    bpy.ops.tetflora.mark(what='EXPLICIT')
     assert not stone.tetflora.is_explicit
     select(plant)
-    assert not bpy.ops.tetflora.mark_explicit.poll()
+    with pytest.raises(RuntimeError, match="Select meshes, or objects that instance them, first"):
+        bpy.ops.tetflora.mark(what='EXPLICIT')

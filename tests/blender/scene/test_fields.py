@@ -337,11 +337,11 @@ def test_a_field_and_its_plants_are_the_same_forest():
     disabled.tetflora.enabled = False
     before = _plants()
     select(*plants, disabled)
-    assert bpy.ops.tetflora.make_field() == {'FINISHED'}
+    assert bpy.ops.tetflora.convert_plants(to='FIELD') == {'FINISHED'}
     assert {o.name for o in bpy.data.objects if o != camera} == {"disabled", "Field of plants"}
     _same(before, _plants())
     assert bpy.context.active_object.name == "Field of plants"
-    assert bpy.ops.tetflora.split_field() == {'FINISHED'}
+    assert bpy.ops.tetflora.convert_plants(to='OBJECTS') == {'FINISHED'}
     assert not bpy.data.meshes
     assert {o.type for o in bpy.data.objects} == {'CAMERA', 'EMPTY'}
     _same(before, _plants())
@@ -350,9 +350,9 @@ def test_a_field_and_its_plants_are_the_same_forest():
 def test_marking_and_removing():
     ground = add_mesh("ground")
     select(ground)
-    bpy.ops.tetflora.mark_field()
+    bpy.ops.tetflora.mark(what='FIELD')
     assert len(_plants()) == 4
-    bpy.ops.tetflora.mark_field()
+    bpy.ops.tetflora.mark(what='FIELD')
     assert not ground.tetflora.is_field
     bpy.ops.tetflora.populate(count=20, min_distance=0.0, as_field='FIELD', species="bush")
     ground.tetflora.is_field = True

@@ -172,5 +172,5 @@ def test_a_field_that_can_have_no_points_is_named(scene, kind):
         with pytest.raises(errors.SceneError, match=r'"odd" is no mesh or point cloud .*turn off Field of Plants'):
             do()
     select(odd)
-    assert bpy.ops.tetflora.mark_field() == {'FINISHED'}  # off again
+    assert bpy.ops.tetflora.mark(what='FIELD') == {'FINISHED'}  # off again
     refine.refine(scene, depsgraph())

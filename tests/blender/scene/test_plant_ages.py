@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from devtools.layouts import Layout
 from panels import plants as panel
-from tests.blender.layouts import Layout
 from tests.blender.scene.test_fields import _field
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import errors
@@ -275,7 +275,7 @@ def test_the_panel_tells_the_stage(scene):
     for age in (0.0, 1.0, 9_000.0):
         plant.tetflora.age = age
         layout = Layout()
-        panel.TETFLORA_PT_plants.draw(type("Panel", (), {"layout": layout})(), bpy.context)
+        panel.TETFLORA_PT_object.draw(type("Panel", (), {"layout": layout})(), bpy.context)
         told[age] = [options.get("text") for name, _, options in layout.drawn if name == "label"]
     assert "Full-grown" in told[0.0]
     assert "Seedling" in told[1.0]

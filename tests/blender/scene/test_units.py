@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
+from devtools.layouts import Layout
 from panels import refine as panel
-from tests.blender.layouts import Layout
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,11 @@ def test_the_panel_tells_how_large_plants_are_in_the_units_of_the_scene(clean_fi
         preferences=bpy.context.preferences,
     )
     layout = Layout()
-    panel.TETFLORA_PT_refine.draw(SimpleNamespace(layout=layout), context)
-    said = [text for *_, options in layout.drawn if "One unit" in (text := options.get("text", ""))]
-    assert bool(said) == bool(shown)
-    assert all(text.endswith(f"shows as {shown}") for text in said)
+    panel.TETFLORA_PT_warnings.draw(SimpleNamespace(layout=layout), context)
+    said = " ".join(options.get("text", "") for *_, options in layout.drawn)
+    assert ("One unit" in said) == bool(shown)
+    assert shown in said
+    assert layout.names("operator") == ["tetflora.mend"] * bool(shown)
+    if shown:
+        bpy.ops.tetflora.mend(what="units")
+        assert units.scale_length == 1.0

@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 import pytest
 
-from panels import results as panel
-from tests.blender.layouts import Layout
+from devtools.layouts import Layout
+from panels import season as panel
 from tests.blender.scene.test_wind import places
 from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon import errors
@@ -122,7 +122,7 @@ def test_the_south_has_other_seasons(scene):
     assert names[50.0] == ["winter", "spring", "summer", "autumn"]
     assert names[-35.0] == ["summer", "autumn", "winter", "spring"]
     for season in ('WINTER', 'SPRING', 'SUMMER', 'AUTUMN'):
-        bpy.ops.tetflora.set_season(season=season)
+        bpy.context.scene.tetflora.year.season = season
         assert settings.season_name(settings.season_of(scene)) == season.lower()
 
 
@@ -199,7 +199,7 @@ def test_a_number_that_is_none_is_refused(scene, name):
 def test_the_panel_tells_the_date(scene):
     scene.tetflora.year.day = 287.0
     layout = Layout()
-    panel.TETFLORA_PT_year.draw(SimpleNamespace(layout=layout), bpy.context)
+    panel.TETFLORA_PT_season.draw(SimpleNamespace(layout=layout), bpy.context)
     assert "14 October" in [options.get("text") for name, _, options in layout.drawn if name == "label"]
 
 

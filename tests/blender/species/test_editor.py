@@ -222,8 +222,7 @@ def test_saved_species_come_back_as_they_were(own_folder, tmp_path):
     session.clean_file()
     assert _edited(identifier) == species
     _editor(identifier)
-    assert bpy.ops.tetflora.delete_species.poll()
-    bpy.ops.tetflora.delete_species()
+    bpy.ops.tetflora.delete_file()
     assert identifier not in edits.catalog()
     assert bpy.ops.tetflora.load_species(filepath=str(tmp_path / "given.json")) == {'FINISHED'}
     given = _edited("given")
@@ -234,7 +233,8 @@ def test_saved_species_come_back_as_they_were(own_folder, tmp_path):
 
 def test_shipped_species_cannot_be_deleted(own_folder):
     _editor("bush")
-    assert not bpy.ops.tetflora.delete_species.poll()
+    with pytest.raises(RuntimeError, match="no file in your species folder"):
+        bpy.ops.tetflora.delete_file()
     with pytest.raises(errors.SpeciesError, match="built-in"):
         OWN_FILES.delete("bush")
 

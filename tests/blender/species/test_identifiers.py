@@ -44,7 +44,7 @@ def _carried(identifier: str, **changes: object) -> None:
 
 def _press_everything() -> None:
     """All buttons of the species menu, for what the editor shows; what cannot be done is a report."""
-    for operator in (bpy.ops.tetflora.save_species, bpy.ops.tetflora.delete_species, bpy.ops.tetflora.revert_species):
+    for operator in (bpy.ops.tetflora.save_species, bpy.ops.tetflora.delete_file, bpy.ops.tetflora.revert_species):
         try:
             operator()
         except RuntimeError as error:
@@ -64,7 +64,8 @@ def test_identifiers_from_a_file_lead_nowhere(own_folder, tmp_path, way):
     _carried(identifier)
     assert identifier not in edits.catalog()
     assert not bpy.ops.tetflora.save_species.poll()
-    assert not bpy.ops.tetflora.delete_species.poll()
+    with pytest.raises(RuntimeError, match="no file in your species folder"):
+        bpy.ops.tetflora.delete_file()
     _press_everything()
     for do in (menus.save_species, edits.species_for, edits.species_data):
         with pytest.raises(errors.SpeciesError):
@@ -112,11 +113,12 @@ def test_saving_and_deleting_leave_alone_what_a_link_leads_to(own_folder, tmp_pa
     link = own_folder / "bush.json"
     link.symlink_to(tmp_path / "target")
     bpy.context.scene.tetflora.species_editor.species = "bush"
-    assert not bpy.ops.tetflora.delete_species.poll()
+    with pytest.raises(RuntimeError, match="no file in your species folder"):
+        bpy.ops.tetflora.delete_file()
     bpy.ops.tetflora.save_species()
     assert not link.is_symlink()
     assert (tmp_path / "target").read_text(encoding="utf-8") == "mine"
-    bpy.ops.tetflora.delete_species()
+    bpy.ops.tetflora.delete_file()
     assert not list(own_folder.iterdir())
 
 

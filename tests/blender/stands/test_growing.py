@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from operators.stands import TETFLORA_OT_keep_year
+from operators.growing import TETFLORA_OT_keep_year
 from tests.blender.scenes import add_mesh, depsgraph, select
 from tetflora_addon import errors
 from tetflora_addon.blender.placing.brush import Standing
@@ -61,10 +61,10 @@ def test_a_stand_grows_on_its_ground_and_has_a_history():
 def test_the_same_settings_grow_the_same_stand_and_others_another():
     field = stand_on(add_mesh("ground", size=12.0))
     before = digest(field)
-    assert bpy.ops.tetflora.grow_again() == {'FINISHED'}
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}
     assert digest(field) == before
     field.tetflora.stand.seed = 1
-    assert bpy.ops.tetflora.grow_again() == {'FINISHED'}
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}
     assert digest(field) != before
     assert len([obj for obj in bpy.data.objects if obj.tetflora.is_field]) == 1
 
@@ -106,7 +106,7 @@ def test_a_year_is_kept_as_a_plain_field():
     np.testing.assert_allclose(kept.frame, seeds.frame, atol=1e-5)
     np.testing.assert_allclose(now.height, sizes.height, rtol=1e-6)
     assert len(stored_now(field)) == len(seeds)
-    assert bpy.ops.tetflora.grow_again() == {'FINISHED'}
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}
     assert has_history(field)
 
 
@@ -152,7 +152,7 @@ def test_the_slider_ends_with_the_stand_and_keys_go_with_its_years():
     assert group.stand_year == 12.0
     assert len(plants_of(field, 150.0)[0]) == there > 0
     group.stand.years = 8
-    assert bpy.ops.tetflora.grow_again() == {'FINISHED'}
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}
     assert group.stand_year == 8.0
     assert bpy.ops.tetflora.animate_growth(first=1, last=9) == {'FINISHED'}
     field.keyframe_insert("location", frame=3)

@@ -34,10 +34,10 @@ def _dots():
 
 def test_dots_stand_where_plants_will():
     _populate(count=15)
-    _settings().populations[0].seed = 9
+    _settings().layers[0].seed = 9
     dots = _dots()
     assert dots.plants == 15
-    _ops().update_population()
+    _ops().update_layers(which='ACTIVE')
     own = [o for o in bpy.context.scene.objects if o.tetflora.is_plant]
     places = np.array([tuple(o.location) for o in own])
     assert np.allclose(np.sort(dots.position[:, :2], axis=0), np.sort(places[:, :2], axis=0), atol=1e-4)
@@ -66,7 +66,7 @@ def test_the_preview_shows_few_dots_of_many_and_says_how_many(monkeypatch):
 def test_in_the_background_nothing_is_drawn():
     _populate(count=5)
     try:
-        _ops().preview_population()
+        bpy.context.window_manager.tetflora_points = True
         assert bpy.app.background
         assert points.shown_in(bpy.context.scene)
         assert points._state.handle is None

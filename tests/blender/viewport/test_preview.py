@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 import pytest
 
+from devtools.layouts import Layout
 from panels.refine import TETFLORA_PT_refine
-from tests.blender.layouts import Layout
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender.job import refine
@@ -128,7 +128,6 @@ def test_freezing_before_anything_is_computed_takes_the_camera_of_that_moment():
 def test_without_a_camera_the_button_says_so():
     add_plant()
     assert not bpy.ops.tetflora.preview_levels.poll()
-    assert not bpy.ops.tetflora.forget_levels.poll()
     bpy.context.scene.tetflora.preview.freeze = True  # nothing to freeze: said in the panel
     assert state.find(bpy.context.scene).frozen is None
     assert "camera" in state.find(bpy.context.scene).message
@@ -151,7 +150,7 @@ def test_levels_can_be_forgotten():
     scene, _, _ = scene_of_plants()
     preview = compute()
     made = preview.made
-    assert bpy.ops.tetflora.forget_levels() == {'FINISHED'}
+    assert bpy.ops.tetflora.preview_levels(clear=True) == {'FINISHED'}
     assert preview.levels is None
     assert preview.made > made
     assert not state.is_outdated(scene)
@@ -288,6 +287,6 @@ def test_results_say_what_has_changed_since_they_were_made():
     context = SimpleNamespace(region=region, **{name: getattr(bpy.context, name) for name in names})
     TETFLORA_PT_refine.draw(SimpleNamespace(layout=layout), context)
     said = " ".join(options.get("text", "") for name, _, options in layout.drawn if name == "label")
-    assert "out of date: the camera, the day or year, settings changed" in said
+    assert "Out of date: the camera, the day or year, settings changed" in said
     bpy.ops.tetflora.refine()
     assert auto.changed_since(scene) == []

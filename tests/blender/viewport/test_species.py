@@ -25,10 +25,15 @@ def preview():
         bpy.app.timers.unregister(species._on_timer)
 
 
+def _toggle():
+    manager = bpy.context.window_manager
+    manager.tetflora_species = not manager.tetflora_species
+
+
 def _switch_on(preview, species="bush"):
     editor = bpy.context.scene.tetflora.species_editor
     editor.species = species
-    bpy.ops.tetflora.preview_species()
+    _toggle()
     preview.refresh()
     return editor
 
@@ -150,7 +155,7 @@ def test_undo_brings_no_preview_back_that_was_switched_off(preview):
     bpy.ops.ed.undo_push(message="empty")
     _switch_on(preview)
     bpy.ops.ed.undo_push(message="with preview")
-    bpy.ops.tetflora.preview_species()
+    _toggle()
     assert _objects() == []
     bpy.ops.ed.undo_push(message="without")
     bpy.ops.ed.undo()
@@ -162,7 +167,7 @@ def test_undo_brings_no_preview_back_that_was_switched_off(preview):
 def test_leaves_nothing_of_itself(preview):
     before = datablocks()
     _switch_on(preview)
-    bpy.ops.tetflora.preview_species()
+    _toggle()
     after = datablocks()
     for kind in ("objects", "meshes", "collections"):
         assert after[kind] == before[kind]

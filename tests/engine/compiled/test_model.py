@@ -50,12 +50,12 @@ def trunk_of(seeds: Any, **order0: Any) -> tuple[Flora, Branches]:
 
 
 def test_averages_of_everything_at_once() -> None:
-    """Leaves, their area and color, wood, faces: compiled against 600 plants grown to the last leaf."""
+    """Leaves, their area and color, wood, faces: compiled against 300 plants grown to the last leaf."""
     flora = rich()
-    trunk, pieces = support.grown(flora, support.plants(np.arange(600)))
+    trunk, pieces = support.grown(flora, support.plants(np.arange(300)))
     tubes, blades = support.meshes(flora, pieces)
     areas = [support.face_areas(m) for m in blades]
-    assert sum(m.polygons for m in (*tubes, *blades)) == pytest.approx(600 * flora.polygons[0], rel=0.025)
+    assert sum(m.polygons for m in (*tubes, *blades)) == pytest.approx(300 * flora.polygons[0], rel=0.025)
     totals = subplant_totals(flora, trunk)
     assert sum(a.sum() for a in areas) == pytest.approx(totals.leaf_area.sum(), rel=0.03)
     assert wood_areas(flora, pieces).sum() == pytest.approx(totals.wood_area.sum(), rel=0.03)

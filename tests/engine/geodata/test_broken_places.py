@@ -8,7 +8,7 @@ import random
 
 import pytest
 
-from benchmarks import places_files as files
+from tests import places_files as files
 from tetflora_addon.errors import SceneError
 from tetflora_addon.geodata.grids import read_grid
 from tetflora_addon.geodata.inventories import read_inventory

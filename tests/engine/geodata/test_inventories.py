@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import places_files as files
-from benchmarks import places_inventories as inventories
+from tests import places_files as files
+from tests import places_inventories as inventories
 from tetflora_addon.errors import SceneError
 from tetflora_addon.geodata import table, tables
 from tetflora_addon.geodata.inventories import IMPERIAL, preview, read_inventory

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import zstandard
 
-from benchmarks import places_files as files
-from benchmarks import places_maps as maps
+from tests import places_files as files
+from tests import places_maps as maps
 from tetflora_addon.errors import SceneError
 from tetflora_addon.geodata import geotiff
 from tetflora_addon.geodata.canopy import checked_canopy, heights_above, without_areas

@@ -9,7 +9,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks import places_files as files
+from tests import places_files as files
 from tetflora_addon.errors import SceneError
 from tetflora_addon.geodata.outlines import BUILDING, MEADOW, OTHER, ROAD, WATER, WOOD, denser, one_ring, read_outlines
 from tetflora_addon.planting.plane import inside_any

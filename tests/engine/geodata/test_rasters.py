@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import places_files as files
+from tests import places_files as files
 from tetflora_addon.errors import SceneError
 from tetflora_addon.geodata import rasters
 from tetflora_addon.geodata.geotiff import read_tiff
@@ -114,6 +114,10 @@ def test_points_matrices_and_feet(tmp_path):
     )
     np.testing.assert_allclose(raster.values, 0.3048 * _HILLS, rtol=1e-6)
     assert raster.notes == ("heights in feet read as such",)
+    # A unit that nobody knows counts as a meter.
+    keys = [1, 1, 0, 3, 1025, 0, 1, 2, 3072, 0, 1, 32767, 3076, 0, 1, 9998]
+    path.write_bytes(files.geotiff(_HILLS, 10.0, extra={34735: (3, keys)}))
+    assert _tiff(path).system == System(unit=1.0)
     # A turned raster.
     matrix = [0.0, 2.0, 0.0, 100.0, 2.0, 0.0, 0.0, 200.0, *(8 * [0.0])]
     path.write_bytes(files.geotiff(_HILLS, extra={34264: (12, matrix)}))

@@ -75,7 +75,7 @@ def test_shipped_species_keep_within_their_bounds_in_a_storm(species: str) -> No
     number = support.SPECIES.index(species)
     for time in (0.0, 3.7):
         flora = support.flora().in_wind(Wind(30.0, 1.0, 1.0, time))
-        trunk = support.trunks(flora.rows, support.plants([1, 2, 3], number))
+        trunk = support.trunks(flora.rows, support.plants([1, 2], number))
         assert outside(flora, trunk) < _FLOAT32
 
 

@@ -19,7 +19,6 @@ from tetflora_addon.light.illumination import Illumination
 from tetflora_addon.light.receivers import MediumCells, SurfaceElements
 from tetflora_addon.light.scattering import (
     DIRECTIONS,
-    GLOSS,
     SOLID_ANGLE,
     harmonics,
     irradiance,
@@ -28,6 +27,7 @@ from tetflora_addon.light.scattering import (
     sphere_phase,
 )
 from tetflora_addon.light.sources import Near, World, arriving, buffers_of, split_areas
+from tetflora_addon.optics import GLOSS
 from tetflora_addon.refinement.lights import Light
 from tetflora_addon.tetrahedra.geometry import signed_volume
 

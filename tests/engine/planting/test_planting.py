@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tetflora_addon.errors import SceneError
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.planting import plane, site
-from tetflora_addon.planting.places import Placement, place
+from tetflora_addon.planting.places import Placement, new_seeds, place
 from tetflora_addon.planting.rules import Companion, Rules
 from tetflora_addon.planting.terrain import Path, Terrain, sampled
 
@@ -375,3 +375,11 @@ def test_fewer_plants_come_with_a_reason(changes, says):
     placed = place(Terrain(SQUARE), Rules(**changes))
     assert says in placed.reason
     assert len(placed) < max(placed.wanted, 1)
+
+
+def test_other_seeds_are_positive_and_others_for_each_roll() -> None:
+    seeds = np.arange(-50, 50)
+    first, second = new_seeds(seeds), new_seeds(seeds, 1)
+    np.testing.assert_array_equal(first, new_seeds(seeds, 0))
+    assert (first >= 0).all() and (second >= 0).all()
+    assert len(np.unique(np.concatenate([first, second]))) == 200

@@ -69,6 +69,13 @@ def test_colors_stay_colors_and_white_is_changed_least(color: float, hotspot_fac
     assert balanced_colors(given_, np.ones(1)) == pytest.approx(given_)
 
 
+def test_colors_beyond_white_are_changed_as_white_is() -> None:
+    hotspot_factor = np.array([0.3])
+    assert balanced_colors(np.full((1, 3), 1.2), hotspot_factor) == pytest.approx(
+        1.2 * balanced_colors(np.ones((1, 3)), hotspot_factor)
+    )
+
+
 def test_mean_overlap_lies_between() -> None:
     a = np.geomspace(1e-2, 1e2, 30)
     assert (mean_overlap(a) >= overlap(a / np.sqrt(2.0)) - 1e-6).all()

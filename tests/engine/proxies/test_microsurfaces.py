@@ -15,6 +15,7 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
+from tetflora_addon.optics import GLOSS
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, STRETCH, subplant_facets
 from tetflora_addon.proxies.primitives import facet_mesh
 from tetflora_addon.refinement.contents import bounding_cylinders, subplant_totals
@@ -144,9 +145,12 @@ def test_a_fraction_of_the_area_is_that_and_darkens_as_a_cluster_does() -> None:
     part_of = subplant_facets(flora, plant, side, weight=np.full(5, 0.5))
     np.testing.assert_allclose(part_of.side**2, 0.5 * whole.side**2)
     c = whole.color
-    assert (whole.transmission == 0).any()  # of wood as well as of leaves
-    np.testing.assert_allclose(part_of.color, c * 0.5 / (1 - 0.5 * c))
+    leafy = whole.transmission > 0  # of wood as well as of leaves
+    assert leafy.any() and not leafy.all()
+    np.testing.assert_allclose(part_of.color[~leafy], (c * 0.5 / (1 - 0.5 * c))[~leafy])
     assert (part_of.color <= whole.color + 1e-12).all()
-    # What is mirrored is lost as what is scattered once.
-    leafy = whole.transmission > 0
+    # What is mirrored is lost as such, and scattered by what it meets: of all light, a cluster sends on as much.
     np.testing.assert_allclose(1.0 - part_of.dull[leafy], 0.5 * (1.0 - whole.dull[leafy]))
+    mirrored = [GLOSS * (1.0 - f.dull[leafy])[:, None] for f in (whole, part_of)]
+    one, many = ((1 - g) * f.color[leafy] + g for f, g in zip((whole, part_of), mirrored, strict=True))
+    np.testing.assert_allclose(many, one * 0.5 / (1 - 0.5 * one))

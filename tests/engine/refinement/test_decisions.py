@@ -134,6 +134,10 @@ def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() ->
     seen = without_splits(split, cells, np.ones(count), SETTINGS)
     assert seen.tolist() == [Decision.PROXY, Decision.EXPLICIT, Decision.EXPLICIT, Decision.PROXY]
     assert (without_splits(split, cells, np.zeros(count), SETTINGS) == Decision.HIDDEN).all()
+    # Up to four blocks on each side is not large.
+    blocks = replace(cells, pixels=(np.array([4.1, 4.1, 3.9, 3.9]) * SETTINGS.block) ** 2)
+    seen = without_splits(split, blocks, np.ones(count), SETTINGS)
+    assert seen.tolist() == [Decision.PROXY, Decision.EXPLICIT, Decision.EXPLICIT, Decision.PROXY]
     kept = np.array([Decision.PROXY, Decision.HIDDEN, Decision.EXPLICIT, Decision.EMPTY], np.int8)
     assert (without_splits(kept, cells, np.zeros(count), SETTINGS) == kept).all()
 

@@ -13,7 +13,7 @@ from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.refinement.decisions import Decision
-from tetflora_addon.refinement.lights import Light, seen_ground
+from tetflora_addon.refinement.lights import GROUND, Light, seen_ground
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.settings import RefinementSettings
 
@@ -117,3 +117,4 @@ def test_ground_is_where_rays_meet_it() -> None:
     every = seen_ground(around, None, 0.0)
     assert every[:, 2] == pytest.approx(0.0, abs=1e-9)
     assert np.ptp(np.arctan2(every[:, 1], every[:, 0])) > 6.0
+    assert len(every) <= 6 * (GROUND // 2) ** 2  # each side of the cube has half of the rays across

@@ -47,7 +47,7 @@ def test_every_species_has_every_age(name: str) -> None:
     """Nothing is infinite or negative, and what does not die has leaves or wood."""
     species = load_species(name)
     end = ages_of(species).lifespan
-    for years in (1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 200.0, 0.97 * end, 2.0 * end):
+    for years in (1.0, 5.0, 20.0, 80.0, 0.97 * end, 2.0 * end):
         flora = at_age(name, years)
         for key, value in vars(flora).items():
             if isinstance(value, np.ndarray) and value.dtype.kind == "f":

@@ -57,7 +57,7 @@ def test_expected_polygons_are_those_of_the_compiled_species() -> None:
 
 
 @given(name=KINDS, quality=QUALITIES)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_polygons_are_as_asked(name: str, quality: float) -> None:
     wanted = quality * expected_polygons(kind(name))
     assume(500 <= wanted <= 500_000)
@@ -65,14 +65,14 @@ def test_polygons_are_as_asked(name: str, quality: float) -> None:
 
 
 @pytest.mark.parametrize("name", support.SPECIES)
-@pytest.mark.parametrize("polygons", [500, 5_000, 50_000, 500_000])
+@pytest.mark.parametrize("polygons", [500, 500_000])
 def test_every_species_reaches_500_to_500_000_polygons(name: str, polygons: int) -> None:
     changed = with_quality(kind(name), polygons / expected_polygons(kind(name)))
     assert expected_polygons(changed) == pytest.approx(polygons, rel=TOLERANCE)
 
 
 @given(name=KINDS, quality=QUALITIES)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_leaf_area_and_height_of_the_bound_are_kept(name: str, quality: float) -> None:
     before, after = kind(name), with_quality(kind(name), quality)
     assert leaf_area(after) == pytest.approx(leaf_area(before), rel=0.05)
@@ -82,7 +82,7 @@ def test_leaf_area_and_height_of_the_bound_are_kept(name: str, quality: float) -
 
 
 @given(name=KINDS, quality=st.floats(math.log(QUALITY_LIMITS[0]), math.log(30)).map(math.exp))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_the_result_is_a_species_that_the_format_allows(name: str, quality: float) -> None:
     for i, order in enumerate(with_quality(kind(name), quality).orders):
         assert isinstance(order.sides, int) and isinstance(order.segments, int)
@@ -108,20 +108,25 @@ def test_more_quality_never_means_fewer_polygons(name: str, qualities: tuple[flo
     assert low <= high * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("quality", [0.05, 0.3, 2.0])
+@cache
+def extents(name: str, quality: float) -> list[float]:
+    """Height and distance from the trunk within which 90 % of the surface of two plants lies."""
+    flora = compile_species([with_quality(kind(name), quality)])
+    tubes, leaves = support.meshes(flora, support.grown(flora, support.plants(np.arange(2)))[1])
+    centers = np.concatenate([support.face_centers(m) for m in (*tubes, *leaves)])
+    weight = np.concatenate([support.face_areas(m) for m in (*tubes, *leaves)])
+    found = []
+    for measure in (centers[:, 2], np.hypot(centers[:, 0], centers[:, 1])):
+        order = np.argsort(measure)
+        found.append(measure[order][np.searchsorted(np.cumsum(weight[order]), 0.9 * weight.sum())])
+    return found
+
+
+@pytest.mark.parametrize("quality", [0.05, 0.2, 1.0])
 @pytest.mark.parametrize("name", ["oak", "birch", "conifer", "palm"])
 def test_plants_keep_their_height_and_width(name: str, quality: float) -> None:
-    """Height and distance from the trunk within which 90 % of the surface lies, over the same few seeds."""
-    extents = []
-    for species in (kind(name), with_quality(kind(name), quality)):
-        flora = compile_species([species])
-        tubes, leaves = support.meshes(flora, support.grown(flora, support.plants(np.arange(2)))[1])
-        centers = np.concatenate([support.face_centers(m) for m in (*tubes, *leaves)])
-        weight = np.concatenate([support.face_areas(m) for m in (*tubes, *leaves)])
-        for measure in (centers[:, 2], np.hypot(centers[:, 0], centers[:, 1])):
-            order = np.argsort(measure)
-            extents.append(measure[order][np.searchsorted(np.cumsum(weight[order]), 0.9 * weight.sum())])
-    assert extents[2:] == pytest.approx(extents[:2], rel=0.12)
+    """Where their surface lies, over the same few seeds."""
+    assert extents(name, quality) == pytest.approx(extents(name, 0.5), rel=0.12)
 
 
 def test_bent_branches_end_where_they_did() -> None:

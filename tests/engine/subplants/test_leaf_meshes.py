@@ -194,7 +194,7 @@ def test_species_of_one_seed_are_plants_of_their_own() -> None:
 @pytest.mark.parametrize("species", ["maple", "cherry_blossom", "scots_pine"])
 def test_kites_in_the_place_of_leaves(species: str, share: float) -> None:
     """Each leaf is made once, as it is or as a kite of the same area; the more are kites, the same ones."""
-    flora = support.compiled(support.shipped(species))
+    flora = support.compiled({**support.shipped(species), "quality": 0.3})
     whole = support.whole_of(flora, support.grown(flora, support.plants(3, scale=0.5))[1])
 
     def made(wanted: float, kites: float) -> list[LeafMesh]:
@@ -230,6 +230,9 @@ def test_twigs_show_what_their_tubes_show() -> None:
     assert support.face_areas(twigs).sum() == pytest.approx(support.face_areas(tubes).sum() / 2, rel=0.02)
     a, b, c = twigs.positions[twigs.corner_verts].reshape(-1, 3, 3).transpose(1, 0, 2)
     np.testing.assert_allclose((a + b) / 2, whole.branches.position, atol=1e-5)
+    uv = twigs.attributes["UVMap"][1].reshape(-1, 3, 2)  # bark runs around the base, and up to the tip
+    np.testing.assert_array_equal(uv[:, :, 0], np.tile([0.0, 1.0, 0.5], (len(uv), 1)))
+    assert (uv[:, :2, 1] == 0.0).all() and (uv[:, 2, 1] > 0.0).all()
     corners = tubes.positions[tubes.corner_verts].reshape(-1, 4, 3)
     across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]) / 2
     directions = np.random.default_rng(0).normal(size=(200, 3))

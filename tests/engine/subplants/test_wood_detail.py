@@ -172,15 +172,15 @@ def test_roots_lead_into_the_ground() -> None:
     assert ((path[:, :, 2] + width).max(axis=1) > 0).all(), "can be seen"
 
 
-def test_the_budget_expects_what_near_wood_has() -> None:
+def test_the_estimate_expects_what_near_wood_has() -> None:
     flora = support.flora()
     for species in (support.SPECIES.index("ash"), support.SPECIES.index("beech")):
         for some in grown(flora, species)[:2]:
             for pixel in (0.004, 0.001):
                 made = tube_buffers(flora, [some], even(pixel)).polygons
                 rows = flora.rows[some.branches.row]
-                coarse = rows["sides"] * (rows["segments"] + rows["rings"])
-                expected = (coarse * finer(flora, some.branches, np.ones(len(some), bool), even(pixel))).sum()
+                around, along = finer(rows["sides"], some.branches.radius / pixel)
+                expected = (around * (rows["segments"] + rows["rings"]) * along).sum()
                 assert 0.4 < made / expected < 2.5
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
+from math import pi
 from typing import Any
 
 import bpy
@@ -23,17 +24,17 @@ from ...jobs import Progress, part_of
 from ...species.litter import FALLEN
 from ...species.litter import KIND as FALLEN_LEAVES
 from ..placing.cover import fallen_from
-from ..placing.plant_objects import remove_fields
 from ..placing.population_data import fill_population, set_setting
-from ..placing.populations import add_population, free_name, make_plants_steps, remove_population
+from ..placing.populations import add_population, free_name, make_plants_steps
 from ..placing.rules import set_grounds
 from ..runtime import GoneError, JobData, is_there, job
 from ..scene.field_sizes import has_history
-from ..settings import with_identity
+from ..settings import BIOME, SCATTER, with_identity
 from ..species.edits import catalog, new_identifier, revert_species, species_data, store_species, unknown_text
-from ..stands.growing import GrownStand, again_steps, is_stand, new_stand_steps
+from ..stands.growing import GrownStand, again_steps, new_stand_steps
 from .files import Biome, find_biome, layers_of, pages_of, stand_settings, stands_of
 from .ground import lay_biome_soil, make_line
+from .layers import index_of, remove_layer
 
 _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
 
@@ -81,9 +82,9 @@ def add_biome_steps(
     with _restored(scene):
         renamed = _own_species(scene, biome)
         group, uid = scene.tetflora, uuid.uuid4().hex
-        made = group.biomes.add()
-        made.uid, made.name, made.source = uid, free_name(group.biomes, biome.name), biome.identifier
-        made.gives_way = biome.gives_way
+        made = group.layers.add()
+        made.kind, made.uid, made.name, made.source = BIOME, uid, free_name(group.layers, biome.name), biome.identifier
+        made.gives_way, made.slope_max = biome.gives_way, pi / 2
         made.data = json.dumps({"ground": biome.ground, "season": biome.season}, ensure_ascii=False)
         for obj in grounds:
             made.grounds.add().object = obj
@@ -92,7 +93,6 @@ def add_biome_steps(
         made.use_altitude = bool({"altitude_min", "altitude_max"} & biome.limits.keys())
         if "path_max" in biome.limits:
             made.paths = make_line(scene, f"{made.name} line", grounds)
-        group.biomes_index = len(group.biomes) - 1
         stands = [layer for layer in biome.layers if layer["kind"] == "stand"]
         grown = yield from _grown(
             [layer["name"] for layer in stands],
@@ -115,6 +115,7 @@ def add_biome_steps(
             for entry in population.mix:
                 entry.species = renamed.get(entry.species, entry.species)
                 entry.shed_by = renamed.get(entry.shed_by, entry.shed_by)
+        group.layers_index = index_of(scene, uid)
         return (yield from _plant(scene, depsgraph, uid, *grown))
 
 
@@ -170,7 +171,7 @@ def _plant(
     layers, bare = list(stands), list(without)
     for number, name in enumerate(names):
         depsgraph.update()  # plants of the layers before shade the ground, and keep others away
-        population = with_identity(scene.tetflora.populations, name)
+        population = with_identity(scene.tetflora.layers, name)
         if population is None:
             continue
         for entry in population.mix:
@@ -236,23 +237,19 @@ def _make_litter(scene: bpy.types.Scene, entry: bpy.types.PropertyGroup) -> None
 def _restored(scene: bpy.types.Scene) -> Iterator[None]:
     """Where what is done ends early, forget the biome that was begun, its populations and its species."""
     group = scene.tetflora
-    before = {p.uid for p in group.populations} | {b.uid for b in group.biomes}
+    before = {layer.uid for layer in group.layers}
     species = {edit.identifier for edit in group.species_edits}
-    stands = {obj.session_uid for obj in scene.objects if is_stand(obj)}
-    active = group.populations_index, group.biomes_index
+    active = group.layers_index
     try:
         yield
     except BaseException:  # an error, or Esc
         if is_there(scene):
-            for index in [i for i, p in enumerate(group.populations) if p.uid not in before][::-1]:
-                remove_population(scene, index)
-            for index in [i for i, b in enumerate(group.biomes) if b.uid not in before][::-1]:
-                if group.biomes[index].paths is not None:
-                    bpy.data.batch_remove([*group.biomes[index].paths.objects, group.biomes[index].paths])
-                group.biomes.remove(index)
-            new = (o for o in scene.objects if is_stand(o) and o.session_uid not in stands)
-            remove_fields([o for o in new if o.tetflora.stand.biome not in {"", *before}])
-            group.populations_index, group.biomes_index = active
+            for index in [i for i, layer in enumerate(group.layers) if layer.uid not in before][::-1]:
+                layer = group.layers[index]
+                if layer.kind == BIOME and layer.paths is not None:
+                    bpy.data.batch_remove([*layer.paths.objects, layer.paths])
+                remove_layer(scene, index)
+            group.layers_index = active
             for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
                 revert_species(identifier)
         raise
@@ -279,10 +276,12 @@ def _fill_stand(
 
 def remove_biome(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> int:
     """Remove a biome with its plants; those of frozen populations and of kept years stay. How many plants went."""
-    uid, group, number = biome.uid, scene.tetflora, 0
-    for index in [i for i, p in enumerate(group.populations) if p.biome == uid][::-1]:
-        number += remove_population(scene, index)
-    remove_fields(growing_of(scene, uid))
-    group.biomes.remove(next(i for i, b in enumerate(group.biomes) if b.uid == uid))
-    group.biomes_index = max(min(group.biomes_index, len(group.biomes) - 1), 0)
+    uid, number, grown = biome.uid, 0, set(growing_of(scene, biome.uid))
+    for index in [i for i, one in enumerate(scene.tetflora.layers) if one.biome == uid][::-1]:
+        layer = scene.tetflora.layers[index]
+        if layer.kind == SCATTER or layer.field in grown:
+            number += remove_layer(scene, index)
+        else:
+            layer.biome = ""
+    remove_layer(scene, index_of(scene, uid))
     return number

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ...errors import SceneError, SpeciesError, quoted
 from ...files import IDENTIFIER_RULE, is_identifier, parse_json, read_whole
@@ -35,14 +36,15 @@ from ..placing.population_data import (
     settings_data,
     value_for,
 )
+from ..placing.properties import TetFloraLayer
 from ..placing.rules import active_population, grounds_of
 from ..placing.zones import limits_of_zone
-from ..settings import active_in, with_identity
+from ..settings import BIOME, SCATTER, active_in, with_identity
 from ..species.edits import find_edit, new_identifier, species_data
 from ..stands.growing import is_stand
 from ..stands.properties import TetFloraStand, TetFloraStandEntry
 from . import library
-from .properties import GROUND, TetFloraBiome, data_of
+from .properties import GROUND, data_of
 
 FORMAT = "TetFlora biome"
 #: What a layer is: plants that keep their distance from others and shade the ground; what grows and lies under them,
@@ -52,8 +54,9 @@ KINDS = ("population", "cover", "stand")
 SEASON = {"day": (1.0, 365.0), "latitude": (-66.0, 66.0)}
 _KEYS = {"format", "version", "name", "layers"}
 _MORE = {"description", "species", "limits", "gives_way", "ground", "season"}
-#: Settings of populations that mean something in one file only.
-_LOCAL = ("grounds", "ground_collection", "vertex_group", "image", "uv_layer", "areas", "paths")
+#: Settings of the ground that a layer grows on: that is chosen when it is added. Images and collections are found by
+#: their names, if at all.
+_LOCAL = ("grounds", "ground_collection", "vertex_group", "uv_layer")
 #: Settings of a species of a stand.
 STAND_ENTRY = ("species", "planted", "incoming_seeds")
 
@@ -85,7 +88,11 @@ class Biome:
 def stand_settings() -> list[str]:
     """Names of settings of stands that mean something in any file."""
     numbers = [p.identifier for p in TetFloraStand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN'}]
-    return [name for name in numbers if name not in ("is_grown", "last_year", "species_index", "path_distance")]
+    return [
+        name
+        for name in numbers
+        if name not in ("is_grown", "last_year", "plants", "species_index", "path_distance", "limits_shown")
+    ]
 
 
 def read_biome(path: Path) -> Biome:
@@ -155,9 +162,9 @@ def biome_data(
     if biome is not None:
         limits = limits_of_zone(biome)
         changed = {
-            one.name: value_for(TetFloraBiome.bl_rna.properties[one.name], getattr(limits, one.name))
+            one.name: value_for(TetFloraLayer.bl_rna.properties[one.name], getattr(limits, one.name))
             for one in fields(Limits)
-            if getattr(limits, one.name) not in (one.default, TetFloraBiome.bl_rna.properties[one.name].default)
+            if getattr(limits, one.name) not in (one.default, np.float32(one.metadata.get("default", one.default)))
         }
         data |= {"limits": changed} if changed else {}
         data |= {} if biome.gives_way else {"gives_way": False}
@@ -182,17 +189,20 @@ def _stand_data(stand: bpy.types.Object) -> dict[str, Any]:
 
 def find_biome(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
     """A biome of a scene by its identity."""
-    return with_identity(scene.tetflora.biomes, uid)
+    return with_identity(scene.tetflora.layers, uid)
 
 
 def active_biome(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
-    """The biome that buttons act on; None where there is none."""
-    return active_in(scene.tetflora, "biomes")
+    """The biome that is the active layer, or that this belongs to; None where there is none."""
+    active = active_in(scene.tetflora, "layers")
+    if active is None or active.kind == BIOME:
+        return active
+    return find_biome(scene, active.biome) if active.biome else None
 
 
 def layers_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.PropertyGroup]:
     """Populations of a biome, in their order."""
-    return [population for population in scene.tetflora.populations if population.biome == uid]
+    return [layer for layer in scene.tetflora.layers if layer.biome == uid and layer.kind == SCATTER]
 
 
 def stands_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
@@ -210,7 +220,7 @@ def _species_data(scene: bpy.types.Scene, parts: Iterable[Mapping[str, Any]]) ->
 def _check_limits(limits: Any) -> None:
     known = {one.name for one in fields(Limits)}
     check_keys('"limits"', limits, set(), known)
-    check_settings('"limits"', limits, TetFloraBiome, known)
+    check_settings('"limits"', limits, TetFloraLayer, known)
 
 
 def _check_ground(ground: Any) -> None:
@@ -305,7 +315,7 @@ def saved_populations(scene: bpy.types.Scene) -> list[bpy.types.PropertyGroup]:
     if active is None:
         return []
     own = set(grounds_of(scene, active))
-    return [p for p in scene.tetflora.populations if p.uid == active.uid or own & set(grounds_of(scene, p))]
+    return [p for p in scene.tetflora.layers if p.uid == active.uid or own & set(grounds_of(scene, p))]
 
 
 def save_biome(scene: bpy.types.Scene, name: str, description: str, picture: bool, replace: bool) -> Path:

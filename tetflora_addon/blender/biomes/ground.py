@@ -20,6 +20,7 @@ from ..attributes import world_matrix
 from ..materials.soil import SHADED, lay_soil, may_have_soil
 from ..placing.populations import own_objects
 from ..placing.terrain import grid_mesh, read_ground
+from ..placing.zones import biomes_in
 from ..scene.crowns import crown_for
 from ..scene.fields import fields_of, read_field
 from .properties import GROUND, data_of
@@ -101,7 +102,7 @@ def lay_biome_soil(
     sheet = Sheet.over(triangles.reshape(-1, 3), _CELL, _MOST)
     cells = sheet.rows * sheet.columns
     on_it = set(fits)
-    found = [b for b in scene.tetflora.biomes if on_it & {entry.object for entry in b.grounds}]
+    found = [b for b in biomes_in(scene) if on_it & {entry.object for entry in b.grounds}]
     earth, turf, share, here = np.zeros((cells, 3)), np.zeros((cells, 3)), np.zeros(cells), np.full(cells, 1e-9)
     hidden, color = np.zeros(cells), np.zeros((cells, 3))
     for biome in found:
@@ -132,7 +133,7 @@ def _low_plants(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str, sheet: Sheet
 ) -> Iterable[tuple[bool, NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]]:
     """Plants of the layers of a biome: whether they are low, their cells, what each hides, m², and its color."""
-    for population in scene.tetflora.populations:
+    for population in scene.tetflora.layers:
         if population.biome != uid:
             continue
         for obj in fields_of(own_objects(scene, population)):

@@ -11,9 +11,10 @@ import bpy
 import numpy as np
 
 from ... import memory, parallel
+from ...arrays import Floats
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
-from ...emission.budget import BYTES_PER_POLYGON
+from ...emission.budget import BYTES_PER_TRIANGLE
 from ...emission.expansion import expanded_faces
 from ...emission.light import Sources
 from ...errors import SceneError
@@ -40,7 +41,7 @@ from ..scene.looks import LayerLooks
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants
 from ..scene.skeletons import plain_kind
-from ..settings import check_limits, season_of, wind_of, years_of
+from ..settings import check_limits, most_memory, season_of, wind_of, years_of
 
 
 @dataclass(frozen=True)
@@ -217,7 +218,8 @@ def settings_from(scene: bpy.types.Scene) -> RefinementSettings:
     group = scene.tetflora
     # A field without a property keeps the engine's value.
     names = [f.name for f in fields(RefinementSettings) if f.name in group.bl_rna.properties]
-    return RefinementSettings(**{name: getattr(group, name) for name in names})
+    given = {name: getattr(group, name) for name in names}
+    return RefinementSettings(**(given | {"max_memory": most_memory(scene)}))
 
 
 def picture_bytes(scene: bpy.types.Scene, camera: Camera) -> int:
@@ -231,7 +233,7 @@ def memory_left(scene: bpy.types.Scene, camera: Camera | None = None) -> float:
 
     What other processes of TetFlora will take is kept for them.
     """
-    most = scene.tetflora.max_memory
+    most = most_memory(scene)
     picture = 0 if camera is None else picture_bytes(scene, camera)
     return memory.allowance(most, picture + pool.share(memory.limit(most)))
 
@@ -247,18 +249,18 @@ def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
 def use_machine(scene: bpy.types.Scene) -> None:
     """Let what follows work with as many threads, and processes with as much memory, as the artist wants."""
     parallel.set_threads(wanted_threads(scene))
-    pool.set_memory_limit(memory.limit(scene.tetflora.max_memory))
+    pool.set_memory_limit(memory.limit(most_memory(scene)))
 
 
-def check_fits(what: str, polygons: float, left: float, remedy: str) -> None:
+def check_fits(what: str, faces: Floats, left: float, remedy: str) -> None:
     """Refuse what would make too many polygons.
 
     Parameters
     ----------
     what : str
         Begins the message.
-    polygons : float
-        At least.
+    faces : (2,) float64
+        Polygons, at least, and the triangles that they consist of.
     left : float
         Bytes, see `contents.memory_left`.
     remedy : str
@@ -269,9 +271,9 @@ def check_fits(what: str, polygons: float, left: float, remedy: str) -> None:
     SceneError
         Has the numbers, and says what to do.
     """
-    if (needed := polygons * BYTES_PER_POLYGON) > left:
+    if (needed := faces[1] * BYTES_PER_TRIANGLE) > left:
         raise SceneError(
-            f"{what} would make more than {polygons / 1e6:,.1f} million polygons, which take "
+            f"{what} would make more than {faces[0] / 1e6:,.1f} million polygons, which take "
             f"{needed / memory.GIGABYTE:,.1f} GB with rendering; Max Memory leaves {left / memory.GIGABYTE:,.1f} GB. "
             f"Raise Max Memory, {remedy}"
         )
@@ -279,6 +281,6 @@ def check_fits(what: str, polygons: float, left: float, remedy: str) -> None:
 
 def check_expanded(flora: Flora, seeds: Seeds, camera: Camera, left: float) -> None:
     """Refuse to expand plants that would not fit, near a camera as finely as it sees them; as `check_fits`."""
-    for polygons in expanded_faces(flora, seeds, camera):
+    for faces in expanded_faces(flora, seeds, camera):
         remedy = "turn Expand Everything off, use fewer plants, or move the camera away from them"
-        check_fits("Expand Everything", polygons, left, remedy)
+        check_fits("Expand Everything", faces, left, remedy)

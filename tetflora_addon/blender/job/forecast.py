@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 
 from ... import memory
 from ...compiled.crowns import Crown
-from ...emission.budget import image_limit
+from ...emission.estimate import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
-from ...refinement.estimate import Estimate, Stand, estimate
 from ..attributes import read, values_of
 from ..runtime import Handlers
 from ..scene.ages import crown_kinds
@@ -35,12 +34,11 @@ from ..scene.objects import objects_within, renderable_objects
 from ..scene.own_ages import AGE, sound_ages
 from ..scene.sizes import ages_of_heights
 from ..scene.skeletons import species_of
-from ..settings import season_of
+from ..settings import most_memory, season_of
 from ..species.edits import display_height, species_for
 from .contents import check_settings, memory_left, picture_bytes, settings_from
 
 _LOOKED_AT = 2_000  # plants of each kind of storage that stand for all
-_LEAVES = 0.8  # of a plant's polygons are leaves: .71 to .85 for trees of the catalog
 _PATIENCE = 30.0  # times that counting took before plants are counted again
 _GIGA, _MEGA = memory.GIGABYTE, 1e6
 
@@ -76,13 +74,11 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
         camera = read_camera(scene, depsgraph)
     except TetFloraError:
         return None
-    others = pool.share(memory.limit(scene.tetflora.max_memory))
+    others = pool.share(memory.limit(most_memory(scene)))
     used = (memory.resident() or 0) + others + picture_bytes(scene, camera)
     allowed = memory_left(scene, camera)
     everything = scene.tetflora.expand_everything
-    return estimate(
-        stand, camera, settings_from(scene), used, allowed, image_limit(camera, scene.tetflora.facet), everything
-    )
+    return estimate(stand, camera, settings_from(scene), used, allowed, everything)
 
 
 def learn(expected: Estimate | None, seconds: float) -> None:
@@ -106,9 +102,9 @@ def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> st
 
 
 def memory_text(scene: bpy.types.Scene) -> str:
-    """``Automatic: 11.7 GB`` where the artist sets no limit of memory, else an empty text."""
-    if scene.tetflora.max_memory > 0.0:
-        return ""
+    """``Automatic: 11.7 GB`` where the artist sets no limit of memory, else that limit."""
+    if (own := most_memory(scene)) > 0.0:
+        return f"{own:.1f} GB by the preferences"
     most = memory.limit(0.0)
     return f"Automatic: {most / _GIGA:.1f} GB" if np.isfinite(most) else "Automatic: no limit"
 
@@ -163,12 +159,12 @@ def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | N
             return None
         index = {identifier: i for i, identifier in enumerate(crowns)}
         rows.append((number, foot, scale, np.array([index[identifier] for identifier in species], dtype=np.int64)))
-    left = [replace(c, polygons=c.polygons * _in_leaf(scene, identifier)) for identifier, c in crowns.items()]
+    left = [replace(c, parts=c.parts.with_leaves(_in_leaf(scene, identifier))) for identifier, c in crowns.items()]
     return _merged(rows, tuple(left))
 
 
 def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
-    """Fraction of the polygons of a kind of plant that there are on the scene's day."""
+    """Fraction of the leaves of a kind of plant that there are on the scene's day."""
     season = season_of(scene)
     try:
         year = None if season is None else species_for(scene, species_of(kind)).year
@@ -177,8 +173,7 @@ def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
     if year is None or year.leaf is None:
         return 1.0
     leaf = year.at_latitude(abs(season.latitude)).leaf
-    left = expected_of(leaf, np.array([season.northern_day]), PRESENT)
-    return 1.0 - _LEAVES * (1.0 - float(left[0]))
+    return float(expected_of(leaf, np.array([season.northern_day]), PRESENT)[0])
 
 
 def _merged(

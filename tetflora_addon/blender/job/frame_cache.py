@@ -23,6 +23,7 @@ from ..assets.marks import reach_of
 from ..assets.parts import digest_of
 from ..compat import drawn_disc
 from ..materials.snow import has_snow
+from ..preferences import preferences
 from ..results.hiding import hidden_originals, hide_originals, name_of, object_named, show_originals
 from ..results.leaf_objects import brought_materials
 from ..results.output import REPLACED, remove_collection, result_collections
@@ -43,7 +44,6 @@ _IGNORED = {
     "share_frames",
     "cell_length",
     "cell_turn",
-    "kept_memory",
     "refine_at_render",
     "auto_refine",
     "follow_viewport",
@@ -288,7 +288,9 @@ def store(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, me
     _entries[key] = _Entry(scene.session_uid, collection.name, originals, megabytes, scene.tetflora.statistics)
     wind = wind_of(scene)
     # In a wind without a loop no frame returns.
-    limit = scene.tetflora.kept_memory * 1e3 if wind is None or wind.loop > 0.0 else 0.0
+    own = preferences()
+    kept = own.kept_memory if own is not None else 1.0
+    limit = kept * 1e3 if wind is None or wind.loop > 0.0 else 0.0
     for other in _stowed(scene):
         if sum(entry.megabytes for entry in _entries.values()) <= limit:
             break

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...compiled.flora import Flora
+from ...emission.expansion import coarse_faces
 from ...emission.plants import expanded_blocks
 from ...errors import SceneError
 from ...growth.seeds import Seeds
@@ -30,7 +31,7 @@ from ..scene.looks import LIKE, look_like
 from ..scene.own_ages import stored_ages
 from ..scene.skeletons import kind_of
 from ..worker import call_in_thread
-from .contents import check_fits, compile_for, expected_polygons, in_year, memory_left
+from .contents import check_fits, compile_for, in_year, memory_left
 
 _UPRIGHT = np.eye(3)
 
@@ -126,9 +127,9 @@ def _make_plant_mesh_steps(
     seeds = [aged for _, aged in classed(scene, [("", s, age, None) for s, age in zip(seeds, each, strict=True)])]
     kinds = dict.fromkeys(s.identifiers[0] for s in seeds)
     floras = {kind: in_year(scene, compile_for((kind,), scene, depsgraph)) for kind in kinds}
-    polygons = sum(expected_polygons(floras[s.identifiers[0]], s) for s in seeds)
+    faces = sum(coarse_faces(floras[s.identifiers[0]], s) for s in seeds)
     what = "A mesh of a plant" if len(plants) == 1 else f"Meshes of {len(plants):,} plants"
-    check_fits(what, polygons, memory_left(scene), "or select fewer plants")
+    check_fits(what, faces, memory_left(scene), "or select fewer plants")
     made, data_made, switched = [], [], []
     whole = False
     try:

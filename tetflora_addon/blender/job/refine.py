@@ -297,9 +297,9 @@ def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Generator[Prog
         name = f"{surface.name} {block.number:03d}"
         obj = yield from run.results.add(name, "explicit", block.buffers, materials, look=surface.look)
         _made(run, obj, block.buffers, lit=False)
-        return Progress(0.95, f"OriginalPolicy polygons: {run.statistics.polygons_meshed:,}")
+        return Progress(0.95, f"Keeping polygons: {run.statistics.polygons_meshed:,}")
 
-    yield from _written(blocks, write, Progress(0.95, "OriginalPolicy polygons"))
+    yield from _written(blocks, write, Progress(0.95, "Keeping polygons"))
 
 
 def _written(

@@ -16,7 +16,8 @@ from typing import Any
 
 import bpy
 
-from ...light.scattering import GLOSS, THROUGH_TINT
+from ...light.scattering import THROUGH_TINT
+from ...optics import GLOSS
 from .nodes import LEAF_GREEN, Graph, Term, node_group
 
 # Raise this when nodes or numbers change; `blade_version` then makes new materials as well.

@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 
 from ...emission.light import BACK, FRONT
-from ...light.scattering import GLOSS
+from ...optics import GLOSS
 from ..compat import disable_bump_correction
 from ..runtime import is_there
 from .bark import bark_group, bark_version, place_group

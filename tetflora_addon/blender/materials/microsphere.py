@@ -19,7 +19,8 @@ from typing import Any
 import bpy
 
 from ...light import scattering
-from ...light.scattering import GLOSS, GLOSS_ROUGHNESS
+from ...light.scattering import GLOSS_ROUGHNESS
+from ...optics import GLOSS
 from ..compat import blend_in_mesh_order, disable_bump_correction, loses_summed_lobes
 from .nodes import LEAF_GREEN, Graph, Term, node_group, surface_material
 

@@ -26,13 +26,12 @@ from .canopy import not_of_covers
 from .distances import SQUARE, distance_of, painted_weights
 from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
-from .plant_objects import add_field, add_plants, plants_of
+from .plant_objects import PAINTED_MARK, add_field, add_plants, plants_of
 from .populations import own_number, own_objects
 from .properties import MOST_PAINTED_EMPTIES
 from .rules import note_erased
 
 PAINTED = "Painted plants"
-_PAINTED_MARK = "tetflora_painted"  # on the field that painted plants go to
 _OBJECTS = -1  # where single plants are, in place of the number of a field
 _REACH = 2.0  # radii above and below the brush within which ground counts
 _LEAST_REACH = 10.0  # meters
@@ -248,7 +247,7 @@ class Stroke:
 
     def _finish(self) -> None:
         self._flush()
-        for population in self.scene.tetflora.populations:
+        for population in self.scene.tetflora.layers:
             taken = self._taken.get(population.uid)
             if taken is None:
                 continue
@@ -269,12 +268,12 @@ class Stroke:
             standing.objects += add_plants(self.scene, placement, species)
             standing.add(places, _OBJECTS, first)
             return
-        number = next((i for i, o in enumerate(standing.fields) if o.get(_PAINTED_MARK) and editable(o)), None)
+        number = next((i for i, o in enumerate(standing.fields) if o.get(PAINTED_MARK) and editable(o)), None)
         if number is None:
             number = len(standing.fields)
             field = add_field(self.scene, placement, species)
             field.name = field.data.name = PAINTED
-            field[_PAINTED_MARK] = True
+            field[PAINTED_MARK] = True
             standing.fields.append(field)
             standing.add(places, number, 0)
             return

@@ -36,7 +36,7 @@ def is_cover(population: bpy.types.PropertyGroup) -> bool:
 
 def not_of_covers(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Objects of a scene less those of populations that cover the ground."""
-    covers = {p.uid for p in scene.tetflora.populations if is_cover(p)}
+    covers = {p.uid for p in scene.tetflora.layers if is_cover(p)}
     return [o for o in scene.objects if o.tetflora.population not in covers] if covers else list(scene.objects)
 
 

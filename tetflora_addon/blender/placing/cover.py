@@ -95,7 +95,7 @@ def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None
     active = active_population(scene)
     if active is None or not active.covers:
         return active
-    return with_identity(scene.tetflora.populations, active.covers) or active
+    return with_identity(scene.tetflora.layers, active.covers) or active
 
 
 @job("Covering the ground")
@@ -115,7 +115,7 @@ def cover_steps(
 
     Parameters
     ----------
-    population : TetFloraPopulation
+    population : TetFloraLayer
         A population, or the settings for new ones.
     soil : bool
         Give the ground a material.
@@ -189,7 +189,7 @@ def _told(steps: Generator[float, object, Floor]) -> Generator[Progress, object,
 def _restored(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> Iterator[None]:
     """Where what is done ends early, forget a cover that is new, or what was added to one, and species of litter."""
     group, found = scene.tetflora, cover_of(scene, uid, fallen)
-    active, species = group.populations_index, {edit.identifier for edit in group.species_edits}
+    active, species = group.layers_index, {edit.identifier for edit in group.species_edits}
     there, density = (len(found.mix), found.density) if found else (0, 0.0)
     try:
         yield
@@ -212,7 +212,7 @@ def cover_of(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> bpy.type
     return next(
         (
             p
-            for p in scene.tetflora.populations
+            for p in scene.tetflora.layers
             if _is_fallen(p) == fallen and (p.covers == uid or (p.uid == uid and is_cover(p)))
         ),
         None,
@@ -231,13 +231,13 @@ def _add_cover(
     name: str = NAME,
 ) -> bpy.types.PropertyGroup:
     """A population for the cover, on the same ground and within the same limits; the covered one stays active."""
-    index, uid = scene.tetflora.populations_index, population.uid
+    index, uid = scene.tetflora.layers_index, population.uid
     cover = add_population(scene, grounds, name=name)
     # Fetched again: adding to a list moves what is in it.
-    source = with_identity(scene.tetflora.populations, uid)
+    source = with_identity(scene.tetflora.layers, uid)
     if source is not None:
         copy_settings(source, cover)
-        scene.tetflora.populations_index = index
+        scene.tetflora.layers_index = index
     for name, value in masks.items():
         setattr(cover, name, value)
     cover.covers, cover.as_field, cover.by_density, cover.density = uid or ANYBODY, 'FIELD', True, 0.0

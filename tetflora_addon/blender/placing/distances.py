@@ -17,6 +17,7 @@ from ...errors import SpeciesError
 from ...planting.rules import suggested_distance
 from ..scene.crowns import crown_for, crown_to_draw
 from ..scene.skeletons import aged_kind
+from ..settings import active_in
 from ..species.catalog import default_species
 
 #: Square meters of the area that densities are counted on: foresters count trees by the hectare.
@@ -57,7 +58,9 @@ def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
     if brush.source == 'ONE' and brush.species:
         return {brush.species: 1.0}
     weights: dict[str, float] = {}
-    for entry in scene.tetflora.populate.mix if brush.source == 'MIX' else ():
+    layer = active_in(scene.tetflora, "layers")
+    mix = scene.tetflora.populate.mix if layer is None or not layer.mix else layer.mix
+    for entry in mix if brush.source == 'MIX' else ():
         if entry.species:
             weights[entry.species] = weights.get(entry.species, 0.0) + entry.weight
     return weights or {default_species(): 1.0}

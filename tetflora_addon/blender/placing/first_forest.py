@@ -243,7 +243,7 @@ def _cover(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     )
     run_to_end(steps)
     tread(ground.material_slots[0].material)
-    scene.tetflora.populations_index = -1  # Populate begins with settings for a new one
+    scene.tetflora.layers_index = -1  # Populate begins with settings for a new one
 
 
 def _camera() -> bpy.types.Object:

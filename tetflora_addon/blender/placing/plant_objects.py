@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plants as objects of a scene: making, finding and removing the empties and fields that stand for them."""
 
+import uuid
 from collections.abc import Generator, Iterable, Sequence
 from functools import lru_cache
 
@@ -28,6 +29,7 @@ FIELD = "Field of plants"
 #: Up to this many become empties by default; with more, Blender becomes slow.
 EMPTIES_UNASKED = 10_000
 POPULATION_MARK = "tetflora_population"  # on the collection of a population's plants
+PAINTED_MARK = "tetflora_painted"  # on the field that painted plants go to
 _MARK = "tetflora_plants"  # on the collection, so that it may be renamed
 _BATCH = 300  # empties of one step, ten milliseconds
 _FEW = 1000  # plants that may get their names the way Blender does it
@@ -315,8 +317,20 @@ def link_field(
     """Put a field that TetFlora made into a collection; the scene's for plants if not given."""
     field.tetflora.version, field[FIELD_MARK] = VERSION, True
     (collection or plant_collection(scene)).objects.link(field)
+    if collection is None:
+        note_field(scene, field)
     prepare_scene(scene)
     return field
+
+
+def note_field(scene: bpy.types.Scene, field: bpy.types.Object) -> None:
+    """Let a field be a layer of its scene, below the others; it becomes the active one."""
+    layers = scene.tetflora.layers
+    if all(layer.field != field for layer in layers):
+        layer = layers.add()
+        layer.kind, layer.uid, layer.name = 'FIELD', uuid.uuid4().hex, field.name
+        layer.field, layer.biome = field, field.tetflora.stand.biome
+        scene.tetflora.layers_index = len(layers) - 1
 
 
 def prepare_scene(scene: bpy.types.Scene) -> None:

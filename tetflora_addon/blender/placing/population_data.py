@@ -18,7 +18,7 @@ from ... import formats
 from ...errors import NAME, quoted, readable
 from ...files import IDENTIFIER_RULE, is_identifier
 from ..settings import limits_of
-from .properties import TetFloraMixEntry, TetFloraPopulation
+from .properties import TetFloraLayer, TetFloraMixEntry
 from .rules import ENTRY, set_grounds, settings_of
 
 MAX_TEXT = 1000
@@ -28,7 +28,7 @@ MAX_ENTRIES = 1000
 _IDENTIFIERS = {"species", "companion", "shed_by"}
 
 
-def population_data(population: TetFloraPopulation, changed: bool = False) -> dict[str, Any]:
+def population_data(population: TetFloraLayer, changed: bool = False) -> dict[str, Any]:
     """A population as a file has it, all of it or what differs from a new one."""
     data: dict[str, Any] = {"name": population.name}
     data["grounds"] = [entry.object.name for entry in population.grounds if entry.object is not None]
@@ -75,13 +75,13 @@ def check_population(where: str, entry: Any, more: Iterable[str] = ()) -> None:
     more : iterable of str
         Keys that somebody else checks.
     """
-    simple = {p.identifier for p in simple_settings(TetFloraPopulation)}
+    simple = {p.identifier for p in simple_settings(TetFloraLayer)}
     check_keys(where, entry, {"name"}, {"name", "grounds", "species", *simple, *more})
     check_text(f'{where}: "name"', entry["name"])
     for name in list_of(f'{where}: "grounds"', entry.get("grounds", [])):
         check_text(f'{where}: "grounds"', name)
     check_species(where, entry.get("species", []), TetFloraMixEntry, ENTRY)
-    check_settings(where, entry, TetFloraPopulation, simple)
+    check_settings(where, entry, TetFloraLayer, simple)
 
 
 def check_species(where: str, parts: Any, kind: type[bpy.types.PropertyGroup], names: Collection[str]) -> None:
@@ -105,7 +105,7 @@ def check_settings(
 
 
 def fill_population(
-    population: TetFloraPopulation, entry: dict[str, Any], scene: bpy.types.Scene, missing: list[str]
+    population: TetFloraLayer, entry: dict[str, Any], scene: bpy.types.Scene, missing: list[str]
 ) -> None:
     """Give a new population what a checked entry says, and defaults for the rest."""
     for prop in simple_settings(population):

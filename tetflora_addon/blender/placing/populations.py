@@ -40,7 +40,7 @@ from .plant_objects import (
     remove_empty_collections,
     remove_fields,
 )
-from .properties import MOST_EMPTIES, TetFloraPopulation
+from .properties import MOST_EMPTIES, TetFloraLayer
 from .rules import copy_settings, fingerprint, makes_field, read_search, set_grounds
 
 NAME = "Population"
@@ -58,15 +58,15 @@ class PlacedPlants:
     erased: int  # plants omitted where the brush has erased
 
 
-def owner_of(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> TetFloraPopulation | None:
+def owner_of(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> TetFloraLayer | None:
     """The population that all of these plants and fields belong to; None if there is no such one."""
     objects = set(objects)
     uids = {o.tetflora.population for o in objects}
-    found = next((p for p in scene.tetflora.populations if {p.uid} == uids), None)
+    found = next((p for p in scene.tetflora.layers if {p.uid} == uids), None)
     return found if found is not None and objects <= set(own_objects(scene, found)) else None
 
 
-def adopt(scene: bpy.types.Scene, population: TetFloraPopulation, objects: Iterable[bpy.types.Object]) -> None:
+def adopt(scene: bpy.types.Scene, population: TetFloraLayer, objects: Iterable[bpy.types.Object]) -> None:
     """Let plants and fields belong to a population, after those that it has."""
     numbers = [o.tetflora.population_number for o in own_objects(scene, population)]
     for number, obj in enumerate(objects, max(numbers, default=-1) + 1):
@@ -75,38 +75,38 @@ def adopt(scene: bpy.types.Scene, population: TetFloraPopulation, objects: Itera
 
 def recount(scene: bpy.types.Scene) -> None:
     """Let populations know how many plants they still have, after some were removed."""
-    for population in scene.tetflora.populations:
+    for population in scene.tetflora.layers:
         population.made = own_number(own_objects(scene, population))
 
 
 def add_population(
     scene: bpy.types.Scene,
     grounds: Iterable[bpy.types.Object] = (),
-    settings: TetFloraPopulation | None = None,
+    settings: TetFloraLayer | None = None,
     name: str = NAME,
-) -> TetFloraPopulation:
+) -> TetFloraLayer:
     """Add a population without plants and make it the active one.
 
     Parameters
     ----------
     grounds : iterable of bpy.types.Object
         Meshes to grow on.
-    settings : TetFloraPopulation, optional
+    settings : TetFloraLayer, optional
         What to begin with; the scene's settings for new populations if not given.
     name : str
         A number is added if another population has it.
     """
     group = scene.tetflora
-    population = group.populations.add()
-    group.populations_index = len(group.populations) - 1
+    population = group.layers.add()
+    group.layers_index = len(group.layers) - 1
     population.uid = uuid.uuid4().hex
-    population.name = free_name(group.populations, name)
+    population.name = free_name(group.layers, name)
     copy_settings(settings or group.populate, population)
     set_grounds(population, grounds)
     return population
 
 
-def own_objects(scene: bpy.types.Scene, population: TetFloraPopulation) -> list[bpy.types.Object]:
+def own_objects(scene: bpy.types.Scene, population: TetFloraLayer) -> list[bpy.types.Object]:
     """Plants and fields that belong to a population, in the order of their numbers."""
     return _sorted_out(scene, population)[0]
 
@@ -118,7 +118,7 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
 
 @job("Placing plants")
 def make_plants_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer
 ) -> Generator[Progress, object, PlacedPlants]:
     """Place a population's plants by its settings, in place of those that it has.
 
@@ -176,16 +176,16 @@ def make_plants_steps(
     return PlacedPlants(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
 
 
-def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraPopulation:
+def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraLayer:
     """A population, fetched again: adding to the list moves what is in it."""
-    found = with_identity(scene.tetflora.populations, uid)
+    found = with_identity(scene.tetflora.layers, uid)
     if found is None:
         data.stop("its population was deleted")
         data.check()
     return found
 
 
-def own_ages(population: TetFloraPopulation, placement: Placement) -> NDArray[np.float32] | None:
+def own_ages(population: TetFloraLayer, placement: Placement) -> NDArray[np.float32] | None:
     """Ages (n,) of a population's plants in years; None where all are full-grown."""
     if population.age == 0.0:
         return None
@@ -214,7 +214,7 @@ def _new_plants(
 
 
 def reroll_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer
 ) -> Generator[Progress, object, PlacedPlants]:
     """Place a population anew with another seed, which follows from the one that it has.
 
@@ -231,7 +231,7 @@ def reroll_steps(
     try:
         return (yield from make_plants_steps(scene, depsgraph, population))
     except BaseException:  # an error, or Esc
-        found = with_identity(scene.tetflora.populations, uid) if is_there(scene) else None
+        found = with_identity(scene.tetflora.layers, uid) if is_there(scene) else None
         if found is not None:
             found.seed = old
         raise
@@ -243,7 +243,7 @@ def remove_population(scene: bpy.types.Scene, index: int, keep_plants: bool = Fa
     What stays is the artist's own.
     """
     group = scene.tetflora
-    population = group.populations[index]
+    population = group.layers[index]
     own, copies = _sorted_out(scene, population)
     kept = keep_plants or population.frozen
     _release([*own, *copies] if kept else copies)
@@ -251,8 +251,8 @@ def remove_population(scene: bpy.types.Scene, index: int, keep_plants: bool = Fa
     if not kept:
         _remove(own)
         _dissolve(scene, population.collection)
-    group.populations.remove(index)
-    group.populations_index = max(min(group.populations_index, len(group.populations) - 1), 0)
+    group.layers.remove(index)
+    group.layers_index = max(min(group.layers_index, len(group.layers) - 1), 0)
     remove_empty_collections()
     return number
 
@@ -260,13 +260,13 @@ def remove_population(scene: bpy.types.Scene, index: int, keep_plants: bool = Fa
 def forget_population(scene: bpy.types.Scene, uid: str, active: int) -> None:
     """Remove a population that has got no plants, if it is still there; another one becomes active again."""
     group = scene.tetflora if is_there(scene) else None
-    number = next((i for i, p in enumerate(group.populations) if p.uid == uid), None) if group is not None else None
+    number = next((i for i, p in enumerate(group.layers) if p.uid == uid), None) if group is not None else None
     if number is not None:
         remove_population(scene, number)
-        group.populations_index = active
+        group.layers_index = active
 
 
-def refuse_frozen(population: TetFloraPopulation) -> None:
+def refuse_frozen(population: TetFloraLayer) -> None:
     """Keep the plants of a frozen population from being replaced.
 
     Raises
@@ -279,7 +279,7 @@ def refuse_frozen(population: TetFloraPopulation) -> None:
 
 
 def _sorted_out(
-    scene: bpy.types.Scene, population: TetFloraPopulation
+    scene: bpy.types.Scene, population: TetFloraLayer
 ) -> tuple[list[bpy.types.Object], list[bpy.types.Object]]:
     """A population's own plants and fields by number, and copies of them that the artist made."""
     uid = population.uid
@@ -310,7 +310,7 @@ def _remove(objects: Iterable[bpy.types.Object]) -> None:
     bpy.data.batch_remove(plants)
 
 
-def collection_of(scene: bpy.types.Scene, population: TetFloraPopulation) -> bpy.types.Collection:
+def collection_of(scene: bpy.types.Scene, population: TetFloraLayer) -> bpy.types.Collection:
     """The collection of a population's plants, within the scene's for plants; made if there is none in the scene."""
     found = population.collection
     if found is None or found.library is not None or found not in set(scene.collection.children_recursive):

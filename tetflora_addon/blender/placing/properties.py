@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of populations, of new ones (``Scene.tetflora.populate``), and of the brush (``Scene.tetflora.brush``)."""
 
+from math import pi
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -15,10 +17,11 @@ from bpy.props import (
 
 from ...planting.rules import Companion, Rules
 from ...planting.strokes import Brush
+from ...planting.zones import Limits
 from ...setting import LENGTH
 from ..runtime import Listeners
 from ..scene.own_ages import AGE_PROPERTY
-from ..settings import properties_of, settings_in
+from ..settings import BIOME, FIELD, SCATTER, properties_of, settings_in
 from ..species.catalog import SpeciesChoice, items_for, number_of
 from .distances import SOURCES, choose, follows_species
 from .plant_objects import EMPTIES_UNASKED
@@ -111,7 +114,7 @@ class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
     companion: StringProperty(
         name="Companion",
         description="Identifier of the species that this one seeks or avoids; empty for none",
-        **LIVE,
+        **{**LIVE, **HIDDEN},
     )
     companion_choice: EnumProperty(
         name="Companion",
@@ -150,11 +153,82 @@ class TetFloraGround(bpy.types.PropertyGroup):
     )
 
 
+#: What can limit where something grows: settings that decide, by what menus call it, with an icon.
+LIMITS = {
+    'GROUP': ("Vertex Group", 'GROUP_VERTEX', ("vertex_group", "invert_group")),
+    'IMAGE': ("Image", 'IMAGE_DATA', ("image", "invert_image", "uv_layer")),
+    'SLOPE': ("Slope", 'IPO_LINEAR', ("slope_min", "slope_max")),
+    'ALTITUDE': ("Altitude", 'SORT_DESC', ("use_altitude",)),
+    'WETNESS': ("Wetness", 'MATFLUID', ("wetness_min", "wetness_max")),
+    'FACING': ("Facing", 'ORIENTATION_NORMAL', ("aspect_spread", "aspect")),
+    'EDGE': ("Edge", 'MOD_EDGESPLIT', ("edge_falloff",)),
+    'AREAS': ("Areas", 'MESH_CIRCLE', ("areas",)),
+    'PATHS': ("Paths", 'CURVE_PATH', ("paths",)),
+}
+_OPEN = {"slope_max": pi / 2}  # values that leave everything open, where defaults do not
+
+
+def _limit_items(owner: bpy.types.PropertyGroup, _context: bpy.types.Context | None) -> list:
+    known = owner.bl_rna.properties
+    others = ('FACING', 'EDGE', 'AREAS') if getattr(owner, "kind", "") == 'BIOME' else ()
+    found = [
+        (key, name, f"Limit where this grows by {name.lower()}", icon, 1 << number)
+        for number, (key, (name, icon, names)) in enumerate(LIMITS.items())
+        if names[0] in known and key not in others
+    ]
+    return _kept_items.setdefault(len(found), found)
+
+
+def limits_in_use(owner: bpy.types.PropertyGroup) -> int:
+    """Bits of `LIMITS` that are switched on, or of which something is set."""
+    known, found = owner.bl_rna.properties, owner.limits_shown
+    for number, (_, _, names) in enumerate(LIMITS.values()):
+        if any(name in known and _differs(getattr(owner, name), _open_value(known[name])) for name in names):
+            found |= 1 << number
+    return found
+
+
+def _open_value(prop: bpy.types.Property) -> object:
+    """Value of a setting that limits nothing."""
+    return _OPEN.get(prop.identifier, getattr(prop, "default", None))
+
+
+def _differs(value: object, other: object) -> bool:
+    return abs(value - other) > 1e-6 if isinstance(other, float) else value != other
+
+
+def _set_limits(owner: bpy.types.PropertyGroup, bits: int) -> None:
+    known, before = owner.bl_rna.properties, limits_in_use(owner)
+    owner.limits_shown = bits
+    for number, (_, _, names) in enumerate(LIMITS.values()):
+        bit = 1 << number
+        for name in names if (before ^ bits) & bit else ():
+            if name == "use_altitude":
+                owner.use_altitude = bool(bits & bit)
+            elif name in known and not bits & bit:
+                setattr(owner, name, _open_value(known[name]))
+    listeners.notify()
+
+
+class Limited:
+    """Mix-in: which limits of where something grows panels show."""
+
+    limits: EnumProperty(
+        name="Limits",
+        description="What limits where this grows; switched off, it no longer does",
+        items=_limit_items,
+        options={'ENUM_FLAG', 'SKIP_SAVE'},
+        get=limits_in_use,
+        set=_set_limits,
+    )
+    limits_shown: IntProperty(name="Limits That Are Shown", options={'HIDDEN'})
+
+
 class GroundMask:
     """Mix-in: where on its grounds something grows, by a vertex group and an image, and whether altitudes count."""
 
     use_altitude: BoolProperty(
-        name="Altitude", description="Grow only between two heights above the scene's origin", **LIVE
+        name="Altitude", description="Grow only between two heights above the scene's origin", **{**LIVE, **HIDDEN}
     )
 
     vertex_group: StringProperty(
@@ -177,7 +251,7 @@ class GroundMask:
     )
 
 
-class AroundPaths:
+class AroundPaths(Limited):
     """Mix-in: inside which areas something grows, and how far from which paths."""
 
     areas: PointerProperty(
@@ -205,13 +279,49 @@ class AroundPaths:
     )
 
 
-class TetFloraPopulation(bpy.types.PropertyGroup, settings_in(Rules, **LIVE), GroundMask, AroundPaths):
-    """How plants are placed together."""
+def _holders(layer: "TetFloraLayer") -> list[bpy.types.Collection | bpy.types.Object]:
+    """What the plants of a layer are in: its collection or object, or those of the layers of a biome."""
+    own = [one for one in (layer.collection, layer.field) if one is not None]
+    if layer.kind == BIOME:
+        parts = (part for part in layer.id_data.tetflora.layers if part.biome == layer.uid and part.kind != BIOME)
+        own += [one for part in parts for one in _holders(part)]
+    return own
+
+
+def _is_shown(layer: "TetFloraLayer") -> bool:
+    holders = _holders(layer)
+    return not holders or not all(one.hide_render and one.hide_viewport for one in holders)
+
+
+def _show(layer: "TetFloraLayer", on: bool) -> None:
+    for one in _holders(layer):
+        one.hide_render = one.hide_viewport = not on
+
+
+class TetFloraLayer(
+    bpy.types.PropertyGroup, settings_in(Rules, **LIVE), settings_in(Limits, **LIVE), GroundMask, AroundPaths
+):
+    """Something that grows on a ground, and how it is placed there."""
 
     # Identity and state. Plants refer to ``uid``, never to the name or the place in the list.
-    name: StringProperty(name="Name", description="Name of the population, and of the collection of its plants")
+    name: StringProperty(name="Name", description="Name of the layer, and of the collection of its plants")
     uid: StringProperty(name="Identity", **HIDDEN)
-    frozen: BoolProperty(name="Frozen", **HIDDEN)
+    kind: EnumProperty(name="Kind", items=[(k, k.title(), "") for k in (SCATTER, BIOME, FIELD)], **HIDDEN)
+    frozen: BoolProperty(
+        name="Freeze",
+        description="Keep the plants of this layer as they are: updates and removal leave them alone",
+        options=set(),
+    )
+    shown: BoolProperty(
+        name="Show",
+        description="Show the plants of this layer in viewports, results and renders",
+        get=_is_shown,
+        set=_show,
+        options={'SKIP_SAVE'},
+    )
+    field: PointerProperty(name="Field", type=bpy.types.Object, **HIDDEN)
+    source: StringProperty(name="Source", **HIDDEN)  # identifier of the file that a biome was made from
+    data: StringProperty(name="Data", **HIDDEN)  # of that file: what is not in layers, as JSON
     collection: PointerProperty(name="Collection", type=bpy.types.Collection, **HIDDEN)
     made: IntProperty(name="Plants Made", **HIDDEN)
     message: StringProperty(name="Message", **HIDDEN)
@@ -267,6 +377,16 @@ class TetFloraPopulation(bpy.types.PropertyGroup, settings_in(Rules, **LIVE), Gr
     )
 
     biome: StringProperty(name="Biome", **HIDDEN)  # ``uid`` of the biome of which it is a layer
+    folded: BoolProperty(name="Fold", description="Hide the layers of this biome in the list", options=set())
+    gives_way: BoolProperty(
+        name="Give Way",
+        description=(
+            "Leave the ground that other biomes take by their mask and limits to these: to those above this one in the "
+            "list or, if this one has no limits, to all. Where their edge is soft, the biomes blend"
+        ),
+        default=True,
+        **LIVE,
+    )
 
 
 MODES = (
@@ -303,7 +423,7 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
         name="Species",
         description="What to paint",
         items=(
-            ('MIX', "As in Populate", "The species of the Populate panel, by weight", 0),
+            ('MIX', "As the Active Layer", "The species of the active layer, by weight", 0),
             ('ONE', "One Species", "The species below", 1),
         ),
         options=set(),
@@ -339,6 +459,6 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
 CLASSES = (
     TetFloraMixEntry,
     TetFloraGround,
-    TetFloraPopulation,
+    TetFloraLayer,
     TetFloraBrush,
 )

@@ -31,7 +31,7 @@ from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
-from ..settings import active_in, check_limits
+from ..settings import SCATTER, active_in, check_limits
 from ..species.catalog import default_species
 from ..species.edits import catalog, unknown_text
 from .canopy import not_of_covers, read_suits
@@ -40,10 +40,26 @@ from .plant_objects import EMPTIES_UNASKED, plants_of
 from .terrain import MASKS, read_ground
 from .zones import read_zones, zone_values
 
+#: Settings of biomes only.
+BIOME_ONLY = ("gives_way", "slope_softness", "altitude_softness", "path_min", "path_max", "path_softness")
 #: Identity and state of a population; all else are settings, which can be copied and written to files.
 IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
-    *("mix_index", "distance_from", "covers", "biome"),
+    *(
+        "mix_index",
+        "distance_from",
+        "covers",
+        "biome",
+        "kind",
+        "field",
+        "source",
+        "data",
+        "shown",
+        "folded",
+        "limits",
+        "limits_shown",
+    ),
+    *BIOME_ONLY,
 }
 _DIGITS = 4  # of erased places: tenths of a millimeter
 #: Settings of a species of a mixture.
@@ -69,7 +85,12 @@ def fingerprint(population: bpy.types.PropertyGroup) -> str:
             value = value.name_full
         if value != default:
             values.append([name, value])
-    values += zone_values(population)
+    values += zone_values(population.id_data, population)
+    return digest(values)
+
+
+def digest(values: list[Any]) -> str:
+    """A short text that changes with values."""
     return blake2b(repr(values).encode(), digest_size=8).hexdigest()
 
 
@@ -112,8 +133,9 @@ def copy_entry(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup)
 
 
 def active_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
-    """The population that buttons act on; None where there is none."""
-    return active_in(scene.tetflora, "populations")
+    """The population that buttons act on; None where the active layer is none."""
+    active = active_in(scene.tetflora, "layers")
+    return active if active is not None and active.kind == SCATTER else None
 
 
 def shown_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup:
@@ -195,7 +217,7 @@ def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> l
     What was deleted from the scene does not count, although the population's pointer keeps it in the file.
     """
     named = [entry.object for entry in population.grounds]
-    if population.ground_collection is not None:
+    if getattr(population, "ground_collection", None) is not None:  # stands have none
         named += objects_within(population.ground_collection)
     meshes = dict.fromkeys(o for o in named if o is not None and o.type == 'MESH' and not o.tetflora.is_field)
     return [o for o in meshes if scene in o.users_scene]

@@ -19,16 +19,21 @@ import numpy as np
 from ...planting.terrain import Terrain
 from ...planting.wetness import wet_ground
 from ...planting.zones import Limits, Spots, Zone, distance_lines
-from ..settings import with_identity
+from ..settings import BIOME, with_identity
 from .terrain import lines_within, read_ground
 
 #: Settings of a biome's mask, by the names that `read_ground` has for them.
 MASK = ("vertex_group", "invert_group", "image", "invert_image", "uv_layer")
 
 
+def biomes_in(scene: bpy.types.Scene) -> list[bpy.types.PropertyGroup]:
+    """Biomes of a scene, those above first."""
+    return [layer for layer in scene.tetflora.layers if layer.kind == BIOME]
+
+
 def biome_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup | None:
     """The biome of which a population is a layer; None of others."""
-    return with_identity(scene.tetflora.biomes, population.biome) if population.biome else None
+    return with_identity(scene.tetflora.layers, population.biome) if population.biome else None
 
 
 def limits_of_zone(biome: bpy.types.PropertyGroup) -> Limits:
@@ -55,7 +60,7 @@ def come_before(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> list[
         return []
     own, found = {entry.object for entry in biome.grounds}, []
     limited = is_limited(biome)
-    for other in scene.tetflora.biomes:
+    for other in biomes_in(scene):
         if other.uid == biome.uid:
             if limited:
                 break
@@ -64,9 +69,8 @@ def come_before(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> list[
     return found
 
 
-def zone_values(population: bpy.types.PropertyGroup) -> list[Any]:
-    """All that decides the zone of a population, for its fingerprint; empty without a biome."""
-    scene = population.id_data
+def zone_values(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[Any]:
+    """All that decides the zone of a population or stand, for its fingerprint; empty without a biome."""
     biome = biome_of(scene, population) if population.biome else None
     if biome is None:
         return []

@@ -325,13 +325,13 @@ class TetFloraOutput(bpy.types.PropertyGroup):
         **_COMMON,
     )
     show_viewport: BoolProperty(
-        name="Show Results in Viewports",
+        name="Show in Viewports",
         description="Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
         default=True,
         **_COMMON,
     )
     show_render: BoolProperty(
-        name="Show Results in Renders",
+        name="Show in Renders",
         description="Show meshes and proxies in renders",
         default=True,
         **_COMMON,

@@ -321,14 +321,18 @@ def _concerns(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) 
 
 def _others(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) -> list[str]:
     """Names of other scenes whose results replace an object."""
+    return [other.name for other in _replacing(original, purpose) if other != scene]
+
+
+def _replacing(original: bpy.types.Object, purpose: str) -> list[bpy.types.Scene]:
+    """Scenes whose results replace an object; where one was renamed, those that the object is in."""
     names = _marker(original, purpose)[1]
     renamed = any(name not in bpy.data.scenes for name in names)
     return [
-        other.name
-        for other in bpy.data.scenes
-        if other != scene
-        and result_collections(other, purpose)
-        and (other.name in names or (renamed and other.objects.get(original.name) == original))
+        scene
+        for scene in bpy.data.scenes
+        if result_collections(scene, purpose)
+        and (scene.name in names or (renamed and scene.objects.get(original.name) == original))
     ]
 
 
@@ -367,15 +371,15 @@ def lift_marks() -> dict[tuple, str | list]:
         The marks by purpose and name of the object, and linked objects by purpose, name of the scene and None, for
         `restore_marks`.
     """
-    saving = {scene.name for scene in bpy.data.scenes if scene.tetflora.output.save_results}
     lifted = {}
     for scene, purpose in list(scenes_hiding()):
-        if purpose == 'RENDER' or scene.name not in saving:
+        if purpose == 'RENDER' or not scene.tetflora.output.save_results:
             lifted[purpose, scene.name, None] = [name_of(o) for o in linked_hidden(scene, purpose)]
             show_linked(scene, purpose)
     for purpose in ('RENDER', 'VIEW'):
         for original in _marked(purpose):
-            if purpose == 'RENDER' or not saving.intersection(_marker(original, purpose)[1]):
+            replacing = _replacing(original, purpose)
+            if purpose == 'RENDER' or not any(scene.tetflora.output.save_results for scene in replacing):
                 lifted[purpose, original.name] = original[HIDDEN[purpose]]
                 _show(original, purpose)
     return lifted

@@ -8,12 +8,12 @@ must not wait for that.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
 
 import bpy
 
-from ...compiled.crowns import Crown, crown_of, known_crown
+from ...compiled.crowns import Crown, crown_of, known_crown, prepare
 from ...errors import SpeciesError
 from ...jobs import Progress
 from ...species.species import Species
@@ -71,7 +71,7 @@ def crown_steps(progress: Progress, scene: bpy.types.Scene, kinds: Iterable[str]
     for kind in sorted(kinds):
         with suppress(SpeciesError):
             species.append(_grown(scene, kind))
-    yield from call_in_thread(progress, _find_all, species)
+    yield from call_in_thread(progress, _find_all, species, crown_of)
 
 
 def _grown(scene: bpy.types.Scene, kind: str) -> Species:
@@ -87,7 +87,7 @@ def _find() -> float | None:
     if not _finding:
         if not _wanted:
             return None
-        _finding.append(call_in_thread(Progress(0.0, "Compiling species"), _find_all, tuple(_wanted)))
+        _finding.append(call_in_thread(Progress(0.0, "Compiling species"), _find_all, tuple(_wanted), prepare))
         _wanted.clear()
     try:
         next(_finding[0])
@@ -98,10 +98,10 @@ def _find() -> float | None:
     return _SOON
 
 
-def _find_all(species: Iterable[Species]) -> None:
+def _find_all(species: Iterable[Species], find: Callable[[Species], object]) -> None:
     for one in species:
         try:
-            crown_of(one)
+            find(one)
         except SpeciesError:
             _without.add(one)
 

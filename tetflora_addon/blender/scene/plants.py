@@ -40,7 +40,7 @@ def gone_species(scene: bpy.types.Scene) -> set[str]:
     """Identifiers of those that populations of the scene strew, or that its file holds."""
     group, season = scene.tetflora, season_of(scene)
     names = set(edited_infos())
-    names |= {e.species for p in group.populations for e in p.mix if e.habitat == 'FALLEN'}
+    names |= {e.species for p in group.layers for e in p.mix if e.habitat == 'FALLEN'}
     found = set()
     for name in names:
         with suppress(TetFloraError):  # which is told elsewhere

@@ -174,6 +174,7 @@ class SpeciesChoice:
         name="Species",
         description="File name of the species in the catalog, without extension",
         override={'LIBRARY_OVERRIDABLE'},
+        options={'HIDDEN', 'ANIMATABLE'},
     )
     species_choice: EnumProperty(
         name="Species",

@@ -245,6 +245,9 @@ class WholeSpecies(SpeciesChoice):
 
     takes_assets = False  # there is nothing to edit in them
 
+    shown: BoolProperty(
+        name="Species Editor", description="Show the tab Species in the sidebar, to edit species", options=set()
+    )
     order_index: IntProperty(name="Active Order", min=0, options={'HIDDEN'})
     order: EnumProperty(
         name="Order",

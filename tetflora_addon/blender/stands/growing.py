@@ -22,8 +22,9 @@ from ...stands.site import StandSite
 from ...stands.traits import StandSpecies
 from ..attributes import write
 from ..placing.plant_objects import link_field
+from ..placing.rules import digest
 from ..placing.terrain import read_ground
-from ..placing.zones import zoned
+from ..placing.zones import zone_values, zoned
 from ..runtime import JobData, is_there, job
 from ..scene.field_points import read_points
 from ..scene.field_sizes import (
@@ -58,8 +59,9 @@ MIXED_WOOD = {
     "hornbeam": (1.0, 1.0),
     "hazel": (0.5, 1.0),
 }
-#: Settings that a stand hands on; identity and state are its own.
-_OWN = {"rna_type", "name", "is_grown", "last_year", "biome", "grounds", "species", "species_index"}
+#: State of a stand: what does not say how it grows, and what another does not get from it.
+_STATE = {"rna_type", "limits", "limits_shown", "name", "is_grown", "last_year", "plants", "grown_by", "species_index"}
+_OWN = {*_STATE, "biome", "grounds", "species"}
 _MASKS = ("vertex_group", "areas", "paths", "path_distance")
 _PATIENCE = 5.0  # seconds for what the viewport will ask at once
 _GROWING = (0.08, 0.85)  # fractions of the job: before, and while it grows
@@ -80,10 +82,14 @@ def is_stand(obj: bpy.types.Object | None) -> bool:
     return obj is not None and obj.tetflora.is_field and obj.tetflora.stand.is_grown
 
 
-def shown_stand(context: bpy.types.Context) -> bpy.types.PropertyGroup:
-    """Settings that panels show: those of the active stand, or of new ones."""
-    active = context.active_object
-    return active.tetflora.stand if is_stand(active) else context.scene.tetflora.stand
+def stand_settings_now(scene: bpy.types.Scene, field: bpy.types.Object) -> str:
+    """A short text that changes with the settings of a stand, for `TetFloraStand.grown_by`."""
+    stand = field.tetflora.stand
+    own = [p.identifier for p in stand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN', 'STRING'}]
+    values = [getattr(stand, name) for name in own if name not in _STATE]
+    values += [(entry.species, entry.planted, entry.incoming_seeds) for entry in stand.species]
+    values += [one.name_full if one else "" for one in (stand.areas, stand.paths)]
+    return digest(values + zone_values(scene, stand))
 
 
 def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
@@ -190,7 +196,7 @@ def _again_steps(
                 "hectare; use a larger mesh, or raise Planted"
             )
         raise SceneError(
-            "Nothing is left of the stand: no plant is as tall as Min Height; grow it longer, plant more, or change "
+            "Nothing is left of the stand: no plant is 1 m tall; grow it longer, plant more, or change "
             "the species, Warmth or Moisture"
         )
     progress = Progress(sum(_GROWING), "Measuring plants")
@@ -202,6 +208,7 @@ def _again_steps(
     group = field.tetflora
     group.stand.last_year = last
     group.stand_year = min(group.stand_year, last)
+    group.stand.grown_by = stand_settings_now(scene, field)
     return GrownStand(field, len(records.at(last)), len(records), last)
 
 

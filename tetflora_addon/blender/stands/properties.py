@@ -45,6 +45,8 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
 
     is_grown: BoolProperty(name="Stand", description="This field was grown as a stand", options={'HIDDEN'})
     last_year: FloatProperty(name="Last Year", description="Year of the stand's last record", options={'HIDDEN'})
+    plants: IntProperty(name="Plants in Its Year", options={'HIDDEN'})
+    grown_by: StringProperty(name="Grown By", options={'HIDDEN'})  # `layers.stand_settings_now` of when it was grown
     biome: StringProperty(name="Biome", options={'HIDDEN'})  # ``uid`` of the biome of which it is a layer
     grounds: CollectionProperty(name="Grounds", description="Meshes that the stand grows on", type=TetFloraGround)
     species: CollectionProperty(

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import bpy
 import gpu
 import numpy as np
+from bpy.props import BoolProperty
 from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
@@ -217,6 +218,16 @@ _HANDLERS = Handlers(undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_p
 
 def register() -> None:
     """Listen to changes of populations and species, undo and loading."""
+    bpy.types.WindowManager.tetflora_points = BoolProperty(
+        name="Preview Points",
+        description=(
+            "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
+            "colored by species, updated with every change. Creates no objects"
+        ),
+        get=lambda _: bpy.context.scene is not None and shown_in(bpy.context.scene),
+        set=lambda _, on: show(bpy.context.scene, on),
+        options={'SKIP_SAVE'},
+    )
     properties.listeners.append(schedule)
     edits.listeners.append(schedule)
     _HANDLERS.register()
@@ -224,6 +235,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Take the dots and all that listens away."""
+    del bpy.types.WindowManager.tetflora_points
     _state.scene = None
     call_off(_on_timer)
     _clear()

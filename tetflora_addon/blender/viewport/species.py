@@ -13,13 +13,14 @@ import time
 from dataclasses import dataclass, replace
 
 import bpy
+from bpy.props import BoolProperty
 
 from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...species.species import Range
-from ..job.contents import in_year
-from ..job.plant_mesh import expected_polygons, plant_mesh, plant_parts, single_seed
+from ..job.contents import expected_polygons, in_year
+from ..job.plant_mesh import plant_mesh, plant_parts, single_seed
 from ..materials.nodes import is_ours, tag
 from ..results.leaf_objects import resolved_species
 from ..runtime import Handlers, call_off, call_soon, redraw, with_uid
@@ -178,12 +179,23 @@ _HANDLERS = Handlers(
 
 def register() -> None:
     """Listen to changes of species, undo and loading."""
+    bpy.types.WindowManager.tetflora_species = BoolProperty(
+        name="Preview",
+        description=(
+            "Show one plant of the species in the editor at the 3D cursor, updated with every change. It is never "
+            "rendered or saved"
+        ),
+        get=lambda _: bpy.context.scene is not None and shown_in(bpy.context.scene),
+        set=lambda _, on: show(bpy.context.scene, on),
+        options={'SKIP_SAVE'},
+    )
     edits.listeners.append(schedule)
     _HANDLERS.register()
 
 
 def unregister() -> None:
     """Take the preview and all that listens away."""
+    del bpy.types.WindowManager.tetflora_species
     _remove()
     _state.scene = None
     call_off(_on_timer)

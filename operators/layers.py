@@ -1,0 +1,331 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The list of layers: update, move, duplicate, remove and select them, change their ground, save them as a biome."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import closing
+from dataclasses import dataclass
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ..tetflora_addon.blender.biomes.adding import plant_biome_steps, remove_biome
+from ..tetflora_addon.blender.biomes.files import (
+    active_biome,
+    find_biome,
+    saved_populations,
+)
+from ..tetflora_addon.blender.biomes.files import save_biome as save_biome_file
+from ..tetflora_addon.blender.biomes.ground import lay_biome_soil
+from ..tetflora_addon.blender.biomes.layers import (
+    active_layer,
+    children_of,
+    copy_layer,
+    due_layers,
+    forget_gone,
+    index_of,
+    move_layer,
+    remove_layer,
+)
+from ..tetflora_addon.blender.placing.cover import cover_with_snow, covered_population
+from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, reroll_steps
+from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, set_grounds
+from ..tetflora_addon.blender.settings import BIOME, FIELD, with_identity
+from ..tetflora_addon.blender.stands.growing import GrownStand, again_steps, is_stand
+from ..tetflora_addon.blender.viewport import points
+from ..tetflora_addon.errors import SceneError, TetFloraError
+from ..tetflora_addon.jobs import Progress, part_of
+from .base import ModalJob, Reporting, counted, in_object_mode, need, show_shapes
+
+
+def selected_grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Selected meshes; those of fields are plants, not ground."""
+    return [obj for obj in context.selected_objects if obj.type == 'MESH' and not obj.tetflora.is_field]
+
+
+def grounds_to_plant(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Selected meshes or, without any, the ground of the active layer: what one adds next grows there too."""
+    layer = active_layer(context.scene)
+    if (found := selected_grounds(context)) or layer is None:
+        return found
+    return grounds_of(context.scene, layer.field.tetflora.stand if layer.kind == FIELD and layer.field else layer)
+
+
+ground_selected = need(selected_grounds, "Select a mesh to plant on")
+ground_found = need(grounds_to_plant, "Select a mesh to plant on")
+layer_exists = need(lambda context: active_layer(context.scene), "Add a layer first")
+_ACTIVE = (in_object_mode, layer_exists)
+
+
+def tell_placed(operator: Reporting, made: PlacedPlants) -> set[str]:
+    """Report how many plants of a layer were placed, and why not more."""
+    where = ""
+    if made.objects and made.objects[0].tetflora.is_field:
+        where = f' in the field "{made.objects[0].name}"'
+    placed = f"{counted(made.number, 'plant')} of {made.wanted:,} placed{where}: {made.reason}"
+    if made.reason:
+        operator.report({'WARNING'}, placed)
+        return {'FINISHED'}
+    returned = f"; {counted(made.returned, 'deleted plant')} restored" if made.returned else ""
+    erased = f"; {made.erased:,} omitted where you erased" if made.erased else ""
+    return operator.done(f"{counted(made.number, 'plant')} placed{where}{returned}{erased}")
+
+
+def tell_layers(
+    operator: Reporting, name: str, numbers: list[int], bare: list[str], kept: list[str], more: str = ""
+) -> set[str]:
+    """Report how many plants several layers have, and which have none."""
+    text = f"{name}{counted(sum(numbers), 'plant')} in {counted(len(numbers), 'layer')}"
+    if kept:
+        text += f'; "{kept[0]}" keeps its own material'
+    if bare:
+        others = f"; and {counted(len(bare) - 1, 'other layer')}" if len(bare) > 1 else ""
+        operator.report({'WARNING'}, f"{text}; without plants: {bare[0]}{others}")
+        return {'FINISHED'}
+    return operator.done(text + more)
+
+
+@dataclass(frozen=True)
+class Updated:
+    """What an update made: results of layers, why others have no plants, grounds that keep a material."""
+
+    made: list[PlacedPlants | GrownStand | int]
+    bare: list[str]
+    kept: list[str]
+
+
+class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
+    """Grow layers again by their settings.
+
+    Plants that you moved, changed or deleted are replaced too, except where you erased with the brush; plants of other
+    layers keep their space. Frozen layers, and stands of which a year is kept, stay as they are.
+    """
+
+    bl_label = "Update"
+    needs = _ACTIVE
+    cancelled = "Stopped; layers that were done already keep their new plants"
+
+    which: EnumProperty(
+        name="Layers",
+        description="Which layers to grow again",
+        items=(
+            ('DUE', "All That Are Due", "All whose settings have changed, and those without plants"),
+            ('ACTIVE', "Active", "The active layer, a biome with all of its layers and its soil, whatever has changed"),
+        ),
+        options={'SKIP_SAVE'},
+    )
+    reroll: BoolProperty(name="Re-roll", description="With a new seed, for another arrangement", options={'SKIP_SAVE'})
+    forget_erased: BoolProperty(
+        name="Clear Erased Places",
+        description="Let plants grow again where you erased with the brush",
+        options={'SKIP_SAVE'},
+    )
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        if properties.reroll or properties.forget_erased:
+            name = "reroll" if properties.reroll else "forget_erased"
+            return f"Grow the active layer again: {properties.bl_rna.properties[name].description}"
+        return cls.bl_description
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        result = {'CANCELLED'}
+        try:
+            result = super().modal(context, event)
+        finally:
+            # What was done so far can be undone. Not in `cancel`: Blender calls that also as it loads files and quits.
+            if result == {'CANCELLED'} and bpy.ops.ed.undo_push.poll():
+                bpy.ops.ed.undo_push(message=self.bl_label)
+        return result
+
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Updated]:
+        scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
+        active, one = active_layer(scene), self.which == 'ACTIVE'
+        if one and active.kind == BIOME and not self.reroll:
+            added = yield from plant_biome_steps(scene, depsgraph, active)
+            return Updated([number for _, number in added.layers], added.bare, added.kept)
+        uids = [layer.uid for layer in (*children_of(active), active) if layer.kind != BIOME] if one else []
+        uids = uids if one else due_layers(scene)
+        if not uids:
+            raise SceneError("All layers are up to date")
+        return (yield from self._each(scene, depsgraph, uids))
+
+    def _each(
+        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]
+    ) -> Generator[Progress, object, Updated]:
+        made, bare = [], []
+        biomes = {with_identity(scene.tetflora.layers, uid).biome for uid in uids} - {""}
+        for number, uid in enumerate(uids):
+            depsgraph.update()  # plants of the layers before shade the ground, and keep others away
+            layer = with_identity(scene.tetflora.layers, uid)
+            if layer is None:
+                continue
+            name = layer.name
+            try:
+                with closing(self._steps_of(scene, depsgraph, layer)) as steps:
+                    made.append((yield from part_of(steps, number / len(uids), (number + 1) / len(uids), name)))
+            except TetFloraError as error:
+                if len(uids) == 1:
+                    raise
+                bare.append(f"{name}: {error}")
+        kept = []
+        for biome in filter(None, (find_biome(scene, uid) for uid in biomes)):
+            depsgraph.update()
+            kept += lay_biome_soil(scene, depsgraph, [e.object for e in biome.grounds if e.object is not None])
+        return Updated(made, bare, kept)
+
+    def _steps_of(
+        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layer: bpy.types.PropertyGroup
+    ) -> Generator[Progress, object, PlacedPlants | GrownStand]:
+        if layer.kind == FIELD:
+            if not is_stand(layer.field):
+                raise SceneError(f'"{layer.name}" has no rules to grow again by; use the brush, or edit its points')
+            if layer.frozen:
+                raise SceneError(f'"{layer.name}" is frozen and keeps its plants; turn off Freeze to change it')
+            if self.reroll:
+                layer.field.tetflora.stand.seed += 1
+            return again_steps(scene, depsgraph, layer.field)
+        if self.forget_erased:
+            layer.erased = ""
+        return (reroll_steps if self.reroll else make_plants_steps)(scene, depsgraph, layer)
+
+    def finish(self, context: bpy.types.Context, result: Updated) -> set[str]:
+        points.schedule()
+        show_shapes(context.scene)
+        context.scene.update_tag()
+        if len(result.made) == 1 and isinstance(result.made[0], PlacedPlants):
+            return tell_placed(self, result.made[0])
+        numbers = [
+            n if isinstance(n, int) else n.number if isinstance(n, PlacedPlants) else n.plants for n in result.made
+        ]
+        return tell_layers(self, "", numbers, result.bare, result.kept)
+
+
+class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
+    """Move the active layer in the list, a biome with all of its layers; of biomes with limits, those above come
+    first.
+    """
+
+    bl_label = "Move Layer"
+    needs = (layer_exists,)
+
+    direction: EnumProperty(
+        name="Direction",
+        description="Where to move it",
+        items=(('UP', "Up", "Before the layer above"), ('DOWN', "Down", "After the layer below")),
+    )
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        if not move_layer(context.scene, -1 if self.direction == 'UP' else 1):
+            return {'CANCELLED'}
+        points.schedule()
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_duplicate_layer(Reporting, bpy.types.Operator):
+    """Copy the active layer with all of its settings, a biome with its layers; *Update* then grows the copy."""
+
+    bl_label = "Duplicate Layer"
+    needs = _ACTIVE
+
+    to_selected: BoolProperty(
+        name="To Selected Meshes",
+        description="Let the copy grow on the selected meshes instead of the same ground",
+        options={'SKIP_SAVE'},
+    )
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        grounds = selected_grounds(context) if self.to_selected else None
+        if grounds == []:
+            return self.failed("Select a mesh to copy the layer to")
+        made = copy_layer(context.scene, active_layer(context.scene), grounds)
+        points.schedule()
+        return self.done(f'"{made.name}" added; click Update to grow it')
+
+
+class TETFLORA_OT_remove_layer(Reporting, bpy.types.Operator):
+    """Remove the active layer and its plants, a biome with all of its layers. Plants of frozen layers and stands of
+    which a year is kept remain, and so does the ground.
+    """
+
+    bl_label = "Remove Layer"
+    needs = _ACTIVE
+
+    keep_plants: BoolProperty(
+        name="Keep Plants",
+        description="Remove only the layer, and keep its plants as plants of your own",
+        options={'SKIP_SAVE'},
+    )
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        scene, layer = context.scene, active_layer(context.scene)
+        name, number = layer.name, 0
+        if layer.kind == BIOME and not self.keep_plants:
+            number = remove_biome(scene, layer)
+        else:
+            for uid in [*(one.uid for one in children_of(layer)), layer.uid]:
+                number += remove_layer(scene, index_of(scene, uid), self.keep_plants)
+        forget_gone(scene)
+        points.schedule()
+        return self.done(f'"{name}" removed with {counted(number, "plant")}')
+
+
+class TETFLORA_OT_set_layer_ground(Reporting, bpy.types.Operator):
+    """Let the active layer grow on the selected meshes, a biome with all of its layers. Click Update to grow it."""
+
+    bl_label = "Use Selected Meshes"
+    needs = (*_ACTIVE, ground_selected)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        layer = active_layer(context.scene)
+        for one in (layer, *children_of(layer)):
+            set_grounds(one.field.tetflora.stand if one.kind == FIELD and one.field else one, selected_grounds(context))
+        points.schedule()
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_ground_snow(Reporting, bpy.types.Operator):
+    """Add the snow of the scene to the materials of the active layer's ground, as a node before their output.
+
+    Soil of Ground Cover needs none of it.
+    """
+
+    bl_label = "Snow on Ground"
+    needs = (
+        in_object_mode,
+        need(lambda context: active_population(context.scene), "Add a layer first; its ground can then have snow"),
+    )
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        found = cover_with_snow(context.scene, covered_population(context.scene))
+        if not found:
+            return self.refused("The materials of the ground have snow already")
+        return self.done(f"{counted(len(found), 'material')} can have snow; set Snow under Season and Wind")
+
+
+class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
+    """Save the layers of the active biome to your folder of biomes, for use in all files and to share it; without a
+    biome, the layers on the ground of the active one.
+    """
+
+    bl_label = "Save as Biome"
+    needs = (need(lambda context: saved_populations(context.scene), "Add a layer with plants first"),)
+    bl_options = {'REGISTER'}
+
+    name: StringProperty(name="Name", description="Name of the biome, from which that of its file follows")
+    description: StringProperty(name="Description", description="What grows there, for the tooltip in menus")
+    picture: BoolProperty(name="Last Render", description="Use the last render as the picture of the biome")
+    replace: BoolProperty(
+        name="Replace", description="Replace your own biome of the same file name", options={'SKIP_SAVE'}
+    )
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        biome = active_biome(context.scene)
+        self.name = self.name or (biome.name if biome is not None else "My biome")
+        return context.window_manager.invoke_props_dialog(self)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        path = save_biome_file(context.scene, self.name, self.description, self.picture, self.replace)
+        return self.done(f"Saved as {path}")

@@ -1,0 +1,247 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Layers: one list of all that grows on the grounds of a scene, and what and where the active one is."""
+
+import bpy
+
+from ..operators.layers import grounds_to_plant
+from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
+from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of
+from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
+from ..tetflora_addon.blender.scene.field_sizes import has_history
+from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in
+from ..tetflora_addon.blender.viewport import points
+from .base import (
+    Button,
+    SidebarPanel,
+    draw_below,
+    draw_buttons,
+    draw_message,
+    draw_properties,
+    draw_species,
+    draw_where,
+    section,
+    shown_length,
+    split_layout,
+)
+from .places import IMPORTS
+
+
+class TETFLORA_UL_layers(bpy.types.UIList):
+    """What a layer is, its name, how many plants it has, whether it is due, frozen or hidden."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
+        row, kind = layout.row(align=True), kind_of(item)
+        if kind is GROUP:
+            row.prop(item, "folded", text="", emboss=False, icon='RIGHTARROW' if item.folded else 'DOWNARROW_HLT')
+        elif item.biome:
+            row.separator(factor=2.0)
+        named = item.field if item.kind == FIELD and item.field is not None else item
+        row.prop(named, "name", text="", emboss=False, icon=kind.icon)
+        right = row.row(align=True)
+        right.alignment = 'RIGHT'
+        right.label(text=_short(plants_in(item)), icon='FILE_REFRESH' if is_due(item) else 'NONE')
+        right.prop(item, "frozen", text="", emboss=False, icon='FREEZE')
+        right.prop(item, "shown", text="", emboss=False, icon='HIDE_OFF' if item.shown else 'HIDE_ON')
+
+    def filter_items(self, _context, data, propname) -> tuple[list[int], list[int]]:
+        layers = getattr(data, propname)
+        folded = {layer.uid for layer in layers if layer.kind == BIOME and layer.folded}
+        gone = (layer.biome in folded or is_gone(layer) for layer in layers)
+        return [0 if one else self.bitflag_filter_item for one in gone], []
+
+
+def _short(number: int) -> str:
+    """A number in few letters, beside names: ``960``, ``82 k``, ``1.2 M``."""
+    if number < 10_000:
+        return f"{number:,}"
+    return f"{number / 1e3:.0f} k" if number < 1e6 else f"{number / 1e6:.1f} M"
+
+
+class TETFLORA_MT_add_biome(bpy.types.Menu):
+    """Biomes to add to the selected ground, or with land of their own."""
+
+    bl_label = "TetFlora Biome"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator_context = 'INVOKE_DEFAULT'
+        for info in biomes().values():
+            number = icon_of(info)
+            icon = {"icon_value": number} if number else {"icon": FALLBACK_ICON}
+            layout.operator("tetflora.add_biome", text=info.name, **icon).biome = info.identifier
+
+
+class TETFLORA_PT_add_layer(bpy.types.Panel):
+    """What can grow on the selected meshes; opened from the list of layers."""
+
+    bl_label = "Add Layer"
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'HEADER'
+    bl_options = {'INSTANCED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, group = self.layout, context.scene.tetflora
+        grounds = grounds_to_plant(context)
+        more = f" and {len(grounds) - 1:,} more" if len(grounds) > 1 else ""
+        layout.label(text=f"On {grounds[0].name}{more}" if grounds else "Select a mesh to plant on", icon='MESH_GRID')
+        layout.template_icon_view(group, "new_biome", show_labels=True, scale=6.0, scale_popup=7.0)
+        row = layout.row(align=True)
+        row.prop(group, "new_biome", text="")
+        Button("delete_file", 'TRASH', "", {"biome": True}).draw(row)
+        Button("add_biome", FALLBACK_ICON, values={"biome": group.new_biome}).draw(layout)
+        layout.separator()
+        Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter", {"by_density": True}).draw(layout)
+        Button("grow_stand", 'TIME', "Stand").draw(layout)
+        Button("ground_cover", 'OUTLINER_OB_CURVES').draw(layout)
+        Button("paint_plants", 'BRUSH_DATA').draw(layout)
+        layout.separator()
+        draw_buttons(layout, *IMPORTS)
+
+
+class TETFLORA_MT_layers(bpy.types.Menu):
+    """Less common operators for layers."""
+
+    bl_label = "Layers"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, layer = self.layout, active_layer(context.scene)
+        draw_buttons(
+            layout,
+            Button("update_layers", 'FILE_REFRESH', "Update This Layer", {"which": 'ACTIVE'}),
+            Button("update_layers", 'LOOP_BACK', "Clear Erased Places", {"which": 'ACTIVE', "forget_erased": True}),
+            Button("ground_cover", 'OUTLINER_OB_CURVES'),
+            Button("ground_snow", 'FREEZE'),
+            None,
+            Button("duplicate_layer", 'DUPLICATE'),
+            Button("duplicate_layer", 'MESH_GRID', "Copy to Selected Meshes", {"to_selected": True}),
+            Button("set_layer_ground", 'MESH_GRID'),
+            Button("select_plants", 'RESTRICT_SELECT_OFF', "Select Plants of Layer", {"layer": True}),
+            Button("remove_layer", 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
+            None,
+            Button("save_biome", 'FILE_TICK', "Save as Biome..."),
+            Button("import_biome", 'IMPORT', "Import Biome..."),
+        )
+        if layer is not None and layer.kind == SCATTER:
+            layout.separator()
+            draw_properties(layout, layer, "seed", "tilt", "ground_collection")
+            layout.prop_menu_enum(layer, "as_field")
+
+
+class TETFLORA_PT_layers(SidebarPanel, bpy.types.Panel):
+    """Layers."""
+
+    bl_label = "Layers"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = split_layout(self), context.scene
+        group, layer = scene.tetflora, active_layer(scene)
+        layer = None if layer is None or is_gone(layer) else layer
+        row = layout.row()
+        row.template_list(TETFLORA_UL_layers.__name__, "", group, "layers", group, "layers_index", rows=6)
+        column = row.column(align=True)
+        column.popover(panel=TETFLORA_PT_add_layer.__name__, text="", icon='ADD')
+        Button("remove_layer", 'REMOVE', "").draw(column)
+        column.separator()
+        for direction in ('UP', 'DOWN'):
+            Button("move_layer", f"TRIA_{direction}", "", {"direction": direction}).draw(column)
+        column.menu(TETFLORA_MT_layers.__name__, text="", icon='DOWNARROW_HLT')
+        row = layout.row(align=True)
+        row.scale_y = 1.2
+        Button("update_layers", 'FILE_REFRESH').draw(row)
+        Button("update_layers", 'MOD_NOISE', "", {"which": 'ACTIVE', "reroll": True}).draw(row)
+        row.prop(context.window_manager, "tetflora_points", text="", icon='PARTICLE_POINT')
+        layout.label(text=_status(layer), icon='INFO')
+        if layer is None:
+            return
+        column = layout.column()
+        column.active = not layer.frozen
+        owner = layer.field.tetflora.stand if layer.kind == FIELD and layer.field is not None else layer
+        kind = kind_of(layer)
+        if layer.kind == SCATTER:
+            _draw_scatter(column, layer)
+        elif kind is STAND:
+            _draw_stand(column, layer.field)
+        elif kind is GROUP:
+            column.prop(layer, "gives_way")
+        if (layer.kind != FIELD or kind is STAND) and (body := section(column, "Where", closed=False)):
+            names = [entry.object.name for entry in owner.grounds[:2] if entry.object is not None]
+            more = len(owner.grounds) - 2
+            draw_below(body, ", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None", "Ground")
+            draw_where(body, owner)
+        if layer.kind == SCATTER and (body := section(column, "Spacing and Size")):
+            _draw_spacing(body, layer)
+            for text in points.complaints(layer):
+                draw_message(context, body, text)
+
+
+def _status(layer: bpy.types.PropertyGroup | None) -> str:
+    """What is due, or wrong, or how many plants there will be: one line, so that no row moves."""
+    if layer is None:
+        return "Click + to let something grow"
+    if layer.kind != SCATTER:
+        return "Settings have changed: Update" if is_due(layer) else f"{plants_in(layer):,} plants"
+    text = points.status(layer)
+    if points.complaints(layer):
+        return f"{text}; see Spacing and Size"
+    return f"Update: {text}" if is_due(layer) else text
+
+
+def _draw_scatter(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) -> None:
+    """How many plants of which species."""
+    row = layout.row(align=True)
+    if layer.by_density:
+        row.prop(layer, "density", text="Per Hectare")
+    else:
+        row.prop(layer, "count")
+    row.prop(layer, "by_density", text="", icon='MESH_GRID')
+    draw_species(layout, layer, "mix")
+    if entry := active_in(layer, "mix"):
+        layout.prop(entry, "habitat")
+        layout.prop(entry, "companion_choice")
+        if entry.companion:
+            draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")
+
+
+def _draw_spacing(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) -> None:
+    draw_distance(layout, layer)
+    layout.prop(layer, "clumping")
+    if layer.clumping:
+        layout.prop(layer, "clump_size")
+    column = layout.column(align=True)
+    draw_properties(column, layer, "scale_min", "scale_max")
+    column = layout.column(align=True)
+    column.prop(layer, "age")
+    if layer.age > 0.0:
+        column.prop(layer, "age_spread", slider=True)
+
+
+def draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """The switch between the distance that suits the species and the artist's own, and the one that counts."""
+    row = layout.row(heading="Min Distance")
+    row.prop(settings, "distance_by_species")
+    if follows_species(settings):
+        found = distance_to_draw(settings)
+        draw_below(layout, "…" if found is None else shown_length(found))
+    else:
+        layout.prop(settings, "min_distance", text=" ")
+
+
+def _draw_stand(layout: bpy.types.UILayout, field: bpy.types.Object) -> None:
+    """The slider through the years of a stand, and what it grows from."""
+    stand = field.tetflora.stand
+    if has_history(field):
+        last = stand.last_year
+        text = f"Year of {last:g}" if last else "Year"
+        layout.prop(field.tetflora, "stand_year", text=text, slider=True)
+        row = layout.row(align=True)
+        Button("animate_growth", 'KEYFRAME').draw(row)
+        Button("keep_year", 'PINNED').draw(row)
+    draw_properties(layout.column(), stand, "years", "density")
+    draw_species(layout, stand)
+    if entry := active_in(stand, "species"):
+        layout.prop(entry, "incoming_seeds")
+    if body := section(layout, "Site"):
+        draw_properties(body.column(align=True), stand, "recruits", "outside")
+        draw_properties(body.column(align=True), stand, "degree_days", "coldest_month")
+        draw_properties(body.column(align=True), stand, "moisture", "relief", "fertility")

@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is wrong before anybody renders is seen, and a click mends it; sun, sky and camera by one button each."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+
+from panels import refine
+from tests.blender.scenes import add_camera, add_mesh, add_plant, select
+from tetflora_addon.blender.compat import shader_tree
+from tetflora_addon.blender.placing import populations
+from tetflora_addon.blender.viewport import warnings
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _keys():
+    bpy.context.view_layer.update()
+    return [one.key for one in warnings.warned(bpy.context)]
+
+
+def _mend(key):
+    assert bpy.ops.tetflora.mend(what=key) == {'FINISHED'}
+    assert key not in _keys()
+
+
+def test_an_empty_scene_has_nothing_to_mend():
+    assert _keys() == []
+
+
+def test_darkness_is_seen_and_daylight_ends_it():
+    add_plant()
+    add_camera()
+    assert "light" in _keys()
+    _mend("light")
+    sun = next(o for o in bpy.context.scene.objects if o.type == 'LIGHT')
+    assert sun.data.type == 'SUN' and sun.data.energy > 2.0
+
+
+@pytest.mark.parametrize(("color", "dark"), [((0.05, 0.05, 0.05), True), ((0.5, 0.6, 0.9), False)])
+def test_a_world_lights_by_its_color(color, dark):
+    world = bpy.context.scene.world = bpy.data.worlds.new("own")
+    shader_tree(world).nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
+    assert warnings.is_dark(bpy.context.scene) == dark
+
+
+def test_daylight_never_touches_what_is_the_artists():
+    scene = bpy.context.scene
+    world = scene.world = bpy.data.worlds.new("own")
+    shader_tree(world).nodes["Background"].inputs["Color"].default_value = (0.2, 0.3, 0.9, 1.0)
+    sun = bpy.data.objects.new("mine", bpy.data.lights.new("mine", 'SUN'))
+    sun.data.energy = 1.5
+    scene.collection.objects.link(sun)
+    bpy.ops.tetflora.daylight(hour=8.0)
+    assert scene.world == world and sun.data.energy == 1.5
+    assert [o for o in scene.objects if o.type == 'LIGHT'] == [sun]
+
+
+def test_daylight_follows_hour_season_and_clouds():
+    scene = bpy.context.scene
+    energy, height = {}, {}
+    for hour, clouds in ((12.0, 0.0), (20.0, 0.0), (12.0, 1.0)):
+        bpy.ops.tetflora.daylight(hour=hour, clouds=clouds)
+        (sun,) = [o for o in scene.objects if o.type == 'LIGHT']
+        bpy.context.view_layer.update()
+        energy[hour, clouds] = sun.data.energy
+        height[hour, clouds] = sun.matrix_world.to_3x3().col[2].z
+    assert energy[12.0, 0.0] > energy[20.0, 0.0] > 0.0
+    assert energy[12.0, 1.0] == 0.0
+    assert height[12.0, 0.0] == pytest.approx(np.sin(np.radians(61.0)), abs=0.03)  # at 50° north in July
+    assert height[12.0, 0.0] > height[20.0, 0.0] > 0.0
+    scene.tetflora.year.season = 'WINTER'
+    bpy.ops.tetflora.daylight(hour=12.0)
+    (sun,) = [o for o in scene.objects if o.type == 'LIGHT']
+    bpy.context.view_layer.update()
+    assert sun.matrix_world.to_3x3().col[2].z < height[12.0, 0.0]
+    assert len(bpy.data.worlds) == 1
+
+
+def test_the_camera_steps_out_of_a_crown_and_its_range_reaches_all_plants():
+    scene = bpy.context.scene
+    add_plant(species="bush")
+    far = add_plant("far", species="bush", location=(0.0, 300.0, 0.0))
+    camera = add_camera(location=(0.0, 0.0, 0.6))
+    camera.data.clip_end = 100.0
+    assert {"crown", "clip"} <= set(_keys())
+    _mend("crown")
+    assert np.hypot(*camera.matrix_world.translation[:2]) > 0.2
+    assert camera.matrix_world.translation.z == pytest.approx(0.6, abs=1e-5)
+    _mend("clip")
+    assert scene.camera.data.clip_end > 300.0
+    assert far.location.y == 300.0
+
+
+def test_grounds_that_are_small_or_scaled_are_mended():
+    scene = bpy.context.scene
+    small, scaled = add_mesh("small"), add_mesh("scaled", size=10.0)
+    scaled.scale = (2.0, 2.0, 1.0)
+    populations.add_population(scene, [small, scaled])
+    assert {"small small", "scale scaled"} <= set(_keys())
+    _mend("small small")
+    assert small.dimensions.x == pytest.approx(100.0)
+    _mend("scale scaled")
+    assert tuple(scaled.scale) == (1.0, 1.0, 1.0)
+    assert max(v.co.x for v in scaled.data.vertices) == pytest.approx(20.0)
+
+
+def test_the_panel_has_one_line_whatever_is_wrong():
+    from devtools.layouts import Layout
+
+    def lines():
+        layout = Layout()
+        context = SimpleNamespace(
+            region=SimpleNamespace(width=300), scene=bpy.context.scene, view_layer=bpy.context.view_layer
+        )
+        refine.TETFLORA_PT_refine.draw(SimpleNamespace(layout=layout), context)
+        return [name for name, *_ in layout.drawn if name in {"label", "prop"}]
+
+    add_plant()
+    add_camera()
+    wrong = lines()
+    bpy.ops.tetflora.daylight()
+    bpy.context.scene.render.use_lock_interface = True
+    assert lines() == wrong
+
+
+@pytest.mark.parametrize("where", ['EYE', 'ABOVE'])
+def test_a_camera_comes_to_the_ground_and_looks_at_it(where):
+    scene = bpy.context.scene
+    ground = add_mesh("ground", size=50.0, z=3.0)
+    add_plant(location=(0.0, 0.0, 3.0))
+    select(ground)
+    assert bpy.ops.tetflora.look(where=where) == {'FINISHED'}
+    bpy.context.view_layer.update()
+    camera = scene.camera
+    height = camera.matrix_world.translation.z - 3.0
+    ahead = -camera.matrix_world.to_3x3().col[2]
+    if where == 'EYE':
+        assert height == pytest.approx(1.7, abs=1e-3)
+        assert abs(ahead.z) < 0.2
+    else:
+        assert height > 20.0
+        assert ahead.z < -0.4
+    assert "crown" not in _keys() and "clip" not in _keys()
+
+
+def test_an_animated_camera_stays_and_nothing_to_stand_on_is_told():
+    camera = add_camera(location=(5.0, 0.0, 2.0))
+    with pytest.raises(RuntimeError, match="No mesh is visible to stand on"):
+        bpy.ops.tetflora.look()
+    camera.keyframe_insert("location", frame=1)
+    add_mesh("ground", size=50.0)
+    bpy.ops.tetflora.look()
+    assert bpy.context.scene.camera != camera
+    assert tuple(camera.location) == (5.0, 0.0, 2.0)

@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Estimates follow picture, plants and settings in the right direction, and keep to limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.engine import support
+from tetflora_addon.camera.camera import Camera
+from tetflora_addon.compiled.crowns import Crown, CrownParts, crown_of
+from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.emission import budget
+from tetflora_addon.emission import estimate as model
+from tetflora_addon.emission.drawing import HIDDEN_LEAVES, Parts, drawing, drawn_blocks
+from tetflora_addon.emission.estimate import Stand, estimate
+from tetflora_addon.emission.expansion import expanded_faces
+from tetflora_addon.emission.plants import Transition
+from tetflora_addon.jobs import run_to_end
+from tetflora_addon.proxies.facet_weights import facet_weights
+from tetflora_addon.refinement.loop import refine
+from tetflora_addon.refinement.settings import QUALITIES, RefinementSettings
+from tetflora_addon.species.catalog import load_species
+
+SETTINGS = RefinementSettings()
+
+
+#: A tree of 15 m with leaves of 3 cm.
+TREE = Crown(2.7, 15.0, 86_000.0, 3.0, 86.0)
+
+
+def _stand(number=1000, near=20.0, far=300.0, width=100.0):
+    """Trees on the ground before a camera that looks along +y."""
+    rng = np.random.default_rng(number)
+    foot = np.zeros((number, 3))
+    foot[:, 0], foot[:, 1] = rng.uniform(-width, width, number), rng.uniform(near, far, number)
+    return Stand(number, foot, np.ones(number), np.zeros(number, np.int64), (TREE,))
+
+
+def _camera(width=1920, height=1080, kind="PERSP", window=(-0.36, 0.36, -0.2025, 0.2025)):
+    """At 5 m, looking along +y."""
+    frame = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    return Camera(kind, np.array([0.0, 0.0, 5.0]), frame, window, 0.1, 1000.0, width, height)
+
+
+def _estimate(stand, camera=None, settings=SETTINGS, used=1e9, allowed=np.inf, **options):
+    return estimate(stand, camera or _camera(), settings, used, allowed, **options)
+
+
+def test_of_a_plant_that_is_not_in_view_few_facets_are_made():
+    camera = _camera()
+    tree = replace(_stand(1), foot=np.array([[0.0, 60.0, 0.0]]))
+    shown = _estimate(tree, camera).primitives
+    for foot in ([0.0, -60.0, 0.0], [0.0, 10.0 * camera.far, 0.0], [500.0, 60.0, 0.0], [0.0, 60.0, -200.0]):
+        unseen = _estimate(replace(tree, foot=np.array([foot])), camera).primitives
+        assert unseen == pytest.approx(86_000.0 / HIDDEN_LEAVES)
+        assert shown > 4.0 * unseen
+
+
+def test_numbers_follow_pixels_and_not_plants_once_the_picture_is_full():
+    wood = _estimate(_stand(10_000))
+    more = _estimate(_stand(40_000))
+    assert more.primitives < 1.2 * wood.primitives
+    assert more.seconds > wood.seconds
+    half = _estimate(_stand(10_000), _camera(960, 540))
+    assert 2.0 * half.primitives < wood.primitives < 4.0 * half.primitives  # where there are few, they are finer
+    assert _estimate(_stand(10)).primitives < 0.2 * wood.primitives
+
+
+def test_plants_that_are_near_and_seen_are_looked_at_most():
+    camera, stand = _camera(), _stand(3000)
+    near = replace(stand, foot=np.concatenate([[[0.0, 8.0, 0.0]], stand.foot[1:]]))
+    parts, plant = near.parts(camera)
+    looked = np.bincount(plant, minlength=3000)
+    assert looked[0] > 10 * looked[1:].mean() and looked.min() == 1 and 3000 <= len(parts) < 10_000
+    assert parts.number.sum() == pytest.approx(3000 * 86_000.0)
+    assert not np.array_equal(parts.position[plant == 1] - near.foot[1], parts.position[plant == 2] - near.foot[2])
+
+
+#: Scenes by species, number, lower and upper corner of the ground that they stand on, and slope of the camera's look.
+SCENES = {
+    "birch at 3 m": (("birch",), 1, (0.0, 3.0), (0.0, 3.0), 0.8),
+    "bushes": (("bush",), 12, (-3.0, 2.0), (3.0, 9.0), 0.0),
+    "near birches": (("birch",), 5, (-3.0, 5.0), (3.0, 12.0), 0.3),
+    "spruce": (("spruce",), 1, (0.0, 14.0), (0.0, 14.0), 0.2),
+    "mixed": (("spruce", "beech"), 6, (-5.0, 12.0), (5.0, 24.0), 0.2),
+    "far away": (("oak", "birch"), 12, (-8.0, 25.0), (8.0, 40.0), 0.0),
+}
+
+
+def _seeds(name):
+    """Plants of a scene, before a camera at the height of eyes, and the stand that they are."""
+    species, number, low, high, slope = SCENES[name]
+    foot = np.zeros((number, 3))
+    foot[:, :2] = np.random.default_rng(3).uniform(low, high, (number, 2))
+    which = np.arange(number) % len(species)
+    known = [load_species(one) for one in species]
+    eye = np.array([0.0, 0.0, 1.7])
+    camera = support.camera(eye, eye + [0.0, 1.0, slope], pixels=120, view=0.72)
+    seeds = support.plants(1 + np.arange(number), which, foot)
+    return (
+        compile_species(known),
+        seeds,
+        camera,
+        Stand(number, foot, np.ones(number), which, tuple(map(crown_of, known))),
+    )
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_as_many_are_made(name, monkeypatch):
+    """Within one and a half, in a small picture with facets of the size that they have in a large one."""
+    for module in (budget, model):
+        monkeypatch.setattr(module, "NEVER_TOO_MANY", 0.01 * budget.NEVER_TOO_MANY)
+    flora, seeds, camera, stand = _seeds(name)
+    result = run_to_end(refine(flora, seeds, camera, SETTINGS))
+    detail = budget.fit_to_budget(result, camera, SETTINGS)
+    how = Transition(flora, camera, detail.leaf_limit, detail.tolerance), detail.facet, facet_weights(flora)
+    made = 0
+    for one in drawn_blocks(drawing(flora, detail.refinement, camera, *how, detail.coarser)):
+        made += sum(len(facets) for facets, _ in one) if isinstance(one, Parts) else one.buffers.polygons
+    assert 1 / 1.5 < _estimate(stand, camera).primitives / made < 1.5
+
+
+@pytest.mark.parametrize("name", ["birch at 3 m", "bushes", "near birches", "mixed"])
+def test_as_many_are_expanded(name):
+    """Polygons of all plants, those at hand as finely as the camera sees them, and the memory for these."""
+    flora, seeds, camera, stand = _seeds(name)
+    *_, (polygons, triangles) = expanded_faces(flora, seeds, camera)
+    found = _estimate(stand, camera, everything=True)
+    assert 1 / 1.5 < found.primitives / polygons < 1.5
+    assert 1 / 1.5 < (found.memory - 1e9) / (budget.BYTES_PER_TRIANGLE * triangles) < 1.5
+
+
+def test_a_sample_stands_for_all():
+    wood = _stand(20_000)
+    some = replace(wood, **{name: getattr(wood, name)[::20] for name in ("foot", "scale", "which")})
+    assert _estimate(some).primitives == pytest.approx(_estimate(wood).primitives, rel=0.05)
+    assert _estimate(some).seconds == pytest.approx(_estimate(wood).seconds, rel=0.05)
+
+
+def test_no_plant_gets_more_polygons_than_it_has():
+    tufts = replace(_stand(50, 5.0, 10.0, 5.0), crowns=(replace(TREE, polygons=100.0, parts=CrownParts.empty()),))
+    assert _estimate(tufts).primitives <= 5_000
+    assert _estimate(tufts, everything=True).primitives == pytest.approx(5_000)
+
+
+def test_drafts_take_less():
+    sizes = [_estimate(_stand(), settings=replace(SETTINGS, **QUALITIES[name])).primitives for name in QUALITIES]
+    assert sizes[0] < 0.5 * sizes[2]
+    assert sizes[0] < sizes[1] < sizes[2]
+
+
+def test_limits_hold():
+    free = _estimate(_stand())
+    assert not free.limited
+    few = _estimate(_stand(), settings=replace(SETTINGS, max_polygons=10_000))
+    assert (few.primitives, few.limited) == (10_000, True)
+    tight = _estimate(_stand(), allowed=1e8)
+    assert tight.limited
+    assert tight.memory == pytest.approx(1e9 + 1e8, rel=0.01)
+    assert tight.seconds < free.seconds
+    assert not _estimate(_stand(), allowed=1e8, everything=True).limited
+
+
+def test_nothing_is_nothing():
+    empty = Stand(0, np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64), ())
+    found = _estimate(empty)
+    assert (found.plants, found.primitives, found.memory) == (0, 0.0, 1e9)
+
+
+@pytest.mark.parametrize("kind", ["ORTHO", "PANO"])
+def test_other_cameras_have_estimates_too(kind):
+    window = (-60.0, 60.0, -34.0, 34.0) if kind == "ORTHO" else (-np.pi, np.pi, -np.pi / 2.0, np.pi / 2.0)
+    found = _estimate(_stand(), _camera(kind=kind, window=window))
+    assert 10_000 < found.primitives < np.inf

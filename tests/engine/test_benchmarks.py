@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The list of benchmarks is true: each is there and has its answer in a document, and what documents call exists."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from benchmarks.__main__ import NAMES
+
+ROOT = Path(__file__).resolve().parents[2]
+BENCHMARKS = ROOT / "benchmarks"
+#: What benchmarks share.
+SHARED = {"__init__", "__main__", "report", "pictures", "asset_trees"}
+DOCUMENTS = [*sorted((ROOT / "docs").glob("*.md")), *sorted(ROOT.glob("*.md")), ROOT / "Makefile"]
+
+
+def _anchors(path: Path) -> set[str]:
+    headings = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_every_file_is_a_benchmark_or_shared() -> None:
+    assert {path.stem for path in BENCHMARKS.glob("*.py")} == {*NAMES, *SHARED}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_has_what_the_runner_asks_for_and_an_answer(name: str) -> None:
+    nodes = ast.parse((BENCHMARKS / f"{name}.py").read_text(encoding="utf-8")).body
+    defined = {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
+    defined |= {t.id for node in nodes if isinstance(node, ast.Assign) for t in node.targets if isinstance(t, ast.Name)}
+    defined |= {
+        node.target.id for node in nodes if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
+    }
+    assert {"run", "TARGETS", "QUICK_TARGETS"} <= defined
+    document, anchor = NAMES[name][0].split("#")
+    assert anchor in _anchors(ROOT / "docs" / document)
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_commands_of_documents_exist(path: Path) -> None:
+    """`python -m` of benchmarks, examples and devtools."""
+    text = path.read_text(encoding="utf-8")
+    for name in re.findall(r"-m benchmarks ([a-z_0-9]+)", text):
+        assert name in {*NAMES, "all"}, name
+    for package, name in re.findall(r"-m (examples|devtools|benchmarks)\.([a-z_0-9]+)", text):
+        assert package != "benchmarks", f"benchmarks.{name}: one runner, python -m benchmarks NAME"
+        assert (ROOT / package / f"{name}.py").exists() or (ROOT / package / name / "__main__.py").exists(), name

@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a bare ground to a lit wood at eye height by clicks in the sidebar; tests/window/test_layers.py judges it."""
+
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.append(str(Path(__file__).resolve().parent))
+
+from forest_steps import press_button, running
+
+
+def steps(ui):
+    """See devtools/window_driver.py."""
+    scene = bpy.context.scene
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=20, y_subdivisions=20, size=60.0)
+    scene.tetflora.populate.density = 150.0
+    yield from ui.show_sidebar("TetFlora")
+
+    # The popover that + opens, and a click on Scatter in it.
+    with ui.override():
+        bpy.ops.wm.call_panel(name="TETFLORA_PT_add_layer", keep_open=False)
+    yield 0.5
+    yield from ui.picture("add")
+    yield from click_in_popover(ui, "tetflora.populate")
+    yield from ui.until(lambda: len(scene.tetflora.layers) and not running(ui), 60, "plants")
+    layer = scene.tetflora.layers[0]
+    ui.values["planted"] = [layer.made, layer.by_density]
+    yield 1.0
+    yield from ui.picture("scattered")
+    ui.values["rows"] = [(yield from row_of(ui, "tetflora.update_layers"))]
+
+    yield from press_button(ui, "tetflora.daylight")
+    yield from press_button(ui, "tetflora.look")
+    yield 1.5
+    camera = scene.camera.matrix_world.translation
+    ui.values["camera"] = list(camera)
+    ui.values["view"] = ui.area().spaces.active.region_3d.view_perspective
+    ui.values["suns"] = sum(o.type == 'LIGHT' and o.data.type == 'SUN' for o in scene.objects)
+    yield from ui.picture("lit")
+    ui.values["rows"].append((yield from row_of(ui, "tetflora.update_layers")))
+
+    # A setting changes: the layer is due, and Update does it.
+    scene.tetflora.layers[0].density = 80.0
+    before = scene.tetflora.layers[0].made
+    yield from press_button(ui, "tetflora.update_layers")
+    yield from ui.until(lambda: scene.tetflora.layers[0].made < before and not running(ui), 60, "update")
+    ui.values["rows"].append((yield from row_of(ui, "tetflora.update_layers")))
+    scene.tetflora.layers[0].shown = False
+    yield from ui.picture("hidden")
+    ui.values["hidden"] = scene.tetflora.layers[0].collection.hide_viewport
+    with ui.override():
+        bpy.ops.wm.tool_set_by_id(name="tetflora.paint_plants")
+    yield 0.5
+    yield from ui.picture("tool")
+    tool = bpy.context.workspace.tools.from_space_view3d_mode('OBJECT')
+    ui.values["tool"] = tool.idname
+
+
+def row_of(ui, operator):
+    """How far below the top of the sidebar an operator's button is, pixels."""
+    manager = bpy.context.window_manager
+    region = next(r for r in ui.area().regions if r.type == 'UI')
+    for y in range(region.y + region.height - 6, region.y, -6):
+        manager.clipboard = ""
+        ui.move(region.x + region.width // 3, y)
+        yield 0.03
+        ui.press('C', ctrl=True)
+        yield 0.03
+        if manager.clipboard.startswith(f"bpy.ops.{operator}("):
+            return region.y + region.height - y
+    return -1
+
+
+def click_in_popover(ui, operator):
+    """Find an operator's button in the popover around the mouse and click on it."""
+    manager, (x, middle) = bpy.context.window_manager, ui.center()
+    for y in range(middle + 300, middle - 400, -8):
+        manager.clipboard = ""
+        ui.move(x, y)
+        yield 0.03
+        ui.press('C', ctrl=True)
+        yield 0.03
+        if manager.clipboard.startswith(f"bpy.ops.{operator}("):
+            ui.press('LEFTMOUSE')
+            yield 0.2
+            ui.move(*ui.center())
+            return
+    raise LookupError(f"the popover shows no button for {operator}")

@@ -1,0 +1,284 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is wrong with a scene before anybody renders it, and what mends it: light, camera, ground, scales, settings.
+
+Looked for a moment after a change, never while panels are drawn; the larger the scene, the less often.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import isclose
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+from numpy.typing import NDArray
+
+from ..job.render import render_errors
+from ..placing.field_edits import positions
+from ..placing.plant_objects import plants_of
+from ..results.proxy_kinds import few_bounces
+from ..runtime import Handlers, call_off, call_soon, redraw
+from ..scene.crowns import crown_to_draw
+from ..scene.fields import field_kinds, fields_of
+from ..scene.skeletons import species_of
+
+#: Wider ground is large enough for trees, meters.
+_SMALL = 10.0
+_SIDE = 100.0  # of ground that was too small, meters
+#: Light of a world from all around that shows plants; a new file's gray is 0.05.
+_DARK = 0.1
+_NEAR = 20.0  # meters around the camera where crowns are looked at
+_SOON, _PATIENCE = 0.3, 30.0  # seconds to the next look, and times that one took before another
+
+
+@dataclass(frozen=True)
+class Warned:
+    """Something that is wrong.
+
+    Attributes
+    ----------
+    key : str
+        Names it for `mend`.
+    short, text : str
+        In a few letters beside a button, and at length.
+    button : str
+        What a click does, empty where none can; where ``mend`` is missing, an operator does it.
+    mend : callable, optional
+        Does that to a scene.
+    """
+
+    key: str
+    short: str
+    text: str
+    button: str = ""
+    mend: Callable[[bpy.types.Scene], object] | None = None
+
+
+_found: dict[int, list[Warned]] = {}
+_took = 0.0
+
+
+def warned(context: bpy.types.Context) -> list[Warned]:
+    """What was found last in a scene; in the background, where no timer runs, it is looked for now."""
+    if bpy.app.background:
+        return list(_look(context.scene))
+    found = _found.get(context.scene.session_uid)
+    if found is None:
+        _on_change()
+    return found or []
+
+
+def mend(scene: bpy.types.Scene, key: str) -> bool:
+    """Mend one of them; whether it was still there."""
+    one = next((one for one in _look(scene) if one.key == key and one.mend is not None), None)
+    if one is not None:
+        one.mend(scene)
+        _on_change()
+    return one is not None
+
+
+def _look(scene: bpy.types.Scene) -> Iterator[Warned]:
+    settings, camera = scene.tetflora, scene.camera
+    for error in render_errors()[-1:]:
+        yield Warned("render", "Last render failed", error)
+    yield from _grounds(scene)
+    place = _places(scene)
+    if camera is None and len(place):
+        text = "The scene has no camera. Turn the view to where you want to look from, and click Look from Here"
+        yield Warned("camera", "No camera", text, "Look from Here")
+    elif len(place):
+        yield from _camera(scene, place)
+    if len(place) and is_dark(scene):
+        text = "There is no sun, lamp or bright sky: shade renders black. Daylight adds a sun and a sky"
+        yield Warned("light", "Too dark", text, "Daylight")
+    units = scene.unit_settings
+    if units.system != 'NONE' and not isclose(units.scale_length, 1.0, rel_tol=1e-3):
+        tall = bpy.utils.units.to_string(units.system, 'LENGTH', 20.0 * units.scale_length, precision=2)
+        text = f"One unit is 1 m for plants, whatever Unit Scale says: a tree of 20 m shows as {tall}"
+        yield Warned("units", "Unit Scale", text, "Set to 1", _setter("unit_settings.scale_length", 1.0))
+    if len(place) and settings.refine_at_render and not scene.render.use_lock_interface:
+        text = "Lock Interface is off: the window stands still while frames are refined"
+        yield Warned("lock", "Lock Interface", text, "Turn On", _setter("render.use_lock_interface", True))
+    for layer in scene.tetflora.layers:
+        if layer.message and not layer.made:
+            yield Warned(f"layer {layer.uid}", "No plants", f'"{layer.name}": {layer.message}')
+    if text := few_bounces(scene):
+        yield Warned("bounces", "Few bounces", text, "Raise", _setter("cycles.transparent_max_bounces", 128))
+
+
+def _setter(path: str, value: object) -> Callable[[bpy.types.Scene], None]:
+    """What sets a property of a scene."""
+    owner, _, name = path.rpartition(".")
+    return lambda scene: setattr(scene.path_resolve(owner), name, value)
+
+
+def is_dark(scene: bpy.types.Scene) -> bool:
+    """Whether a scene has neither lamps that render nor a world that lights it."""
+    lamps = (obj for obj in scene.objects if obj.type == 'LIGHT' and not obj.hide_render)
+    if any(lamp.data.energy > 0.0 and lamp.data.type != 'POINT' for lamp in lamps):  # a point lights no forest
+        return False
+    world = scene.world
+    tree = None if world is None else world.node_tree
+    if tree is None:
+        return world is None or max(world.color) <= _DARK
+    for node in tree.nodes:
+        if node.type == 'BACKGROUND':
+            color = node.inputs["Color"]
+            if color.is_linked or max(color.default_value[:3]) * node.inputs["Strength"].default_value > _DARK:
+                return False
+    return all(node.type in {'BACKGROUND', 'OUTPUT_WORLD'} for node in tree.nodes)
+
+
+def _grounds(scene: bpy.types.Scene) -> Iterator[Warned]:
+    """Grounds of layers that are too small, or whose scale is not applied."""
+    grounds = dict.fromkeys(e.object for layer in scene.tetflora.layers for e in layer.grounds if e.object is not None)
+    for obj in (o for o in grounds if scene in o.users_scene):
+        wide = max(obj.dimensions[:2])
+        if 0.0 < wide < _SMALL:
+            text = (
+                f'"{obj.name}" is {wide:.3g} m wide, and trees are tens of meters tall. Scale it, or take a larger mesh'
+            )
+            yield Warned(f"small {obj.name}", "Small ground", text, "Make 100 m", _enlarger(obj))
+        elif obj.parent is None and obj.data.users == 1 and not np.allclose(obj.scale, 1.0, rtol=1e-3):
+            text = f'The scale of "{obj.name}" is not applied: textures on it are stretched. Apply makes it 1'
+            yield Warned(f"scale {obj.name}", "Scale not applied", text, "Apply", _applier(obj))
+
+
+def _enlarger(obj: bpy.types.Object) -> Callable[[bpy.types.Scene], None]:
+    def change(_scene: bpy.types.Scene) -> None:
+        factor = _SIDE / max(obj.dimensions[:2])
+        obj.scale = [factor * value for value in obj.scale]
+
+    return change
+
+
+def _applier(obj: bpy.types.Object) -> Callable[[bpy.types.Scene], None]:
+    def change(_scene: bpy.types.Scene) -> None:
+        obj.data.transform(Matrix.Diagonal((*obj.scale, 1.0)))
+        obj.scale = (1.0, 1.0, 1.0)
+
+    return change
+
+
+def _places(scene: bpy.types.Scene) -> NDArray[np.float64]:
+    """Where plants stand in the world, (n, 3)."""
+    single = [o.matrix_world.translation for o in plants_of(scene.objects) if o.tetflora.enabled and not o.hide_render]
+    return np.concatenate([np.array(single, np.float64).reshape(-1, 3), *(own for _, own in _fields(scene))])
+
+
+def _fields(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, NDArray[np.float64]]]:
+    """Fields that render, and where their points are in the world."""
+    for field in fields_of(scene.objects):
+        if field.type == 'MESH' and not field.hide_render and len(field.data.vertices):
+            yield field, positions(field)
+
+
+def _crowns(scene: bpy.types.Scene, at: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float, float]]:
+    """Feet, radii and heights of plants near a place, as far as their crowns are known."""
+    near = [
+        (np.array(o.matrix_world.translation), o.tetflora.species, o.matrix_world.median_scale)
+        for o in plants_of(scene.objects)
+        if o.tetflora.enabled and (o.matrix_world.translation.xy - Vector(at[:2])).length < _NEAR
+    ]
+    for field, own in _fields(scene):
+        names, mesh = [species_of(kind) for kind in field_kinds(field)], field.data
+        for n in np.flatnonzero(np.linalg.norm(own[:, :2] - at[:2], axis=1) < _NEAR).tolist():
+            number, scale = (_of_point(mesh, name, n) for name in ("species", "scale"))
+            near += [(own[n], names[min(int(number), len(names) - 1)], scale or 1.0)] if names else []
+    crowns = ((foot, crown_to_draw(scene, species), scale) for foot, species, scale in near)
+    return [(foot, crown.radius * scale, crown.height * scale) for foot, crown, scale in crowns if crown is not None]
+
+
+def _of_point(mesh: bpy.types.Mesh, name: str, number: int) -> float:
+    """A number of a point; 0 where none is stored."""
+    value = getattr(mesh.attributes[name].data[number], "value", 0.0) if name in mesh.attributes else 0.0
+    return float(value)
+
+
+def _camera(scene: bpy.types.Scene, place: NDArray[np.float64]) -> Iterator[Warned]:
+    camera = scene.camera
+    at = np.array(camera.matrix_world.translation)
+    if any(_holds(at, *one) for one in _crowns(scene, at)):
+        text = f'"{camera.name}" is inside a crown: leaves fill the picture. Move takes it to the nearest open place'
+        yield Warned("crown", "In a crown", text, "Move", _step_out)
+    text, most = cut_off(scene, place)
+    if text:
+        yield Warned("clip", "Clip End", text, "Raise", _setter("camera.data.clip_end", 1.2 * most))
+
+
+def cut_off(scene: bpy.types.Scene, place: NDArray[np.float64] | None = None) -> tuple[str, float]:
+    """A warning if the camera's range ends before some plants, else an empty text; and how far the last is, meters.
+
+    A new file's camera ends at 100 m: a forest then renders as nothing, and nobody sees why.
+    """
+    place, camera = _places(scene) if place is None else place, scene.camera
+    if camera is None or not len(place):
+        return "", 0.0
+    to_camera = np.array(camera.matrix_world.normalized().inverted_safe())
+    depth, end = -(place @ to_camera[2, :3] + to_camera[2, 3]), getattr(camera.data, "clip_end", np.inf)
+    beyond, all_of_them = int((depth > end).sum()), f"{len(place):,} plant{'s' if len(place) > 1 else ''}"
+    text = (
+        f"{beyond:,} of {all_of_them} are beyond the camera range and invisible; raise the Clip End of "
+        f'"{camera.name}", which is {end:g} m'
+    )
+    return text if beyond else "", float(depth.max())
+
+
+def _holds(at: NDArray[np.float64], foot: NDArray[np.float64], radius: float, height: float) -> bool:
+    """Whether a place is within a crown, as far as eyes mind: not at its rim, and not under it beside the trunk."""
+    away, up = np.linalg.norm(at[:2] - foot[:2]), at[2] - foot[2]
+    if not 0.0 <= up <= height:
+        return False
+    return bool(away < (0.6 * radius if up > 0.25 * height or height < 4.0 else 0.08 * radius))
+
+
+def open_place(scene: bpy.types.Scene, at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The nearest place as high as one that is in no crown, on a grid of circles around it."""
+    crowns = _crowns(scene, at)
+    for away in np.arange(0.0, _NEAR, 0.5):
+        for angle in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
+            there = at + away * np.array([np.cos(angle), np.sin(angle), 0.0])
+            if not any(_holds(there, *one) for one in crowns):
+                return there
+    return at
+
+
+def _step_out(scene: bpy.types.Scene) -> None:
+    camera = scene.camera
+    place = open_place(scene, np.array(camera.matrix_world.translation))
+    matrix = camera.matrix_world.copy()
+    matrix.translation = place
+    camera.matrix_world = matrix
+
+
+def _on_timer() -> None:
+    global _took
+    begin = time.perf_counter()
+    found = {}
+    for window in bpy.context.window_manager.windows:
+        found[window.scene.session_uid] = list(_look(window.scene))
+    _took = time.perf_counter() - begin
+    if found != _found:
+        _found.clear()
+        _found.update(found)
+        redraw()
+
+
+def _on_change(*_: object) -> None:
+    if not bpy.app.background:
+        call_soon(_on_timer, max(_SOON, _PATIENCE * _took))
+
+
+_HANDLERS = Handlers(depsgraph_update_post=_on_change, undo_post=_on_change, redo_post=_on_change, load_post=_on_change)
+register = _HANDLERS.register
+
+
+def unregister() -> None:
+    """Look no more."""
+    _HANDLERS.unregister()
+    call_off(_on_timer)
+    _found.clear()

@@ -1,0 +1,297 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What refining will take, before it is done: seconds, polygons and bytes, from a few thousand leaves and branches.
+
+These stand for all there are (`compiled.crowns.CrownParts`), more of them on near plants. Each has a place in the image
+and a size there, from which follow its polygons, as they do when it is drawn. In each part of the image they lie one
+behind the other: as many as fill it are drawn, and of what is behind them or out of view few facets are made. So
+numbers follow from the rules of drawing and the budget, with their own constants, and nothing is fitted.
+
+Only the seconds are: to the cases of ``python -m benchmarks forest``, at 1920 × 1080 on two cores, whenever refinement
+changes. Other machines differ by their speed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import GOLDEN_ANGLE, GOLDEN_TURN, Floats, Integers, Mask, spread
+from ..camera.camera import Camera
+from ..compiled.crowns import LEVEL, Crown, CrownParts
+from ..leaves.levels import chosen_polygons
+from ..refinement.decisions import explicit_fraction
+from ..refinement.settings import RefinementSettings
+from ..subplants.buds import BUD_RINGS, bud_sides
+from ..subplants.wood_detail import finer, round_up_to
+from .budget import A_PIXEL, BYTES_PER_POLYGON, BYTES_PER_TRIANGLE, FINEST, NEVER_TOO_MANY
+from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, OUTSIDE_A_PIXEL
+from .drawing import NEVER_TOO_MANY as NEVER_TOO_MANY_UNSEEN
+from .leaf_detail import NEARER, TOLERANCE
+from .plant_parts import BENT, BROAD, SIDES, TUBES, TWIG
+from .plants import KITES
+
+#: Seconds of any refinement, of each plant, and of each polygon or facet.
+SECONDS = 1.0
+SECONDS_PER_PLANT = 2.5e-5
+SECONDS_PER_PRIMITIVE = 5.5e-6
+#: Seconds of each polygon that is expanded, and of each triangle that these consist of.
+SECONDS_EXPANDED = np.array([5e-7, 1.2e-7])
+#: Bytes of each plant.
+BYTES_PER_PLANT = 500.0
+#: Leaves and branches that are looked at, about, how many of them lie in a cell of the image, and how many of a plant
+#: in view for one of a plant that is not.
+_PARTS, _IN_CELL, _IN_VIEW = 4096, 32, 16.0
+#: Layers of leaves in a covered pixel of which something is drawn, about: 7 to 10 in scenes of the tests.
+_LAYERS = 8.5
+#: Leaves count as so much shorter than they are, about, see `leaf_meshes`.
+_SHARE = 0.85
+#: How far twigs are off their chords, in lengths of these: arcs of a radian.
+_BEND = 1 / 8
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Plants of a scene, or some of them that stand for all.
+
+    Attributes
+    ----------
+    number : int
+        All plants.
+    foot : (k, 3) float64
+        Where some of them stand, meters.
+    scale : (k,) float64
+    which : (k,) int64
+        Their crowns, as indices into the next.
+    crowns : tuple of Crown
+    """
+
+    number: int
+    foot: Floats
+    scale: Floats
+    which: Integers
+    crowns: tuple[Crown, ...]
+
+    def in_view(self, camera: Camera) -> Mask:
+        """Plants (k,) of which something is in the image, as far as their crowns are upright spheroids."""
+        radius, height = self._of_crowns("radius"), self._of_crowns("height")
+        return camera.distance_to_view(self.foot + height[:, None] * (0.0, 0.0, 0.5)) < radius
+
+    def _of_crowns(self, name: str) -> Floats:
+        return np.array([getattr(crown, name) for crown in self.crowns])[self.which] * self.scale
+
+    def parts(self, camera: Camera) -> tuple[CrownParts, Integers]:
+        """Leaves and branches (n) of all plants as they stand, and the plant that each is on.
+
+        Plants are turned any way. More stand for one that is near and in view.
+        """
+        away = np.linalg.norm(self.foot - camera.eye, axis=1)
+        near = 1.0 / np.maximum(away / np.maximum(self._of_crowns("radius"), self._of_crowns("height")), 1.0)
+        near = np.where(self.in_view(camera), near, near / _IN_VIEW)
+        every = np.array([len(crown.parts) for crown in self.crowns])[self.which]
+        some = np.clip(np.ceil(_PARTS * near / near.sum()), 1, every).astype(np.int64)
+        turn = np.arange(len(self.foot)) * GOLDEN_TURN
+        found, plants = [CrownParts.empty()], [np.zeros(0, np.int64)]
+        for number, crown in enumerate(self.crowns):
+            own = np.flatnonzero(self.which == number)
+            owner, index = spread(some[own])
+            plant = own[owner]
+            each, scale = every[plant] / some[plant], self.scale[plant]
+            part = crown.parts.take(((index + turn[plant] % 1.0) * each).astype(np.int64) % every[plant])
+            (x, y, z), angle = part.position.T * scale, plant * GOLDEN_ANGLE
+            x, y = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y
+            part = replace(
+                part,
+                position=np.stack([x, y, z], axis=1) + self.foot[plant],
+                number=part.number * each * (self.number / len(self.foot)),
+                area=part.area * scale**2,
+                width=part.width * scale,
+                length=part.length * scale,
+                reach=part.reach * scale,
+            )
+            found.append(part)
+            plants.append(plant)
+        return CrownParts.concatenate(found), np.concatenate(plants)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a refinement will take.
+
+    Attributes
+    ----------
+    plants : int
+    primitives : float
+        Polygons and facets.
+    seconds : float
+    memory : float
+        Bytes of the whole process with the result, and rendering it.
+    limited : bool
+        Whether a limit of the settings makes plants coarser.
+    """
+
+    plants: int
+    primitives: float
+    seconds: float
+    memory: float
+    limited: bool
+
+
+def estimate(
+    stand: Stand,
+    camera: Camera,
+    settings: RefinementSettings,
+    used: float,
+    allowed: float,
+    everything: bool = False,
+) -> Estimate:
+    """Estimate a refinement.
+
+    Parameters
+    ----------
+    stand : Stand
+    camera : Camera
+    settings : RefinementSettings
+    used : float
+        Bytes that are taken already, and that the renderer will need for its picture.
+    allowed : float
+        Bytes left for results, see `memory.allowance`; infinite without a limit.
+    everything : bool
+        Whether plants are expanded instead of refined; limits do not hold then.
+    """
+    parts, plant = stand.parts(camera)
+    extent = camera.extent_around(parts.position)
+    whole = _polygons(stand.crowns, parts, stand.which[plant], camera, extent)
+    seconds, memory = SECONDS + SECONDS_PER_PLANT * stand.number, used + BYTES_PER_PLANT * stand.number
+    if everything:
+        made = whole @ parts.number
+        memory += BYTES_PER_TRIANGLE * float(made[1])
+        return Estimate(stand.number, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
+    wanted = _number(stand, camera, settings, parts, plant, extent, whole[0])
+    made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
+    seconds, memory = seconds + SECONDS_PER_PRIMITIVE * made, memory + BYTES_PER_POLYGON * made
+    return Estimate(stand.number, made, seconds, memory, wanted > made)
+
+
+def _number(
+    stand: Stand,
+    camera: Camera,
+    settings: RefinementSettings,
+    parts: CrownParts,
+    plant: Integers,
+    extent: Floats,
+    whole: Floats,
+) -> float:
+    """Polygons and facets without limits; ``whole`` (n,) is `_polygons` of parts, ``extent`` (n,) meters of a pixel."""
+    pixels = camera.width * camera.height
+    inside = _inside(parts, camera, extent)
+    leaves = np.where(inside | (parts.form < 0), 0.0, parts.number) / HIDDEN_LEAVES
+    beside = stand.in_view(camera)[plant]
+    parts = parts.take(inside)
+    extent, whole = extent[inside], whole[inside]
+    area, wide, wood = parts.area / extent**2, parts.width / extent, parts.form < 0
+    drawn, covered = _drawn(parts, camera, parts.number * area)
+    coarser = _coarser(covered, pixels, settings.facet)
+    facet = (coarser * settings.facet) ** 2
+    # Leaves are facets, kites, or have their polygons; branches are triangles, or tubes.
+    real = explicit_fraction(wide, coarser * settings.leaf_limit)
+    leaf = (1.0 - real) * np.minimum(area / facet, 1.0) + real * (1.0 + (whole - 1.0) * explicit_fraction(wide, KITES))
+    tube = np.where(wide < BROAD, np.minimum(parts.sides, SIDES) * parts.segments, whole)
+    tubes = explicit_fraction(wide, TUBES)
+    drawn = np.where(wood & (wide >= BROAD), 1.0, drawn)
+    bows = np.clip(np.sqrt(_BEND * parts.length / (BENT * extent)), 1.0, np.maximum(parts.segments, 1))
+    branch = tubes * tube + (1.0 - tubes) * bows * np.clip(area / (TWIG * facet), 0.0, 1.0)
+    seen = float((drawn * parts.number) @ np.where(wood, branch, leaf))
+    # Of what is not seen a facet stands for several leaves.
+    behind = (1.0 - drawn) * parts.number * area / np.maximum(HIDDEN_LEAVES * area, HIDDEN**2 * facet)
+    for number, a_pixel in (
+        (behind[~wood].sum(), HIDDEN_A_PIXEL),
+        (leaves[beside].sum(), OUTSIDE_A_PIXEL),  # drawn with what is seen of the same plants
+        (leaves[~beside].sum(), OUTSIDE_A_PIXEL),
+    ):
+        seen += min(float(number), max(a_pixel * pixels, NEVER_TOO_MANY_UNSEEN) / coarser**2)
+    return seen
+
+
+def _inside(parts: CrownParts, camera: Camera, extent: Floats) -> Mask:
+    """Leaves and branches (n,) of which something is in view."""
+    # Of branches that are drawn as a whole, spheres around them are tested, as `Coverage.of_spheres` has them.
+    sphere = np.sqrt(0.5) * parts.length
+    away = np.inf if camera.kind == "ORTHO" else extent / camera.pixel_size
+    branch = np.where(parts.width / extent < BROAD, parts.reach, sphere / np.maximum(1.0 - sphere / away, 0.1))
+    reach = np.where(parts.form < 0, branch, 0.25 * parts.length)
+    depth = camera.to_camera_space(parts.position)[:, 2]
+    between = (camera.kind == "PANO") | ((depth + reach > camera.near) & (depth - reach < camera.far))
+    return between & (camera.distance_to_view(parts.position) <= reach)
+
+
+def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, camera: Camera, extent: Floats) -> Floats:
+    """Polygons and triangles (2, n) of leaves and branches at the level of detail they have where they come nearest."""
+    slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
+    extent = np.maximum(extent - slope * parts.reach, extent / NEARER)
+    out = np.ones((2, len(parts)))
+    for number, crown in enumerate(crowns):
+        for kind, form in enumerate(crown.forms):
+            own = np.flatnonzero((which == number) & (parts.form == kind))
+            if form is not None and len(own):
+                out[:, own] = chosen_polygons(form, _SHARE * parts.length[own] / extent[own] / TOLERANCE)
+    wood = np.flatnonzero(parts.form < 0)
+    sides, size = parts.sides[wood], parts.width[wood] / extent[wood] / 2.0
+    around, along = finer(sides, size)
+    buds = np.where(size > round_up_to(sides), parts.buds[wood], 0.0)
+    out[:, wood] = around * parts.segments[wood] * along + buds * (BUD_RINGS - 1) * bud_sides(around)
+    out[1, wood] *= 2.0
+    return out
+
+
+def _drawn(parts: CrownParts, camera: Camera, pixels: Floats) -> tuple[Floats, float]:
+    """Fraction (n,) that is drawn of parts (n,) that have so many pixels (n,) in all, and the pixels that they cover.
+
+    In each cell of the image parts lie one behind the other. So many layers of them are drawn as a pixel has facets;
+    the farther behind, the fewer are seen.
+    """
+    if not len(parts):
+        return np.zeros(0), 0.0
+    local = camera.to_camera_space(parts.position)
+    x, y, depth = local.T
+    if camera.kind == "PANO":
+        (x, y), depth = camera.longitude_latitude(local), np.linalg.norm(local, axis=1)
+    elif camera.kind == "PERSP":
+        x, y = x / np.maximum(depth, camera.near), y / np.maximum(depth, camera.near)
+    left, right, bottom, top = camera.window
+    x, y = np.clip((x - left) / (right - left), 0.0, 1.0), np.clip((y - bottom) / (top - bottom), 0.0, 1.0)
+    strips = max(round(np.sqrt(len(x) / _IN_CELL)), 1)
+    column, wide = _groups(x, np.zeros(len(x), np.int64), strips)
+    cell, tall = _groups(y, column, strips)
+    size = np.maximum((wide[np.arange(len(tall)) // strips] * tall) * camera.width * camera.height, 1.0)
+    order = np.lexsort((depth, cell))
+    own = cell[order]
+    layers = np.maximum(pixels[order] / size[own], 1e-12)
+    every = np.bincount(own, layers, len(size))
+    before = np.cumsum(layers) - layers - (np.cumsum(every) - every)[own]
+    drawn = np.empty(len(parts))
+    drawn[order] = np.exp(-before / _LAYERS) * -np.expm1(-layers / _LAYERS) * _LAYERS / layers
+    # A layer of what is turned all ways covers a part of its area.
+    return drawn, float(-(size * np.expm1(-LEVEL * every)).sum())
+
+
+def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floats]:
+    """Each group of things (n,) at places (n,) divided into so many of equally many: which (n,), and how wide (k,)."""
+    order = np.lexsort((place, group))
+    count = np.bincount(group)
+    rank = np.arange(len(place)) - (np.cumsum(count) - count)[group[order]]
+    out = np.empty(len(place), np.int64)
+    out[order] = group[order] * number + rank * number // count[group[order]]
+    many = np.bincount(out, minlength=len(count) * number)
+    low, high = np.full(len(many), np.inf), np.full(len(many), -np.inf)
+    np.minimum.at(low, out, place)
+    np.maximum.at(high, out, place)
+    # Those on the border stand for as much beyond it as is between two.
+    return out, np.where(many > 1, (high - low) * many / np.maximum(many - 1, 1), 0.0)
+
+
+def _coarser(covered: float, pixels: float, facet: float) -> float:
+    """Sides of facets over those that are asked for, as of `budget.fit_to_budget` without limits."""
+    number = A_PIXEL * covered / facet**2 + (HIDDEN_A_PIXEL + OUTSIDE_A_PIXEL) * pixels
+    return float(np.clip(np.sqrt(number / NEVER_TOO_MANY), 1.0 / FINEST, 1.0))

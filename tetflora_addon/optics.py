@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light that leaves of a cluster send to each other, and what is left of it for those who see the cluster as one.
+
+Of what one surface scatters, the fraction p meets another of its cluster and is scattered again: a cluster of
+surfaces of the albedo w sends on w (1 − p) / (1 − p w) (Smolander and Stenberg, "Simple parameterizations of the
+radiation budget of uniform broadleaved and coniferous canopies", 2005).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Floats
+
+#: Fraction of light that the waxy surface of leaves mirrors without color (4 % at a refractive index of 1.5); what they
+#: scatter is the rest times their color.
+GLOSS = 0.04
+
+
+def recollision_albedo(albedo: Floats, weight: Floats) -> Floats:
+    """Albedo (n, 3) of clusters of surfaces of albedos (n, 3) that are seen by a fraction ``weight`` (n,)."""
+    p = np.clip(1.0 - weight, 0.0, 1.0)[:, None]
+    return albedo * (1.0 - p) / (1.0 - p * albedo)
+
+
+def surface_albedo(albedo: NDArray[np.floating], p: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Albedo (..., 3) of surfaces whose clusters have albedos (..., 3), by their recollision probability (..., 1)."""
+    return albedo / (1.0 - p + p * albedo)
+
+
+def cluster_color(color: Floats, gloss: Floats, weight: Floats) -> Floats:
+    """Color (n, 3) of clusters of leaves that mirror ``gloss`` (n,), of which they mirror ``weight`` (n,) as clusters.
+
+    The rest of what is mirrored meets other leaves and is scattered by them: no light is lost on its way.
+    """
+    whole = recollision_albedo(_albedo(color, gloss[:, None]), weight)
+    return _color(whole, (gloss * np.clip(weight, 0.0, 1.0))[:, None])
+
+
+def needle_color(color: NDArray[np.floating], p: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Color (..., 3) of needles whose shoots have colors (..., 3), by their recollision probability (..., 1)."""
+    return _color(surface_albedo(_albedo(color, GLOSS * (1.0 - p)), p), np.where(p > 0.0, GLOSS, 0.0))
+
+
+def _albedo(color: NDArray[np.floating], gloss: NDArray[np.floating]) -> NDArray[np.floating]:
+    return (1.0 - gloss) * color + gloss
+
+
+def _color(albedo: NDArray[np.floating], gloss: NDArray[np.floating]) -> NDArray[np.floating]:
+    return np.clip((albedo - gloss) / (1.0 - gloss), 0.0, 1.0)
