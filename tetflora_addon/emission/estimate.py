@@ -5,10 +5,11 @@
 These stand for all there are (`compiled.crowns.CrownParts`), more of them on near plants. Each has a place in the image
 and a size there, from which follow its polygons, as they do when it is drawn. In each part of the image they lie one
 behind the other: as many as fill it are drawn, and of what is behind them or out of view few facets are made. So
-numbers follow from the rules of drawing and the budget, with their own constants, and nothing is fitted.
+numbers follow from the rules of drawing and the budget, with their own constants; only how many layers fill a pixel is
+measured.
 
-Only the seconds are: to the cases of ``python -m benchmarks forest``, at 1920 × 1080 on two cores, whenever refinement
-changes. Other machines differ by their speed.
+Seconds are fitted to the cases of ``python -m benchmarks forest``, at 1920 × 1080 on two cores, whenever refinement
+changes, and those of what is expanded to plants of three species. Other machines differ by their speed.
 """
 
 from __future__ import annotations
