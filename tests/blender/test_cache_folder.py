@@ -29,10 +29,10 @@ def cache():
 def test_it_lies_where_blender_keeps_what_belongs_to_the_extension(cache, monkeypatch):
     own = preferences.preferences()
     own.cache_folder = ""
-    assert cache.used().is_relative_to(bpy.utils.user_resource('EXTENSIONS'))
-    assert not cache.used().exists()
+    assert cache.current_folder().is_relative_to(bpy.utils.user_resource('EXTENSIONS'))
+    assert not cache.current_folder().exists()
     own.use_cache = False
-    assert cache.used() is None
+    assert cache.current_folder() is None
     assert not bpy.ops.tetflora.clear_cache.poll()
 
 
@@ -40,13 +40,13 @@ def test_the_environment_has_the_first_word(cache, monkeypatch, tmp_path):
     own = preferences.preferences()
     monkeypatch.setenv("TETFLORA_CACHE", str(tmp_path / "shared"))
     own.use_cache = False
-    assert cache.used() == tmp_path / "shared"
+    assert cache.current_folder() == tmp_path / "shared"
     monkeypatch.setenv("TETFLORA_CACHE", "OFF")
     own.use_cache = True
-    assert cache.used() is None
+    assert cache.current_folder() is None
     monkeypatch.setenv("TETFLORA_CACHE", "")
     own.cache_folder = str(tmp_path / "mine")
-    assert cache.used() == tmp_path / "mine"
+    assert cache.current_folder() == tmp_path / "mine"
 
 
 def test_an_edited_species_is_looked_at_once(cache, tmp_path, monkeypatch):

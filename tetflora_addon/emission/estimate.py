@@ -88,10 +88,11 @@ class Stand:
         Plants are turned any way. More stand for one that is near and in view.
         """
         away = np.linalg.norm(self.foot - camera.eye, axis=1)
-        near = 1.0 / np.maximum(away / np.maximum(self._of_crowns("radius"), self._of_crowns("height")), 1.0)
+        size = np.maximum(self._of_crowns("radius"), self._of_crowns("height"))
+        near = size / np.maximum(np.maximum(away, size), 1e-9)
         near = np.where(self.in_view(camera), near, near / _IN_VIEW)
         every = np.array([len(crown.parts) for crown in self.crowns])[self.which]
-        some = np.clip(np.ceil(_PARTS * near / near.sum()), 1, every).astype(np.int64)
+        some = np.clip(np.ceil(_PARTS * near / max(near.sum(), 1e-9)), 1, every).astype(np.int64)
         turn = np.arange(len(self.foot)) * GOLDEN_TURN
         found, plants = [CrownParts.empty()], [np.zeros(0, np.int64)]
         for number, crown in enumerate(self.crowns):

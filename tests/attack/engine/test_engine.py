@@ -11,7 +11,7 @@ import pytest
 from tests.attack import engine_cases
 from tests.attack.watch import attack
 
-CASES = 800
+CASES = 2400
 
 
 @pytest.mark.parametrize("kind", engine_cases.SHARES)

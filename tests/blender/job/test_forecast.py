@@ -52,11 +52,11 @@ def test_the_last_run_teaches_the_next_estimate():
     add_plant(species="birch")
     found = _forecast()
     shown = bpy.context.scene, bpy.context.view_layer
-    forecast.learn(found, 50.0 * found.seconds + 100.0)
-    assert forecast.seconds_text(50.0 * found.seconds + 100.0) in forecast.forecast_text(*shown)
+    forecast.learn(found, 60.0 * found.seconds)
+    assert forecast.seconds_text(60.0 * found.seconds) in forecast.forecast_text(*shown)
     forecast.learn(found, 0.01)  # too short to tell
     forecast.learn(None, 1000.0)
-    assert forecast.seconds_text(50.0 * found.seconds + 100.0) in forecast.forecast_text(*shown)
+    assert forecast.seconds_text(60.0 * found.seconds) in forecast.forecast_text(*shown)
     forecast._on_load()
     assert forecast.seconds_text(found.seconds) in forecast.forecast_text(*shown)
 
@@ -71,7 +71,8 @@ def test_plants_of_both_kinds_count_alike(as_field):
     if empties is None:
         bpy.ops.tetflora.convert_plants(to='OBJECTS')
         empties = _forecast()
-    assert found.primitives == pytest.approx(empties.primitives, rel=0.01)
+    # Samples of crowns are turned by the order of plants.
+    assert found.primitives == pytest.approx(empties.primitives, rel=0.05)
     assert found.primitives > 10_000
 
 
@@ -124,6 +125,7 @@ def test_settings_and_camera_show_at_once():
     camera = add_camera()
     _wood(500)
     scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 1920, 1080
     before = _forecast()
     scene.render.resolution_percentage *= 2
     # Leaves that are large enough to be drawn as they are do not become more.

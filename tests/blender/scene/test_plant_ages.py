@@ -246,7 +246,7 @@ def test_young_plants_are_small_in_all_that_knows_them(scene):
         tall = mesh.dimensions.z
         bpy.data.objects.remove(mesh)
         plant.tetflora.enabled = True
-        return np.array([height, (stand.of_crowns("height") * stand.scale)[0], above.top[0], tall])
+        return np.array([height, stand.crowns[0].height * stand.scale[0], above.top[0], tall])
 
     plant_objects.show_age(plant)
     arrow = plant.empty_display_size

@@ -76,7 +76,9 @@ def test_estimates_follow_the_day(scene):
     def expected(day):
         scene.tetflora.year.day = day
         forecast._counted.stand = None
-        return float(forecast._stand_of(scene, bpy.context.view_layer).of_crowns("polygons")[0])
+        return forecast.forecast(scene, bpy.context.view_layer).primitives
+
+    scene.tetflora.expand_everything = True
 
     bare, full = expected(WINTER), expected(SUMMER)
     assert bare / full == pytest.approx(on(scene, WINTER) / on(scene, SUMMER), abs=0.15)

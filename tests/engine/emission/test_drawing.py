@@ -34,7 +34,7 @@ WIDTH = 96
 @cache
 def wood() -> tuple:
     """Birches so close together that most of them are hidden, seen from beside and a little above."""
-    flora = support.flora(support.MANY_POLYGONS)
+    flora = support.flora()
     seeds = support.grove(100, 2.0)
     seeds = replace(seeds, species=np.full(100, support.SPECIES.index("birch"), np.int32))
     camera = support.camera((0, -36, 20), (0, 0, 6), pixels=WIDTH, view=0.7)
@@ -102,7 +102,7 @@ def test_what_is_hidden_never_shows() -> None:
 @pytest.mark.parametrize("lens", [0.0, 0.1, 0.4])
 def test_no_facet_of_what_is_outside_is_in_the_image(lens: float) -> None:
     """A plant of which a little is in the corner of the image: what is large lies beyond it and its blur as a whole."""
-    flora = support.flora(support.MANY_POLYGONS)
+    flora = support.flora()
     seeds = support.plants([3], support.SPECIES.index("birch"), [(11.2, 0, 0)])
     camera = support.camera((0, -30, 8), (0, 0, 8), pixels=WIDTH, view=0.7)
     camera = replace(camera, lens_radius=lens, focus=10.0)
@@ -117,7 +117,7 @@ def test_no_facet_of_what_is_outside_is_in_the_image(lens: float) -> None:
 @pytest.mark.parametrize(("name", "away", "hidden"), [("birch", 2.5, 1.0), ("birch", 6.0, 16.0), ("beech", 6.0, 1.0)])
 def test_no_facet_near_the_eye_is_as_large_as_a_leaf(name: str, away: float, hidden: float) -> None:
     """Leaves that are many pixels wide are leaves; next to nothing shows of the facets for what is behind them."""
-    flora = support.flora(support.MANY_POLYGONS)
+    flora = support.flora()
     seeds = support.plants([3], support.SPECIES.index(name))
     high = 0.7 * support.trunks(flora.rows, seeds).length[0]
     camera = support.camera((0, -away, high), (0, 0, high), pixels=200, view=0.7)

@@ -31,7 +31,7 @@ from tetflora_addon.subplants.pieces import Pieces
 def tree(name: str) -> tuple[Flora, Pieces]:
     """A shipped tree, and its branches; of fewer and larger leaves than it is shipped with, where it has many."""
     species = load_species(name)
-    flora = compile_species([with_quality(species, min(support.MANY_POLYGONS / expected_polygons(species), 1.0))])
+    flora = compile_species([with_quality(species, min(support.MOST_POLYGONS / expected_polygons(species), 1.0))])
     return flora, support.grown(flora, support.plants(3))[1]
 
 

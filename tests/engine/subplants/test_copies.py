@@ -113,7 +113,7 @@ def test_solid_needles_send_on_as_much_light_as_sheets(color: float, transmissio
     level = next(level for level in leaf_levels(LEAF_MODELS["needles"]) if level.solid)
     plain = replace(level, again=np.zeros_like(level.again))
     copies = LevelCopies(plain, 1, transmission)
-    copies.color[:] = color
+    copies.color[:], copies.done = color, 1
     made = copies.buffers().attributes
     needles = level.again > 0.0
     face = made["tf_color"][1][needles].astype(np.float64)

@@ -8,7 +8,8 @@ What cannot be is refused by a `ValueError` that names the key.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from math import degrees, inf, radians
+from math import degrees, radians
+from sys import float_info
 from typing import Any
 
 import bpy
@@ -168,7 +169,7 @@ def _check_number(where: str, prop: bpy.types.Property, value: Any) -> None:
     whole = prop.type == 'INT'
     if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
         raise ValueError(f"{where} is {quoted(value)}; it must be a {'whole ' if whole else ''}number")
-    if not whole and not -inf < value < inf:
+    if not whole and not abs(value) <= float_info.max:  # of whole numbers, which have no end, as well
         raise ValueError(f"{where} is {quoted(value)}; it must be a finite number")
     angle = prop.subtype == 'ANGLE'
     # Bounds are single-precision numbers: 0.1 as a file has it is less than 0.1 as Blender stores it.
