@@ -130,7 +130,8 @@ def test_every_part_is_drawn_once(limit: float, fraction: float, monkeypatch: py
     assert fraction <= 1.0 or not len(plan.originals)
     whole = placed.wholes().totals.optical_area.sum()
     assert optical(placed, plan) + area(seen) < 1.01 * whole
-    assert 0.5 * whole < optical(placed, plan) + area(seen, unseen) < 1.02 * whole
+    # Of hidden ones a few are drawn by chance for many: up to 64 times as large.
+    assert 0.5 * whole < optical(placed, plan) + area(seen, unseen) < 1.05 * whole
 
 
 def test_assets_that_are_always_originals_are_in_every_place() -> None:
