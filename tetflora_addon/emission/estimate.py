@@ -93,7 +93,9 @@ class Stand:
         near = np.where(self.in_view(camera), near, near / _IN_VIEW)
         every = np.array([len(crown.parts) for crown in self.crowns])[self.which]
         some = np.clip(np.ceil(_PARTS * near / max(near.sum(), 1e-9)), 1, every).astype(np.int64)
-        turn = np.arange(len(self.foot)) * GOLDEN_TURN
+        order = np.empty(len(self.foot), np.int64)  # by places: that of a scene's objects is chance
+        order[np.lexsort(np.round(self.foot.T, 4))] = np.arange(len(self.foot))
+        turn = order * GOLDEN_TURN
         found, plants = [CrownParts.empty()], [np.zeros(0, np.int64)]
         for number, crown in enumerate(self.crowns):
             own = np.flatnonzero(self.which == number)
@@ -101,7 +103,7 @@ class Stand:
             plant = own[owner]
             each, scale = every[plant] / some[plant], self.scale[plant]
             part = crown.parts.take(((index + turn[plant] % 1.0) * each).astype(np.int64) % every[plant])
-            (x, y, z), angle = part.position.T * scale, plant * GOLDEN_ANGLE
+            (x, y, z), angle = part.position.T * scale, order[plant] * GOLDEN_ANGLE
             x, y = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y
             part = replace(
                 part,
