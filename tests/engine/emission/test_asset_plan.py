@@ -19,6 +19,7 @@ from tests.engine.assets import trees
 from tests.engine.emission.test_emission import with_decision
 from tests.engine.refinement.test_asset_parts import check_cover, grove, placed_of, run
 from tetflora_addon.camera.camera import Camera
+from tetflora_addon.emission import drawing
 from tetflora_addon.emission.asset_costs import NEVER
 from tetflora_addon.emission.asset_plan import (
     ASSETS,
@@ -130,8 +131,14 @@ def test_every_part_is_drawn_once(limit: float, fraction: float, monkeypatch: py
     assert fraction <= 1.0 or not len(plan.originals)
     whole = placed.wholes().totals.optical_area.sum()
     assert optical(placed, plan) + area(seen) < 1.01 * whole
-    # Of hidden ones a few are drawn by chance for many: up to 64 times as large.
-    assert 0.5 * whole < optical(placed, plan) + area(seen, unseen) < 1.05 * whole
+    # Of hidden ones a few are drawn by chance for many, up to 64 times as large: the mean of several draws is meant.
+    found = [optical(placed, plan) + area(seen, unseen)]
+    monkeypatch.setenv("TETFLORA_THREADS", "1")  # other processes know nothing of the draws
+    for draw in range(5):
+        monkeypatch.setattr(drawing, "_MERGE", 300 + draw)
+        plan, seen, unseen = drawn(result, camera, limit, originals(fraction))
+        found.append(optical(placed, plan) + area(seen, unseen))
+    assert 0.5 * whole < np.mean(found) < 1.02 * whole
 
 
 def test_assets_that_are_always_originals_are_in_every_place() -> None:
