@@ -366,7 +366,7 @@ class _Meshes:
 
 
 def test_shadows_from_just_beside_the_image_are_fine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Trees out of view, of which many throw shadows that fall far: that of the nearest has the facets that it needs."""
+    """Trees out of view, of which many throw shadows that fall far: the nearest has what it needs."""
     monkeypatch.setattr(subject, "NEVER_TOO_MANY", 4000.0)
     flora = support.flora()
     beside = [(-16.5, 0, 0), *((-20.0 - 2.0 * (k // 5), 6.0 * (k % 5 - 2), 0) for k in range(40))]
