@@ -21,24 +21,14 @@ GENERATIONS = 3
 
 @dataclass(frozen=True)
 class Hierarchy:
-    """Clusters (c), parents before children and children of one parent together; the first is all of the asset.
+    """Clusters (c), parents before children and children of one parent together; the first is all of the asset."""
 
-    Attributes
-    ----------
-    order : (p,) int64
-        Patches, those of each cluster together.
-    first, last : (c,) int64
-        Which of them are of each: from the first on, before the last.
-    parent : (c,) int32
-        −1 for the first.
-    child, children : (c,) int32
-        First child, and how many there are; 0 where there are none.
-    """
-
-    order: NDArray[np.int64]
+    order: NDArray[np.int64]  # (p,): patches, those of each cluster together
+    #: first and last, (c,): which of them are of each: from the first on, before the last.
     first: NDArray[np.int64]
     last: NDArray[np.int64]
-    parent: NDArray[np.int32]
+    parent: NDArray[np.int32]  # (c,): −1 for the first
+    #: child and children, (c,): first child, and how many there are; 0 where there are none.
     child: NDArray[np.int32]
     children: NDArray[np.int32]
 

@@ -42,30 +42,16 @@ _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True)
 class PatchTable:
-    """Patches (p) of all parts of a source.
+    """Patches (p) of all parts of a source."""
 
-    Attributes
-    ----------
-    patches : tuple of Patches or None
-        By surface.
-    part, patch : (p,) int32
-        Part of the source, and patch of its surface.
-    center : (p, 3) float32
-        In the space of the asset.
-    triangles : (p,) int32
-    woody : (p,) bool
-        Of a large solid: a trunk, not a berry or a closed leaf.
-    kind : (p,) int8
-        0 for leaves, 1 for thin wood, 2 for thick.
-    """
-
-    patches: tuple[Patches | None, ...]
+    patches: tuple[Patches | None, ...]  # by surface
+    #: part and patch, (p,): part of the source, and patch of its surface.
     part: NDArray[np.int32]
     patch: NDArray[np.int32]
-    center: NDArray[np.float32]
-    triangles: NDArray[np.int32]
-    woody: NDArray[np.bool_]
-    kind: NDArray[np.int8]
+    center: NDArray[np.float32]  # (p, 3): in the space of the asset
+    triangles: NDArray[np.int32]  # (p,)
+    woody: NDArray[np.bool_]  # (p,): of a large solid: a trunk, not a berry or a closed leaf
+    kind: NDArray[np.int8]  # (p,): 0 for leaves, 1 for thin wood, 2 for thick
 
 
 def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> PatchTable:
@@ -94,37 +80,22 @@ def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> 
 
 @dataclass(frozen=True)
 class Run:
-    """Triangles (t) of a run of clusters.
+    """Triangles (t) of a run of clusters."""
 
-    Attributes
-    ----------
-    cluster : (t,) int64
-        Among those without children, in their order; ascending.
-    corners : (t, 3, 3) float64
-        In the space of the asset, meters.
-    part, face : (t,) int32
-    new_face, new_patch : (t,) bool
-        The first triangle of a face, and of a patch.
-    color : (t, 3) float32
-    transmission, coverage, roughness : (t,) float32
-    solid, woody : (t,) bool
-    width : (t,) float32
-        Meters.
-    """
-
-    cluster: NDArray[np.int64]
-    corners: NDArray[np.float64]
-    part: NDArray[np.int32]
-    face: NDArray[np.int32]
+    cluster: NDArray[np.int64]  # (t,): among those without children, in their order; ascending
+    corners: NDArray[np.float64]  # (t, 3, 3): in the space of the asset, meters
+    part: NDArray[np.int32]  # (t,)
+    face: NDArray[np.int32]  # (t,)
+    #: new_face and new_patch, (t,): the first triangle of a face, and of a patch.
     new_face: NDArray[np.bool_]
     new_patch: NDArray[np.bool_]
-    color: NDArray[np.float32]
-    transmission: NDArray[np.float32]
-    coverage: NDArray[np.float32]
-    roughness: NDArray[np.float32]
-    solid: NDArray[np.bool_]
-    woody: NDArray[np.bool_]
-    width: NDArray[np.float32]
+    color: NDArray[np.float32]  # (t, 3)
+    transmission: NDArray[np.float32]  # (t,)
+    coverage: NDArray[np.float32]  # (t,)
+    roughness: NDArray[np.float32]  # (t,)
+    solid: NDArray[np.bool_]  # (t,)
+    woody: NDArray[np.bool_]  # (t,)
+    width: NDArray[np.float32]  # (t,): meters
 
 
 def runs_of(
@@ -191,29 +162,17 @@ def _run(source: AssetSource, pool: PatchTable, some: NDArray[np.int64], cluster
 
 @dataclass(frozen=True)
 class Measured:
-    """What is known of the smallest clusters (c) of a run, and samples on them.
+    """What is known of the smallest clusters (c) of a run, and samples on them."""
 
-    Attributes
-    ----------
-    low, high : (c, 3) float64
-    sums : (c, 17) float64
-        Areas of sheets and solids, optical area; faces; patches that are not wood; area of solids that are not;
-        optical area times width, color (3), transmission, and n nᵀ (6).
-    samples : SurfaceSamples of s
-    counts : (c, 2) int64
-        Samples on leaves and on wood of each.
-    leaves : AssetKites of l
-        Those of the clusters, one after the other; patches that are not wood.
-    part, face : (f,) int32
-        Faces of the clusters, one after the other.
-    """
-
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    low: NDArray[np.float64]  # (c, 3)
+    high: NDArray[np.float64]  # (c, 3)
+    #: (c, 17): areas of sheets and solids, optical area; faces; patches that are not wood; area of solids that are not;
+    #: optical area times width, color (3), transmission, and n nᵀ (6).
     sums: NDArray[np.float64]
-    samples: SurfaceSamples
-    counts: NDArray[np.int64]
-    leaves: AssetKites
+    samples: SurfaceSamples  # of s
+    counts: NDArray[np.int64]  # (c, 2): samples on leaves and on wood of each
+    leaves: AssetKites  # of l: those of the clusters, one after the other; patches that are not wood
+    #: part and face, (f,): faces of the clusters, one after the other.
     part: NDArray[np.int32]
     face: NDArray[np.int32]
 

@@ -29,36 +29,16 @@ _BITS = 10
 
 @dataclass(frozen=True)
 class Patches:
-    """Patches (p) of a surface, and its triangles in their order.
+    """Patches (p) of a surface, and its triangles in their order."""
 
-    Attributes
-    ----------
-    triangle : (t,) int32
-        Triangles of the surface, patch after patch, those of a face together.
-    first : (p + 1,) int64
-        First of these of each patch.
-    faces : (p,) int32
-        Faces of each.
-    solid : (p,) bool
-        Of a closed surface, or a tube with open ends: half of it is never seen.
-    width : (p,) float32
-        Of the leaf, or the local thickness of the solid, in the unit of the positions.
-    center : (p, 3) float32
-        Mean of its corners.
-    island : (p,) float32
-        Area of the island that each is or is cut from, in that unit squared.
-    pieces : (p,) int32
-        How many that island is cut into.
-    """
-
-    triangle: NDArray[np.int32]
-    first: NDArray[np.int64]
-    faces: NDArray[np.int32]
-    solid: NDArray[np.bool_]
-    width: NDArray[np.float32]
-    center: NDArray[np.float32]
-    island: NDArray[np.float32]
-    pieces: NDArray[np.int32]
+    triangle: NDArray[np.int32]  # (t,): triangles of the surface, patch after patch, those of a face together
+    first: NDArray[np.int64]  # (p + 1,): first of these of each patch
+    faces: NDArray[np.int32]  # (p,): faces of each
+    solid: NDArray[np.bool_]  # (p,): of a closed surface, or a tube with open ends: half of it is never seen
+    width: NDArray[np.float32]  # (p,): of the leaf, or the local thickness of the solid, in the unit of the positions
+    center: NDArray[np.float32]  # (p, 3): mean of its corners
+    island: NDArray[np.float32]  # (p,): area of the island that each is or is cut from, in that unit squared
+    pieces: NDArray[np.int32]  # (p,): how many that island is cut into
 
     def __len__(self) -> int:
         return len(self.faces)

@@ -43,51 +43,32 @@ class Camera:
     """A perspective, orthographic or panoramic camera.
 
     Camera space is Blender's: +x right, +y up, looking along −z. *Depth* is the distance along the viewing direction.
-
-    Attributes
-    ----------
-    kind : {'PERSP', 'ORTHO', 'PANO'}
-        Perspective, parallel rays along the viewing direction, or an equirectangular panorama: columns are longitudes
-        and rows are latitudes.
-    position : (3,) float64
-        The eye; for ``'ORTHO'`` the point from which depth is counted.
-    frame : (3, 3) float64
-        Rotation; columns are the camera's x, y and z axes in world space.
-    window : tuple of float
-        ``(left, right, bottom, top)`` of the image at depth 1 (``'PERSP'``), at any depth in meters (``'ORTHO'``), or
-        in radians (``'PANO'``): longitude from the viewing direction to the right, latitude from its plane upwards.
-        Lens shift, sensor fit and pixel aspect are in it; it need not be symmetric.
-    near, far : float
-        Clipping depths, meters, ``0 < near < far``.
-    width, height : int
-        Size of the final image in pixels.
-    lens_radius : float
-        Radius of the lens, meters; 0 where all is sharp.
-    focus : float
-        Depth that is sharp, meters.
-    shutter : tuple of Camera
-        The camera at other times while the shutter is open, and the other eyes of a stereoscopic image; often empty.
-    setback : float
-        How far, in depth, the position lies behind the eye, meters: not 0 where the camera stands for several.
-    cell_radius : float
-        Largest distance from that eye to the others that the camera stands for, meters; see `view_cells`.
-    origin : (3,) float64
-        Where in the world coordinates begin, meters: those of the camera, and of all that is refined for it.
     """
 
+    #: Perspective, parallel rays along the viewing direction, or an equirectangular panorama: columns are longitudes
+    #: and rows are latitudes.
     kind: Literal["PERSP", "ORTHO", "PANO"]
-    position: NDArray[np.float64]
-    frame: NDArray[np.float64]
+    position: NDArray[np.float64]  # (3,): the eye; for ``'ORTHO'`` the point from which depth is counted
+    frame: NDArray[np.float64]  # (3, 3): rotation; columns are the camera's x, y and z axes in world space
+    #: ``(left, right, bottom, top)`` of the image at depth 1 (``'PERSP'``), at any depth in meters (``'ORTHO'``), or in
+    #: radians (``'PANO'``): longitude from the viewing direction to the right, latitude from its plane upwards. Lens
+    #: shift, sensor fit and pixel aspect are in it; it need not be symmetric.
     window: tuple[float, float, float, float]
+    #: near and far: clipping depths, meters, ``0 < near < far``.
     near: float
     far: float
+    #: width and height: size of the final image in pixels.
     width: int
     height: int
-    lens_radius: float = 0.0
-    focus: float = np.inf
+    lens_radius: float = 0.0  # radius of the lens, meters; 0 where all is sharp
+    focus: float = np.inf  # depth that is sharp, meters
+    #: The camera at other times while the shutter is open, and the other eyes of a stereoscopic image; often empty.
     shutter: tuple[Camera, ...] = ()
+    #: How far, in depth, the position lies behind the eye, meters: not 0 where the camera stands for several.
     setback: float = 0.0
+    #: Largest distance from that eye to the others that the camera stands for, meters; see `view_cells`.
     cell_radius: float = 0.0
+    #: (3,): where in the world coordinates begin, meters: those of the camera, and of all that is refined for it.
     origin: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def local(self) -> Camera:

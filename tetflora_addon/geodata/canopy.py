@@ -35,22 +35,15 @@ _AROUND = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 
 
 @dataclass(frozen=True)
 class Trees:
-    """Trees that were found.
+    """Trees that were found."""
 
-    Attributes
-    ----------
-    column, row : (n,) float64
-        Places of the tops in cells.
-    height, width : (n,) float64
-        Meters; the width is that of a circle of the crown's area.
-    offset : (n, 2) float64
-        From the top to the middle of the crown, in radii, along rows and down columns.
-    """
-
+    #: column and row, (n,): places of the tops in cells.
     column: NDArray[np.float64]
     row: NDArray[np.float64]
+    #: height and width, (n,): meters; the width is that of a circle of the crown's area.
     height: NDArray[np.float64]
     width: NDArray[np.float64]
+    #: (n, 2): from the top to the middle of the crown, in radii, along rows and down columns.
     offset: NDArray[np.float64]
 
 

@@ -45,39 +45,19 @@ _NAMED = 6  # rows that a message names
 
 @dataclass(frozen=True)
 class Inventory:
-    """Trees of a file, in the order of their rows; sizes in meters, 0 where nobody knows.
+    """Trees of a file, in the order of their rows; sizes in meters, 0 where nobody knows."""
 
-    Attributes
-    ----------
-    names : tuple of tuple of str
-        Names of a tree in the order in which they count, each combination once.
-    name : (n,) int64
-        Index into them.
-    points : (n, 2) float64
-        Coordinates.
-    system : System
-    sizes : dict
-        ``height``, ``diameter`` (of the trunk), ``crown_width``, ``crown_base``, ``age`` and ``dead`` (years since
-        then), each (n,) float32.
-    notes : list of str
-        What was guessed, and which columns were used and which not.
-    skipped : int
-        Rows that were broken.
-    first : str
-        What was wrong with the first of them.
-    left_out : Counter
-        Rows that are no trees, by what they are.
-    """
-
-    names: tuple[tuple[str, ...], ...]
-    name: NDArray[np.int64]
-    points: NDArray[np.float64]
+    names: tuple[tuple[str, ...], ...]  # names of a tree in the order in which they count, each combination once
+    name: NDArray[np.int64]  # (n,): index into them
+    points: NDArray[np.float64]  # (n, 2): coordinates
     system: System
+    #: ``height``, ``diameter`` (of the trunk), ``crown_width``, ``crown_base``, ``age`` and ``dead`` (years since
+    #: then), each (n,) float32.
     sizes: dict[str, NDArray[np.float32]]
-    notes: list[str] = field(default_factory=list)
-    skipped: int = 0
-    first: str = ""
-    left_out: Counter = field(default_factory=Counter)
+    notes: list[str] = field(default_factory=list)  # what was guessed, and which columns were used and which not
+    skipped: int = 0  # rows that were broken
+    first: str = ""  # what was wrong with the first of them
+    left_out: Counter = field(default_factory=Counter)  # rows that are no trees, by what they are
 
 
 class Column(NamedTuple):

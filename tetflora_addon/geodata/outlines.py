@@ -48,25 +48,15 @@ _FEET = re.compile(r"(ft|feet)$")
 
 @dataclass(frozen=True)
 class MapFeature:
-    """One feature of a map.
+    """One feature of a map."""
 
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    name : str
-    rings : tuple of (k, 2) float64
-        Coordinates. Of an area its border and the holes in it, without the last point, which is the first; or a line.
-    closed : bool
-        Whether it is an area.
-    width, height : float
-        Of a line and a building, meters.
-    """
-
-    kind: str
+    kind: str  # one of `KINDS`
     name: str
+    #: tuple of (k, 2): coordinates. Of an area its border and the holes in it, without the last point, which is the
+    #: first; or a line.
     rings: tuple[NDArray[np.float64], ...]
-    closed: bool
+    closed: bool  # whether it is an area
+    #: width and height: of a line and a building, meters.
     width: float = 0.0
     height: float = 0.0
 

@@ -109,29 +109,15 @@ WGS84 = Ellipsoid()
 
 @dataclass(frozen=True)
 class Definition:
-    """A coordinate system.
+    """A coordinate system."""
 
-    Attributes
-    ----------
-    method : str
-        A key of `METHODS`, or ``geo`` for longitude and latitude.
-    ellipsoid : Ellipsoid
-    shift : tuple of 7 floats
-        To WGS 84: meters, seconds of arc, and parts in a million, as of a position vector.
-    meridian : float
-        Of longitude 0, degrees east of Greenwich.
-    unit : float
-        Meters.
-    parameters : tuple of floats
-        Degrees and meters, in the order that the method has them.
-    """
-
-    method: str
+    method: str  # a key of `METHODS`, or ``geo`` for longitude and latitude
     ellipsoid: Ellipsoid = WGS84
+    #: tuple of 7 floats: to WGS 84: meters, seconds of arc, and parts in a million, as of a position vector.
     shift: tuple[float, ...] = (0.0,) * 7
-    meridian: float = 0.0
-    unit: float = 1.0
-    parameters: tuple[float, ...] = ()
+    meridian: float = 0.0  # of longitude 0, degrees east of Greenwich
+    unit: float = 1.0  # meters
+    parameters: tuple[float, ...] = ()  # degrees and meters, in the order that the method has them
 
     @cached_property
     def ways(self) -> tuple[Callable[..., _Pair], Callable[..., _Pair], float]:
@@ -340,26 +326,16 @@ TRUE = {"tm", "lcc1", "lcc2", "sterea", "omercA", "omercB"}
 
 @dataclass(frozen=True)
 class System:
-    """A coordinate system.
+    """A coordinate system."""
 
-    Attributes
-    ----------
-    epsg : int
-        EPSG; 0 for a plane in meters of which nobody knows where on Earth it lies, -1 for one about a place, -2 for one
-        that a file defines by itself.
-    longitude, latitude : float
-        The place, degrees.
-    own : Definition, optional
-        Of the file.
-    unit : float
-        Meters of plain coordinates, or of those that are taken for meters of the system.
-    """
-
+    #: EPSG; 0 for a plane in meters of which nobody knows where on Earth it lies, -1 for one about a place, -2 for one
+    #: that a file defines by itself.
     epsg: int = 0
+    #: longitude and latitude: the place, degrees.
     longitude: float = 0.0
     latitude: float = 0.0
-    own: Definition | None = field(default=None, repr=False)
-    unit: float = 1.0
+    own: Definition | None = field(default=None, repr=False)  # of the file
+    unit: float = 1.0  # meters of plain coordinates, or of those that are taken for meters of the system
 
     @property
     def definition(self) -> Definition:
@@ -483,16 +459,10 @@ def between(points: NDArray[np.float64], source: System, target: System) -> NDAr
 
 @dataclass(frozen=True)
 class MapOrigin:
-    """Where on a map the world's origin is.
-
-    Attributes
-    ----------
-    system : System
-    east, north : float
-        Coordinates of the origin in the system.
-    """
+    """Where on a map the world's origin is."""
 
     system: System
+    #: east and north: coordinates of the origin in the system.
     east: float
     north: float
 

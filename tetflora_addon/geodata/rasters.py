@@ -34,27 +34,17 @@ _SMALL = 4096  # bytes of world files and files with the name of a coordinate sy
 
 @dataclass(frozen=True)
 class Raster:
-    """Cells with one value each.
+    """Cells with one value each."""
 
-    Attributes
-    ----------
-    values : (h, w) float32
-        Meters, the first row is the first of the file (the northernmost, if ``down`` is); nan where nothing is known.
-    corner : (2,) float64
-        Coordinates of the middle of the first cell of the first row.
-    along, down : (2,) float64
-        Steps from a cell to the next of its row, and to the next row.
-    system : System
-    notes : tuple of str
-        What was taken from the file beside its values.
-    """
-
+    #: (h, w): meters, the first row is the first of the file (the northernmost, if ``down`` is); nan where nothing is
+    #: known.
     values: NDArray[np.float32]
-    corner: NDArray[np.float64]
+    corner: NDArray[np.float64]  # (2,): coordinates of the middle of the first cell of the first row
+    #: along and down, (2,): steps from a cell to the next of its row, and to the next row.
     along: NDArray[np.float64]
     down: NDArray[np.float64]
     system: System
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what was taken from the file beside its values
 
     def places(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> NDArray[np.float64]:
         """Coordinates (n, 2) of places given in cells; 0, 0 is the middle of the first cell."""

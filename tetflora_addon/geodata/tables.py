@@ -36,39 +36,17 @@ MAX_POINTS = 5_000_000
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts under names.
+    """Rows of texts under names."""
 
-    Attributes
-    ----------
-    name : str
-        Of the file.
-    row : str
-        What a row is called, such as "line".
-    numbers : (n,) int64
-        Number of each row in the file.
-    columns : dict
-        Texts (n,) of each column by its name.
-    points : (n, 2) float64, optional
-        Coordinates from geometry.
-    system : System, optional
-        That goes with them.
-    broken : int
-        Rows that were left out because they are not like the others.
-    first : str
-        What is wrong with the first of them.
-    notes : list of str
-        What else was left out.
-    """
-
-    name: str
-    row: str
-    numbers: NDArray[np.int64]
-    columns: dict[str, NDArray[np.str_]]
-    points: NDArray[np.float64] | None = None
-    system: System | None = None
-    broken: int = 0
-    first: str = ""
-    notes: list[str] = field(default_factory=list)
+    name: str  # of the file
+    row: str  # what a row is called, such as "line"
+    numbers: NDArray[np.int64]  # (n,): number of each row in the file
+    columns: dict[str, NDArray[np.str_]]  # texts (n,) of each column by its name
+    points: NDArray[np.float64] | None = None  # (n, 2): coordinates from geometry
+    system: System | None = None  # that goes with them
+    broken: int = 0  # rows that were left out because they are not like the others
+    first: str = ""  # what is wrong with the first of them
+    notes: list[str] = field(default_factory=list)  # what else was left out
 
     def where(self, index: int, column: str = "") -> str:
         """A place in the file, for messages."""

@@ -28,36 +28,18 @@ _PLACE_JITTER = 0.4  # below a half, so that leaves keep their order along the b
 
 @dataclass(frozen=True)
 class Leaves(Arrays):
-    """Leaves as a structure of arrays.
+    """Leaves as a structure of arrays."""
 
-    Attributes
-    ----------
-    branch : (n,) int64
-        Index of the branch that bears the leaf.
-    key : (n,) uint64
-    position : (n, 3) float64
-        Base of the leaf, meters.
-    frame : (n, 3, 3) float32
-        Columns: across, along the midrib, upper side; before it turns to the light. Single precision is off by some
-        nanometers at the tip of a leaf, and its cosines are ten times as fast.
-    size : (n,) float64
-        Meters by which the leaf model is scaled.
-    light : (n,) float64
-        How far it turns to the sky; (1,) where that is the same for all.
-    sky : (3,) float64 or (n, 3) float32
-        Where that is; with the branch in the wind.
-    stages : Stages or None
-        On a day of the year; None where all are as in summer.
-    """
-
-    branch: Integers
-    key: Keys
-    position: Floats
+    branch: Integers  # (n,): index of the branch that bears the leaf
+    key: Keys  # (n,)
+    position: Floats  # (n, 3): base of the leaf, meters
+    #: (n, 3, 3): columns: across, along the midrib, upper side; before it turns to the light. Single precision is off
+    #: by some nanometers at the tip of a leaf, and its cosines are ten times as fast.
     frame: NDArray[np.float32]
-    size: Floats
-    light: Floats
-    sky: NDArray[np.floating]
-    stages: Stages | None = None
+    size: Floats  # (n,): meters by which the leaf model is scaled
+    light: Floats  # (n,): how far it turns to the sky; (1,) where that is the same for all
+    sky: NDArray[np.floating]  # (3,) or (n, 3) float32: where that is; with the branch in the wind
+    stages: Stages | None = None  # on a day of the year; None where all are as in summer
 
 
 def leaf_keys(branches: Branches, owner: Integers, index: Integers) -> Keys:

@@ -312,16 +312,10 @@ def children(rows: Table, parents: Branches, lines: Axes | None = None) -> tuple
 
 @dataclass(frozen=True)
 class WholeBranches(Arrays):
-    """Whole branches and their axes.
+    """Whole branches and their axes."""
 
-    Attributes
-    ----------
-    branches : Branches of n
-    lines : Axes of the same n
-    """
-
-    branches: Branches
-    lines: Axes
+    branches: Branches  # of n
+    lines: Axes  # of the same n
 
     def knots(self, rows: Table) -> tuple[Integers, Floats, Floats]:
         """Where segments begin and end; a flared base has some more.

@@ -74,19 +74,6 @@ sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency,
 class Wind:
     """A wind at a moment. Fields with a label are properties of a scene, and documented by their tooltips.
 
-    Attributes
-    ----------
-    direction : float
-        Radians from +x toward +y.
-    time : float
-        Seconds.
-    loop : float
-        Seconds after which all movement repeats; 0 for never.
-    moving : bool
-        Whether vertices shall have velocities.
-    origin : tuple of float
-        Where in the world positions are counted from, meters.
-
     Raises
     ------
     TetFloraError
@@ -102,6 +89,7 @@ class Wind:
         soft_max=25.0,
         max=100.0,
     )
+    #: Radians from +x toward +y.
     direction: float = setting(
         0.0,
         "Direction",
@@ -119,10 +107,10 @@ class Wind:
         min=0.0,
         max=1.0,
     )
-    time: float = 0.0
-    loop: float = 0.0
-    moving: bool = False
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    time: float = 0.0  # seconds
+    loop: float = 0.0  # seconds after which all movement repeats; 0 for never
+    moving: bool = False  # whether vertices shall have velocities
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where in the world positions are counted from, meters
 
     def __post_init__(self) -> None:
         if not np.isfinite([self.speed, self.direction, self.gusts, self.time, self.loop]).all():

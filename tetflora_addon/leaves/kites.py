@@ -36,23 +36,13 @@ _SKEWNESS /= 5.0 * (1.0 - _WIDEST * (1.0 - _WIDEST)) ** 1.5
 
 @dataclass(frozen=True)
 class LeafKites:
-    """Kites (k) that stand for a leaf model.
+    """Kites (k) that stand for a leaf model."""
 
-    Attributes
-    ----------
-    positions : (k, 4, 3) float64
-        Their vertices, in units of the leaf's size; each kite has the area that the model shows.
-    uv : (k, 4, 2) float32
-    share : (k,) float64
-        Up to which random number, from 0 to 1, each is taken; the last is 1.
-    material_index : (k,) int32, optional
-        As of the model.
-    """
-
+    #: (k, 4, 3): their vertices, in units of the leaf's size; each kite has the area that the model shows.
     positions: Floats
-    uv: NDArray[np.float32]
-    share: Floats
-    material_index: NDArray[np.int32] | None = None
+    uv: NDArray[np.float32]  # (k, 4, 2)
+    share: Floats  # (k,): up to which random number, from 0 to 1, each is taken; the last is 1
+    material_index: NDArray[np.int32] | None = None  # (k,): as of the model
 
     def chosen(self, number: Floats) -> Integers:
         """Which kite (n,) copies with random numbers (n,) take."""

@@ -46,36 +46,17 @@ class Spines:
 
 @dataclass(frozen=True, eq=False)
 class LeafModel:
-    """Polygons of one leaf.
+    """Polygons of one leaf."""
 
-    Attributes
-    ----------
-    positions : (v, 3) float64
-        Vertices in units of the leaf's size.
-    corner_verts : (c,) int32
-        Vertex of each corner, face after face.
-    face_offsets : (f + 1,) int32
-        First corner of each face.
-    uv : (c, 2) float32
-        Texture coordinates by corner.
-    material_index : (f,) int32, optional
-        Material of each face, of models that have several.
-    textured : bool
-        Drawn as it is at any size: a texture may cut it out.
-    shape : Blade, Needles or Compound, optional
-        What it stands for, which leaves are drawn as that are near; see `levels`.
-    spines : Spines, optional
-        What grows on its closed parts up close.
-    """
-
-    positions: Floats
-    corner_verts: NDArray[np.int32]
-    face_offsets: NDArray[np.int32]
-    uv: NDArray[np.float32]
-    material_index: NDArray[np.int32] | None = None
-    textured: bool = False
+    positions: Floats  # (v, 3): vertices in units of the leaf's size
+    corner_verts: NDArray[np.int32]  # (c,): vertex of each corner, face after face
+    face_offsets: NDArray[np.int32]  # (f + 1,): first corner of each face
+    uv: NDArray[np.float32]  # (c, 2): texture coordinates by corner
+    material_index: NDArray[np.int32] | None = None  # (f,): material of each face, of models that have several
+    textured: bool = False  # drawn as it is at any size: a texture may cut it out
+    #: What it stands for, which leaves are drawn as that are near; see `levels`.
     shape: Blade | Needles | Compound | None = None
-    spines: Spines | None = None
+    spines: Spines | None = None  # what grows on its closed parts up close
 
     @property
     def polygons(self) -> int:

@@ -34,27 +34,14 @@ def next_corners(offsets: NDArray[np.int32]) -> NDArray[np.int32]:
 
 @dataclass(frozen=True)
 class LeafSurface:
-    """Faces of a leaf.
+    """Faces of a leaf."""
 
-    Attributes
-    ----------
-    positions : (k, v, 3) float64
-        Vertices of each variant, in units of the leaf's size.
-    corner_verts : (c,) int32
-    face_offsets : (f + 1,) int32
-    uv : (c, 2) float64
-    solid : (f,) bool
-        Faces of closed bodies, as needles: half of their surface counts as one-sided area.
-    error : float
-        Largest distance from the shape that it stands for.
-    """
-
-    positions: Floats
-    corner_verts: NDArray[np.int32]
-    face_offsets: NDArray[np.int32]
-    uv: Floats
-    solid: Mask
-    error: float = 0.0
+    positions: Floats  # (k, v, 3): vertices of each variant, in units of the leaf's size
+    corner_verts: NDArray[np.int32]  # (c,)
+    face_offsets: NDArray[np.int32]  # (f + 1,)
+    uv: Floats  # (c, 2)
+    solid: Mask  # (f,): faces of closed bodies, as needles: half of their surface counts as one-sided area
+    error: float = 0.0  # largest distance from the shape that it stands for
 
     @property
     def polygons(self) -> int:

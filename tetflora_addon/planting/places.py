@@ -37,38 +37,17 @@ _SPECIES = 2**32  # keys of species that are placed one after the other, away fr
 
 @dataclass(frozen=True)
 class Placement(Arrays):
-    """Plants to make.
+    """Plants to make."""
 
-    Attributes
-    ----------
-    position : (n, 3) float64
-        Meters, world space.
-    azimuth : (n,) float64
-        Rotation about the vertical, radians; comes before the tilt.
-    scale : (n,) float64
-    species : (n,) int32
-        Index into the weights of the rules.
-    seed : (n,) int32
-        Zero or positive.
-    wanted : int
-        How many were asked for, by number or by density.
-    reason : str
-        Why there are fewer, and what to do; empty if there are not.
-    up : (n, 3) float64, optional
-        Unit vectors along the trunks; upright if not given.
-    erased : int
-        How many were left out by `without`.
-    """
-
-    position: Floats
-    azimuth: Floats
-    scale: Floats
-    species: NDArray[np.int32]
-    seed: NDArray[np.int32]
-    wanted: int
-    reason: str = ""
-    up: Floats | None = None
-    erased: int = 0
+    position: Floats  # (n, 3): meters, world space
+    azimuth: Floats  # (n,): rotation about the vertical, radians; comes before the tilt
+    scale: Floats  # (n,)
+    species: NDArray[np.int32]  # (n,): index into the weights of the rules
+    seed: NDArray[np.int32]  # (n,): zero or positive
+    wanted: int  # how many were asked for, by number or by density
+    reason: str = ""  # why there are fewer, and what to do; empty if there are not
+    up: Floats | None = None  # (n, 3): unit vectors along the trunks; upright if not given
+    erased: int = 0  # how many were left out by `without`
 
     def __post_init__(self) -> None:
         """Plants that nobody tilted are upright."""

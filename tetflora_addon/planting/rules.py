@@ -29,20 +29,12 @@ _SCALE = {"min": 0.01, "soft_max": 4.0}
 
 @dataclass(frozen=True)
 class Companion:
-    """How plants of one species stand to those of another.
+    """How plants of one species stand to those of another."""
 
-    Attributes
-    ----------
-    species, other : int
-        Indices into the weights. Plants of ``other`` may also be older than the population.
-    strength : float
-        -1: none grows within the distance of any of the others; 0: indifferent; 1: they grow only there.
-    distance : float
-        Meters on the map.
-    """
-
+    #: species and other: indices into the weights. Plants of ``other`` may also be older than the population.
     species: int
     other: int
+    #: -1: none grows within the distance of any of the others; 0: indifferent; 1: they grow only there.
     strength: float = setting(
         -1.0,
         "Attraction",
@@ -52,6 +44,7 @@ class Companion:
         min=-1.0,
         max=1.0,
     )
+    #: Meters on the map.
     distance: float = setting(
         5.0,
         "Reach",
@@ -100,16 +93,6 @@ class Rules(GroundLimits):
 
     Fields with a label are properties of a population, and documented by their tooltips. Lengths are in meters,
     altitudes z in the world, angles in radians.
-
-    Attributes
-    ----------
-    density : float
-        Plants for each square meter of the map that is wholly suitable; fewer where it is suitable in part.
-    aspect : float
-        Clockwise from +Y (north) on the map.
-    weights : tuple of float
-        Relative frequency of each species.
-    companions : tuple of Companion
     """
 
     count: int = setting(
@@ -121,6 +104,7 @@ class Rules(GroundLimits):
         max=MOST_PLANTS,
     )
     by_density: bool = setting(False, "By Density", "Set the number of plants per hectare instead of in total")
+    #: Plants for each square meter of the map that is wholly suitable; fewer where it is suitable in part.
     density: float = 0.01
     seed: int = setting(0, "Seed", "A different seed gives a different arrangement and different plants")
     min_distance: float = setting(
@@ -141,6 +125,7 @@ class Rules(GroundLimits):
         soft_max=500.0,
         **LENGTH,
     )
+    #: Clockwise from +Y (north) on the map.
     aspect: float = setting(
         0.0,
         "Facing",
@@ -188,7 +173,7 @@ class Rules(GroundLimits):
         "0: upright, as trees grow; 1: perpendicular to the ground, as moss and grass grow",
         **_FACTOR,
     )
-    weights: tuple[float, ...] = (1.0,)
+    weights: tuple[float, ...] = (1.0,)  # relative frequency of each species
     companions: tuple[Companion, ...] = ()
 
 

@@ -43,16 +43,7 @@ class _Draw(IntEnum):
 
 @dataclass(frozen=True)
 class Brush:
-    """What the brush is like. Fields with a label are properties of a scene, and documented by their tooltips.
-
-    Attributes
-    ----------
-    density : float
-        Plants for each square meter of the map.
-    scale_min, scale_max : float
-    weights : tuple of float
-        Relative frequency of each species.
-    """
+    """What the brush is like. Fields with a label are properties of a scene, and documented by their tooltips."""
 
     radius: float = setting(
         5.0,
@@ -63,7 +54,7 @@ class Brush:
         max=10_000.0,
         **LENGTH,
     )
-    density: float = 0.04
+    density: float = 0.04  # plants for each square meter of the map
     strength: float = setting(
         1.0,
         "Strength",
@@ -84,7 +75,7 @@ class Brush:
     )
     scale_min: float = 1.0
     scale_max: float = 1.0
-    weights: tuple[float, ...] = (1.0,)
+    weights: tuple[float, ...] = (1.0,)  # relative frequency of each species
 
 
 def stroke_key(seed: int, stroke: int) -> Keys:

@@ -61,49 +61,24 @@ class Limits(GroundLimits):
 
 @dataclass(frozen=True)
 class Spots:
-    """Places on the ground, as zones ask for them.
+    """Places on the ground, as zones ask for them."""
 
-    Attributes
-    ----------
-    triangle : (n,) int64
-        Of the ground.
-    barycentric : (n, 3) float64
-    position : (n, 3) float64
-        Meters.
-    normal : (n, 3) float64
-        Of the ground, upwards.
-    """
-
-    triangle: Integers
-    barycentric: Floats
-    position: Floats
-    normal: Floats
+    triangle: Integers  # (n,): of the ground
+    barycentric: Floats  # (n, 3)
+    position: Floats  # (n, 3): meters
+    normal: Floats  # (n, 3): of the ground, upwards
 
 
 @dataclass(frozen=True)
 class Zone:
-    """One zone of a ground of t triangles.
-
-    Attributes
-    ----------
-    weight : (t, 3) float, optional
-        Mask at the corners, 0 to 1; linear between.
-    uv : (t, 3, 2) float, optional
-        Where the corners are in the image.
-    image : (h, w) float, optional
-        Mask in texels, 0 to 1; the first row is at the bottom.
-    lines : Lines, optional
-        What distances are measured from: see `distance_lines`.
-    inverse : bool
-        All but the zone, as what gives way to it has.
-    """
+    """One zone of a ground of t triangles."""
 
     limits: Limits
-    weight: Floats | None = None
-    uv: Floats | None = None
-    image: NDArray[np.float32] | None = None
-    lines: Lines | None = None
-    inverse: bool = False
+    weight: Floats | None = None  # (t, 3): mask at the corners, 0 to 1; linear between
+    uv: Floats | None = None  # (t, 3, 2): where the corners are in the image
+    image: NDArray[np.float32] | None = None  # (h, w): mask in texels, 0 to 1; the first row is at the bottom
+    lines: Lines | None = None  # what distances are measured from: see `distance_lines`
+    inverse: bool = False  # all but the zone, as what gives way to it has
 
     @property
     def asks_for_water(self) -> bool:

@@ -44,39 +44,18 @@ _LEAST, _MOST = 0.25, 1_024.0
 
 @dataclass(frozen=True)
 class Level(Arrays):
-    """The tetrahedra that hold something after one pass.
+    """The tetrahedra that hold something after one pass."""
 
-    Attributes
-    ----------
-    nodes : (t,) int32
-        Their nodes in the tree.
-    depth : (t,) int16
-        Planes between the root and each.
-    decision : (t,) int8
-        `Decision`; in all levels but the last some are still to be divided.
-    visibility : (t,) float32
-        Fraction of each one's light that nothing in front blocks; 0 out of view.
-    contribution : (t,) float32
-        Pixels of the image that its contents change.
-    extinction : (t,) float32
-        κ of its contents spread evenly, 1/m; optical depth is κ times the way through it.
-    color : (t, 3) float32
-        Mean color of its contents, linear RGB.
-    figures : Step
-        Counts for the overlay.
-    number : int
-        Pass of the loop, from 0.
-    """
-
-    nodes: NDArray[np.int32]
-    depth: NDArray[np.int16]
-    decision: NDArray[np.int8]
-    visibility: NDArray[np.float32]
-    contribution: NDArray[np.float32]
+    nodes: NDArray[np.int32]  # (t,): their nodes in the tree
+    depth: NDArray[np.int16]  # (t,): planes between the root and each
+    decision: NDArray[np.int8]  # (t,): `Decision`; in all levels but the last some are still to be divided
+    visibility: NDArray[np.float32]  # (t,): fraction of each one's light that nothing in front blocks; 0 out of view
+    contribution: NDArray[np.float32]  # (t,): pixels of the image that its contents change
+    #: (t,): κ of its contents spread evenly, 1/m; optical depth is κ times the way through it.
     extinction: NDArray[np.float32]
-    color: NDArray[np.float32]
-    figures: Step
-    number: int
+    color: NDArray[np.float32]  # (t, 3): mean color of its contents, linear RGB
+    figures: Step  # counts for the overlay
+    number: int  # pass of the loop, from 0
 
 
 class Levels:

@@ -41,29 +41,14 @@ _SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
 
 @dataclass(frozen=True)
 class Shapes:
-    """Many plants in one mesh.
+    """Many plants in one mesh."""
 
-    Attributes
-    ----------
-    positions : (v, 3) float32
-        Meters from ``origin``.
-    colors : (v, 3) float32
-        As a screen shows them, shaded by a fixed light.
-    indices : (m, 3) int32 for faces, or (m, 2) int32 for edges
-    plants : int
-        Plants that are shown.
-    of : int
-        Plants that there are.
-    origin : (3,) float64
-        Near most plants, meters, world space.
-    """
-
-    positions: NDArray[np.float32]
-    colors: NDArray[np.float32]
-    indices: NDArray[np.int32]
-    plants: int
-    of: int
-    origin: Floats
+    positions: NDArray[np.float32]  # (v, 3): meters from ``origin``
+    colors: NDArray[np.float32]  # (v, 3): as a screen shows them, shaded by a fixed light
+    indices: NDArray[np.int32]  # (m, 3) for faces, or (m, 2) int32 for edges
+    plants: int  # plants that are shown
+    of: int  # plants that there are
+    origin: Floats  # (3,): near most plants, meters, world space
 
 
 def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:

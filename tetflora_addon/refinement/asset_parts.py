@@ -29,25 +29,13 @@ _EVEN = 1e-4
 
 @dataclass(frozen=True)
 class AssetParts(Arrays):
-    """Clusters of instances (n).
+    """Clusters of instances (n)."""
 
-    Attributes
-    ----------
-    instance : (n,) int32
-    cluster : (n,) int32
-        Of `AssetTable.clusters`.
-    center : (n, 3) float64
-        Middle of its bound, meters.
-    totals : Totals of n
-    extent : (n,) float64
-        Longest side of its bound, meters.
-    """
-
-    instance: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    cluster: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    center: NDArray[np.float64] = field(metadata=column(3))
-    totals: Totals = field(metadata=nested(Totals))
-    extent: NDArray[np.float64]
+    instance: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,)
+    cluster: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,): of `AssetTable.clusters`
+    center: NDArray[np.float64] = field(metadata=column(3))  # (n, 3): middle of its bound, meters
+    totals: Totals = field(metadata=nested(Totals))  # of n
+    extent: NDArray[np.float64]  # (n,): longest side of its bound, meters
 
     @property
     def reach(self) -> NDArray[np.float64]:

@@ -42,25 +42,14 @@ Kind = TypeVar("Kind", Branches, Pieces, Polygons)
 
 @dataclass(frozen=True)
 class Totals(Arrays):
-    """What each thing (sub-plant, piece, polygon) or each tetrahedron holds in total.
+    """What each thing (sub-plant, piece, polygon) or each tetrahedron holds in total."""
 
-    Attributes
-    ----------
-    leaf_area : (n,) float64
-        One-sided area of leaves, m².
-    wood_area : (n,) float64
-        Surface of branches, m².
-    polygons : (n,) float64
-        Expected faces if made explicit.
-    width : (n,) float64
-        Width of the features, meters: that of the leaves, or of the branch where there are none. By tetrahedron: the
-        mean, weighted by area. Infinite where polygons are drawn as they are whatever is decided; these count for a
-        tetrahedron that holds nothing else.
-    """
-
-    leaf_area: Floats
-    wood_area: Floats
-    polygons: Floats
+    leaf_area: Floats  # (n,): one-sided area of leaves, m²
+    wood_area: Floats  # (n,): surface of branches, m²
+    polygons: Floats  # (n,): expected faces if made explicit
+    #: (n,): width of the features, meters: that of the leaves, or of the branch where there are none. By tetrahedron:
+    #: the mean, weighted by area. Infinite where polygons are drawn as they are whatever is decided; these count for a
+    #: tetrahedron that holds nothing else.
     width: Floats
 
     @property
@@ -147,22 +136,13 @@ def sums(totals: Totals, cells: Integers, number: int) -> Totals:
 
 @dataclass(frozen=True)
 class PlantParts(Arrays):
-    """Parts of plants (n): sub-plants, and branches without what grows on them.
+    """Parts of plants (n): sub-plants, and branches without what grows on them."""
 
-    Attributes
-    ----------
-    branches : Branches of n
-    branch_only : (n,) bool
-        Only the branch itself, with the leaves that it bears.
-    totals : Totals of n
-    extent : (n,) float64
-        Longest side, meters.
-    """
-
-    branches: Branches = field(metadata=nested(Branches))
+    branches: Branches = field(metadata=nested(Branches))  # of n
+    #: (n,): only the branch itself, with the leaves that it bears.
     branch_only: Mask = field(metadata=column(dtype=bool))
-    totals: Totals = field(metadata=nested(Totals))
-    extent: Floats
+    totals: Totals = field(metadata=nested(Totals))  # of n
+    extent: Floats  # (n,): longest side, meters
 
     @classmethod
     def of_subplants(cls, flora: Flora, branches: Branches) -> PlantParts:
@@ -194,19 +174,11 @@ def as_pieces(branches: Branches) -> Pieces:
 
 @dataclass(frozen=True)
 class InCells(Arrays, Generic[Kind]):
-    """Things of one kind (n), each in one node of the tree.
+    """Things of one kind (n), each in one node of the tree."""
 
-    Attributes
-    ----------
-    items : Branches, Pieces or Polygons of n
-    cell : (n,) int32
-        Node that holds each.
-    totals : Totals of n
-    """
-
-    items: Kind
-    cell: NDArray[np.int32]
-    totals: Totals
+    items: Kind  # of n
+    cell: NDArray[np.int32]  # (n,): node that holds each
+    totals: Totals  # of n
 
     @classmethod
     def none(cls, kind: type[Kind]) -> InCells[Kind]:

@@ -63,52 +63,22 @@ class Refinement:
     """State of the loop after a pass; the last one is the result.
 
     The tree and its contents grow with the loop: those of an intermediate state are valid until the next one is made.
-
-    Attributes
-    ----------
-    tree : TetrahedralTree
-    plants : SharedPlants
-        All plants, shared among terminal nodes.
-    assets : SharedAssets
-        All instances of assets, likewise.
-    cell_polygons : PolygonsByCell
-        All polygons, in terminal nodes.
-    cells : Terminals of t
-        Terminal nodes that hold something.
-    transmittance : (t,) float64
-        Fraction of each one's light that nothing in front of it blocks.
-    decision : (t,) int8
-        `Decision` for each of them.
-    rank : (t,) int32
-        Front-to-back order of them.
-    passes : int
-        Passes so far.
-    complete : bool
-        False where a limit of the settings stopped the loop.
-    seconds : dict of str to float
-        Wall clock by step.
-    outliers : Outliers
-        What is left out.
-    lights : sequence of Light
-        Those that throw shadows.
-    polygons : Polygons
-        All of them, whole.
     """
 
     tree: TetrahedralTree
-    plants: SharedPlants
-    assets: SharedAssets
-    cell_polygons: PolygonsByCell
-    cells: Terminals
-    transmittance: NDArray[np.float64]
-    decision: NDArray[np.int8]
-    rank: NDArray[np.int32]
-    passes: int
-    complete: bool
-    seconds: dict[str, float]
-    outliers: Outliers = field(default_factory=Outliers)
-    lights: Sequence[Light] = ()
-    polygons: Polygons = field(default_factory=Polygons.empty)
+    plants: SharedPlants  # all plants, shared among terminal nodes
+    assets: SharedAssets  # all instances of assets, likewise
+    cell_polygons: PolygonsByCell  # all polygons, in terminal nodes
+    cells: Terminals  # of t: terminal nodes that hold something
+    transmittance: NDArray[np.float64]  # (t,): fraction of each one's light that nothing in front of it blocks
+    decision: NDArray[np.int8]  # (t,): `Decision` for each of them
+    rank: NDArray[np.int32]  # (t,): front-to-back order of them
+    passes: int  # passes so far
+    complete: bool  # false where a limit of the settings stopped the loop
+    seconds: dict[str, float]  # wall clock by step
+    outliers: Outliers = field(default_factory=Outliers)  # what is left out
+    lights: Sequence[Light] = ()  # those that throw shadows
+    polygons: Polygons = field(default_factory=Polygons.empty)  # all of them, whole
 
     @property
     def nodes(self) -> NDArray[np.intp]:

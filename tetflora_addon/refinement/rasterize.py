@@ -39,26 +39,13 @@ _PARALLEL = 1e-150
 
 @dataclass(frozen=True)
 class Fragments(Arrays):
-    """Tetrahedra as seen from pixels, in no particular order.
+    """Tetrahedra as seen from pixels, in no particular order."""
 
-    Attributes
-    ----------
-    cell : (f,) int32
-        Which tetrahedron.
-    pixel : (f,) int32
-        Which pixel.
-    entry : (f,) float64
-        Where the ray enters, meters along the ray.
-    thickness : (f,) float64
-        Meters of the ray inside.
-    coverage : (f,) float64
-        Pixels that the fragment stands for: 1, or for small tetrahedra their area divided among their fragments.
-    """
-
-    cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    pixel: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    entry: Floats
-    thickness: Floats
+    cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (f,): which tetrahedron
+    pixel: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (f,): which pixel
+    entry: Floats  # (f,): where the ray enters, meters along the ray
+    thickness: Floats  # (f,): meters of the ray inside
+    #: (f,): pixels that the fragment stands for: 1, or for small tetrahedra their area divided among their fragments.
     coverage: Floats
 
 

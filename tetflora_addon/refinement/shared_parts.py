@@ -34,22 +34,12 @@ Parts = TypeVar("Parts", bound=Arrays)
 
 @dataclass(frozen=True)
 class SharePoints(Arrays):
-    """Points (m) on parts of plants; each stands for a fraction of its part's area.
+    """Points (m) on parts of plants; each stands for a fraction of its part's area."""
 
-    Attributes
-    ----------
-    part : (m,) int32
-    cell : (m,) int32
-        Node of the tree that the point is in.
-    position : (m, 3) float32
-        Meters, world space.
-    leaf, wood : (m,) float32
-        Area that it stands for, m²; one of the two is 0.
-    """
-
-    part: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    part: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (m,)
+    cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (m,): node of the tree that the point is in
+    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))  # (m, 3): meters, world space
+    #: leaf and wood, (m,): area that it stands for, m²; one of the two is 0.
     leaf: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
     wood: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
 

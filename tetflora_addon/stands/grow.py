@@ -36,23 +36,10 @@ _LEVEL = 0.5
 
 @dataclass(frozen=True)
 class StandSettings:
-    """How a stand grows. Fields with a label are properties of the scene, and documented by their tooltips.
-
-    Attributes
-    ----------
-    interval : int
-        Years between two records of the stand; 0 keeps the last year only.
-    min_height : float
-        Meters; lower plants are not part of the result.
-    cell : float
-        Width, meters, of the columns in which light is computed.
-    open_edges : bool
-        Light comes in from all sides, as at the edge of a wood. Otherwise the stand goes on beyond the ground, and what
-        grows at one side shades what grows at the opposite one.
-    """
+    """How a stand grows. Fields with a label are properties of the scene, and documented by their tooltips."""
 
     years: int = setting(80, "Years", "How long the stand grows", min=1, soft_max=300, max=2000)
-    interval: int = script_setting(5, min=0)
+    interval: int = script_setting(5, min=0)  # years between two records of the stand; 0 keeps the last year only
     seed: int = setting(0, "Seed", "A different seed gives a different stand")
     density: float = setting(
         2500.0,
@@ -75,8 +62,10 @@ class StandSettings:
         min=0.0,
         soft_max=10.0,
     )
-    min_height: float = script_setting(1.0, min=0.0)
-    cell: float = script_setting(1.0, min=0.1)
+    min_height: float = script_setting(1.0, min=0.0)  # meters; lower plants are not part of the result
+    cell: float = script_setting(1.0, min=0.1)  # width, meters, of the columns in which light is computed
+    #: Light comes in from all sides, as at the edge of a wood. Otherwise the stand goes on beyond the ground, and what
+    #: grows at one side shades what grows at the opposite one.
     open_edges: bool = script_setting(False)
 
 

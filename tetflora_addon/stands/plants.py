@@ -25,43 +25,25 @@ LYING = 20.0
 
 @dataclass(frozen=True)
 class Records(Arrays):
-    """Plants at a year, one row each; all rows of a plant are neighbors, years ascending.
+    """Plants at a year, one row each; all rows of a plant are neighbors, years ascending."""
 
-    Attributes
-    ----------
-    plant : (n,) int32
-        Number of the plant, ascending.
-    year : (n,) float32
-        Of the simulation.
-    species : (n,) int32
-        Index into the species.
-    seed : (n,) int32
-        From which it is drawn.
-    position : (n, 3) float32
-        Foot of the trunk in the world, meters.
-    height, diameter, crown_width, crown_base : (n,) float32
-        Meters; the diameter is that at 1.3 m, 0 for what is smaller, the width the mean of all directions, and the base
-        the height of the lowest limb.
-    offset : (n, 2) float32
-        By which fraction limbs to the east and to the north are longer, and those opposite shorter.
-    lean : (n, 2) float32
-        Tangents of the trunk's tilt to the east and to the north; `LYING` or more long where it lies.
-    dead : (n,) float32
-        Years since death, 0 of what is alive.
-    """
-
-    plant: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    year: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    species: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    seed: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    plant: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,): number of the plant, ascending
+    year: NDArray[np.float32] = field(metadata=column(dtype=np.float32))  # (n,): of the simulation
+    species: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,): index into the species
+    seed: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,): from which it is drawn
+    #: (n, 3): foot of the trunk in the world, meters.
     position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    #: height, diameter, crown_width and crown_base, (n,): meters; the diameter is that at 1.3 m, 0 for what is smaller,
+    #: the width the mean of all directions, and the base the height of the lowest limb.
     height: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
     diameter: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
     crown_width: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
     crown_base: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
+    #: (n, 2): by which fraction limbs to the east and to the north are longer, and those opposite shorter.
     offset: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))
+    #: (n, 2): tangents of the trunk's tilt to the east and to the north; `LYING` or more long where it lies.
     lean: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))
-    dead: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
+    dead: NDArray[np.float32] = field(metadata=column(dtype=np.float32))  # (n,): years since death, 0 of what is alive
 
     @property
     def lying(self) -> Mask:
@@ -122,49 +104,27 @@ class StandDraw(IntEnum):
 
 @dataclass(frozen=True)
 class Plants(Arrays):
-    """Living plants.
+    """Living plants."""
 
-    Attributes
-    ----------
-    number : (n,) int64
-        In the order in which they came.
-    key : (n,) uint64
-        Of their random numbers.
-    species : (n,) int64
-    x, y : (n,) float64
-        Meters from the corner of the site.
-    basal, height, base, radius : (n,) float64
-        Meters; basal diameter as `traits` has it.
-    east, north : (n,) float64
-        Offset of the crown, as of `Records`.
-    vigor : (n,) float64
-        Growth of the last years over that of a free plant of the same basal diameter.
-    quality : (n,) float64
-        How well it grows where it is, 0 to 1.
-    strength : (n,) float64
-        How well it grows by nature, about 1.
-    age : (n,) float64
-        Years.
-    known : (n,) bool
-        Whether it has a record.
-    """
-
-    number: Integers = field(metadata=column(dtype=np.int64))
-    key: Keys = field(metadata=column(dtype=np.uint64))
-    species: Integers = field(metadata=column(dtype=np.int64))
+    number: Integers = field(metadata=column(dtype=np.int64))  # (n,): in the order in which they came
+    key: Keys = field(metadata=column(dtype=np.uint64))  # (n,): of their random numbers
+    species: Integers = field(metadata=column(dtype=np.int64))  # (n,)
+    #: x and y, (n,): meters from the corner of the site.
     x: Floats
     y: Floats
+    #: basal, height, base and radius, (n,): meters; basal diameter as `traits` has it.
     basal: Floats
     height: Floats
     base: Floats
     radius: Floats
+    #: east and north, (n,): offset of the crown, as of `Records`.
     east: Floats
     north: Floats
-    vigor: Floats
-    quality: Floats
-    strength: Floats
-    age: Floats
-    known: Mask = field(metadata=column(dtype=bool))
+    vigor: Floats  # (n,): growth of the last years over that of a free plant of the same basal diameter
+    quality: Floats  # (n,): how well it grows where it is, 0 to 1
+    strength: Floats  # (n,): how well it grows by nature, about 1
+    age: Floats  # (n,): years
+    known: Mask = field(metadata=column(dtype=bool))  # (n,): whether it has a record
 
     def crowns(self, traits: StandTraits) -> Crowns:
         """What takes light."""
@@ -200,23 +160,14 @@ class Plants(Arrays):
 
 @dataclass(frozen=True)
 class DeadPlants(Arrays):
-    """Trees that stand dead or lie.
+    """Trees that stand dead or lie."""
 
-    Attributes
-    ----------
-    last : Records
-        What they were at their death.
-    died, falls, gone : (n,) float64
-        Years.
-    lean : (n, 2) float32
-        Of their trunks when they lie.
-    """
-
-    last: Records = field(metadata=nested(Records))
+    last: Records = field(metadata=nested(Records))  # what they were at their death
+    #: died, falls and gone, (n,): years.
     died: Floats
     falls: Floats
     gone: Floats
-    lean: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))
+    lean: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))  # (n, 2): of their trunks when they lie
 
     def records(self, year: float) -> Records:
         """What they are in a year."""

@@ -255,21 +255,11 @@ _EARLIEST = 0.7
 
 @dataclass(frozen=True)
 class LeafMesh:
-    """Copies of one form of leaf.
+    """Copies of one form of leaf."""
 
-    Attributes
-    ----------
-    kind : int
-        Index into `species.LEAF_KINDS`.
-    form : int
-        Which of the species' forms of that kind.
-    buffers : MeshBuffers
-        Faces with ``UVMap``, ``tf_color`` and ``tf_transmission``.
-    """
-
-    kind: int
-    form: int
-    buffers: MeshBuffers
+    kind: int  # index into `species.LEAF_KINDS`
+    form: int  # which of the species' forms of that kind
+    buffers: MeshBuffers  # faces with ``UVMap``, ``tf_color`` and ``tf_transmission``
 
 
 def leaf_meshes(

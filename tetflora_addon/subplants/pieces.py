@@ -28,21 +28,14 @@ Thin = Callable[[Keys, Floats, Floats, Floats], tuple[Integers, Floats]]
 
 @dataclass(frozen=True)
 class Pieces(Arrays):
-    """Parts of branches, each within one straight segment.
+    """Parts of branches, each within one straight segment."""
 
-    Attributes
-    ----------
-    branches : Branches of n
-        The whole branch that each piece is part of; enough to make its wood and leaves.
-    t0, t1 : (n,) float64
-        The part's ends as fractions of the branch's axis.
-    start, end : (n, 3) float64
-        The same ends in space, meters.
-    """
-
+    #: of n: the whole branch that each piece is part of; enough to make its wood and leaves.
     branches: Branches = field(metadata=nested(Branches))
+    #: t0 and t1, (n,): the part's ends as fractions of the branch's axis.
     t0: Floats
     t1: Floats
+    #: start and end, (n, 3): the same ends in space, meters.
     start: Floats = field(metadata=column(3))
     end: Floats = field(metadata=column(3))
 
