@@ -170,16 +170,20 @@ def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
     return owner, np.arange(len(owner)) - first[owner]
 
 
-def connected(n: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:
+def connected(n: int, a: Integers, b: Integers) -> NDArray[np.int32]:
     """(n,) smallest index in the part of each of n things, of which a (e,) and b (e,) are connected."""
-    label = np.arange(n)
-    while (label[a] != label[b]).any():
-        np.minimum.at(label, np.maximum(label[a], label[b]), np.minimum(label[a], label[b]))
+    label = np.arange(n, dtype=np.int32)
+    while True:
+        one, other = label[a], label[b]
+        apart = one != other
+        if not apart.any():
+            return label
+        a, b, one, other = a[apart], b[apart], one[apart], other[apart]
+        np.minimum.at(label, np.maximum(one, other), np.minimum(one, other))
         label = top(label)
-    return label
 
 
-def top(up: NDArray[np.int64]) -> NDArray[np.int64]:
+def top(up: Integers) -> Integers:
     """Where each thing (n,) comes to by following ``up`` until it stays; the steps double each time."""
     while (up[up] != up).any():
         up = up[up]

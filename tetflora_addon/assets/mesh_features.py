@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import connected
 from ..storage import memoized
 
 #: Bytes of cached features, ten a face.
@@ -104,24 +105,6 @@ def _welded(positions: NDArray[np.float64]) -> NDArray[np.int64]:
     place = np.zeros(len(order), np.int64)
     place[order] = np.cumsum(new) - 1
     return place
-
-
-def connected(number: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int32]:
-    """The least of all that each of a number of vertices hangs together with, by pairs (n,), (n,)."""
-    label = np.arange(number, dtype=np.int32)
-    while True:
-        la, lb = label[a], label[b]
-        apart = la != lb
-        if not apart.any():
-            return label
-        a, b, la, lb = a[apart], b[apart], la[apart], lb[apart]
-        # The larger of two roots gets the smaller one as its parent; then all point to their roots.
-        np.minimum.at(label, np.maximum(la, lb), np.minimum(la, lb))
-        while True:
-            shorter = label[label]
-            if (shorter == label).all():
-                break
-            label = shorter
 
 
 def _measures(

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import connected, spread
 from ..growth.hashing import mix
 from ..parallel import blocks
 from .asset import AssetSurface
-from .mesh_features import classified, connected
+from .mesh_features import classified
 
 #: Faces of a patch at most; an island with more is cut into pieces of about so many that lie together.
 MOST_FACES = 48
@@ -97,8 +97,7 @@ def islands(surface: AssetSurface) -> NDArray[np.int32]:
     same = np.flatnonzero(np.diff(surface.face) == 0)
     a = np.concatenate([corners[:, 0], corners[:, 1], corners[same, 0]])
     b = np.concatenate([corners[:, 1], corners[:, 2], corners[same + 1, 0]])
-    label = connected(int(place.max(initial=-1)) + 1, a, b)
-    return label[corners[:, 0]]
+    return connected(int(place.max(initial=-1)) + 1, a, b)[corners[:, 0]]
 
 
 def _places(positions: NDArray[np.float32]) -> NDArray[np.int32]:

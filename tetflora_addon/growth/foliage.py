@@ -233,28 +233,18 @@ def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArr
     (n, 3, 3), type of frame
         Right-handed frames; the upper side is turned, the midrib follows by the least turn.
     """
-    kind = frame.dtype
-    light, sky = light.astype(kind), sky.astype(kind).T
-    along, up = frame[:, :, 1].T, frame[:, :, 2].T
-    out = np.zeros((3, 3, len(frame)), kind)
-    across_out, along_out, normal = out.swapaxes(0, 1)
-    np.multiply(1 - light, up, out=normal)
-    normal += light * sky if sky.ndim == 2 else light * sky[:, None]
-    normal += kind.type(1e-9) * up  # a leaf that hangs upside down half way has no direction left; it keeps its own
-    normal /= _length(normal)
-    np.multiply(_inner(along, normal), normal, out=along_out)
-    np.subtract(along, along_out, out=along_out)
+    along, up, light, sky = _by_component(frame, light, sky)
+    normal = _toward(up, light, sky, 1e-9)
+    along_out = along - _inner(along, normal) * normal
     length = _length(along_out)
     # The midrib points straight up or down: turn about the blade. What is left of it must stand above rounding.
-    lost = np.flatnonzero(length <= (1e-6 if kind == np.float64 else 1e-3))
+    lost = np.flatnonzero(length <= (1e-6 if frame.dtype == np.float64 else 1e-3))
     if len(lost):
         across, facing = gathered(frame[:, :, 0], lost), normal[:, lost].T
         along_out[:, lost] = cross(facing, across - dot(across, facing) * facing).T
         length = _length(along_out)
     along_out /= length
-    np.multiply(along_out[[1, 2, 0]], normal[[2, 0, 1]], out=across_out)
-    across_out -= along_out[[2, 0, 1]] * normal[[1, 2, 0]]
-    return out.transpose(2, 0, 1)
+    return _frames(along_out, normal)
 
 
 def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
@@ -287,23 +277,38 @@ def in_wind(
 
 def hanging(frame: NDArray[np.floating], droop: Floats, sky: Floats) -> NDArray:
     """Let leaves hang: the midrib turns down as far as ``droop`` (n,) or (1,), the blade follows it."""
-    kind = frame.dtype
-    droop, sky = droop.astype(kind), sky.astype(kind).T
-    along, up = frame[:, :, 1].T, frame[:, :, 2].T
-    out = np.zeros((3, 3, len(frame)), kind)
-    across_out, along_out, normal = out.swapaxes(0, 1)
-    np.multiply(1 - droop, along, out=along_out)
-    along_out -= droop * sky if sky.ndim == 2 else droop * sky[:, None]
-    along_out += kind.type(1e-6) * along  # a leaf that stands upright half way has no direction left; it keeps its own
-    along_out /= _length(along_out)
+    along, up, droop, sky = _by_component(frame, droop, sky)
+    along_out = _toward(along, droop, -sky, 1e-6)
     # The upper side leads away from the old midrib, so that it never lies along the new one: a leaf may hang over.
-    np.subtract(up, _inner(up, along_out) * along_out, out=normal)
+    normal = up - _inner(up, along_out) * along_out
     lost = np.flatnonzero(_length(normal) < 1e-3)
     if len(lost):
         normal[:, lost] = -along[:, lost]
     normal /= _length(normal)
-    np.multiply(along_out[[1, 2, 0]], normal[[2, 0, 1]], out=across_out)
-    across_out -= along_out[[2, 0, 1]] * normal[[1, 2, 0]]
+    return _frames(along_out, normal)
+
+
+def _by_component(frame: NDArray[np.floating], share: Floats, sky: Floats) -> tuple[NDArray, ...]:
+    """Midribs and upper sides (3, n) of leaf frames, shares (n,) or (1,), and skies (3, n) or (3, 1), of one type."""
+    sky = sky.astype(frame.dtype).T
+    return frame[:, :, 1].T, frame[:, :, 2].T, share.astype(frame.dtype), sky if sky.ndim == 2 else sky[:, None]
+
+
+def _toward(vector: NDArray, share: NDArray, target: NDArray, least: float) -> NDArray:
+    """Unit vectors (3, n) a share of the way to targets; what is half way to the opposite keeps its own direction."""
+    out = (1 - share) * vector
+    out += share * target
+    out += out.dtype.type(least) * vector
+    out /= _length(out)
+    return out
+
+
+def _frames(along: NDArray, normal: NDArray) -> NDArray:
+    """Leaf frames (n, 3, 3) of midribs and upper sides (3, n)."""
+    out = np.empty((3, 3, along.shape[1]), along.dtype)
+    out[:, 1], out[:, 2] = along, normal
+    np.multiply(along[[1, 2, 0]], normal[[2, 0, 1]], out=out[:, 0])
+    out[:, 0] -= along[[2, 0, 1]] * normal[[1, 2, 0]]
     return out.transpose(2, 0, 1)
 
 
