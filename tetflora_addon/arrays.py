@@ -13,7 +13,7 @@ columns that nobody looks at before all is done.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, Generic, Self, TypeVar
@@ -375,24 +375,27 @@ class Chunks(Generic[Rows]):
         out, start = [], 0
         ends = np.cumsum([len(chunk) for chunk in self._chunks])
         runs = np.split(rows, np.searchsorted(rows, ends[:-1]))
-        for chunk, there, own in zip(self._chunks, self._there, runs, strict=True):
+        for (chunk, there), own in zip(self.chunks(), runs, strict=True):
             if len(own):
                 out.append(chunk.take(own - start))
                 there[own - start] = False
             start += len(chunk)
         self.marked += len(rows)
-        return self.kind.concatenate(out)
+        return self.kind.concatenate(out or [self._chunks[0].take(slice(0))])
 
     @property
     def there(self) -> NDArray[np.bool_]:
         """Rows (n,) that are not marked."""
         return np.concatenate(self._there)
 
+    def chunks(self) -> Iterator[tuple[Rows, NDArray[np.bool_]]]:
+        """Each chunk (k), and which of its rows (k,) are not marked."""
+        return zip(self._chunks, self._there, strict=True)
+
     def joined(self) -> Rows:
         """All that is not marked, as the only chunk from now on: rows have new numbers, in the same order."""
         if len(self._chunks) > 1 or self.marked:
-            some = zip(self._chunks, self._there, strict=True)
-            one = self.kind.concatenate([chunk.take(there) for chunk, there in some])
+            one = self.kind.concatenate([chunk.take(there) for chunk, there in self.chunks()])
             self._chunks, self._there, self._number, self.marked = [], [], 0, 0
             self.append(one)
         return self._chunks[0]

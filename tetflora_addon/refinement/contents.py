@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Mask, column, nested
+from ..arrays import Arrays, Chunks, Floats, Integers, Mask, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds, extents
@@ -206,64 +206,29 @@ def in_the_root(polygons: Polygons, large: Mask | None = None) -> InCells[Polygo
     return InCells(polygons, np.zeros(len(polygons), np.int32), totals)
 
 
-class PolygonsByCell:
+class PolygonsByCell(Chunks[InCells[Polygons]]):
     """Polygons in terminal nodes while a tree is divided: only what lies in divided nodes is taken out and copied."""
 
-    def __init__(self, polygons: InCells[Polygons]) -> None:
-        self._parts = [polygons]
-
     def __len__(self) -> int:
-        return int(sum((part.cell >= 0).sum() for part in self._parts))
+        return super().__len__() - self.marked
 
     @property
     def polygons(self) -> InCells[Polygons]:
         """All together; copies them into one, which is then kept until something changes."""
-        self._parts = [_joined([_living(part) for part in self._parts])]
-        return self._parts[0]
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays, including what was taken out but is not yet dropped."""
-        return sum(part.nbytes for part in self._parts)
+        return self.joined()
 
     def totals(self, chosen: Mask) -> list[tuple[Totals, NDArray[np.int32]]]:
-        """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each part."""
-        some = [part.take(_within(part, chosen)) for part in self._parts]
+        """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each chunk."""
+        some = [chunk.take(chosen[chunk.cell] & there) for chunk, there in self.chunks()]
         return [(part.totals, part.cell) for part in some]
 
-    def put(self, polygons: InCells[Polygons]) -> None:
-        """Add polygons."""
-        self._parts.append(polygons)
-
-    def take_out(self, chosen: Mask) -> InCells[Polygons]:
+    def take_within(self, chosen: Mask) -> InCells[Polygons]:
         """Remove and return what lies in chosen nodes; ``chosen`` is (nodes,) bool."""
-        out, kept = [], []
-        for part in self._parts:
-            taken = _within(part, chosen)
-            if taken.any():
-                out.append(part.take(taken))
-                # What is taken is only marked; copying what stays would cost more than all else that moves.
-                part = replace(part, cell=np.where(taken, np.int32(-1), part.cell))
-                if 2 * (part.cell < 0).sum() > len(part):
-                    part = _living(part)
-            kept.append(part)
-        self._parts = kept
-        return _joined(out)
-
-
-def _within(part: InCells[Polygons], chosen: Mask) -> Mask:
-    return chosen[np.maximum(part.cell, 0)] & (part.cell >= 0)
-
-
-def _living(part: InCells[Polygons]) -> InCells[Polygons]:
-    """Without what has been taken out."""
-    return part.take(part.cell >= 0)
-
-
-def _joined(parts: list[InCells[Polygons]]) -> InCells[Polygons]:
-    if len(parts) < 2:
-        return parts[0] if parts else InCells.none(Polygons)
-    return InCells.concatenate(parts)
+        within = [chosen[chunk.cell] & there for chunk, there in self.chunks()]
+        out = self.take_out(np.flatnonzero(np.concatenate(within)))
+        if self.marked > len(self):  # copying what stays each time would cost more than all else that moves
+            self.joined()
+        return out
 
 
 def large_polygons(polygons: Polygons, camera: Camera) -> Mask:

@@ -215,9 +215,9 @@ def refine(
         edge[parents] = np.sqrt(squared_edges(tree.vertices(parents)).max(axis=1))
         may_cut = len(cell_polygons) <= most
         new = sort_into_children(
-            tree, cell_polygons.take_out(dividing), slack if may_cut else lambda at: np.full(len(at), np.inf)
+            tree, cell_polygons.take_within(dividing), slack if may_cut else lambda at: np.full(len(at), np.inf)
         )
-        cell_polygons.put(new)
+        cell_polygons.append(new)
         changed = plants.update(tree, dividing, edge) | assets.update(tree, dividing, edge)
         changed[new.cell] = True
         clock.lap("update")
