@@ -93,10 +93,7 @@ def known_crown(species: Species) -> Crown | None:
 def crown_of(species: Species) -> Crown:
     """The mean crown of a species; its samples are drawn at the first time, which takes some hundredths of a second.
 
-    Raises
-    ------
-    SpeciesError
-        A leaf is still the name of a Blender object.
+    Raises SpeciesError: a leaf is still the name of a Blender object.
     """
     found = _known.get(species)
     if found is None:
@@ -109,10 +106,7 @@ def crown_of(species: Species) -> Crown:
 def prepare(species: Species) -> None:
     """Find the mean crown of a species, and how finely its leaves may be drawn: what an estimate may have to wait for.
 
-    Raises
-    ------
-    SpeciesError
-        As `crown_of`.
+    Raises SpeciesError: as `crown_of`.
     """
     for form in crown_of(species).forms:
         if form is not None:

@@ -110,12 +110,7 @@ def upright(dx: float, dy: float) -> tuple[NDArray[np.float64], NDArray[np.float
 def check_regular(path: Path) -> None:
     """Refuse folders, links, pipes and devices.
 
-    Raises
-    ------
-    OSError
-        There is nothing, or it cannot be looked at.
-    SceneError
-        It is one of these.
+    Raises OSError (there is nothing, or it cannot be looked at) or SceneError (it is one of these).
     """
     if not is_regular(path):
         with suppress(ValueError):  # a zero in its name
@@ -126,10 +121,7 @@ def check_regular(path: Path) -> None:
 def in_degrees(raster: Raster, what: str) -> Raster:
     """A raster of which no file tells the system; its cells may be so small that they are degrees.
 
-    Raises
-    ------
-    SceneError
-        Nobody can tell; ``what`` begins the message.
+    Raises SceneError: nobody can tell; ``what`` begins the message.
     """
     if raster.system != System() or not may_be_degrees(raster.outline):
         return raster
@@ -150,10 +142,7 @@ _DEGREES, _UNCLEAR = 0.003, 0.1  # cells: no ground is as fine in meters, or as 
 def checked_size(width: int, height: int, what: str) -> None:
     """Refuse rasters that are too large, or have no cells.
 
-    Raises
-    ------
-    SceneError
-        ``what`` begins the message.
+    ``what`` begins the message of the SceneError.
     """
     if min(width, height) < 2 or max(width, height) > MAX_SIDE or width * height > MAX_CELLS:
         raise SceneError(
@@ -165,12 +154,7 @@ def checked_size(width: int, height: int, what: str) -> None:
 def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
     """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system.
 
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line.
+    Raises OSError (it cannot be read) or SceneError (it is broken; names the line).
     """
     content = read_whole(path, MAX_TEXT)
     name, header, start = path.name, {}, 0
@@ -293,12 +277,7 @@ def system_beside(path: Path) -> System:
 def world_file(path: Path) -> list[NDArray[np.float64]]:
     """Middle of the first cell, and steps along and down, of the world file of an image.
 
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        There is none, or it is broken; names the line.
+    Raises OSError (it cannot be read) or SceneError (there is none, or it is broken; names the line).
     """
     ending = path.suffix.lower()
     endings = f"{ending[:2]}{ending[-1:]}w", f"{ending}w", ".wld"

@@ -74,7 +74,6 @@ def leaf_sites(
 
     Parameters
     ----------
-    rows : parameter table
     branches, lines : Branches of n and their Axes
     row : (m,) or (1,) int
     owner : (m,) int
@@ -117,13 +116,8 @@ def inclinations(kind: Integers, number: Floats) -> Floats:
 def inclined(frame: NDArray[np.float32], kind: Integers, key: Keys) -> NDArray[np.float32]:
     """Frames (m, 3, 3) of leaves that stand by a distribution, all around their branch and turned in their own plane.
 
-    Parameters
-    ----------
-    frame : (m, 3, 3) float32
-        Of the branch where each leaf is.
-    kind : (m,) or (1,) int
-        Index into `LEAF_INCLINATIONS`.
-    key : (m,) uint64
+    ``frame`` (m, 3, 3): of the branch where each leaf is. ``kind`` (m,) or (1,) int: index into `LEAF_INCLINATIONS`.
+    ``key`` (m,).
     """
     angle = inclinations(kind, uniform(key, Draw.LEAF_INCLINATION))
     angle = np.where(uniform(key, Draw.LEAF_SIDE) < 0.5, angle, np.pi - angle)

@@ -29,10 +29,7 @@ OUTLINES: dict[str, type] = {"blade": Blade, "needles": Needles, "compound": Com
 def read_forms(reader: FileReader, data: Any, key: str) -> tuple[LeafModel | str, ...]:
     """A leaf, or a list of forms among which each leaf has one by chance.
 
-    Raises
-    ------
-    SpeciesError
-        Names the field and what it may be.
+    A SpeciesError names the field and what it may be.
     """
     if not isinstance(data, list):
         return (_read_leaf(reader, data, key),)
@@ -102,10 +99,7 @@ def _is_list_of_points(value: Any, size: int) -> bool:
 def read_outline(reader: FileReader, data: Any, where: str) -> Blade | Needles | Compound:
     """An outline from what a species file has for it.
 
-    Raises
-    ------
-    SpeciesError
-        Names the field and what it may be.
+    A SpeciesError names the field and what it may be.
     """
     kind = "blade"
     if isinstance(data, dict) and "kind" in data:

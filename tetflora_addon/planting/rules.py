@@ -188,10 +188,7 @@ def species_by_weight(weights: tuple[float, ...], draws: Floats) -> NDArray[np.i
 def check_rules(rules: Rules) -> None:
     """Look through all rules.
 
-    Raises
-    ------
-    SceneError
-        The first that cannot be.
+    A SceneError names the first that cannot be.
     """
     _check_numbers(rules)
     if not sum(max(weight, 0.0) for weight in rules.weights) > 0.0:

@@ -47,10 +47,7 @@ class StandSite:
     def __post_init__(self) -> None:
         """Refuse what is no site.
 
-        Raises
-        ------
-        TetFloraError
-            Names what is wrong.
+        A TetFloraError names what is wrong.
         """
         if not self.cell > 0.0:
             raise TetFloraError(f"The cells of a site must be larger than 0 m, not {self.cell:g} m")

@@ -30,7 +30,6 @@ def twig_buffers(
 
     Parameters
     ----------
-    flora : Flora
     whole : WholeBranches of n
         Of any rows.
     wider : (n,) float64, optional
