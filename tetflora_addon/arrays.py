@@ -13,8 +13,8 @@ columns that nobody looks at before all is done.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any, Generic, Self, TypeVar
 
@@ -24,8 +24,8 @@ from numpy.typing import DTypeLike, NDArray
 from .parallel import blocks
 
 #: Arrays by what they hold. A table has one structured row for each kind of branch, see `growth.rows`.
-Floats = NDArray[np.float64]
-Integers = NDArray[np.integer]
+Floats, Floats32, Floats16 = NDArray[np.float64], NDArray[np.float32], NDArray[np.float16]
+Integers, Integers32 = NDArray[np.integer], NDArray[np.int32]
 Keys = NDArray[np.uint64]
 Mask = NDArray[np.bool_]
 Table = NDArray[np.void]
@@ -134,20 +134,20 @@ class Arrays:
 
     @classmethod
     def empty(cls) -> Self:
-        """No things. Columns are (0,) float64 unless their fields have metadata by `column` or `nested`."""
+        """No things. Columns are (0,) float64 unless their fields are by `column` or `nested`."""
         return cls(
             *(f.metadata.get("empty", lambda: np.zeros(0))() for f in fields(cls) if f.name not in _optional(cls))
         )
 
 
-def column(*shape: int, dtype: DTypeLike = np.float64) -> dict[str, Callable]:
-    """Metadata of a field that is an array (n, *shape), for `Arrays.empty`."""
-    return {"empty": lambda: np.zeros((0, *shape), dtype)}
+def column(*shape: int, dtype: DTypeLike = np.float64) -> Any:
+    """Field of a structure that is an array (n, *shape), for `Arrays.empty`."""
+    return field(metadata={"empty": lambda: np.zeros((0, *shape), dtype)})
 
 
-def nested(kind: type[Arrays]) -> dict[str, Callable]:
-    """Metadata of a field that is another structure of arrays, for `Arrays.empty`."""
-    return {"empty": kind.empty}
+def nested(kind: type[Arrays]) -> Any:
+    """Field of a structure that is another structure of arrays, for `Arrays.empty`."""
+    return field(metadata={"empty": kind.empty})
 
 
 def gathered(array: NDArray, index: NDArray | slice) -> NDArray:

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats32, Integers32, Mask
+
 #: Polygons in a block, about; some 60 MB of buffers.
 BLOCK_POLYGONS = 250_000
 
@@ -18,13 +20,13 @@ BLOCK_POLYGONS = 250_000
 class MeshBuffers:
     """One mesh, ready to be copied into a Blender mesh without any further computation."""
 
-    positions: NDArray[np.float32]  # (v, 3): vertices, meters, world space
-    edge_verts: NDArray[np.int32]  # (e, 2): the two vertices of each edge
+    positions: Floats32  # (v, 3): vertices, meters, world space
+    edge_verts: Integers32  # (e, 2): the two vertices of each edge
     #: corner_verts and corner_edges, (c,): vertex of each face corner, and the edge that leads from it to the next
     #: corner.
-    corner_verts: NDArray[np.int32]
-    corner_edges: NDArray[np.int32]
-    face_offsets: NDArray[np.int32]  # (f + 1,): where each face's corners start; the last entry is ``c``
+    corner_verts: Integers32
+    corner_edges: Integers32
+    face_offsets: Integers32  # (f + 1,): where each face's corners start; the last entry is ``c``
     #: mapping of str to (str, ndarray): name to domain (``'POINT'``, ``'FACE'`` or ``'CORNER'``) and values: ``(n,)``,
     #: ``(n, 2)`` or ``(n, 3)`` float32, or ``(n,)`` int32.
     attributes: Mapping[str, tuple[str, NDArray]] = field(default_factory=dict)
@@ -48,8 +50,8 @@ class MeshBuffers:
 class PointBuffers:
     """One cloud of points that are drawn as spheres."""
 
-    positions: NDArray[np.float32]  # (n, 3): centers, meters, world space
-    radius: NDArray[np.float32]  # (n,): meters
+    positions: Floats32  # (n, 3): centers, meters, world space
+    radius: Floats32  # (n,): meters
     #: Name to values of the points: ``(n,)`` or ``(n, 3)`` float32.
     attributes: Mapping[str, NDArray] = field(default_factory=dict)
     #: species and look: as of meshes.
@@ -73,7 +75,7 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
     if len(parts) < 2:
         return parts[0] if parts else None
 
-    def joined(name: str, offset_by: str) -> NDArray[np.int32]:
+    def joined(name: str, offset_by: str) -> Integers32:
         sizes = np.cumsum([0] + [len(getattr(p, offset_by)) for p in parts[:-1]])
         return np.concatenate([getattr(p, name) + np.int32(s) for p, s in zip(parts, sizes, strict=True)])
 
@@ -93,7 +95,7 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
     )
 
 
-def kept_faces(mesh: MeshBuffers, kept: NDArray[np.bool_]) -> MeshBuffers:
+def kept_faces(mesh: MeshBuffers, kept: Mask) -> MeshBuffers:
     """Some faces of a mesh, a mask (f,), with the vertices and edges that they need."""
     size = np.diff(mesh.face_offsets)
     corner = np.flatnonzero(np.repeat(kept, size))

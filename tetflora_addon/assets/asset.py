@@ -8,13 +8,13 @@ What an asset is before it is compiled: all of its faces, in its own space, and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column
+from ..arrays import Arrays, Floats, Floats16, Floats32, Integers, Integers32, Mask, column
 
 #: Faces up to which a cluster is drawn as a mesh of its own, where it is near.
 MESH_FACES = 2048
@@ -27,57 +27,54 @@ class Clusters(Arrays):
     """Clusters (c) in the space of their asset: parents before children, those of one parent together."""
 
     #: parent, child and children, (c,): parent or −1, first child, and number of children.
-    parent: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    child: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    children: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    parent: Integers32 = column(dtype=np.int32)
+    child: Integers32 = column(dtype=np.int32)
+    children: Integers32 = column(dtype=np.int32)
     #: low and high, (c, 3): bounds of all vertices, meters.
-    low: NDArray[np.float64] = field(metadata=column(3))
-    high: NDArray[np.float64] = field(metadata=column(3))
+    low: Floats = column(3)
+    high: Floats = column(3)
     #: leaf_area and wood_area, (c,): one-sided area of sheets, and surface of solids, m², without what is transparent.
-    leaf_area: NDArray[np.float64]
-    wood_area: NDArray[np.float64]
+    leaf_area: Floats
+    wood_area: Floats
     #: (c,): the part of that of solids which are as many as leaves: closed leaves, berries, twigs. Facets stand for
     #: them as for leaves.
-    closed_leaf_area: NDArray[np.float64]
-    faces: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (c,)
-    #: (c,): first of its faces in the asset's order.
-    first_face: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
-    width: NDArray[np.float64]  # (c,): mean width of its leaves and wood, by area, meters
-    one_leaf: NDArray[np.float64]  # (c,): mean optical area of its leaves, m²; 0 where there are none
-    color: NDArray[np.float64] = field(metadata=column(3))  # (c, 3)
-    transmission: NDArray[np.float64]  # (c,)
-    #: (c, 6): mean of n nᵀ by optical area: xx, yy, zz, xy, xz, yz.
-    moment: NDArray[np.float64] = field(metadata=column(6))
-    #: (c,): first of its leaves in the asset's order.
-    first_leaf: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
-    leaves: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (c,): leaves, and other islands as small
+    closed_leaf_area: Floats
+    faces: Integers32 = column(dtype=np.int32)  # (c,)
+    first_face: Integers = column(dtype=np.int64)  # (c,): first of its faces in the asset's order
+    width: Floats  # (c,): mean width of its leaves and wood, by area, meters
+    one_leaf: Floats  # (c,): mean optical area of its leaves, m²; 0 where there are none
+    color: Floats = column(3)  # (c, 3)
+    transmission: Floats  # (c,)
+    moment: Floats = column(6)  # (c, 6): mean of n nᵀ by optical area: xx, yy, zz, xy, xz, yz
+    first_leaf: Integers = column(dtype=np.int64)  # (c,): first of its leaves in the asset's order
+    leaves: Integers32 = column(dtype=np.int32)  # (c,): leaves, and other islands as small
     #: leaf_sample, leaf_samples, wood_sample and wood_samples, (c,): first sample and number of samples on leaves, and
     #: on wood; each of either stands for an equal optical area.
-    leaf_sample: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    leaf_samples: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    wood_sample: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    wood_samples: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    leaf_sample: Integers32 = column(dtype=np.int32)
+    leaf_samples: Integers32 = column(dtype=np.int32)
+    wood_sample: Integers32 = column(dtype=np.int32)
+    wood_samples: Integers32 = column(dtype=np.int32)
     #: (c, 7): fraction of their area that facets need to block as much light, for each of `COUNTS`.
-    weights: NDArray[np.float64] = field(metadata=column(len(COUNTS)))
+    weights: Floats = column(len(COUNTS))
 
     @property
-    def optical_area(self) -> NDArray[np.float64]:
+    def optical_area(self) -> Floats:
         """Area (c,) that can block light, m²: sheets, and half of what is closed."""
         return self.leaf_area + self.wood_area / 2
 
     @property
-    def leaf_optical(self) -> NDArray[np.float64]:
+    def leaf_optical(self) -> Floats:
         """The part (c,) of the optical area that facets stand for as for leaves, m²."""
         return self.leaf_area + self.closed_leaf_area / 2
 
     @property
-    def leaf_faces(self) -> NDArray[np.float64]:
+    def leaf_faces(self) -> Floats:
         """Mean number (c,) of faces of a leaf; 1 where there are none, or more wood than leaves."""
         leafy = (self.leaf_optical >= 0.5 * self.optical_area) & (self.leaves > 0)
         return np.where(leafy, self.faces / np.maximum(self.leaves, 1), 1.0)
 
     @property
-    def meshes(self) -> NDArray[np.bool_]:
+    def meshes(self) -> Mask:
         """Clusters (c,) that are drawn as meshes where they are near: the largest with no more than `MESH_FACES`.
 
         None has both leaves and wood where its children have either: kites take the place of leaves alone.
@@ -92,11 +89,11 @@ class Clusters(Arrays):
 class SurfaceSamples(Arrays):
     """Places (s) on the surfaces of clusters, in the space of their asset."""
 
-    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))  # (s, 3): meters
-    normal: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))  # (s, 3)
-    color: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))  # (s, 3)
-    transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))  # (s,)
-    roughness: NDArray[np.float16] = field(metadata=column(dtype=np.float16))  # (s,)
+    position: Floats32 = column(3, dtype=np.float32)  # (s, 3): meters
+    normal: Floats16 = column(3, dtype=np.float16)  # (s, 3)
+    color: Floats16 = column(3, dtype=np.float16)  # (s, 3)
+    transmission: Floats16 = column(dtype=np.float16)  # (s,)
+    roughness: Floats16 = column(dtype=np.float16)  # (s,)
 
 
 @dataclass(frozen=True)
@@ -107,13 +104,13 @@ class AssetKites(Arrays):
     same area from everywhere.
     """
 
-    center: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))  # (l, 3): meters
+    center: Floats32 = column(3, dtype=np.float32)  # (l, 3): meters
     #: along and across, (l, 3): halves of its diagonals, meters.
-    along: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    across: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    color: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))  # (l, 3)
-    transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))  # (l,)
-    roughness: NDArray[np.float16] = field(metadata=column(dtype=np.float16))  # (l,)
+    along: Floats32 = column(3, dtype=np.float32)
+    across: Floats32 = column(3, dtype=np.float32)
+    color: Floats16 = column(3, dtype=np.float16)  # (l, 3)
+    transmission: Floats16 = column(dtype=np.float16)  # (l,)
+    roughness: Floats16 = column(dtype=np.float16)  # (l,)
 
 
 @dataclass(frozen=True)
@@ -127,8 +124,8 @@ class Asset:
     leaves: AssetKites  # of l: those of a cluster together
     #: part and face, (f,): part of the source, and face of that part's surface, for each face, those of a cluster
     #: together.
-    part: NDArray[np.int32]
-    face: NDArray[np.int32]
+    part: Integers32
+    face: Integers32
 
     @property
     def faces(self) -> int:
@@ -140,7 +137,7 @@ class Asset:
         """Bytes of all arrays."""
         return self.clusters.nbytes + self.samples.nbytes + self.leaves.nbytes + self.part.nbytes + self.face.nbytes
 
-    def faces_of(self, cluster: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def faces_of(self, cluster: int) -> tuple[Integers32, Integers32]:
         """Parts (k,) and faces (k,) of a cluster."""
         start = int(self.clusters.first_face[cluster])
         some = slice(start, start + int(self.clusters.faces[cluster]))
@@ -159,7 +156,7 @@ class AssetTable:
     every: tuple[Asset, ...]
     clusters: Clusters  # of c
     samples: SurfaceSamples  # of s
-    root: NDArray[np.int64]  # (a + 1,): first cluster of each, and their number
+    root: Integers  # (a + 1,): first cluster of each, and their number
 
     @classmethod
     def of(cls, assets: Sequence[Asset]) -> AssetTable:
@@ -199,17 +196,17 @@ class AssetTable:
         return AssetKites.concatenate([asset.leaves for asset in self.every])
 
     @cached_property
-    def first_leaf(self) -> NDArray[np.int64]:
+    def first_leaf(self) -> Integers:
         """The first (a,) of each asset."""
         return np.cumsum([0, *(len(asset.leaves) for asset in self.every)])
 
     @cached_property
-    def leaf_faces(self) -> NDArray[np.float64]:
+    def leaf_faces(self) -> Floats:
         """As of `Clusters`."""
         return self.clusters.leaf_faces
 
     @cached_property
-    def mesh_of(self) -> NDArray[np.int64]:
+    def mesh_of(self) -> Integers:
         """The cluster (c,) with a mesh of its own that each is or lies in; −1 for those above such."""
         out = np.where(self.clusters.meshes, np.arange(len(self.clusters)), -1)
         while True:  # a level at a time
@@ -224,23 +221,23 @@ class AssetTable:
 class Instances(Arrays):
     """Places of assets (n)."""
 
-    asset: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,)
+    asset: Integers32 = column(dtype=np.int32)  # (n,)
     #: (n, 3, 3): from the space of the asset to the world, without the translation: turned, stretched or mirrored.
-    linear: NDArray[np.float64] = field(metadata=column(3, 3))
-    position: NDArray[np.float64] = field(metadata=column(3))  # (n, 3): of the asset's origin, meters
-    key: NDArray[np.uint64] = field(metadata=column(dtype=np.uint64))  # (n,): tells individuals apart
+    linear: Floats = column(3, 3)
+    position: Floats = column(3)  # (n, 3): of the asset's origin, meters
+    key: NDArray[np.uint64] = column(dtype=np.uint64)  # (n,): tells individuals apart
 
-    def counted_from(self, origin: NDArray[np.float64]) -> Instances:
+    def counted_from(self, origin: Floats) -> Instances:
         """The same in coordinates that begin at a place (3,)."""
         return replace(self, position=self.position - origin) if origin.any() else self
 
     @property
-    def scale(self) -> NDArray[np.float64]:
+    def scale(self) -> Floats:
         """Mean scale (n,): the cube root of the factor on volumes."""
         return np.cbrt(np.abs(np.linalg.det(self.linear)))
 
     @property
-    def largest(self) -> NDArray[np.float64]:
+    def largest(self) -> Floats:
         """Largest factor (n,) on any length, or somewhat more where an instance is stretched (Frobenius norm)."""
         length = np.linalg.norm(self.linear, axis=1)
         even = length.max(axis=1, initial=0.0)
@@ -254,13 +251,13 @@ class AssetSurface:
     """Faces of one mesh."""
 
     name: str
-    positions: NDArray[np.float32]  # (v, 3): in the space of the mesh, meters
-    triangles: NDArray[np.int32]  # (t, 3): vertices of each
-    face: NDArray[np.int32]  # (t,): the mesh's face that each is a part of; ascending
-    color: NDArray[np.float16]  # (f, 3): mean linear color of what is not transparent of each face
-    transmission: NDArray[np.float16]  # (f,): fraction of light that is scattered through; NaN where nobody knows
-    coverage: NDArray[np.float16]  # (f,): fraction of each that is not transparent
-    roughness: NDArray[np.float16] | None = None  # (f,): of its gloss; None where nobody knows
+    positions: Floats32  # (v, 3): in the space of the mesh, meters
+    triangles: Integers32  # (t, 3): vertices of each
+    face: Integers32  # (t,): the mesh's face that each is a part of; ascending
+    color: Floats16  # (f, 3): mean linear color of what is not transparent of each face
+    transmission: Floats16  # (f,): fraction of light that is scattered through; NaN where nobody knows
+    coverage: Floats16  # (f,): fraction of each that is not transparent
+    roughness: Floats16 | None = None  # (f,): of its gloss; None where nobody knows
 
     @property
     def faces(self) -> int:
@@ -274,8 +271,8 @@ class AssetSource:
 
     name: str  # of the object or collection, for messages
     surfaces: tuple[AssetSurface, ...]
-    surface: NDArray[np.int32]  # (n,): surface of each part
-    matrices: NDArray[np.float64]  # (n, 4, 4): from the space of that surface to that of the asset
+    surface: Integers32  # (n,): surface of each part
+    matrices: Floats  # (n, 4, 4): from the space of that surface to that of the asset
     digest: str  # hexadecimal; of all that the above follows from
 
     @property

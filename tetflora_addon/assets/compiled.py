@@ -13,6 +13,7 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..jobs import run_to_end
@@ -65,7 +66,7 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
     )
 
 
-def _smallest(hierarchy: Hierarchy) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
+def _smallest(hierarchy: Hierarchy) -> tuple[NDArray[np.intp], Integers]:
     """Clusters (k,) without children, in their order, and which of these each cluster has: (2, c), first and end."""
     small = np.flatnonzero(hierarchy.children == 0)
     small = small[np.argsort(hierarchy.first[small], kind="stable")]
@@ -124,13 +125,8 @@ def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Su
 
 
 def _samples_above(
-    hierarchy: Hierarchy,
-    sums: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    samples: SurfaceSamples,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-) -> tuple[SurfaceSamples, NDArray[np.int64]]:
+    hierarchy: Hierarchy, sums: Floats, counts: Integers, samples: SurfaceSamples, first: Integers, last: Integers
+) -> tuple[SurfaceSamples, Integers]:
     """Samples of clusters with children (k): some of those of the smallest clusters, in proportion to their areas."""
     inner = np.flatnonzero(hierarchy.children > 0)
     areas = np.stack([sums[:, 0] + sums[:, 5] / 2, (sums[:, 1] - sums[:, 5]) / 2], axis=1)

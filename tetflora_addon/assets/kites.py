@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import unit
+from ..arrays import Floats, Integers, unit
 from ..buffers import MeshBuffers
 from ..growth.hashing import key_of_seed, uniform
 from .asset import AssetKites
@@ -19,14 +19,14 @@ _PLANE = 248
 
 
 def kites_of(
-    corners: NDArray[np.float64],
-    optical: NDArray[np.float64],
-    normal: NDArray[np.float64],
+    corners: Floats,
+    optical: Floats,
+    normal: Floats,
     color: NDArray[np.floating],
     transmission: NDArray[np.floating],
     roughness: NDArray[np.floating],
-    first: NDArray[np.integer],
-    number: NDArray[np.integer],
+    first: Integers,
+    number: Integers,
 ) -> AssetKites:
     """Kites for leaves that are runs of triangles.
 

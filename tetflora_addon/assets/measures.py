@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Floats, Floats32, Integers, Integers32, Mask, spread
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .asset import AssetKites, AssetSource, SurfaceSamples
 from .clusters import Hierarchy
@@ -46,11 +46,11 @@ class PatchTable:
 
     patches: tuple[Patches | None, ...]  # by surface
     #: part and patch, (p,): part of the source, and patch of its surface.
-    part: NDArray[np.int32]
-    patch: NDArray[np.int32]
-    center: NDArray[np.float32]  # (p, 3): in the space of the asset
-    triangles: NDArray[np.int32]  # (p,)
-    woody: NDArray[np.bool_]  # (p,): of a large solid: a trunk, not a berry or a closed leaf
+    part: Integers32
+    patch: Integers32
+    center: Floats32  # (p, 3): in the space of the asset
+    triangles: Integers32  # (p,)
+    woody: Mask  # (p,): of a large solid: a trunk, not a berry or a closed leaf
     kind: NDArray[np.int8]  # (p,): 0 for leaves, 1 for thin wood, 2 for thick
 
 
@@ -82,20 +82,20 @@ def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> 
 class Run:
     """Triangles (t) of a run of clusters."""
 
-    cluster: NDArray[np.int64]  # (t,): among those without children, in their order; ascending
-    corners: NDArray[np.float64]  # (t, 3, 3): in the space of the asset, meters
-    part: NDArray[np.int32]  # (t,)
-    face: NDArray[np.int32]  # (t,)
+    cluster: Integers  # (t,): among those without children, in their order; ascending
+    corners: Floats  # (t, 3, 3): in the space of the asset, meters
+    part: Integers32  # (t,)
+    face: Integers32  # (t,)
     #: new_face and new_patch, (t,): the first triangle of a face, and of a patch.
-    new_face: NDArray[np.bool_]
-    new_patch: NDArray[np.bool_]
-    color: NDArray[np.float32]  # (t, 3)
-    transmission: NDArray[np.float32]  # (t,)
-    coverage: NDArray[np.float32]  # (t,)
-    roughness: NDArray[np.float32]  # (t,)
-    solid: NDArray[np.bool_]  # (t,)
-    woody: NDArray[np.bool_]  # (t,)
-    width: NDArray[np.float32]  # (t,): meters
+    new_face: Mask
+    new_patch: Mask
+    color: Floats32  # (t, 3)
+    transmission: Floats32  # (t,)
+    coverage: Floats32  # (t,)
+    roughness: Floats32  # (t,)
+    solid: Mask  # (t,)
+    woody: Mask  # (t,)
+    width: Floats32  # (t,): meters
 
 
 def runs_of(
@@ -112,7 +112,7 @@ def runs_of(
         yield _run(source, pool, hierarchy.order[hierarchy.first[own][of] + index], first + block[of])
 
 
-def _run(source: AssetSource, pool: PatchTable, some: NDArray[np.int64], cluster: NDArray[np.int64]) -> Run:
+def _run(source: AssetSource, pool: PatchTable, some: Integers, cluster: Integers) -> Run:
     """Triangles of some patches (k,), each of a cluster (k,)."""
     of, index = spread(pool.triangles[some])
     count = len(of)
@@ -164,17 +164,17 @@ def _run(source: AssetSource, pool: PatchTable, some: NDArray[np.int64], cluster
 class Measured:
     """What is known of the smallest clusters (c) of a run, and samples on them."""
 
-    low: NDArray[np.float64]  # (c, 3)
-    high: NDArray[np.float64]  # (c, 3)
+    low: Floats  # (c, 3)
+    high: Floats  # (c, 3)
     #: (c, 17): areas of sheets and solids, optical area; faces; patches that are not wood; area of solids that are not;
     #: optical area times width, color (3), transmission, and n nᵀ (6).
-    sums: NDArray[np.float64]
+    sums: Floats
     samples: SurfaceSamples  # of s
-    counts: NDArray[np.int64]  # (c, 2): samples on leaves and on wood of each
+    counts: Integers  # (c, 2): samples on leaves and on wood of each
     leaves: AssetKites  # of l: those of the clusters, one after the other; patches that are not wood
     #: part and face, (f,): faces of the clusters, one after the other.
-    part: NDArray[np.int32]
-    face: NDArray[np.int32]
+    part: Integers32
+    face: Integers32
 
 
 def measured(run: Run) -> Measured:
@@ -206,7 +206,7 @@ def measured(run: Run) -> Measured:
     )
 
 
-def _leaves(run: Run, optical: NDArray[np.float64], normal: NDArray[np.float64]) -> AssetKites:
+def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:
     """Patches that are not wood, as kites."""
     some = np.flatnonzero(~run.woody)
     if not len(some):
@@ -221,7 +221,7 @@ def _leaves(run: Run, optical: NDArray[np.float64], normal: NDArray[np.float64])
     return kites_of(*seen, first, number)
 
 
-def shared_out(leaf: NDArray[np.float64], wood: NDArray[np.float64], number: int) -> NDArray[np.int64]:
+def shared_out(leaf: Floats, wood: Floats, number: int) -> Integers:
     """How many of a number of samples are on leaves and how many on wood (c, 2), by their optical areas (c,)."""
     total = np.maximum(leaf + wood, 1e-300)
     on_leaves = np.clip(np.rint(number * leaf / total), FEWEST, number - FEWEST)
@@ -230,7 +230,7 @@ def shared_out(leaf: NDArray[np.float64], wood: NDArray[np.float64], number: int
     return np.stack([on_leaves, on_wood], axis=1).astype(np.int64)
 
 
-def well_spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def well_spread(counts: Integers) -> tuple[Integers, Integers]:
     """Owner (m,) and place (m,) of so many things each, in an order in which any run is spread over all of an owner."""
     owner, index = spread(counts)
     place = np.lexsort([index * _GOLDEN % 1.0, owner])
@@ -240,8 +240,8 @@ def well_spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[n
 
 
 def _samples(
-    run: Run, owner: NDArray[np.int64], start: NDArray[np.intp], optical: NDArray[np.float64], normal: NDArray
-) -> tuple[SurfaceSamples, NDArray[np.int64]]:
+    run: Run, owner: Integers, start: NDArray[np.intp], optical: Floats, normal: NDArray
+) -> tuple[SurfaceSamples, Integers]:
     """Samples of equal areas on leaves, and on wood, of the clusters of a run; leaves first, cluster by cluster."""
     kinds = [np.where(run.woody, 0.0, optical), np.where(run.woody, optical, 0.0)]
     areas = [np.add.reduceat(kind, start) for kind in kinds]

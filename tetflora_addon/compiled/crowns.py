@@ -36,7 +36,7 @@ _known: dict[Species, Crown] = {}
 class CrownParts(Arrays):
     """Some leaves and branches (n) of a plant of scale 1, each of which stands for a number of its like."""
 
-    position: Floats = field(metadata=column(3))  # (n, 3): in the axes of the plant, meters
+    position: Floats = column(3)  # (n, 3): in the axes of the plant, meters
     number: Floats  # (n,): how many it stands for
     area: Floats  # (n,): one-sided area of one leaf, half the surface of one branch, m²
     #: width and length, (n,): of the leaf, or the branch; meters.
@@ -46,10 +46,10 @@ class CrownParts(Arrays):
     #: and turned any way; meters.
     reach: Floats
     #: sides and segments, (n,): of the tube of a branch.
-    sides: Integers = field(metadata=column(dtype=np.int64))
-    segments: Integers = field(metadata=column(dtype=np.int64))
+    sides: Integers = column(dtype=np.int64)
+    segments: Integers = column(dtype=np.int64)
     buds: Floats  # (n,): on a branch
-    form: Integers = field(metadata=column(dtype=np.int64))  # (n,): which of `Crown.forms` a leaf has; -1 of branches
+    form: Integers = column(dtype=np.int64)  # (n,): which of `Crown.forms` a leaf has; -1 of branches
 
     def with_leaves(self, fraction: float) -> CrownParts:
         """The same with a fraction of the leaves."""

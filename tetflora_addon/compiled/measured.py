@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Mask, Table, spread
+from ..arrays import Floats, Floats32, Integers, Integers32, Mask, Table, spread
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.crown_effects import MOST_LEANING, are_stools, bare_part, child_factors, lateral_fractions, length_factors
@@ -175,7 +174,7 @@ class TwigReach:
 class OuterLimbs:
     """What reaches farthest on plants (n)."""
 
-    plant: NDArray[np.int32]  # (m,): whose limb it is; in order
+    plant: Integers32  # (m,): whose limb it is; in order
     #: root and limb, (5, m): how far limbs begin in each of `DIRECTIONS`, and how much farther they lead; meters.
     root: Floats
     limb: Floats
@@ -284,7 +283,7 @@ def _likely(rows: Table, stems: list[tuple[Branches, Axes]], n: int) -> list[tup
     return out
 
 
-def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Integers, Integers, NDArray[np.float32]]:
+def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Integers, Integers, Floats32]:
     """Limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `DIRECTIONS`.
 
     As `growth.chosen_children` has it, but for what differs at random from limb to limb.

@@ -13,12 +13,12 @@ Those of trunks know which limbs they are on, so that they can be moved as the c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Table, column, dot, gathered
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Table, column, dot, gathered
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, youth
@@ -51,13 +51,12 @@ class Points:
     #: have the same for all.
     first: Integers
     number: Integers
-    position: NDArray[np.float32]  # (k, 3): in units of the branch's length, in its own axes
-    #: (k, 3, 3): of leaves, before they turn to the light; of wood the axis is the third column.
-    frame: NDArray[np.float32]
-    row: NDArray[np.int32]  # (k,): row that describes the leaf (its size, color and turn to the light) or the branch
-    outward: NDArray[np.float32]  # (k,): place between the inside and the outside of the crown
-    light: NDArray[np.float32]  # (k,): how far a leaf turns to the sky
-    young: NDArray[np.float32]  # (k,): how young it is, see `growth.foliage.youth`
+    position: Floats32  # (k, 3): in units of the branch's length, in its own axes
+    frame: Floats32  # (k, 3, 3): of leaves, before they turn to the light; of wood the axis is the third column
+    row: Integers32  # (k,): row that describes the leaf (its size, color and turn to the light) or the branch
+    outward: Floats32  # (k,): place between the inside and the outside of the crown
+    light: Floats32  # (k,): how far a leaf turns to the sky
+    young: Floats32  # (k,): how young it is, see `growth.foliage.youth`
     limbs: Limbs  # of k
     shares: Shares  # of r
 
@@ -119,11 +118,11 @@ class _Points(Arrays):
     position that does not follow the length of the branches that lead there: the way along a short shoot.
     """
 
-    line: NDArray[np.int32]
+    line: Integers32
     position: Floats
     offset: Floats
     frame: NDArray[np.floating]
-    row: NDArray[np.int32]
+    row: Integers32
     outward: Floats
     light: Floats
     young: Floats
@@ -149,7 +148,7 @@ class _Arrived:
 
     branches: Branches
     weight: Floats
-    line: NDArray[np.int32]
+    line: Integers32
 
 
 class _Walk:
@@ -348,11 +347,9 @@ class Limbs(Arrays):
     """The limbs that samples (k) are on."""
 
     #: (k, 3): where the limb leaves the trunk, in the axes and units of samples; 0 where there is none.
-    root: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    #: (k,): class of the sample; `TRUNK` on all that is not a trunk.
-    kind: NDArray[np.int8] = field(metadata=column(dtype=np.int8))
-    #: (k,): fraction of what is there that follows the limb's length.
-    follows: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
+    root: Floats32 = column(3, dtype=np.float32)
+    kind: NDArray[np.int8] = column(dtype=np.int8)  # (k,): class of the sample; `TRUNK` on all that is not a trunk
+    follows: Floats32 = column(dtype=np.float32)  # (k,): fraction of what is there that follows the limb's length
 
 
 @dataclass(frozen=True)

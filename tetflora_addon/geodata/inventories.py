@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Floats32, Integers, Mask
 from ..errors import SceneError, quoted
 from . import table
 from .layers import ENDINGS
@@ -48,12 +49,12 @@ class Inventory:
     """Trees of a file, in the order of their rows; sizes in meters, 0 where nobody knows."""
 
     names: tuple[tuple[str, ...], ...]  # names of a tree in the order in which they count, each combination once
-    name: NDArray[np.int64]  # (n,): index into them
-    points: NDArray[np.float64]  # (n, 2): coordinates
+    name: Integers  # (n,): index into them
+    points: Floats  # (n, 2): coordinates
     system: System
     #: ``height``, ``diameter`` (of the trunk), ``crown_width``, ``crown_base``, ``age`` and ``dead`` (years since
     #: then), each (n,) float32.
-    sizes: dict[str, NDArray[np.float32]]
+    sizes: dict[str, Floats32]
     notes: list[str] = field(default_factory=list)  # what was guessed, and which columns were used and which not
     skipped: int = 0  # rows that were broken
     first: str = ""  # what was wrong with the first of them
@@ -260,7 +261,7 @@ class _Reading:
         distinct, index = np.unique(self._texts(title), return_inverse=True)
         return np.array([what(text) for text in distinct.tolist()])[index]
 
-    def _refuse(self, bad: NDArray[np.bool_], column: str, why: Callable[[int], str]) -> None:
+    def _refuse(self, bad: Mask, column: str, why: Callable[[int], str]) -> None:
         """Refuse the file, or leave out rows."""
         bad = bad & self.good
         if not bad.any():
@@ -284,7 +285,7 @@ class _Reading:
                 self.left_out.update(what[(what != "") & self.good].tolist())
                 self.good &= what == ""
 
-    def _size(self, name: str) -> NDArray[np.float64]:
+    def _size(self, name: str) -> Floats:
         """Sizes in meters, ages in years; 0 for unknown."""
         read = [(title, what, *cells(self.table.columns[title])) for title, what in self.found.get(name, ())]
         if not read:
@@ -318,7 +319,7 @@ class _Reading:
         )
         return np.where(self.good, values, 0.0)
 
-    def _guess(self, title: str, name: str, known: NDArray[np.float64]) -> float:
+    def _guess(self, title: str, name: str, known: Floats) -> float:
         """Meters of the unit of a column that names none."""
         if self.units == IMPERIAL:
             unit, text = (0.0254, "inches") if name in _TRUNKS else (0.3048, "feet")
@@ -332,7 +333,7 @@ class _Reading:
         self.notes.append(f'"{title}" read as {text}')
         return unit
 
-    def _since_planting(self) -> NDArray[np.float64]:
+    def _since_planting(self) -> Floats:
         """Ages from years of planting, 0 for unknown."""
         if "planted" not in self.found:
             return np.zeros(len(self.good))
@@ -342,7 +343,7 @@ class _Reading:
         self.notes.append(f'ages from "{title}" to {now}')
         return np.where(years > 0, np.maximum(now - years, 1), 0).astype(np.float64)
 
-    def _dead(self) -> NDArray[np.float64]:
+    def _dead(self) -> Floats:
         """Years since death, 0 for those alive."""
         years = np.zeros(len(self.good))
         for name in ("dead", "status", "name", "common"):
@@ -355,7 +356,7 @@ class _Reading:
                 years = np.maximum(years, values)
         return years
 
-    def _points(self, epsg: int) -> tuple[NDArray[np.float64], System]:
+    def _points(self, epsg: int) -> tuple[Floats, System]:
         """Coordinates and their system."""
         name, points, system, pair = self.table.name, self.table.points, self.table.system, ("coordinates",)
         if points is None:
@@ -394,7 +395,7 @@ class _Reading:
         self._refuse_far(points, system, pair[0])
         return points, system
 
-    def _refuse_far(self, points: NDArray[np.float64], system: System, column: str) -> None:
+    def _refuse_far(self, points: Floats, system: System, column: str) -> None:
         """Refuse rows that lie far from most others, as those do whose coordinates are 0 or wrong."""
         good = np.flatnonzero(self.good)
         if not len(good):
@@ -409,7 +410,7 @@ class _Reading:
                 far, column, lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} is {_away(away[i])} most other trees"
             )
 
-    def _places(self) -> tuple[NDArray[np.float64], int]:
+    def _places(self) -> tuple[Floats, int]:
         """Coordinates that stand in one column, and the EPSG code that stands there too, or 0."""
         title = self.found["place"][0][0]
         texts = self._texts(title)
@@ -424,7 +425,7 @@ class _Reading:
             self.notes.append(f'"{title}" read as latitude, longitude')
         return points, int(found[:, 2].max(initial=0.0))
 
-    def _coordinate(self, column: str) -> NDArray[np.float64]:
+    def _coordinate(self, column: str) -> Floats:
         """Numbers (n,) of a column of coordinates, in meters or degrees."""
         title, what = self.found[column][0]
         texts = self._texts(title)
@@ -434,7 +435,7 @@ class _Reading:
         self._refuse(bad, column, lambda i: f"{quoted(str(texts[i]))} is not a coordinate")
         return np.where(self.good, values, 0.0) * (what.unit or 1.0)
 
-    def _names(self) -> tuple[tuple[tuple[str, ...], ...], NDArray[np.int64]]:
+    def _names(self) -> tuple[tuple[tuple[str, ...], ...], Integers]:
         """Names of the trees: each combination once, and the index of each tree."""
         titles = [title for kind in NAMES for title, _ in self.found.get(kind, ())]
         genera, names = (len(self.found.get(kind, ())) for kind in NAMES[:2])
@@ -457,7 +458,7 @@ def _ordered(genera: tuple[str, ...], names: tuple[str, ...], others: tuple[str,
     return tuple(name for name in (*joined[:1], *names, *others, genus) if is_name(name))
 
 
-def _are_degrees(points: NDArray[np.float64]) -> bool:
+def _are_degrees(points: Floats) -> bool:
     """Whether coordinates that are called x and y are degrees: nobody lists trees of a plot so small."""
     if not len(points) or (np.abs(points) > (180.0, 90.0)).any():
         return False

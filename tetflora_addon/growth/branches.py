@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Keys, column
+from ..arrays import Arrays, Floats, Floats32, Integers32, Keys, column
 
 
 @dataclass(frozen=True)
@@ -25,14 +25,13 @@ class Pose(Arrays):
 class Branches(Arrays):
     """Branches (or sub-plants) as a structure of arrays."""
 
-    #: (n,): row of the parameter table: which kind of branch of which species.
-    row: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    plant: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,): index of the plant that it belongs to
-    key: Keys = field(metadata=column(dtype=np.uint64))  # (n,): hash of the plant's seed and the path of child indices
-    position: Floats = field(metadata=column(3))  # (n, 3): base, meters, world space
+    row: Integers32 = column(dtype=np.int32)  # (n,): row of the parameter table: which kind of branch of which species
+    plant: Integers32 = column(dtype=np.int32)  # (n,): index of the plant that it belongs to
+    key: Keys = column(dtype=np.uint64)  # (n,): hash of the plant's seed and the path of child indices
+    position: Floats = column(3)  # (n, 3): base, meters, world space
     #: (n, 3, 3): columns are the local axes at the base; the branch sets out along the third, the first points away
     #: from the parent.
-    frame: Floats = field(metadata=column(3, 3))
+    frame: Floats = column(3, 3)
     #: length and radius, (n,): length of the axis and radius at its base, meters.
     length: Floats
     radius: Floats
@@ -52,7 +51,7 @@ class Branches(Arrays):
     year: Floats | None = None
     #: (n, 5): where plants have crown shapes: what trunks and their stems know of these, see `crown_effects`; of all
     #: others the factor on their length in the first column, and 0.
-    crown: NDArray[np.float32] | None = None
+    crown: Floats32 | None = None
 
     @classmethod
     def apart(cls, row: int, key: NDArray, frame: NDArray, length: float, scale: float) -> Branches:

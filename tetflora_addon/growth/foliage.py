@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Keys, Table, cross, dot, gathered
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, Table, cross, dot, gathered
 from .axes import Axes
 from .branches import Branches
 from .envelopes import EVEN_JITTER, inclined, leaf_sites, leaf_start
@@ -35,7 +35,7 @@ class Leaves(Arrays):
     position: Floats  # (n, 3): base of the leaf, meters
     #: (n, 3, 3): columns: across, along the midrib, upper side; before it turns to the light. Single precision is off
     #: by some nanometers at the tip of a leaf, and its cosines are ten times as fast.
-    frame: NDArray[np.float32]
+    frame: Floats32
     size: Floats  # (n,): meters by which the leaf model is scaled
     light: Floats  # (n,): how far it turns to the sky; (1,) where that is the same for all
     sky: NDArray[np.floating]  # (3,) or (n, 3) float32: where that is; with the branch in the wind
@@ -109,7 +109,7 @@ def stages_of(rows: Table, branches: Branches, owner: Integers, key: Keys) -> St
     return leaf_stages(rows, _rows_of(branches, owner), key, np.take(branches.year[:, 0], owner))
 
 
-def _rows_of(branches: Branches, owner: Integers) -> NDArray[np.int32]:
+def _rows_of(branches: Branches, owner: Integers) -> Integers32:
     """Row (m,) of each branch's parameters, or the only one (1,), which is as good and need not be gathered."""
     row = branches.row
     return row[:1] if len(row) and (row == row[0]).all() else np.take(row, owner)
@@ -153,12 +153,12 @@ def place_leaves(
 def leaf_frames(
     rows: Table,
     row: Integers,
-    frame: NDArray[np.float32],
+    frame: Floats32,
     roll: Floats,
     index: Integers,
     key: Keys,
     sky: NDArray[np.floating] | None = None,
-) -> NDArray[np.float32]:
+) -> Floats32:
     """Frames (m, 3, 3) of leaves before they turn to the light.
 
     Parameters
@@ -192,9 +192,7 @@ def leaf_frames(
     return np.where(kind[:, None, None] > 0, inclined(frame, kind, key), out) if kind.any() else out
 
 
-def _leaf_frames(
-    frame: NDArray[np.float32], azimuth: NDArray[np.float32], angle: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def _leaf_frames(frame: Floats32, azimuth: Floats32, angle: Floats32) -> Floats32:
     """As `growth.turned`, with columns in the order of a leaf.
 
     The upper side of a leaf faces the tip of its branch: against the tilt, whose first column leads away from it.
@@ -255,9 +253,7 @@ def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floa
     return hanging(frame, droop, sky) if droop.any() else frame
 
 
-def in_wind(
-    rows: Table, branches: Branches, leaves: Leaves, frame: NDArray[np.float32], ahead: float = 0.0
-) -> NDArray[np.float32]:
+def in_wind(rows: Table, branches: Branches, leaves: Leaves, frame: Floats32, ahead: float = 0.0) -> Floats32:
     """`settled` frames (m, 3, 3) of leaves (m) of branches as the wind turns them; as they are where there is none.
 
     So many seconds after the moment of the rows; the branches are where they are then.

@@ -7,9 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers
+from ..arrays import Arrays, Floats, Integers, Integers32
 
 
 @dataclass(frozen=True)
@@ -18,7 +17,7 @@ class Seeds(Arrays):
 
     #: Species that ``species`` counts through, as in the catalog; in a scene, kinds of plants.
     identifiers: tuple[str, ...]
-    species: NDArray[np.int32]  # (n,): index into ``identifiers``
+    species: Integers32  # (n,): index into ``identifiers``
     seed: Integers  # (n,): random seed of each plant; any value
     position: Floats  # (n, 3): where the trunk leaves the ground, meters
     #: (n, 3, 3): rotation of each plant; its columns are the plant's axes in world space, +z along the upright trunk.

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Keys, Table, cross, dot
+from ..arrays import Floats, Floats32, Integers, Keys, Table, cross, dot
 from ..errors import TetFloraError
 from ..setting import setting
 from .branches import Branches
@@ -274,9 +274,7 @@ def leaned(points: Floats, up: Floats, turn: Floats) -> Floats:
     return along[..., None] * up[:, None] + beside[..., None] * aside[:, None] + level
 
 
-def fluttered(
-    rows: Table, row: Integers, frame: NDArray[np.float32], key: Keys, gust: Floats, ahead: float = 0.0
-) -> NDArray[np.float32]:
+def fluttered(rows: Table, row: Integers, frame: Floats32, key: Keys, gust: Floats, ahead: float = 0.0) -> Floats32:
     """Frames of leaves (n, 3, 3) turned about their bases: up and down, and about their midribs.
 
     Parameters

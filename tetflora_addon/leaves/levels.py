@@ -14,9 +14,8 @@ from functools import lru_cache
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers
+from ..arrays import Floats, Floats32, Integers
 from ..optics import needle_color
 from .blades import blade_surface
 from .bodies import closed_parts, rounded, spined
@@ -54,15 +53,14 @@ class LeafLevel:
     """A leaf within an error."""
 
     model: LeafModel  # faces and texture; the vertices of the first variant
-    shapes: NDArray[np.float32]  # (k, v, 3): vertices of each variant, in units of the leaf's size
+    shapes: Floats32  # (k, v, 3): vertices of each variant, in units of the leaf's size
     error: float  # largest distance of the margin from that of the shape, in lengths of the leaf
-    #: (f, 3): what the color of a leaf is times that of each face: shoots are brown, petioles pale.
-    tint: NDArray[np.float32]
+    tint: Floats32  # (f, 3): what the color of a leaf is times that of each face: shoots are brown, petioles pale
     #: (f,): probability that light which a face scatters meets another: needles on a shoot hide each other.
-    again: NDArray[np.float32]
+    again: Floats32
     solid: bool = False  # whether light that enters a face comes out of another, as of prisms: all others are sheets
 
-    def colors(self, whole: NDArray[np.float32]) -> NDArray[np.float32]:
+    def colors(self, whole: Floats32) -> Floats32:
         """Colors (n, f, 3) of faces, from those of leaves: that of a species with needles is that of its shoots."""
         whole = np.minimum(whole * self.tint, 1.0)
         return needle_color(whole, self.again[:, None]) if self.again.any() else whole

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import GOLDEN_ANGLE, Floats, Integers, perpendicular, spiral, spread
+from ..arrays import GOLDEN_ANGLE, Floats, Floats32, Integers, Integers32, perpendicular, spiral, spread
 from ..errors import SpeciesError
 from ..parameters import limited
 from .compounds import Compound
@@ -49,10 +49,10 @@ class LeafModel:
     """Polygons of one leaf."""
 
     positions: Floats  # (v, 3): vertices in units of the leaf's size
-    corner_verts: NDArray[np.int32]  # (c,): vertex of each corner, face after face
-    face_offsets: NDArray[np.int32]  # (f + 1,): first corner of each face
-    uv: NDArray[np.float32]  # (c, 2): texture coordinates by corner
-    material_index: NDArray[np.int32] | None = None  # (f,): material of each face, of models that have several
+    corner_verts: Integers32  # (c,): vertex of each corner, face after face
+    face_offsets: Integers32  # (f + 1,): first corner of each face
+    uv: Floats32  # (c, 2): texture coordinates by corner
+    material_index: Integers32 | None = None  # (f,): material of each face, of models that have several
     textured: bool = False  # drawn as it is at any size: a texture may cut it out
     #: What it stands for, which leaves are drawn as that are near; see `levels`.
     shape: Blade | Needles | Compound | None = None
@@ -85,12 +85,12 @@ class LeafModel:
         return self.content, self.shape, self.spines
 
     @cached_property
-    def next_corner(self) -> NDArray[np.int32]:
+    def next_corner(self) -> Integers32:
         """(c,) int32: the corner that follows each corner in its face."""
         return next_corners(self.face_offsets)
 
     @cached_property
-    def edges(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def edges(self) -> tuple[Integers32, Integers32]:
         """Edges (e, 2) int32 and the edge of each corner (c,) int32."""
         pairs = np.sort(np.stack([self.corner_verts, self.corner_verts[self.next_corner]], axis=1), axis=1)
         edges, corner_edges = np.unique(pairs, axis=0, return_inverse=True)

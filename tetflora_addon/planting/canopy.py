@@ -13,9 +13,8 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, bilinear, spread
+from ..arrays import Arrays, Floats, Integers, Integers32, bilinear, spread
 
 #: Directions of the sky that light comes from: degrees from the vertical, how many, and the weight of all of them.
 DIRECTIONS = ((0.0, 1, 0.2), (32.0, 5, 0.5), (55.0, 5, 0.3))
@@ -38,7 +37,7 @@ class Canopy(Arrays):
     base: Floats
     top: Floats
     area: Floats  # (n,): one-sided area of the leaves, m²
-    species: NDArray[np.int32]  # (n,)
+    species: Integers32  # (n,)
 
     def ordered(self) -> Canopy:
         """The same plants by place, so that sums do not depend on the order in which they were given."""

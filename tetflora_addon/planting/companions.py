@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Keys, Mask
+from ..arrays import Floats, Integers32, Keys, Mask
 from ..growth.hashing import uniform
 from .plane import NO_DISTANCE, Neighbors, Spacing
 from .rules import Companion, Rules
@@ -23,7 +22,7 @@ class Company:
     Where plants shun others, it does not matter who came first: an oak that shuns birches keeps new birches away too.
     """
 
-    def __init__(self, rules: Rules, position: Floats, species: NDArray[np.int32]) -> None:
+    def __init__(self, rules: Rules, position: Floats, species: Integers32) -> None:
         """Begin with older plants: places on the map (m, 2), and indices into the weights or -1 (m,)."""
         self.rules = [(n, r) for n, r in enumerate(rules.companions) if r.strength and r.distance >= NO_DISTANCE]
         self.place = {s: [position[species == s]] for s in range(len(rules.weights))}
@@ -67,7 +66,7 @@ class Company:
         """Plants of a species stand now at places (n, 2)."""
         self.place.setdefault(species, []).append(points)
 
-    def lonely(self, points: Floats, species: NDArray[np.int32], keys: Keys, older: Company) -> Mask:
+    def lonely(self, points: Floats, species: Integers32, keys: Keys, older: Company) -> Mask:
         """Plants that have not what they seek near, (n,), when those that these need in turn are gone as well."""
         gone = np.zeros(len(points), bool)
         seeking = [(n, r) for n, r in self.rules if r.strength > 0.0]

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from math import degrees, floor, inf, isfinite, log10, pi, radians, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Integers32
 from ..errors import SceneError
 from ..setting import LENGTH, setting
 
@@ -177,7 +176,7 @@ class Rules(GroundLimits):
     companions: tuple[Companion, ...] = ()
 
 
-def species_by_weight(weights: tuple[float, ...], draws: Floats) -> NDArray[np.int32]:
+def species_by_weight(weights: tuple[float, ...], draws: Floats) -> Integers32:
     """Species as indices into the weights, which are their relative frequencies, by draws from [0, 1), (n,) each."""
     weights = np.maximum(np.asarray(weights, dtype=np.float64), 0.0)
     limits = np.cumsum(weights) / weights.sum()

@@ -7,9 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, bilinear
+from ..arrays import Floats, Floats32, bilinear
 from ..errors import SceneError
 
 
@@ -29,7 +28,7 @@ class Terrain:
     weight: Floats | None = None  # (t, 3): how suitable the corners are, 0 to 1 (vertex groups); linear between
     uv: Floats | None = None  # (t, 3, 2): where the corners are in the image; it repeats beyond 0 and 1
     #: (h, w): how suitable texels are, 0 to 1; the first row is at the bottom. Read between texels (bilinear).
-    image: NDArray[np.float32] | None = None
+    image: Floats32 | None = None
     #: tuple of (k, 2): closed polygons on the map. If there are any, plants grow in at least one of them.
     areas: tuple[Floats, ...] = ()
     paths: tuple[Path, ...] = ()
@@ -84,7 +83,7 @@ def border_of(triangles: Floats) -> Floats:
     return places[first[(count == 1)]]
 
 
-def sampled(image: NDArray[np.float32], uv: Floats) -> Floats:
+def sampled(image: Floats32, uv: Floats) -> Floats:
     """Values of an image (h, w) at places (n, 2), linear between the middles of texels, (n,).
 
     It repeats, but opposite borders do not mix: a mask that is black on one side would let plants stray to the other.

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from math import inf, pi, radians
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers
+from ..arrays import Floats, Floats32, Integers
 from ..setting import LENGTH, setting
 from .plane import Lines, lines_along
 from .rules import GroundLimits
@@ -76,7 +75,7 @@ class Zone:
     limits: Limits
     weight: Floats | None = None  # (t, 3): mask at the corners, 0 to 1; linear between
     uv: Floats | None = None  # (t, 3, 2): where the corners are in the image
-    image: NDArray[np.float32] | None = None  # (h, w): mask in texels, 0 to 1; the first row is at the bottom
+    image: Floats32 | None = None  # (h, w): mask in texels, 0 to 1; the first row is at the bottom
     lines: Lines | None = None  # what distances are measured from: see `distance_lines`
     inverse: bool = False  # all but the zone, as what gives way to it has
 

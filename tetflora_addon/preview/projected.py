@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Mask
+from ..arrays import Floats, Integers32, Mask
 from ..camera.camera import Camera
 from ..tetrahedra.geometry import barycentric_gradients
 
@@ -57,7 +57,7 @@ class Projected:
     thickness: Floats  # (n,): along that ray, meters
     #: (m, 3): corners of triangles, counted through all tetrahedra (five each); those of one follow one another. They
     #: face either way.
-    triangles: NDArray[np.int32]
+    triangles: Integers32
 
 
 def drawable(vertices: NDArray[np.floating], camera: Camera) -> Mask:

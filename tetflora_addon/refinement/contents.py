@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Chunks, Floats, Integers, Mask, column, nested
+from ..arrays import Arrays, Chunks, Floats, Integers, Integers32, Mask, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds, extents
@@ -138,10 +138,9 @@ def sums(totals: Totals, cells: Integers, number: int) -> Totals:
 class PlantParts(Arrays):
     """Parts of plants (n): sub-plants, and branches without what grows on them."""
 
-    branches: Branches = field(metadata=nested(Branches))  # of n
-    #: (n,): only the branch itself, with the leaves that it bears.
-    branch_only: Mask = field(metadata=column(dtype=bool))
-    totals: Totals = field(metadata=nested(Totals))  # of n
+    branches: Branches = nested(Branches)  # of n
+    branch_only: Mask = column(dtype=bool)  # (n,): only the branch itself, with the leaves that it bears
+    totals: Totals = nested(Totals)  # of n
     extent: Floats  # (n,): longest side, meters
 
     @classmethod
@@ -177,7 +176,7 @@ class InCells(Arrays, Generic[Kind]):
     """Things of one kind (n), each in one node of the tree."""
 
     items: Kind  # of n
-    cell: NDArray[np.int32]  # (n,): node that holds each
+    cell: Integers32  # (n,): node that holds each
     totals: Totals  # of n
 
     @classmethod
@@ -217,7 +216,7 @@ class PolygonsByCell(Chunks[InCells[Polygons]]):
         """All together; copies them into one, which is then kept until something changes."""
         return self.joined()
 
-    def totals(self, chosen: Mask) -> list[tuple[Totals, NDArray[np.int32]]]:
+    def totals(self, chosen: Mask) -> list[tuple[Totals, Integers32]]:
         """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each chunk."""
         some = [chunk.take(chosen[chunk.cell] & there) for chunk, there in self.chunks()]
         return [(part.totals, part.cell) for part in some]
@@ -337,9 +336,7 @@ def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Sl
     return InCells.concatenate(placed)
 
 
-def _lowered(
-    tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack | None
-) -> tuple[NDArray[np.int32], Mask]:
+def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack | None) -> tuple[Integers32, Mask]:
     """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""
     cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
     center, reach, touching = polygons.center, polygons.reach, polygons.touching()

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers32, Mask
 from ..camera.camera import Camera
 from ..camera.silhouette import expected_pixels
 from ..compiled.flora import Flora
@@ -70,9 +71,9 @@ class Refinement:
     assets: SharedAssets  # all instances of assets, likewise
     cell_polygons: PolygonsByCell  # all polygons, in terminal nodes
     cells: Terminals  # of t: terminal nodes that hold something
-    transmittance: NDArray[np.float64]  # (t,): fraction of each one's light that nothing in front of it blocks
+    transmittance: Floats  # (t,): fraction of each one's light that nothing in front of it blocks
     decision: NDArray[np.int8]  # (t,): `Decision` for each of them
-    rank: NDArray[np.int32]  # (t,): front-to-back order of them
+    rank: Integers32  # (t,): front-to-back order of them
     passes: int  # passes so far
     complete: bool  # false where a limit of the settings stopped the loop
     seconds: dict[str, float]  # wall clock by step
@@ -97,7 +98,7 @@ class Refinement:
         return Contents(subplants, branches, self.cell_polygons.polygons)
 
     @property
-    def in_view(self) -> NDArray[np.bool_]:
+    def in_view(self) -> Mask:
         """Mask over all nodes of the tree (nodes,): those that hold something and are within the view, if in part."""
         # The pieces of a view's own root know whether they are part of it; others are in view where they have pixels.
         if self.tree.inside.any():
@@ -106,7 +107,7 @@ class Refinement:
         mask[self.nodes[self.cells.pixels > 0.0]] = True
         return mask
 
-    def chosen(self, *decisions: Decision) -> NDArray[np.bool_]:
+    def chosen(self, *decisions: Decision) -> Mask:
         """Mask over all nodes of the tree (nodes,) of those with one of the decisions."""
         mask = np.zeros(len(self.tree), dtype=bool)
         mask[self.nodes[np.isin(self.decision, decisions)]] = True
@@ -118,7 +119,7 @@ def refine(
     seeds: Seeds,
     camera: Camera,
     settings: RefinementSettings,
-    occluders: NDArray[np.float64] | None = None,
+    occluders: Floats | None = None,
     polygons: Polygons | None = None,
     lights: Sequence[Light] = (),
     placed: PlacedAssets | None = None,
@@ -232,7 +233,7 @@ def _height(seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets) -> fl
     return float(np.median(np.concatenate(heights)))
 
 
-def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons | None) -> NDArray[np.float64]:
+def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons | None) -> Floats:
     """Axis-aligned box (2, 3) of all that is there, meters."""
     boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
     boxes += [assets.parts.bounding_box()] if len(assets.parts) else []
@@ -241,7 +242,7 @@ def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: 
 
 
 def _filled(
-    tree: TetrahedralTree, shared: Sequence[SharedParts], cell_polygons: PolygonsByCell, changed: NDArray[np.bool_]
+    tree: TetrahedralTree, shared: Sequence[SharedParts], cell_polygons: PolygonsByCell, changed: Mask
 ) -> tuple[NDArray[np.intp], Totals]:
     """Nodes (n,) whose contents have changed and that hold something, and their totals."""
     found = [*(kind.totals(changed) for kind in shared), *cell_polygons.totals(changed)]
@@ -272,7 +273,7 @@ def _slack(camera: Camera, resolution: int) -> Slack:
     """A pixel of the alpha buffer, in meters: nothing smaller changes decisions."""
     pixels = max(pixels_of_buffer(camera, resolution), SLACK)
 
-    def slack(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slack(points: Floats) -> Floats:
         return pixels * camera.extent_around(points)
 
     return slack

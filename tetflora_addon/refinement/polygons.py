@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Mask, spread
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, spread
 from ..subplants.pieces import chunks
 
 #: Triangles that are measured at a time; bounds what that takes to some hundred megabytes.
@@ -35,11 +35,11 @@ class Surface:
 
     name: str  # of the object, for messages and results
     positions: Floats  # (v, 3): vertices in the mesh's own space
-    corner_verts: NDArray[np.int32]  # (c,): vertex of each face corner
-    face_offsets: NDArray[np.int32]  # (f + 1,): where each face's corners start
+    corner_verts: Integers32  # (c,): vertex of each face corner
+    face_offsets: Integers32  # (f + 1,): where each face's corners start
     #: (t, 3): corners of the triangles that faces consist of: n − 2 for a face of n corners, face after face.
-    triangles: NDArray[np.int32]
-    material: NDArray[np.int32]  # (f,): slot of each face
+    triangles: Integers32
+    material: Integers32  # (f,): slot of each face
     colors: Floats  # (s, 3): mean color of each slot's material, linear RGB
     #: transmission and coverage, (s,): fraction of scattered light that passes through, and of the surface that is
     #: opaque.
@@ -51,8 +51,8 @@ class Surface:
     width: Floats  # (f,): width of the feature that the face belongs to, in the mesh's own units
     #: mapping of str to (c, k): interpolated across faces: texture coordinates (k = 2), colors and vectors (k = 3),
     #: numbers (k = 1).
-    attributes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
-    normals: NDArray[np.float32] | None = None  # (c, 3): of corners where any face is smooth, in the mesh's own space
+    attributes: Mapping[str, Floats32] = field(default_factory=dict)
+    normals: Floats32 | None = None  # (c, 3): of corners where any face is smooth, in the mesh's own space
     look: str = ""  # what stands for surfaces with different ones is kept apart
 
 
@@ -185,10 +185,10 @@ class Polygons(Arrays):
     """Whole faces and fragments of faces, n in all, m of them fragments."""
 
     meshes: Meshes  # what the numbers below count through
-    face: NDArray[np.int32]  # (n,)
-    instance: NDArray[np.int32]  # (n,)
-    part: NDArray[np.int32]  # (n,): row of the two arrays below, −1 for whole faces
-    triangle: NDArray[np.int32]  # (m,)
+    face: Integers32  # (n,)
+    instance: Integers32  # (n,)
+    part: Integers32  # (n,): row of the two arrays below, −1 for whole faces
+    triangle: Integers32  # (m,)
     weights: Floats  # (m, 3, 3): barycentric coordinates in the triangle, for each corner of the fragment a row
     center: Floats  # (n, 3): somewhere within, meters, world space
     reach: Floats  # (n,): distance from there within which all of it lies, meters

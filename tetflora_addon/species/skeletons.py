@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Integers, connected, top
+from ..arrays import Floats, Integers, Integers32, connected, top
 from ..errors import SpeciesError
 from .curves import breadth_first, coinciding, levels, longest_way, summed_from_root
 
@@ -38,10 +38,9 @@ class Skeleton:
 
     points: Floats  # (p, 3): meters in the plant's space: z up, the origin at its foot
     radius: Floats  # (p,): meters
-    #: (p,): the point before, toward the root; -1 for roots. Parents stand before their children.
-    parent: NDArray[np.int32]
+    parent: Integers32  # (p,): the point before, toward the root; -1 for roots. Parents stand before their children.
     #: (p,): which stroke of the artist's led to the point from the one before; all 0 where nobody knows.
-    line: NDArray[np.int32] | None = None
+    line: Integers32 | None = None
 
     def __post_init__(self) -> None:
         if self.line is None:
@@ -76,8 +75,8 @@ class DrawnBranches:
     #: (k, 3): meters, branch after branch from base to tip. A branch starts at the point of its parent where it leaves.
     knots: Floats
     radius: Floats  # (k,): meters
-    order: NDArray[np.int32]  # (b,): 0 for trunks; at most ``MAX_ORDERS - 1``
-    parent: NDArray[np.int32]  # (b,): branch that it grows on; -1 for trunks
+    order: Integers32  # (b,): 0 for trunks; at most ``MAX_ORDERS - 1``
+    parent: Integers32  # (b,): branch that it grows on; -1 for trunks
     at: Floats  # (b,): where on the parent it leaves, fraction of the parent's length; 0 for trunks
     length: Floats  # (b,): along the knots, meters
     #: (b,): from order 2 on, the fraction of the limb's length (its ancestor of order 1) at which that line of branches

@@ -152,8 +152,7 @@ class Order:
         "linear RGB",
         follows="leaf_color",
     )
-    #: How far it has grown; None where it is as long as it will be.
-    growing: PartGrown | None = None
+    growing: PartGrown | None = None  # How far it has grown; None where it is as long as it will be
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, spread
+from ..arrays import Floats, Floats32, Integers, Integers32, spread
 from ..errors import TetFloraError
 from ..parallel import blocks, each_on_all_cores, on_all_cores
 
@@ -160,12 +160,12 @@ class _Columns(NamedTuple):
     """Columns (m,) of the crowns of a strip: of which, places of foot and top in the grid of light, and leaves."""
 
     number: int
-    crown: NDArray[np.int32]
-    foot: NDArray[np.int32]
-    head: NDArray[np.int32]
-    under: NDArray[np.float32]
-    over: NDArray[np.float32]
-    density: NDArray[np.float32]
+    crown: Integers32
+    foot: Integers32
+    head: Integers32
+    under: Floats32
+    over: Floats32
+    density: Floats32
 
 
 @dataclass
@@ -178,7 +178,7 @@ class LightGrid:
     margin: float = 0.0  # meters of open ground around that of the plants
     ground: Floats | None = None  # (rows × columns,): altitudes; level where it is None
     #: (layers + 1, rows × columns): light summed from above down to where each layer begins, meters of full light.
-    light: NDArray[np.float32] = field(init=False)
+    light: Floats32 = field(init=False)
 
     def __post_init__(self) -> None:
         self.strip = max(_STRIP_ROWS, _STRIP_CELLS // self.columns)
@@ -214,7 +214,7 @@ class LightGrid:
 
     def _leaves(
         self, crowns: Crowns, strip: slice, index: NDArray, layers: int
-    ) -> tuple[_Columns, NDArray, NDArray[np.int32]]:
+    ) -> tuple[_Columns, NDArray, Integers32]:
         """Columns of some crowns, and differences of their leaves along these: rows (r,), (layers, r, columns)."""
         size = self.cell
         x, y = ((values[index] + self.margin) / size for values in (crowns.x, crowns.y))
@@ -256,7 +256,7 @@ class LightGrid:
         rows = np.arange(low, high) % self.rows
         return columns, rows, total.astype(np.int32).reshape(layers, high - low, self.columns)
 
-    def _shine(self, leaves: NDArray[np.int32]) -> None:
+    def _shine(self, leaves: Integers32) -> None:
         layers, rows, columns = leaves.shape
         if getattr(self, "light", np.zeros((0, 0))).shape != (layers + 1, rows * columns):
             self.light = np.zeros((layers + 1, rows * columns), np.float32)
@@ -312,7 +312,7 @@ class LightGrid:
     def _cell(self, row: NDArray, column: NDArray) -> Integers:
         return (row % self.rows) * self.columns + column % self.columns
 
-    def _summed(self, place: NDArray[np.int32], part: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _summed(self, place: Integers32, part: Floats32) -> Floats32:
         flat = self.light.ravel()
         low, high = np.take(flat, place), np.take(flat, place + np.int32(self.rows * self.columns))
         high -= low

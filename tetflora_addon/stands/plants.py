@@ -7,13 +7,13 @@ What a simulation says: plants at several years, and what lies between these.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Keys, Mask, column, nested
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, Mask, column, nested
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .light import Crowns
 from .site import StandSite
@@ -27,23 +27,22 @@ LYING = 20.0
 class Records(Arrays):
     """Plants at a year, one row each; all rows of a plant are neighbors, years ascending."""
 
-    plant: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,): number of the plant, ascending
-    year: NDArray[np.float32] = field(metadata=column(dtype=np.float32))  # (n,): of the simulation
-    species: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,): index into the species
-    seed: NDArray[np.int32] = field(metadata=column(dtype=np.int32))  # (n,): from which it is drawn
-    #: (n, 3): foot of the trunk in the world, meters.
-    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    plant: Integers32 = column(dtype=np.int32)  # (n,): number of the plant, ascending
+    year: Floats32 = column(dtype=np.float32)  # (n,): of the simulation
+    species: Integers32 = column(dtype=np.int32)  # (n,): index into the species
+    seed: Integers32 = column(dtype=np.int32)  # (n,): from which it is drawn
+    position: Floats32 = column(3, dtype=np.float32)  # (n, 3): foot of the trunk in the world, meters
     #: height, diameter, crown_width and crown_base, (n,): meters; the diameter is that at 1.3 m, 0 for what is smaller,
     #: the width the mean of all directions, and the base the height of the lowest limb.
-    height: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    diameter: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    crown_width: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    crown_base: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
+    height: Floats32 = column(dtype=np.float32)
+    diameter: Floats32 = column(dtype=np.float32)
+    crown_width: Floats32 = column(dtype=np.float32)
+    crown_base: Floats32 = column(dtype=np.float32)
     #: (n, 2): by which fraction limbs to the east and to the north are longer, and those opposite shorter.
-    offset: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))
+    offset: Floats32 = column(2, dtype=np.float32)
     #: (n, 2): tangents of the trunk's tilt to the east and to the north; `LYING` or more long where it lies.
-    lean: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))
-    dead: NDArray[np.float32] = field(metadata=column(dtype=np.float32))  # (n,): years since death, 0 of what is alive
+    lean: Floats32 = column(2, dtype=np.float32)
+    dead: Floats32 = column(dtype=np.float32)  # (n,): years since death, 0 of what is alive
 
     @property
     def lying(self) -> Mask:
@@ -106,9 +105,9 @@ class StandDraw(IntEnum):
 class Plants(Arrays):
     """Living plants."""
 
-    number: Integers = field(metadata=column(dtype=np.int64))  # (n,): in the order in which they came
-    key: Keys = field(metadata=column(dtype=np.uint64))  # (n,): of their random numbers
-    species: Integers = field(metadata=column(dtype=np.int64))  # (n,)
+    number: Integers = column(dtype=np.int64)  # (n,): in the order in which they came
+    key: Keys = column(dtype=np.uint64)  # (n,): of their random numbers
+    species: Integers = column(dtype=np.int64)  # (n,)
     #: x and y, (n,): meters from the corner of the site.
     x: Floats
     y: Floats
@@ -124,7 +123,7 @@ class Plants(Arrays):
     quality: Floats  # (n,): how well it grows where it is, 0 to 1
     strength: Floats  # (n,): how well it grows by nature, about 1
     age: Floats  # (n,): years
-    known: Mask = field(metadata=column(dtype=bool))  # (n,): whether it has a record
+    known: Mask = column(dtype=bool)  # (n,): whether it has a record
 
     def crowns(self, traits: StandTraits) -> Crowns:
         """What takes light."""
@@ -162,12 +161,12 @@ class Plants(Arrays):
 class DeadPlants(Arrays):
     """Trees that stand dead or lie."""
 
-    last: Records = field(metadata=nested(Records))  # what they were at their death
+    last: Records = nested(Records)  # what they were at their death
     #: died, falls and gone, (n,): years.
     died: Floats
     falls: Floats
     gone: Floats
-    lean: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))  # (n, 2): of their trunks when they lie
+    lean: Floats32 = column(2, dtype=np.float32)  # (n, 2): of their trunks when they lie
 
     def records(self, year: float) -> Records:
         """What they are in a year."""
@@ -180,7 +179,7 @@ class DeadPlants(Arrays):
         )  # fmt: skip
 
 
-def _positions(x: NDArray, y: NDArray, site: StandSite) -> NDArray[np.float32]:
+def _positions(x: NDArray, y: NDArray, site: StandSite) -> Floats32:
     return np.stack([site.west + x, site.south + y, site.ground(x, y)], axis=1).astype(np.float32)
 
 
