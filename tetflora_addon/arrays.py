@@ -133,21 +133,30 @@ class Arrays:
         )
 
     @classmethod
+    def zeros(cls, number: int) -> Self:
+        """So many things, all columns 0; these are (n,) float64 unless their fields are by `column` or `nested`."""
+        every = (f.metadata.get("zeros", np.zeros) for f in fields(cls) if f.name not in _optional(cls))
+        return cls(*(zeros(number) for zeros in every))
+
+    @classmethod
     def empty(cls) -> Self:
-        """No things. Columns are (0,) float64 unless their fields are by `column` or `nested`."""
-        return cls(
-            *(f.metadata.get("empty", lambda: np.zeros(0))() for f in fields(cls) if f.name not in _optional(cls))
-        )
+        """No things."""
+        return cls.zeros(0)
+
+    @classmethod
+    def typed(cls, *columns: NDArray) -> Self:
+        """Things from all their columns, which get the types that fields have."""
+        return cls(*(c.astype(of.dtype) for c, of in zip(columns, vars(cls.empty()).values(), strict=True)))
 
 
 def column(*shape: int, dtype: DTypeLike = np.float64) -> Any:
-    """Field of a structure that is an array (n, *shape), for `Arrays.empty`."""
-    return field(metadata={"empty": lambda: np.zeros((0, *shape), dtype)})
+    """Field of a structure that is an array (n, *shape), see `Arrays.zeros`."""
+    return field(metadata={"zeros": lambda number: np.zeros((number, *shape), dtype)})
 
 
 def nested(kind: type[Arrays]) -> Any:
-    """Field of a structure that is another structure of arrays, for `Arrays.empty`."""
-    return field(metadata={"empty": kind.empty})
+    """Field of a structure that is another structure of arrays, see `Arrays.zeros`."""
+    return field(metadata={"zeros": kind.zeros})
 
 
 def gathered(array: NDArray, index: NDArray | slice) -> NDArray:

@@ -74,14 +74,8 @@ def kites_of(
     width = 2.0 * area / np.maximum(length, 1e-300)
     mean = np.add.reduceat(optical[:, None] * color, first, axis=0) / whole
     through, rough = (np.add.reduceat(optical * own, first) / whole[:, 0] for own in (transmission, roughness))
-    return AssetKites(
-        center.astype(np.float32),
-        (length[:, None] / 2 * along).astype(np.float32),
-        (width[:, None] / 2 * np.cross(plane, along)).astype(np.float32),
-        mean.astype(np.float16),
-        through.astype(np.float16),
-        rough.astype(np.float16),
-    )
+    along, across = length[:, None] / 2 * along, width[:, None] / 2 * np.cross(plane, along)
+    return AssetKites.typed(center, along, across, mean, through, rough)
 
 
 def kite_mesh(leaves: AssetKites) -> MeshBuffers:

@@ -8,12 +8,12 @@ A run is of whole clusters without children. What it takes does not grow with th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Floats32, Integers, Integers32, Mask, spread
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, column, spread
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .asset import AssetKites, AssetSource, SurfaceSamples
 from .clusters import Hierarchy
@@ -79,23 +79,23 @@ def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> 
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Arrays):
     """Triangles (t) of a run of clusters."""
 
-    cluster: Integers  # (t,): among those without children, in their order; ascending
-    corners: Floats  # (t, 3, 3): in the space of the asset, meters
-    part: Integers32  # (t,)
-    face: Integers32  # (t,)
+    cluster: Integers = column(dtype=np.int64)  # (t,): among those without children, in their order; ascending
+    corners: Floats = column(3, 3)  # (t, 3, 3): in the space of the asset, meters
+    part: Integers32 = column(dtype=np.int32)  # (t,)
+    face: Integers32 = column(dtype=np.int32)  # (t,)
     #: new_face and new_patch, (t,): the first triangle of a face, and of a patch.
-    new_face: Mask
-    new_patch: Mask
-    color: Floats32  # (t, 3)
-    transmission: Floats32  # (t,)
-    coverage: Floats32  # (t,)
-    roughness: Floats32  # (t,)
-    solid: Mask  # (t,)
-    woody: Mask  # (t,)
-    width: Floats32  # (t,): meters
+    new_face: Mask = column(dtype=bool)
+    new_patch: Mask = column(dtype=bool)
+    color: Floats32 = column(3, dtype=np.float32)  # (t, 3)
+    transmission: Floats32 = column(dtype=np.float32)  # (t,)
+    coverage: Floats32 = column(dtype=np.float32)  # (t,)
+    roughness: Floats32 = column(dtype=np.float32)  # (t,)
+    solid: Mask = column(dtype=bool)  # (t,)
+    woody: Mask = column(dtype=bool)  # (t,)
+    width: Floats32 = column(dtype=np.float32)  # (t,): meters
 
 
 def runs_of(
@@ -115,12 +115,9 @@ def runs_of(
 def _run(source: AssetSource, pool: PatchTable, some: Integers, cluster: Integers) -> Run:
     """Triangles of some patches (k,), each of a cluster (k,)."""
     of, index = spread(pool.triangles[some])
-    count = len(of)
-    corners = np.zeros((count, 3, 3))
-    part, face = pool.part[some][of], np.zeros(count, np.int32)
-    color, solid = np.zeros((count, 3), np.float32), np.zeros(count, bool)
-    transmission, coverage, width, roughness = np.zeros((4, count), np.float32)
-    surface, woody = source.surface[part], pool.woody[some][of]
+    part, woody = pool.part[some][of], pool.woody[some][of]
+    run = replace(Run.zeros(len(of)), cluster=cluster[of], part=part, new_patch=index == 0, woody=woody)
+    surface, color, transmission = source.surface[part], run.color, run.transmission
     for s in np.unique(surface):
         at = np.flatnonzero(surface == s)
         own, shown = pool.patches[s], source.surfaces[s]
@@ -131,33 +128,18 @@ def _run(source: AssetSource, pool: PatchTable, some: Integers, cluster: Integer
         # By component: numpy multiplies small matrices one by one.
         for i in range(3):
             along = sum(matrix[:, i, k, None] * local[:, :, k] for k in range(3))
-            corners[at, :, i] = along + matrix[:, i, 3, None]
-        face[at] = of_face = shown.face[triangle]
-        color[at], coverage[at] = shown.color[of_face], shown.coverage[of_face]
-        roughness[at] = _ROUGHNESS if shown.roughness is None else shown.roughness[of_face]
-        solid[at] = own.solid[patch]
+            run.corners[at, :, i] = along + matrix[:, i, 3, None]
+        run.face[at] = of_face = shown.face[triangle]
+        color[at], run.coverage[at] = shown.color[of_face], shown.coverage[of_face]
+        run.roughness[at] = _ROUGHNESS if shown.roughness is None else shown.roughness[of_face]
+        run.solid[at] = solid = own.solid[patch]
         through = shown.transmission[of_face].astype(np.float32)
-        unknown = np.where(solid[at], np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
+        unknown = np.where(solid, np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
         transmission[at] = np.where(np.isnan(through), unknown, through)
-        both = at[solid[at] & ~woody[at]]  # a facet or a kite is one sheet in place of the two sides of a closed leaf
+        both = at[solid & ~woody[at]]  # a facet or a kite is one sheet in place of the two sides of a closed leaf
         color[both], transmission[both] = through_both_sides(color[both], transmission[both])
-        width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
-    new_face = (np.diff(face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0)
-    return Run(
-        cluster[of],
-        corners,
-        part,
-        face,
-        new_face,
-        index == 0,
-        color,
-        transmission,
-        coverage,
-        roughness,
-        solid,
-        woody,
-        width,
-    )
+        run.width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
+    return replace(run, new_face=(np.diff(run.face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0))
 
 
 @dataclass(frozen=True)
@@ -259,15 +241,8 @@ def _samples(
         root, v = np.sqrt(uniform(key, _U)), uniform(key, _V)
         weight = np.stack([1 - root, root * (1 - v), root * v], axis=1)
         place = np.einsum("nk,nki->ni", weight, run.corners[pick])
-        made.append(
-            SurfaceSamples(
-                place.astype(np.float32),
-                normal[pick].astype(np.float16),
-                run.color[pick].astype(np.float16),
-                run.transmission[pick].astype(np.float16),
-                run.roughness[pick].astype(np.float16),
-            )
-        )
+        look = (own[pick] for own in (normal, run.color, run.transmission, run.roughness))
+        made.append(SurfaceSamples.typed(place, *look))
         order.append(cluster)
     cluster = np.concatenate(order)
     return SurfaceSamples.concatenate(made).take(np.argsort(cluster, kind="stable")), counts

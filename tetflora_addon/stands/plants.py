@@ -7,7 +7,7 @@ What a simulation says: plants at several years, and what lies between these.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -72,7 +72,7 @@ class Records(Arrays):
         for name, value in mixed.items():
             value[exact] = getattr(second, name)[exact]
         years = np.full(len(after), year, np.float32)
-        return Records(first.plant, years, first.species, first.seed, **mixed)
+        return replace(first, year=years, **mixed)
 
 
 def in_order(rows: Records) -> Records:
@@ -140,21 +140,11 @@ class Plants(Arrays):
 
     def records(self, year: float, traits: StandTraits, site: StandSite) -> Records:
         """What they are now; ``plant`` is their number still."""
-        number = len(self)
-        return Records(
-            self.number.astype(np.int32),
-            np.full(number, year, np.float32),
-            self.species.astype(np.int32),
-            (uniform(self.key, StandDraw.SEED) * 2.0**31).astype(np.int32),
-            _positions(self.x, self.y, site),
-            self.height.astype(np.float32),
-            traits.diameters(self.species, self.basal).astype(np.float32),
-            (2.0 * self.radius).astype(np.float32),
-            self.base.astype(np.float32),
-            np.stack([self.east, self.north], axis=1).astype(np.float32),
-            np.zeros((number, 2), np.float32),
-            np.zeros(number, np.float32),
-        )
+        diameter, offset = traits.diameters(self.species, self.basal), np.stack([self.east, self.north], axis=1)
+        identity = self.number, np.full(len(self), year), self.species, uniform(self.key, StandDraw.SEED) * 2.0**31
+        crown = diameter, 2.0 * self.radius, self.base, offset
+        upright = np.zeros((len(self), 2)), np.zeros(len(self))
+        return Records.typed(*identity, _positions(self.x, self.y, site), self.height, *crown, *upright)
 
 
 @dataclass(frozen=True)
@@ -173,10 +163,7 @@ class DeadPlants(Arrays):
         last = self.last
         lean = np.where((year > self.falls)[:, None], self.lean, np.float32(0.0))
         dead = (year - self.died).astype(np.float32)
-        return Records(
-            last.plant, np.full(len(last), year, np.float32), last.species, last.seed, last.position, last.height,
-            last.diameter, last.crown_width, last.crown_base, last.offset, lean, dead,
-        )  # fmt: skip
+        return replace(last, year=np.full(len(last), year, np.float32), lean=lean, dead=dead)
 
 
 def _positions(x: NDArray, y: NDArray, site: StandSite) -> Floats32:
