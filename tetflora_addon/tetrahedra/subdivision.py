@@ -37,10 +37,7 @@ def longest_edge(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
 def bisect(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Cut tetrahedra in two at the midpoint of their longest edges.
 
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, meters.
+    ``vertices`` (n, 4, 3): positively oriented tetrahedra, meters.
 
     Returns
     -------
@@ -123,12 +120,8 @@ def divide_in_eight(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Divide tetrahedra into eight of the same volume.
 
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, meters.
-    diagonal : (n,) int, optional
-        Which diagonal of the inner octahedron to cut along; `best_diagonal` if None.
+    ``vertices`` (n, 4, 3): positively oriented tetrahedra, meters. ``diagonal`` (n,): which diagonal of the inner
+    octahedron to cut along; `best_diagonal` if None.
 
     Returns
     -------
@@ -159,10 +152,7 @@ def divide_by_shape(
     subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
     with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
 
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, meters.
+    ``vertices`` (n, 4, 3): positively oriented tetrahedra, meters.
 
     Returns
     -------

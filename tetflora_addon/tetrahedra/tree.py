@@ -101,10 +101,7 @@ class TetrahedralTree:
         Returns (n, 2): the children on sides 0 and 1 of the planes; they inherit `inside`. Raises ValueError: if a node
         is not terminal, has no tetrahedron, or occurs twice.
 
-        Parameters
-        ----------
-        nodes : (n,) int
-            Terminal nodes with a tetrahedron, each once.
+        ``nodes`` (n,): terminal nodes with a tetrahedron, each once.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, halves = bisect(self._tetrahedra(nodes))
@@ -118,10 +115,7 @@ class TetrahedralTree:
         Returns (n, 8): terminals three levels further down, see `subdivision.divide_by_shape`; they inherit `inside`.
         Raises ValueError: if a node is not terminal, has no tetrahedron, or occurs twice.
 
-        Parameters
-        ----------
-        nodes : (n,) int
-            Terminal nodes with a tetrahedron, each once.
+        ``nodes`` (n,): terminal nodes with a tetrahedron, each once.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, pieces, _ = divide_by_shape(self._tetrahedra(nodes))
@@ -133,12 +127,7 @@ class TetrahedralTree:
         Returns (n, 2): the children on sides 0 and 1; they inherit `inside`. Raises ValueError: if a node is not
         terminal or occurs twice.
 
-        Parameters
-        ----------
-        nodes : (n,) int
-            Terminal nodes, each once.
-        planes : (n, 4) float64
-            Cutting planes ``(nx, ny, nz, d)``, unit normals.
+        ``nodes`` (n,): terminal nodes, each once. ``planes`` (n, 4): cutting planes ``(nx, ny, nz, d)``, unit normals.
         """
         nodes = np.asarray(nodes, np.intp)
         self._check_terminal(nodes)
