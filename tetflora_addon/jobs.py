@@ -23,7 +23,6 @@ class Progress:
     fraction: float  # 0 to 1, an estimate
     message: str  # for the status bar
     waiting: bool = False  # whether nothing is new: the next step waits as well
-    partial: bool = False  # whether something small is half done: whoever looks after the job may do that later
 
     @property
     def repeated(self) -> Progress:
@@ -32,8 +31,7 @@ class Progress:
 
     def during(self, steps: Generator[object, None, _Result]) -> Generator[Progress, object, _Result]:
         """The same after each of some small steps; returns what these return."""
-        partial = replace(self, partial=True)
-        return mapped(steps, lambda _: partial)
+        return mapped(steps, lambda _: self)
 
 
 def mapped(steps: Generator[_Item, Any, _Result], change: Callable[[_Item], _Step]) -> Generator[_Step, Any, _Result]:

@@ -170,7 +170,7 @@ def _hidden_by(flat: Floats32, summits: Integers, stride: int, cell: float) -> G
     most = int(radius.max(initial=0.0))
     rows = len(flat) // stride
     for i in range(-most, most + 1):
-        yield Progress(0.3 + 0.4 * (i + most) / max(2 * most, 1), "Looking for treetops", partial=True)
+        yield Progress(0.3 + 0.4 * (i + most) / max(2 * most, 1), "Looking for treetops")
         for j in range(-most, most + 1):
             reach = np.hypot(i, j)
             some = order[: np.searchsorted(-radius[order], -reach, side="right")]  # those with windows as wide

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..arrays import Arrays, Floats, Integers, Keys, Mask, Table, smoothstep
 from ..errors import TetFloraError
-from ..setting import setting
+from ..setting import FACTOR, setting
 from ..species.species import LEAF_KINDS, Species
 from ..species.year import DAYS, MAX_AUTUMN, LeafYear
 from .hashing import Draw, mix_draw, uniform
@@ -82,12 +82,7 @@ class Season:
         max=2.0,
     )
     snow: float = setting(
-        0.0,
-        "Snow",
-        "Snow on leaves, branches and ground: 0 none, 1 on all that faces the sky",
-        subtype='FACTOR',
-        min=0.0,
-        max=1.0,
+        0.0, "Snow", "Snow on leaves, branches and ground: 0 none, 1 on all that faces the sky", **FACTOR
     )
 
     def __post_init__(self) -> None:

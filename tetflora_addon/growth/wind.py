@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Floats32, Integers, Keys, Table, cross, dot
 from ..errors import TetFloraError
-from ..setting import setting
+from ..setting import FACTOR, setting, within
 from .branches import Branches
 from .hashing import Draw, uniform
 from .rows import SPUR_ORDER, with_columns
@@ -82,9 +82,7 @@ class Wind:
         "Speed",
         "Mean speed in meters per second: 2 stirs leaves, 4 is a gentle breeze, 10 sways trees, 20 is a gale. Animate "
         "it slowly: plants react at once",
-        min=0.0,
-        soft_max=25.0,
-        max=100.0,
+        **within(0.0, 25.0, 100.0),
     )
     #: Radians from +x toward +y.
     direction: float = setting(
@@ -100,9 +98,7 @@ class Wind:
         "Gusts",
         "Strength of gusts and lulls relative to the mean speed: 0 is an even wind, 1 makes gusts twice as strong. "
         "They travel with the wind",
-        subtype='FACTOR',
-        min=0.0,
-        max=1.0,
+        **FACTOR,
     )
     time: float = 0.0  # seconds
     loop: float = 0.0  # seconds after which all movement repeats; 0 for never

@@ -15,14 +15,13 @@ import numpy as np
 
 from ..arrays import Floats, Integers32
 from ..errors import SceneError
-from ..setting import LENGTH, setting
+from ..setting import FACTOR, LENGTH, meters, setting, within
 
 #: Most plants that are placed at once.
 MOST_PLANTS = 10_000_000
 _ANGLE = {"subtype": 'ANGLE'}
 _SLOPE = {"min": 0.0, "max": pi / 2, **_ANGLE}
 _ALTITUDE = {"soft_min": -1000.0, "soft_max": 5000.0, **LENGTH}
-_FACTOR = {"subtype": 'FACTOR', "min": 0.0, "max": 1.0}
 _SCALE = {"min": 0.01, "soft_max": 4.0}
 
 
@@ -45,12 +44,7 @@ class Companion:
     )
     #: Meters on the map.
     distance: float = setting(
-        5.0,
-        "Reach",
-        "How far the companion's influence extends, measured on the map",
-        min=0.0,
-        soft_max=100.0,
-        **LENGTH,
+        5.0, "Reach", "How far the companion's influence extends, measured on the map", **meters(0.0, 100.0)
     )
 
 
@@ -72,17 +66,17 @@ class GroundLimits:
         "Min Wetness",
         "Drier ground is left out. 0 is the driest, as on ridges, and 1 the wettest, as at brooks and in hollows: it "
         "follows from where water runs on the ground",
-        **_FACTOR,
+        **FACTOR,
     )
     wetness_max: float = setting(
-        1.0, "Max Wetness", "Wetter ground is left out; 1 is the wettest, as at brooks and in hollows", **_FACTOR
+        1.0, "Max Wetness", "Wetter ground is left out; 1 is the wettest, as at brooks and in hollows", **FACTOR
     )
     wetness_softness: float = setting(
         0.0,
         "Wetness Softness",
         "Range around both limits over which plants become sparser; half of them grow at a limit. 0 for a sharp line",
         default=0.2,
-        **_FACTOR,
+        **FACTOR,
     )
 
 
@@ -98,9 +92,7 @@ class Rules(GroundLimits):
         100,
         "Plants",
         "Number of plants to place. Fewer are placed if no more fit, which the report mentions",
-        min=1,
-        soft_max=10_000,
-        max=MOST_PLANTS,
+        **within(1, 10_000, MOST_PLANTS),
     )
     by_density: bool = setting(False, "By Density", "Set the number of plants per hectare instead of in total")
     #: Plants for each square meter of the map that is wholly suitable; fewer where it is suitable in part.
@@ -111,18 +103,14 @@ class Rules(GroundLimits):
         "Min Distance",
         "Minimum distance between two trunks, measured on the map; existing plants count",
         default=2.0,
-        min=0.0,
-        soft_max=50.0,
-        **LENGTH,
+        **meters(0.0, 50.0),
     )
     slope_max: float = setting(pi / 2, "Max Slope", "Steeper ground is left out", default=radians(40.0), **_SLOPE)
     altitude_falloff: float = setting(
         0.0,
         "Altitude Falloff",
         "Distance inside both altitudes over which plants become sparser; 0 for a sharp line",
-        min=0.0,
-        soft_max=500.0,
-        **LENGTH,
+        **meters(0.0, 500.0),
     )
     #: Clockwise from +Y (north) on the map.
     aspect: float = setting(
@@ -143,19 +131,17 @@ class Rules(GroundLimits):
         0.0,
         "Edge Falloff",
         "Distance from the ground's border over which plants become sparser; 0 for none",
-        min=0.0,
-        soft_max=100.0,
-        **LENGTH,
+        **meters(0.0, 100.0),
     )
     clumping: float = setting(
         0.0,
         "Clumping",
         "0: evenly spread; 1: in clumps with bare ground between them. The number of plants stays the same while "
         "there is room",
-        **_FACTOR,
+        **FACTOR,
     )
     clump_size: float = setting(
-        20.0, "Clump Size", "Approximate distance from one clump to the next", min=0.1, soft_max=500.0, **LENGTH
+        20.0, "Clump Size", "Approximate distance from one clump to the next", **meters(0.1, 500.0)
     )
     scale_min: float = setting(
         1.0, "Min Scale", "Scale of the smallest plants; 1 is the size in the species file", default=0.8, **_SCALE
@@ -170,7 +156,7 @@ class Rules(GroundLimits):
         0.0,
         "Follow Ground",
         "0: upright, as trees grow; 1: perpendicular to the ground, as moss and grass grow",
-        **_FACTOR,
+        **FACTOR,
     )
     weights: tuple[float, ...] = (1.0,)  # relative frequency of each species
     companions: tuple[Companion, ...] = ()

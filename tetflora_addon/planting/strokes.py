@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Keys, Mask
 from ..growth.hashing import child_key, key_of_seed, uniform
-from ..setting import LENGTH, setting
+from ..setting import meters, setting
 from .plane import NO_DISTANCE, Spacing, cells_of, packed
 from .rules import species_by_weight
 
@@ -49,10 +49,7 @@ class Brush:
         5.0,
         "Radius",
         "Radius of the brush on the map. While painting, use F, [ and ], or Ctrl and the mouse wheel",
-        min=0.05,
-        soft_max=50.0,
-        max=10_000.0,
-        **LENGTH,
+        **meters(0.05, 50.0, 10_000.0),
     )
     density: float = 0.04  # plants for each square meter of the map
     strength: float = setting(
@@ -69,9 +66,7 @@ class Brush:
         "Minimum distance between two trunks, measured on the map; existing plants count, including those of fields. "
         "Large values limit the density",
         default=1.0,
-        min=0.0,
-        soft_max=50.0,
-        **LENGTH,
+        **meters(0.0, 50.0),
     )
     scale_min: float = 1.0
     scale_max: float = 1.0

@@ -14,7 +14,7 @@ from math import inf, pi, radians
 import numpy as np
 
 from ..arrays import Floats, Floats32, Integers
-from ..setting import LENGTH, setting
+from ..setting import meters, setting
 from .plane import Lines, lines_along
 from .rules import GroundLimits
 from .terrain import sampled
@@ -32,22 +32,12 @@ class Limits(GroundLimits):
     """
 
     slope_softness: float = setting(0.0, "Slope Softness", _WIDTH, default=radians(10.0), **_ANGLE)
-    altitude_softness: float = setting(
-        0.0, "Altitude Softness", _WIDTH, default=10.0, min=0.0, soft_max=500.0, **LENGTH
-    )
-    path_min: float = setting(
-        0.0, "From", "Ground nearer to the paths is not part of the biome", min=0.0, soft_max=100.0, **LENGTH
-    )
+    altitude_softness: float = setting(0.0, "Altitude Softness", _WIDTH, default=10.0, **meters(0.0, 500.0))
+    path_min: float = setting(0.0, "From", "Ground nearer to the paths is not part of the biome", **meters(0.0, 100.0))
     path_max: float = setting(
-        inf,
-        "To",
-        "Ground farther from the paths is not part of the biome",
-        default=10.0,
-        min=0.0,
-        soft_max=500.0,
-        **LENGTH,
+        inf, "To", "Ground farther from the paths is not part of the biome", default=10.0, **meters(0.0, 500.0)
     )
-    path_softness: float = setting(0.0, "Path Softness", _WIDTH, default=2.0, min=0.0, soft_max=100.0, **LENGTH)
+    path_softness: float = setting(0.0, "Path Softness", _WIDTH, default=2.0, **meters(0.0, 100.0))
 
     @property
     def open(self) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ..setting import script_setting, setting
+from ..setting import script_setting, setting, within
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,7 @@ class RefinementSettings:
         "Max Polygons",
         "Maximum number of polygons in the result, proxies included; 0 for no limit. The most visible plants get "
         "polygons first, and the rest becomes coarser proxies",
-        min=0,
-        soft_max=100_000_000,
+        **within(0, 100_000_000),
         step=100_000,
     )
     #: Gigabytes of Blender, for refinement, its result and rendering together; 0 is half of the machine's memory.
@@ -76,9 +75,7 @@ class RefinementSettings:
         "Size in pixels below which shadows of hidden plants are refined no further; 0 leaves them coarse. About 4 "
         "pixels sharpens shadows of trees behind the camera, for roughly a quarter more polygons",
         subtype='PIXEL',
-        min=0.0,
-        soft_max=16.0,
-        max=1000.0,
+        **within(0.0, 16.0, 1000.0),
     )
 
     def first_look(self) -> RefinementSettings:

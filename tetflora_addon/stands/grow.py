@@ -17,7 +17,7 @@ from ..arrays import Mask
 from ..errors import TetFloraError
 from ..jobs import Progress
 from ..parallel import blocks, on_all_cores
-from ..setting import script_setting, setting
+from ..setting import script_setting, setting, within
 from .change import MOST_PLANTS, SeedDispersal, dying, fallen, grown, planted
 from .light import LightGrid
 from .plants import DeadPlants, Plants, Records, in_order
@@ -45,22 +45,19 @@ class StandSettings:
         2500.0,
         "Planted",
         "Young plants per hectare at the beginning; 0 leaves the ground bare",
-        min=0.0,
-        soft_max=20_000.0,
+        **within(0.0, 20_000.0),
     )
     recruits: float = setting(
         300.0,
         "Seedlings",
         "Most plants that come up from seed per hectare and year; light and soil allow fewer. 0 for none",
-        min=0.0,
-        soft_max=2000.0,
+        **within(0.0, 2000.0),
     )
     outside: float = setting(
         1.0,
         "Incoming Seeds",
         "Factor on the seeds that arrive from beyond the ground; at 0, only the stand itself bears seeds",
-        min=0.0,
-        soft_max=10.0,
+        **within(0.0, 10.0),
     )
     min_height: float = script_setting(1.0, min=0.0)  # meters; lower plants are not part of the result
     cell: float = script_setting(1.0, min=0.1)  # width, meters, of the columns in which light is computed
