@@ -7,10 +7,8 @@ A leaf model lies with its base at the origin, its midrib along +y, one unit lon
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import GOLDEN_ANGLE, Floats, Floats32, Integers, Integers32, perpendicular, spiral, spread
 from ..errors import SpeciesError
+from ..files import beside
 from ..parameters import limited
 from .compounds import Compound
 from .needles import Needles
@@ -237,6 +236,6 @@ def _built_in(page: dict[str, Any]) -> LeafModel:
     return replace(leaf_model(page["vertices"], page["faces"], page.get("uv")), shape=_outline(page["outline"]))
 
 
-_PAGES: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("models.json").read_text(encoding="utf-8"))
+_PAGES: dict[str, dict[str, Any]] = beside(__file__, "models.json")
 LEAF_MODELS = {name: _built_in(page) for name, page in _PAGES.items()}
 """The built-in leaves by name."""

@@ -8,7 +8,7 @@ Rules that nothing can follow are refused, with the setting's name and what to d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import degrees, floor, inf, isfinite, log10, pi, radians, sqrt
 
 import numpy as np
@@ -170,6 +170,13 @@ def species_by_weight(weights: tuple[float, ...], draws: Floats) -> Integers32:
     return np.minimum(np.searchsorted(limits, draws, side="right"), len(weights) - 1).astype(np.int32)
 
 
+#: Fields that have to be 0 or greater, in the order in which they are looked at.
+_NOT_NEGATIVE = (
+    "density", "min_distance", "altitude_falloff", "wetness_softness", "edge_falloff", "clumping", "scale_at_top",
+    "aspect_spread",
+)  # fmt: skip
+
+
 def check_rules(rules: Rules) -> None:
     """Look through all rules.
 
@@ -210,19 +217,11 @@ def check_rules(rules: Rules) -> None:
 
 
 def _check_numbers(rules: Rules) -> None:
-    numbers = {
-        "Density": rules.density,
-        "Min Distance": rules.min_distance,
-        "Altitude Falloff": rules.altitude_falloff,
-        "Wetness Softness": rules.wetness_softness,
-        "Edge Falloff": rules.edge_falloff,
-        "Clumping": rules.clumping,
-        "Scale at Top": rules.scale_at_top,
-        "Facing Spread": rules.aspect_spread,
-    }
-    for name, value in numbers.items():
+    labels = {one.name: one.metadata.get("name", "Density") for one in fields(rules)}
+    for name in _NOT_NEGATIVE:
+        value = getattr(rules, name)
         if not isfinite(value) or value < 0.0:
-            raise SceneError(f"{name} must be 0 or greater, not {value:g}")
+            raise SceneError(f"{labels[name]} must be 0 or greater, not {value:g}")
 
 
 def _check_companion(rule: Companion, species: int) -> None:

@@ -159,7 +159,3 @@ class StandTraits:
     def diameters(self, species: NDArray, basal: NDArray) -> Floats:
         """Diameters (n,) of trunks at breast height, meters."""
         return np.maximum(basal - np.take(self.first, species), 0.0)
-
-    def masses(self, species: NDArray, basal: NDArray, height: NDArray) -> Floats:
-        """Dry mass (n,) of the wood above ground, kg."""
-        return np.take(self.mass_factor, species) * basal**2 * height
