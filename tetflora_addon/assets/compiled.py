@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Integers
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
-from ..jobs import run_to_end
 from .asset import COUNTS, Asset, AssetKites, AssetSource, Clusters, SurfaceSamples
 from .clusters import Hierarchy, hierarchy_of
 from .facet_weights import facet_weights_of
@@ -26,11 +25,6 @@ from .patches import patches_of
 
 #: Samples of a cluster with children.
 SAMPLES_ABOVE = 64
-
-
-def compile_asset(source: AssetSource) -> Asset:
-    """Compile an asset at once; errors as `compile_steps`."""
-    return run_to_end(compile_steps(source))
 
 
 def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:

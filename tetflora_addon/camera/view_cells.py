@@ -125,7 +125,10 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
     narrow = np.minimum(ACROSS * half, 1.0) if camera.kind == "PERSP" else np.ones(2)
     steps = cells.length * np.array([*narrow, 1.0])
     if around is not None and len(around.radii) and camera.kind != "ORTHO":
-        steps = _enlarged(camera.position @ frame, frame, steps, around)
+        place = camera.position @ frame
+        # Doubled as often as nothing is near the cell then. What decides is the cell, not where in it the camera is.
+        while around.leaves_clear(frame @ _middle(place, 2.0 * steps), CLEAR * np.linalg.norm(steps)):
+            steps = 2.0 * steps
     eye = frame @ _middle(camera.position @ frame, steps)
     reach = (0.5 + BEYOND) * steps
     for other in others:
@@ -139,16 +142,6 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
         return alike
     corners = [turns.frame((0.5 + BEYOND_TURN) * np.array(away)) for away in product((-1.0, 1.0), repeat=3)]
     return _standing_back(alike, np.array([frame.T @ corner for corner in corners]), reach)
-
-
-def _enlarged(place: Floats, frame: Floats, steps: Floats, around: Around) -> Floats:
-    """Sides (3,) of the cell in which a place is, doubled as often as nothing is near the cell then.
-
-    What decides is the cell, not where in it the camera is: so all of its cameras agree.
-    """
-    while around.leaves_clear(frame @ _middle(place, 2.0 * steps), CLEAR * np.linalg.norm(steps)):
-        steps = 2.0 * steps
-    return steps
 
 
 def _standing_back(camera: Camera, turned: Floats, reach: Floats) -> Camera | None:

@@ -30,8 +30,9 @@ class Company:
     def order(self, wanted: list[int]) -> list[int]:
         """Species in the order in which they are placed: those that are sought before those that seek them."""
         order, rest = [], list(wanted)
+        seeks = {(rule.species, rule.other) for _, rule in self.rules if rule.strength > 0.0}
         while rest:
-            free = [s for s in rest if not any(self._seeks(s, other) for other in rest if other != s)]
+            free = [s for s in rest if not any((s, other) in seeks for other in rest if other != s)]
             # In a circle of species that seek each other, the first of the list begins.
             order.append(free[0] if free else rest[0])
             rest.remove(order[-1])
@@ -86,9 +87,6 @@ class Company:
 
     def _standing(self, species: int) -> Floats:
         return np.concatenate(self.place[species])
-
-    def _seeks(self, species: int, other: int) -> bool:
-        return any(r.species == species and r.other == other and r.strength > 0.0 for _, r in self.rules)
 
     def _reaches(self, start: int, goal: int, seen: set[int]) -> bool:
         if start == goal:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -294,18 +293,9 @@ def _copies(model: LeafModel, step: int, number: int, transmission: float, movin
 
 def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_LeafBearers]:
     """Those of branches that bear leaves, row by row."""
-    order = np.argsort(whole.branches.row, kind="stable")
-    order = order[flora.rows["leaves"][whole.branches.row[order]].sum(axis=1) > 0]
-    for row, own in _by_row(whole.branches.row[order]):
-        yield _LeafBearers(flora, row, whole.take(order[own]))
-
-
-def _by_row(rows: Integers) -> Iterator[tuple[int, slice]]:
-    """Runs of equal numbers in a sorted array."""
-    cuts = [0, *(np.flatnonzero(np.diff(rows)) + 1), len(rows)]
-    for start, stop in pairwise(cuts):
-        if stop > start:
-            yield int(rows[start]), slice(int(start), int(stop))
+    row = whole.branches.row
+    for one in np.unique(row[flora.rows["leaves"][row].sum(axis=1) > 0]).tolist():
+        yield _LeafBearers(flora, one, whole.take(np.flatnonzero(row == one)))
 
 
 class _LeafBearers:
