@@ -104,14 +104,7 @@ def _check(settings: StandSettings) -> None:
 
 
 class GrowingStand:
-    """A stand in a year.
-
-    Attributes
-    ----------
-    plants : Plants
-        Those that live.
-    dead : DeadPlants
-    """
+    """A stand in a year: ``plants`` that live, and those that are ``dead``."""
 
     def __init__(self, site: StandSite, traits: StandTraits, settings: StandSettings) -> None:
         self.site, self.traits, self.settings = site, traits, settings
