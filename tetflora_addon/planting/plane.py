@@ -195,7 +195,12 @@ class Spacing:
     Cells are as large as the distance is on their diagonal, so two points of a cell are always too close, and points
     that are too close lie at most two cells apart.
 
-    ``distance``: meters. ``points`` (m, 2): those that stand; they may crowd cells.
+    Attributes
+    ----------
+    distance : float
+        Meters.
+    points : (m, 2) float64
+        Those that stand; they may crowd cells.
     """
 
     def __init__(self, distance: float, occupied: Floats) -> None:

@@ -95,7 +95,12 @@ class Statistics:
 
 
 class Stopwatch:
-    """Adds up wall clock by stage, in ``seconds``."""
+    """Adds up wall clock by stage.
+
+    Attributes
+    ----------
+    seconds : dict of str to float
+    """
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

@@ -51,9 +51,7 @@ class Outline:
 
 
 class AlphaBuffer:
-    """The fragments of all tetrahedra in a small image, as they come and go; ``width`` and ``height`` are its pixels.
-
-    Raises ValueError: if the occluders were drawn for a buffer of another size.
+    """The fragments of all tetrahedra in a small image, as they come and go.
 
     Parameters
     ----------
@@ -65,6 +63,16 @@ class AlphaBuffer:
         Where each pixel's ray ends at an opaque polygon, as `occluder_depth` gives it for the same size.
     pixel_weight : (height · width,) float64, optional
         Pixels of the final image that each pixel stands for, where the image is not the camera's own.
+
+    Attributes
+    ----------
+    width, height : int
+        Size of the buffer, pixels.
+
+    Raises
+    ------
+    ValueError
+        If the occluders were drawn for a buffer of another size.
     """
 
     def __init__(

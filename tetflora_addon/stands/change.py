@@ -213,7 +213,13 @@ def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: 
 
 
 class SeedDispersal:
-    """Seeds that fall on a site, and where they can become plants; ``cell`` is that of their grid, meters."""
+    """Seeds that fall on a site, and where they can become plants.
+
+    Attributes
+    ----------
+    cell : float
+        Meters of the grid on which seeds are spread.
+    """
 
     def __init__(self, site: StandSite, traits: StandTraits, suitability: Floats, most: float, outside: float) -> None:
         """Of a site, for species that grow so well on its cells.

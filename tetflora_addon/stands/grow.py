@@ -104,7 +104,14 @@ def _check(settings: StandSettings) -> None:
 
 
 class GrowingStand:
-    """A stand in a year: ``plants`` that live, and those that are ``dead``."""
+    """A stand in a year.
+
+    Attributes
+    ----------
+    plants : Plants
+        Those that live.
+    dead : DeadPlants
+    """
 
     def __init__(self, site: StandSite, traits: StandTraits, settings: StandSettings) -> None:
         self.site, self.traits, self.settings = site, traits, settings
