@@ -96,7 +96,12 @@ def allowance(max_memory: float, reserve: float = 0.0) -> float:
     Returns float: at least `LEAST`, and infinite without a limit. Of a process whose memory is not known the whole
     limit is left.
 
-    ``max_memory``: as of `limit`. ``reserve``: bytes that will be needed beside results, see `picture_bytes`.
+    Parameters
+    ----------
+    max_memory : float
+        As of `limit`.
+    reserve : float
+        Bytes that will be needed beside results, see `picture_bytes`.
     """
     left = limit(max_memory) - (resident() or 0) - reserve
     return max(left, LEAST)

@@ -34,7 +34,11 @@ def classified(positions: Floats, corner_verts: Integers, face_offsets: Integers
     neighbors: 2 r for a long tube, r for a ball, no less for rough ground, where bumps and hollows cancel. Edges of
     no, one or many faces, faces of no area and faces that touch themselves are all allowed.
 
-    They are (v, 3), (c,) and (f + 1,), as of `buffers.MeshBuffers`.
+    Parameters
+    ----------
+    positions : (v, 3) float64
+    corner_verts : (c,) int
+    face_offsets : (f + 1,) int
 
     Returns
     -------

@@ -252,8 +252,14 @@ def blur_margins(camera: Camera, center: Floats, reach: Floats) -> tuple[float, 
 
     Returns ``across``, ``up``: for each side of the image, 0 to `MOST`. Where nothing is blurred, 0.
 
-    ``camera``: with its lens and shutter. ``center`` (n, 3): middles of the plants, meters, world space. ``reach``
-    (n,): radii of spheres around them that hold the plants, meters.
+    Parameters
+    ----------
+    camera : Camera
+        With its lens and shutter.
+    center : (n, 3) float64
+        Middles of the plants, meters, world space.
+    reach : (n,) float64
+        Radii of spheres around them that hold the plants, meters.
     """
     if not len(center) or not (camera.lens_radius > 0.0 or camera.shutter):
         return 0.0, 0.0

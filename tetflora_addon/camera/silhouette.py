@@ -21,7 +21,12 @@ def silhouette_pixels(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
     Returns ``pixels`` (n,): area in pixels of what is beyond the near plane; 0 where it is not known. ``whole`` (n,):
     where it is known: tetrahedra within the window that are not beyond the far plane, as all of the view are.
 
-    ``vertices`` (n, 4, 3): world space, meters. ``camera``: its ``width`` and ``height`` are the image's.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        World space, meters.
+    camera : Camera
+        Its ``width`` and ``height`` are the image's.
     """
     local = camera.to_camera_space(vertices)
     low, high, _ = window_bounds(local, camera)
@@ -33,7 +38,10 @@ def silhouette_pixels(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
 def expected_pixels(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
     """Silhouette areas of tetrahedra on the final image, also of those that are partly in view.
 
-    ``vertices``, ``camera``: as for `silhouette_pixels`; the camera may be panoramic.
+    Parameters
+    ----------
+    vertices, camera
+        As for `silhouette_pixels`; the camera may be panoramic.
 
     Returns
     -------

@@ -111,8 +111,12 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
     None where a camera cannot share its refinement: it moves out of its cell while the shutter is open, its view is
     wider than any window, or it is a panorama of less than the whole sphere.
 
-    ``camera``: as it was read, without margins. Its shutter and other eyes should stay in the cell or next to it, see
-    `BEYOND`. ``around``: where things are; cells far from all of them are larger. None for the same cells everywhere.
+    Parameters
+    ----------
+    camera : Camera
+        As it was read, without margins. Its shutter and other eyes should stay in the cell or next to it, see `BEYOND`.
+    around : Around, optional
+        Where things are; cells far from all of them are larger. None for the same cells everywhere.
     """
     if camera.kind == "PANO" and not _is_whole_sphere(camera):
         return None

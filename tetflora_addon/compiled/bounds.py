@@ -108,8 +108,12 @@ def unit_bounds(rows: Table, raised: bool = False) -> Floats:
     Returns (r, 3): radius, lowest and highest z, in the frame of the branch's base; z is at most 0 at the bottom and at
     least 0 on top.
 
-    ``rows`` (r,) table of `rows.build_rows`. ``raised``: also if plants have crown bases (see `growth.crown_effects`),
-    so that any limb may be anywhere above where they begin.
+    Parameters
+    ----------
+    rows : (r,) table of `rows.build_rows`
+    raised : bool
+        Also if plants have crown bases (see `growth.crown_effects`), so that any limb may be anywhere above where they
+        begin.
     """
     bounds = np.zeros((len(rows), 3))
     for index in range(len(rows) - 1, -1, -1):

@@ -64,7 +64,13 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
     Returns (n, 2): factors on the scale, and on the lengths of limbs (the first column of crown shapes), which stay
     within their limits; heights are met even then.
 
-    ``height``, ``width`` (n,): meters. ``times``: how often plants are measured at most.
+    Parameters
+    ----------
+    seeds : Seeds of n
+    height, width : (n,) float64
+        Meters.
+    times : int
+        How often plants are measured at most.
     """
     out = np.ones((len(seeds), 2))
 

@@ -47,8 +47,15 @@ def placed_samples(
     Returns places (m, 3), and (m,) or None: area over that of other samples of the same sub-plant, 1 on the mean; None
     where all stand for as much.
 
-    ``points``: leaves or wood of its samples. ``owner``, ``pick`` (m,): sub-plants, and samples
-    of these. ``turn`` (m,): by how much the axes of the sub-plant are turned about the third for each.
+    Parameters
+    ----------
+    points : Points
+        Leaves or wood of its samples.
+    subplants : Branches of n
+    owner, pick : (m,) int
+        Sub-plants, and samples of these.
+    turn : (m,) float64, optional
+        By how much the axes of the sub-plant are turned about the third for each.
     """
     place, rows = gathered(points.position, pick), flora.rows
     some = shaped_subplants(rows, subplants)

@@ -74,8 +74,15 @@ def leaf_sites(
 
     Returns position (m, 3), frame (m, 3, 3) of the branch there, and fraction (m,) of its axis.
 
-    ``lines``: axes of the branches. ``row`` (m,) or (1,). ``owner`` (m,): branch of each leaf.
-    ``key`` (m,). ``t`` (m,): from `foliage.leaf_places`.
+    Parameters
+    ----------
+    branches, lines : Branches of n and their Axes
+    row : (m,) or (1,) int
+    owner : (m,) int
+        Branch of each leaf.
+    key : (m,) uint64
+    t : (m,) float64
+        From `foliage.leaf_places`.
     """
     at = axis_places(rows, branches, row, owner, t)
     position, frame = lines.at(owner, at)

@@ -218,8 +218,14 @@ def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArr
     Returns (n, 3, 3), type of frame: right-handed frames; the upper side is turned, the midrib follows by the least
     turn.
 
-    ``frame`` (n, 3, 3): leaf frames (across, along, upper side). ``light`` (n,) or (1,): 0 leaves them as they are, 1
-    makes them level. ``sky`` (3,) or (n, 3): unit vector toward the sky.
+    Parameters
+    ----------
+    frame : (n, 3, 3) float64 or float32
+        Leaf frames (across, along, upper side).
+    light : (n,) or (1,) float64
+        0 leaves them as they are, 1 makes them level.
+    sky : (3,) or (n, 3) float64
+        Unit vector toward the sky.
     """
     along, up, light, sky = _by_component(frame, light, sky)
     normal = _toward(up, light, sky, 1e-9)

@@ -42,7 +42,10 @@ def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
     Returns ``LeafModel``: triangles where parts are closed, and the faces of all others; ``error``: how far the middles
     of its edges are from the round surface, about, in units of the leaf's size.
 
-    ``times``: each makes four faces of a triangle.
+    Parameters
+    ----------
+    times : int
+        Each makes four faces of a triangle.
     """
     of_face = closed_parts(model)
     chosen = np.flatnonzero(of_face >= 0)

@@ -189,8 +189,14 @@ def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | Non
     Returns LeafModel: with the vertices that faces use, in the order given. Raises SpeciesError: no face, too many, one
     that names a vertex twice or one that is not there, coordinates out of range, no area.
 
-    ``positions`` (v, 3): vertices. ``faces``: vertex indices of each face. ``uv`` (v, 2): texture coordinates by
-    vertex; x and y of the vertices where not given.
+    Parameters
+    ----------
+    positions : (v, 3) float
+        Vertices.
+    faces : list of list of int
+        Vertex indices of each face.
+    uv : (v, 2) float, optional
+        Texture coordinates by vertex; x and y of the vertices where not given.
     """
     positions = np.asarray(positions, dtype=np.float64)
     if positions.ndim != 2 or positions.shape[1] != 3:

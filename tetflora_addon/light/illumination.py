@@ -80,8 +80,14 @@ class Illumination:
         Yields ``toward`` (m, 3): unit vectors to the lamp; ``irradiance`` (m, 3): W/m² that arrive on a surface that
         faces it, shadows included.
 
-        ``points`` (m, 3): meters. ``cells`` (m,): tetrahedron (index into the clouds) that holds each, −1 for none.
-        ``sheets`` (m,): sheet (index) on which each lies, which does not shadow it.
+        Parameters
+        ----------
+        points : (m, 3) float64
+            Meters.
+        cells : (m,) int
+            Tetrahedron (index into the clouds) that holds each, −1 for none.
+        sheets : (m,) int, optional
+            Sheet (index) on which each lies, which does not shadow it.
         """
         for lit in self.lamps:
             toward, light = arriving(lit.light, points)

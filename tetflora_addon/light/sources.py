@@ -62,7 +62,12 @@ def arriving(light: Light, points: Floats) -> tuple[Floats, Floats]:
     Returns ``toward`` (m, 3): unit vectors to the light; ``irradiance`` (m, 3): W/m² on a surface that faces the light,
     linear RGB.
 
-    ``light``: an area counts as the point in its middle, see `split_areas`. ``points`` (m, 3): meters.
+    Parameters
+    ----------
+    light : Light
+        An area counts as the point in its middle, see `split_areas`.
+    points : (m, 3) float64
+        Meters.
     """
     if light.kind == "SUN":
         return np.tile(-light.direction, (len(points), 1)), np.tile(light.color, (len(points), 1))

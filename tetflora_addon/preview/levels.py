@@ -172,8 +172,13 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
 
     Raises ValueError: if there is no such mode.
 
-    ``mode``: by how often space was divided, by visibility, by what was decided, or by the logarithm of the pixels that
-    are changed. ``deepest``: depth of the brightest color: colors stay from level to level.
+    Parameters
+    ----------
+    mode : {'LEVEL', 'VISIBILITY', 'FORM', 'CONTRIBUTION'}
+        By how often space was divided, by visibility, by what was decided, or by the logarithm of the pixels that are
+        changed.
+    deepest : int
+        Depth of the brightest color: colors stay from level to level.
     """
     if mode == "LEVEL":
         return ramp(level.depth / max(deepest, 1))

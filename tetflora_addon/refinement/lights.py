@@ -71,8 +71,14 @@ def light_views(light: Light, vertices: Floats, points: Floats, resolution: int)
 
     Returns list of Camera: empty where nothing stands between the sun and what receives its light.
 
-    ``vertices`` (n, 4, 3): tetrahedra that stand in the light, meters. ``points`` (m, 3): what receives it, meters.
-    ``resolution``: longer side of their images, pixels.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Tetrahedra that stand in the light, meters.
+    points : (m, 3) float64
+        What receives it, meters.
+    resolution : int
+        Longer side of their images, pixels.
     """
     frame = frame_toward(light.direction)
     if light.kind == "SUN":

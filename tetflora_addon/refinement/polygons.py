@@ -62,8 +62,12 @@ class Meshes:
     Raises ValueError: a position or matrix holds what is no number, or one beyond all measure; the message names the
     surface.
 
-    ``surface`` (i,): which of them each instance shows. ``matrices`` (i, 4, 4): of instances, to world space; any
-    affine map.
+    Parameters
+    ----------
+    surface : (i,) int
+        Which of them each instance shows.
+    matrices : (i, 4, 4) float64
+        Of instances, to world space; any affine map.
     """
 
     def __init__(self, surfaces: Sequence[Surface], surface: Integers, matrices: NDArray) -> None:

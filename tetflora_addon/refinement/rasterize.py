@@ -74,8 +74,12 @@ def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: 
     A tetrahedron of few pixels (`SMALL`) has its silhouette's area as coverage, divided among its fragments, and its
     mean chord V / A as thickness: Σ coverage · thickness over all pixels is its volume, per area of a pixel.
 
-    ``vertices`` (n, 4, 3): positively oriented tetrahedra, meters, world space. They may hold the eye or cross its
-    plane. ``width``, ``height``: size of the small image, pixels.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, meters, world space. They may hold the eye or cross its plane.
+    width, height : int
+        Size of the small image, pixels.
     """
 
     def drawn(block: slice) -> Fragments:

@@ -86,8 +86,12 @@ def with_age(species: Species, years: float) -> Species:
     Returns Species: of orders, short shoots and dead branches, lengths, thicknesses and numbers differ, and where they
     are.
 
-    ``species``: as described; its habit is applied. ``years``: 0, or the age at which it is as described, returns the
-    species itself.
+    Parameters
+    ----------
+    species : Species
+        As described; its habit is applied.
+    years : float
+        0, or the age at which it is as described, returns the species itself.
     """
     ages = ages_of(species)
     if years <= 0 or years == ages.full or (ages.scaled and years >= ages.full):

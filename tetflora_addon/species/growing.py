@@ -140,8 +140,12 @@ def some_nodes(ends: ArrayLike, extra: float) -> tuple[Floats, Floats, Mask]:
     Returns ``node`` (512,); ``weight`` (512,): how many children each stands for, 1 on the mean; ``extra`` (512,):
     whether they live for a while.
 
-    ``ends`` (3,): where nodes begin, where those begin that live for a while, and where all end. ``extra``: as of
-    `Nodes`.
+    Parameters
+    ----------
+    ends : (3,) float64
+        Where nodes begin, where those begin that live for a while, and where all end.
+    extra : float
+        As of `Nodes`.
     """
     base, some, tip = ends
     weight = np.array([tip - base, extra * (tip - some)])

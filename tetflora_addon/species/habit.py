@@ -31,8 +31,12 @@ def with_habit(species: Species, habit: float) -> Species:
     Returns Species: of the first orders, bare lengths, lengths, thicknesses and numbers differ, within the limits of
     the schema. A species whose form is drawn by hand, and one of a single order, keep what they have.
 
-    ``species``: as described: a plant that stands free. ``habit``: 0 returns the species itself, 1 gives the trees of a
-    dense stand.
+    Parameters
+    ----------
+    species : Species
+        As described: a plant that stands free.
+    habit : float
+        0 returns the species itself, 1 gives the trees of a dense stand.
     """
     if habit == 0 or species.skeleton is not None or len(species.orders) < 2:
         return species

@@ -49,7 +49,12 @@ def with_quality(species: Species, quality: float) -> Species:
     A pure function of its arguments without random numbers; the last few results are kept. A species whose leaf is the
     name of a Blender object is first to be given its mesh, because a leaf counts by its polygons.
 
-    ``species``: as described. ``quality``: within `species.QUALITY_LIMITS`; 1 returns the species itself.
+    Parameters
+    ----------
+    species : Species
+        As described.
+    quality : float
+        Within `species.QUALITY_LIMITS`; 1 returns the species itself.
 
     Returns
     -------

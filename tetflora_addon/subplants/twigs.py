@@ -30,8 +30,14 @@ def twig_buffers(
 
     Returns MeshBuffers or None: attributes as of `tubes.tube_buffers`; None without branches.
 
-    ``whole``: of any rows. ``wider`` (n,): how many times as wide each is: it stands for so many twigs.
-    ``parts`` (n,): quadrilaterals that ribbons consist of; 1, or without it, for triangles.
+    Parameters
+    ----------
+    whole : WholeBranches of n
+        Of any rows.
+    wider : (n,) float64, optional
+        How many times as wide each is: it stands for so many twigs.
+    parts : (n,) int64, optional
+        Quadrilaterals that ribbons consist of; 1, or without it, for triangles.
     """
     wider = np.ones(len(whole)) if wider is None else wider
     bent = np.zeros(len(whole), bool) if parts is None else parts > 1

@@ -247,7 +247,10 @@ def world_cubes(bounds: ArrayLike) -> tuple[float, NDArray[np.int64], NDArray[np
     Returns ``side``: meters, a power of two; ``low`` (3,): lowest corner, in sides; ``number`` (3,): cubes along each
     axis, 1 or 2. Raises ValueError: if the bounds are not finite.
 
-    ``bounds`` (2, 3): lowest and highest corner of what is in the scene, meters.
+    Parameters
+    ----------
+    bounds : (2, 3) float64
+        Lowest and highest corner of what is in the scene, meters.
     """
     bounds = np.asarray(bounds, np.float64)
     if not np.isfinite(bounds).all():

@@ -37,7 +37,10 @@ def longest_edge(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
 def bisect(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Cut tetrahedra in two at the midpoint of their longest edges.
 
-    ``vertices`` (n, 4, 3): positively oriented tetrahedra, meters.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, meters.
 
     Returns
     -------
@@ -120,8 +123,12 @@ def divide_in_eight(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Divide tetrahedra into eight of the same volume.
 
-    ``vertices`` (n, 4, 3): positively oriented tetrahedra, meters. ``diagonal`` (n,): which diagonal of the inner
-    octahedron to cut along; `best_diagonal` if None.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, meters.
+    diagonal : (n,) int, optional
+        Which diagonal of the inner octahedron to cut along; `best_diagonal` if None.
 
     Returns
     -------
@@ -152,7 +159,10 @@ def divide_by_shape(
     subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
     with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
 
-    ``vertices`` (n, 4, 3): positively oriented tetrahedra, meters.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, meters.
 
     Returns
     -------

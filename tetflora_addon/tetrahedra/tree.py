@@ -101,7 +101,10 @@ class TetrahedralTree:
         Returns (n, 2): the children on sides 0 and 1 of the planes; they inherit `inside`. Raises ValueError: if a node
         is not terminal, has no tetrahedron, or occurs twice.
 
-        ``nodes`` (n,): terminal nodes with a tetrahedron, each once.
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes with a tetrahedron, each once.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, halves = bisect(self._tetrahedra(nodes))
@@ -115,7 +118,10 @@ class TetrahedralTree:
         Returns (n, 8): terminals three levels further down, see `subdivision.divide_by_shape`; they inherit `inside`.
         Raises ValueError: if a node is not terminal, has no tetrahedron, or occurs twice.
 
-        ``nodes`` (n,): terminal nodes with a tetrahedron, each once.
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes with a tetrahedron, each once.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, pieces, _ = divide_by_shape(self._tetrahedra(nodes))
@@ -127,7 +133,12 @@ class TetrahedralTree:
         Returns (n, 2): the children on sides 0 and 1; they inherit `inside`. Raises ValueError: if a node is not
         terminal or occurs twice.
 
-        ``nodes`` (n,): terminal nodes, each once. ``planes`` (n, 4): cutting planes ``(nx, ny, nz, d)``, unit normals.
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes, each once.
+        planes : (n, 4) float64
+            Cutting planes ``(nx, ny, nz, d)``, unit normals.
         """
         nodes = np.asarray(nodes, np.intp)
         if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
