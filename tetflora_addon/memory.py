@@ -93,15 +93,17 @@ def picture_bytes(pixels: int, denoised: bool = False) -> int:
 def allowance(max_memory: float, reserve: float = 0.0) -> float:
     """Bytes that are left for results, in Blender and the renderer together.
 
-    Returns float: at least `LEAST`, and infinite without a limit. Of a process whose memory is not known the whole
-    limit is left.
-
     Parameters
     ----------
     max_memory : float
         As of `limit`.
     reserve : float
         Bytes that will be needed beside results, see `picture_bytes`.
+
+    Returns
+    -------
+    float
+        At least `LEAST`, and infinite without a limit. Of a process whose memory is not known the whole limit is left.
     """
     left = limit(max_memory) - (resident() or 0) - reserve
     return max(left, LEAST)

@@ -250,8 +250,6 @@ def to_eye(camera: Camera, points: Floats) -> Floats:
 def blur_margins(camera: Camera, center: Floats, reach: Floats) -> tuple[float, float]:
     """Fractions of the image's width and height by which blur reaches beyond it.
 
-    Returns ``across``, ``up``: for each side of the image, 0 to `MOST`. Where nothing is blurred, 0.
-
     Parameters
     ----------
     camera : Camera
@@ -260,6 +258,11 @@ def blur_margins(camera: Camera, center: Floats, reach: Floats) -> tuple[float, 
         Middles of the plants, meters, world space.
     reach : (n,) float64
         Radii of spheres around them that hold the plants, meters.
+
+    Returns
+    -------
+    across, up : float
+        For each side of the image, 0 to `MOST`. Where nothing is blurred, 0.
     """
     if not len(center) or not (camera.lens_radius > 0.0 or camera.shutter):
         return 0.0, 0.0

@@ -18,15 +18,19 @@ from .camera import Camera
 def silhouette_pixels(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
     """Exact silhouette areas of tetrahedra on the final image.
 
-    Returns ``pixels`` (n,): area in pixels of what is beyond the near plane; 0 where it is not known. ``whole`` (n,):
-    where it is known: tetrahedra within the window that are not beyond the far plane, as all of the view are.
-
     Parameters
     ----------
     vertices : (n, 4, 3) float64
         World space, meters.
     camera : Camera
         Its ``width`` and ``height`` are the image's.
+
+    Returns
+    -------
+    pixels : (n,) float64
+        Area in pixels of what is beyond the near plane; 0 where it is not known.
+    whole : (n,) bool
+        Where it is known: tetrahedra within the window that are not beyond the far plane, as all of the view are.
     """
     local = camera.to_camera_space(vertices)
     low, high, _ = window_bounds(local, camera)

@@ -92,9 +92,6 @@ def own_leaf_integrals(
 ) -> tuple[Floats, Floats, Floats]:
     """Means over leaves that sit evenly between two places.
 
-    Returns (n,), three times: means of (size)² / (size of old leaves inside)²; of that times the place between inside
-    and outside; and of that times the youth of leaves (`growth.foliage.youth`).
-
     Parameters
     ----------
     size_tip, size_young : (n,) float64
@@ -103,6 +100,12 @@ def own_leaf_integrals(
         Where the two places lie between inside and outside of the crown,
     along : pair of (n,) float64, optional
         and along the branch of the order; None where no leaves are young.
+
+    Returns
+    -------
+    (n,) float64, three times
+        Means of (size)² / (size of old leaves inside)²; of that times the place between inside and outside; and of that
+        times the youth of leaves (`growth.foliage.youth`).
     """
     low, high = outward
     k = size_tip - 1

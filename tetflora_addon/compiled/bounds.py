@@ -105,15 +105,18 @@ def _tilted(bound: NDArray, angle: NDArray, scale: NDArray) -> tuple[NDArray, ND
 def unit_bounds(rows: Table, raised: bool = False) -> Floats:
     """Cylinders that hold every axis of every sub-plant whose branch has unit length.
 
-    Returns (r, 3): radius, lowest and highest z, in the frame of the branch's base; z is at most 0 at the bottom and at
-    least 0 on top.
-
     Parameters
     ----------
     rows : (r,) table of `rows.build_rows`
     raised : bool
         Also if plants have crown bases (see `growth.crown_effects`), so that any limb may be anywhere above where they
         begin.
+
+    Returns
+    -------
+    (r, 3) float64
+        Radius, lowest and highest z, in the frame of the branch's base; z is at most 0 at the bottom and at least 0 on
+        top.
     """
     bounds = np.zeros((len(rows), 3))
     for index in range(len(rows) - 1, -1, -1):

@@ -61,9 +61,6 @@ def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
 def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int = 4) -> Floats:
     """Factors that give plants the heights and crown widths that were measured.
 
-    Returns (n, 2): factors on the scale, and on the lengths of limbs (the first column of crown shapes), which stay
-    within their limits; heights are met even then.
-
     Parameters
     ----------
     seeds : Seeds of n
@@ -71,6 +68,12 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
         Meters.
     times : int
         How often plants are measured at most.
+
+    Returns
+    -------
+    (n, 2) float64
+        Factors on the scale, and on the lengths of limbs (the first column of crown shapes), which stay within their
+        limits; heights are met even then.
     """
     out = np.ones((len(seeds), 2))
 

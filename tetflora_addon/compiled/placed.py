@@ -44,9 +44,6 @@ def placed_samples(
 ) -> tuple[NDArray[np.floating], Floats | None]:
     """Samples of sub-plants: places in units of their lengths and in their axes, and what each stands for.
 
-    Returns places (m, 3), and (m,) or None: area over that of other samples of the same sub-plant, 1 on the mean; None
-    where all stand for as much.
-
     Parameters
     ----------
     points : Points
@@ -56,6 +53,12 @@ def placed_samples(
         Sub-plants, and samples of these.
     turn : (m,) float64, optional
         By how much the axes of the sub-plant are turned about the third for each.
+
+    Returns
+    -------
+    (m, 3) float
+    (m,) float64 or None
+        Area over that of other samples of the same sub-plant, 1 on the mean; None where all stand for as much.
     """
     place, rows = gathered(points.position, pick), flora.rows
     some = shaped_subplants(rows, subplants)

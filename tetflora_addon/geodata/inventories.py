@@ -74,8 +74,6 @@ def read_inventory(
 ) -> Inventory:
     """Read a file.
 
-    Raises OSError (it cannot be read) or SceneError (it is broken; names line or feature, and column).
-
     Parameters
     ----------
     epsg : int
@@ -87,6 +85,13 @@ def read_inventory(
     columns : mapping, optional
         What columns hold by their titles, for those that are not to be told by title and values: one of `FIELDS`, with
         a unit if the title does not name it, such as ``height ft``; empty for none.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names line or feature, and column.
     """
     table_ = _table(path, skip, epsg=epsg)
     return _Reading(table_, units, skip, _chosen(table_, columns or {})).inventory(epsg)

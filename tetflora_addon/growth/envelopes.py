@@ -72,8 +72,6 @@ def leaf_sites(
 ) -> tuple[Floats, NDArray, Floats]:
     """Where leaves are: the middles of those in solids, the bases of others.
 
-    Returns position (m, 3), frame (m, 3, 3) of the branch there, and fraction (m,) of its axis.
-
     Parameters
     ----------
     branches, lines : Branches of n and their Axes
@@ -83,6 +81,10 @@ def leaf_sites(
     key : (m,) uint64
     t : (m,) float64
         From `foliage.leaf_places`.
+
+    Returns
+    -------
+    position (m, 3), frame (m, 3, 3) of the branch there, and fraction (m,) of its axis
     """
     at = axis_places(rows, branches, row, owner, t)
     position, frame = lines.at(owner, at)

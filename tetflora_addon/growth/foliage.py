@@ -215,9 +215,6 @@ def _leaf_frames(frame: Floats32, azimuth: Floats32, angle: Floats32) -> Floats3
 def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
     """Turn leaves to the sky, as far as their orders ask for.
 
-    Returns (n, 3, 3), type of frame: right-handed frames; the upper side is turned, the midrib follows by the least
-    turn.
-
     Parameters
     ----------
     frame : (n, 3, 3) float64 or float32
@@ -226,6 +223,11 @@ def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArr
         0 leaves them as they are, 1 makes them level.
     sky : (3,) or (n, 3) float64
         Unit vector toward the sky.
+
+    Returns
+    -------
+    (n, 3, 3), type of frame
+        Right-handed frames; the upper side is turned, the midrib follows by the least turn.
     """
     along, up, light, sky = _by_component(frame, light, sky)
     normal = _toward(up, light, sky, 1e-9)

@@ -39,13 +39,17 @@ def closed_parts(model: LeafModel) -> Integers:
 def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
     """A model whose closed parts are divided so many times, each with the area that it had.
 
-    Returns ``LeafModel``: triangles where parts are closed, and the faces of all others; ``error``: how far the middles
-    of its edges are from the round surface, about, in units of the leaf's size.
-
     Parameters
     ----------
     times : int
         Each makes four faces of a triangle.
+
+    Returns
+    -------
+    LeafModel
+        Triangles where parts are closed, and the faces of all others.
+    error : float
+        How far the middles of its edges are from the round surface, about, in units of the leaf's size.
     """
     of_face = closed_parts(model)
     chosen = np.flatnonzero(of_face >= 0)

@@ -186,9 +186,6 @@ def mean_silhouette(model: LeafModel) -> float:
 def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | None = None) -> LeafModel:
     """Build and check a leaf model.
 
-    Returns LeafModel: with the vertices that faces use, in the order given. Raises SpeciesError: no face, too many, one
-    that names a vertex twice or one that is not there, coordinates out of range, no area.
-
     Parameters
     ----------
     positions : (v, 3) float
@@ -197,6 +194,16 @@ def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | Non
         Vertex indices of each face.
     uv : (v, 2) float, optional
         Texture coordinates by vertex; x and y of the vertices where not given.
+
+    Returns
+    -------
+    LeafModel
+        With the vertices that faces use, in the order given.
+
+    Raises
+    ------
+    SpeciesError
+        No face, too many, one that names a vertex twice or one that is not there, coordinates out of range, no area.
     """
     positions = np.asarray(positions, dtype=np.float64)
     if positions.ndim != 2 or positions.shape[1] != 3:

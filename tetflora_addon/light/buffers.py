@@ -179,9 +179,6 @@ class LightBuffer:
     def transmittance(self, points: Floats, cells: Integers, own_depth: Floats) -> tuple[Floats, Mask]:
         """Fraction of the light that reaches points.
 
-        Returns ``transmittance`` (m,): 0 to 1; 1 where the point is out of view. ``seen`` (m,): whether the point is in
-        view.
-
         Parameters
         ----------
         points : (m, 3) float64
@@ -191,6 +188,13 @@ class LightBuffer:
         own_depth : (m,) float64
             Optical depth of that tetrahedron between where light enters it and the point. However coarse the pixels, no
             tetrahedron darkens itself by more, and no point is darkened by less.
+
+        Returns
+        -------
+        transmittance : (m,) float64
+            0 to 1; 1 where the point is out of view.
+        seen : (m,) bool
+            Whether the point is in view.
         """
         result, seen = np.ones(len(points)), np.zeros(len(points), bool)
         for start in range(0, len(points), POINT_BATCH):

@@ -77,9 +77,6 @@ class Illumination:
     ) -> Iterator[tuple[Floats, Floats]]:
         """Light of each lamp at points.
 
-        Yields ``toward`` (m, 3): unit vectors to the lamp; ``irradiance`` (m, 3): W/m² that arrive on a surface that
-        faces it, shadows included.
-
         Parameters
         ----------
         points : (m, 3) float64
@@ -88,6 +85,13 @@ class Illumination:
             Tetrahedron (index into the clouds) that holds each, −1 for none.
         sheets : (m,) int, optional
             Sheet (index) on which each lies, which does not shadow it.
+
+        Yields
+        ------
+        toward : (m, 3) float64
+            Unit vectors to the lamp.
+        irradiance : (m, 3) float64
+            W/m² that arrive on a surface that faces it, shadows included.
         """
         for lit in self.lamps:
             toward, light = arriving(lit.light, points)
@@ -132,8 +136,6 @@ class Illumination:
     ) -> tuple[Floats32, Floats32]:
         """Outgoing radiance of facets or leaves.
 
-        Returns ``front``, ``back`` (m, 3): linear RGB, as a pixel shows it.
-
         Parameters
         ----------
         center, normal : (m, 3) float64
@@ -150,6 +152,11 @@ class Illumination:
             As for `direct`.
         dull : (m,) float64, optional
             Part of the gloss that is lost.
+
+        Returns
+        -------
+        front, back : (m, 3) float32
+            Linear RGB, as a pixel shows it.
         """
         front, back = np.zeros((2, len(center), 3), np.float32)
         for start in range(0, len(center), _BATCH):

@@ -102,9 +102,6 @@ def reach_of(brush: Brush) -> float:
 def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, dab: int) -> tuple[Floats, Keys]:
     """Where one dab sets new plants.
 
-    Returns ``places`` (n, 2). ``keys`` (n,): one for each place; `individuals` makes plants of them. Raises ValueError:
-    `too_many` cells.
-
     Parameters
     ----------
     center : sequence of float
@@ -115,6 +112,17 @@ def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, da
         Of the stroke, see `stroke_key`.
     dab : int
         Number of the dab in its stroke.
+
+    Returns
+    -------
+    places : (n, 2) float64
+    keys : (n,) uint64
+        One for each place; `individuals` makes plants of them.
+
+    Raises
+    ------
+    ValueError
+        `too_many` cells.
     """
     if too_many(brush):
         raise ValueError(f"the brush covers more than {MOST_CELLS:,} cells; lower its radius")

@@ -170,8 +170,6 @@ def ramp(fraction: NDArray[np.floating]) -> Floats32:
 def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
     """Colors (t, 3) of a level's tetrahedra.
 
-    Raises ValueError: if there is no such mode.
-
     Parameters
     ----------
     mode : {'LEVEL', 'VISIBILITY', 'FORM', 'CONTRIBUTION'}
@@ -179,6 +177,11 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
         changed.
     deepest : int
         Depth of the brightest color: colors stay from level to level.
+
+    Raises
+    ------
+    ValueError
+        If there is no such mode.
     """
     if mode == "LEVEL":
         return ramp(level.depth / max(deepest, 1))

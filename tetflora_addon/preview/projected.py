@@ -70,8 +70,6 @@ def drawable(vertices: NDArray[np.floating], camera: Camera) -> Mask:
 def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
     """Triangles of tetrahedra as a camera sees them.
 
-    Raises ValueError: if the camera is a panorama.
-
     Parameters
     ----------
     vertices : (n, 4, 3) float64
@@ -80,6 +78,11 @@ def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
         κ ≥ 0, 1/m.
     camera : Camera
         Perspective or orthographic; panoramas have no straight edges.
+
+    Raises
+    ------
+    ValueError
+        If the camera is a panorama.
     """
     if camera.kind == "PANO":
         raise ValueError("a panorama bends the edges of tetrahedra; use a perspective or orthographic camera")

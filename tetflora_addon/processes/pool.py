@@ -85,8 +85,6 @@ def in_processes(
 ) -> Iterator[_Result]:
     """Results of ``function(shared, item)`` for items, in their order, made on all cores.
 
-    Raises Exception: whatever the function raises, where its result would come.
-
     Parameters
     ----------
     function : callable
@@ -97,6 +95,11 @@ def in_processes(
         No more are taken ahead than there are threads.
     worth : bool
         Whether this is work enough for other processes.
+
+    Raises
+    ------
+    Exception
+        Whatever the function raises, where its result would come.
     """
     if not worth or parallel.within() or not number():
         yield from (function(shared, item) for item in items)

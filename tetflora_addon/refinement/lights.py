@@ -69,8 +69,6 @@ class Light:
 def light_views(light: Light, vertices: Floats, points: Floats, resolution: int) -> list[Camera]:
     """Flat cameras through which a light sees what receives it.
 
-    Returns list of Camera: empty where nothing stands between the sun and what receives its light.
-
     Parameters
     ----------
     vertices : (n, 4, 3) float64
@@ -79,6 +77,11 @@ def light_views(light: Light, vertices: Floats, points: Floats, resolution: int)
         What receives it, meters.
     resolution : int
         Longer side of their images, pixels.
+
+    Returns
+    -------
+    list of Camera
+        Empty where nothing stands between the sun and what receives its light.
     """
     frame = frame_toward(light.direction)
     if light.kind == "SUN":

@@ -59,15 +59,17 @@ class Surface:
 class Meshes:
     """Surfaces and where their instances stand; polygons refer to its faces, triangles and instances by number.
 
-    Raises ValueError: a position or matrix holds what is no number, or one beyond all measure; the message names the
-    surface.
-
     Parameters
     ----------
     surface : (i,) int
         Which of them each instance shows.
     matrices : (i, 4, 4) float64
         Of instances, to world space; any affine map.
+
+    Raises
+    ------
+    ValueError
+        A position or matrix holds what is no number, or one beyond all measure; the message names the surface.
     """
 
     def __init__(self, surfaces: Sequence[Surface], surface: Integers, matrices: NDArray) -> None:

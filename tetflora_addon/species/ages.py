@@ -83,15 +83,17 @@ def stage(species: Species, years: float) -> str:
 def with_age(species: Species, years: float) -> Species:
     """A species as its plants are at an age.
 
-    Returns Species: of orders, short shoots and dead branches, lengths, thicknesses and numbers differ, and where they
-    are.
-
     Parameters
     ----------
     species : Species
         As described; its habit is applied.
     years : float
         0, or the age at which it is as described, returns the species itself.
+
+    Returns
+    -------
+    Species
+        Of orders, short shoots and dead branches, lengths, thicknesses and numbers differ, and where they are.
     """
     ages = ages_of(species)
     if years <= 0 or years == ages.full or (ages.scaled and years >= ages.full):

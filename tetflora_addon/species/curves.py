@@ -101,8 +101,6 @@ def nurbs_chain(
 ) -> Chains:
     """One NURBS spline, by the recursion of Cox and de Boor (de Boor 1972).
 
-    Returns Chains: the control points themselves where they are too few for the knots.
-
     Parameters
     ----------
     control : (n, 4) float64
@@ -116,6 +114,11 @@ def nurbs_chain(
     cyclic, endpoint, bezier : bool
         As Blender places its knots: around, with the ends at the outer control points, in pieces of Bezier splines. A
         spline that goes around has evenly spaced knots whatever else is asked for.
+
+    Returns
+    -------
+    Chains
+        The control points themselves where they are too few for the knots.
     """
     polygon = Chains(control, np.array([0, len(control)]), np.array([cyclic]))
     order = max(min(order, len(control)), 1)

@@ -137,15 +137,20 @@ EVEN = (np.arange(256) + 0.5) / 256
 def some_nodes(ends: ArrayLike, extra: float) -> tuple[Floats, Floats, Mask]:
     """Places of children in nodes, as many as stand for all.
 
-    Returns ``node`` (512,); ``weight`` (512,): how many children each stands for, 1 on the mean; ``extra`` (512,):
-    whether they live for a while.
-
     Parameters
     ----------
     ends : (3,) float64
         Where nodes begin, where those begin that live for a while, and where all end.
     extra : float
         As of `Nodes`.
+
+    Returns
+    -------
+    node : (512,) float64
+    weight : (512,) float64
+        How many children each stands for, 1 on the mean.
+    extra : (512,) bool
+        Whether they live for a while.
     """
     base, some, tip = ends
     weight = np.array([tip - base, extra * (tip - some)])

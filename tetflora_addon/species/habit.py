@@ -28,15 +28,18 @@ _MORE_DEAD = 4.0
 def with_habit(species: Species, habit: float) -> Species:
     """A species between its description and what becomes of it in a dense stand.
 
-    Returns Species: of the first orders, bare lengths, lengths, thicknesses and numbers differ, within the limits of
-    the schema. A species whose form is drawn by hand, and one of a single order, keep what they have.
-
     Parameters
     ----------
     species : Species
         As described: a plant that stands free.
     habit : float
         0 returns the species itself, 1 gives the trees of a dense stand.
+
+    Returns
+    -------
+    Species
+        Of the first orders, bare lengths, lengths, thicknesses and numbers differ, within the limits of the schema. A
+        species whose form is drawn by hand, and one of a single order, keep what they have.
     """
     if habit == 0 or species.skeleton is not None or len(species.orders) < 2:
         return species

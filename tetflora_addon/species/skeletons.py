@@ -102,17 +102,6 @@ def skeleton_from_edges(
 ) -> Skeleton:
     """A graph of edges made a forest.
 
-    Returns Skeleton: breadth first from the roots, without lone points; points closer than `MERGED_WITHIN` of the size
-    are one. Raises SpeciesError: no edge of any length, numbers that are not finite, a negative radius, an edge to a
-    point that is not there, or more than `MAX_POINTS` points.
-
-    The root of each connected part is an end or a fork at the origin; where there is none, the lowest end; in a part
-    without ends, the lowest point. Loops are cut where two ways from the root meet that have equally many edges.
-
-    The pipe rule (Shinozaki and others 1964; Leonardo da Vinci before them) lets cross-sections add up at forks. Here
-    drawn wood bears twigs along all of its length, so the cross-section is proportional to the wood beyond, and a
-    single stem tapers too. The largest root has 1/40 of the longest way to a tip as its radius.
-
     Parameters
     ----------
     points : (n, 3) float
@@ -125,6 +114,26 @@ def skeleton_from_edges(
         Name of the thing that they are from, for messages.
     line : (e,) int, optional
         Which stroke of the artist's, such as a spline, each edge belongs to; branches go on along it.
+
+    Returns
+    -------
+    Skeleton
+        Breadth first from the roots, without lone points; points closer than `MERGED_WITHIN` of the size are one.
+
+    Raises
+    ------
+    SpeciesError
+        No edge of any length, numbers that are not finite, a negative radius, an edge to a point that is not there, or
+        more than `MAX_POINTS` points.
+
+    Notes
+    -----
+    The root of each connected part is an end or a fork at the origin; where there is none, the lowest end; in a part
+    without ends, the lowest point. Loops are cut where two ways from the root meet that have equally many edges.
+
+    The pipe rule (Shinozaki and others 1964; Leonardo da Vinci before them) lets cross-sections add up at forks. Here
+    drawn wood bears twigs along all of its length, so the cross-section is proportional to the wood beyond, and a
+    single stem tapers too. The largest root has 1/40 of the longest way to a tip as its radius.
     """
     points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     edges = np.asarray(edges, dtype=np.int64).reshape(-1, 2)

@@ -43,15 +43,17 @@ def tube_buffers(
 ) -> MeshBuffers | None:
     """Tubes of whole branches of any rows.
 
-    Returns MeshBuffers or None: quads with ``UVMap``, ``tf_color``, ``tf_transmission`` and ``tf_girth``; None without
-    branches.
-
     Parameters
     ----------
     pixels : Pixels, optional
         How large they are; near branches are rounder then, and bent, and have feet.
     most_sides : int, optional
         Sides of a tube at most, for what is a few pixels wide.
+
+    Returns
+    -------
+    MeshBuffers or None
+        Quads with ``UVMap``, ``tf_color``, ``tf_transmission`` and ``tf_girth``; None without branches.
     """
     sorts = sorted(
         (sort for some in whole for sort in _sorts(flora, some, pixels, most_sides)), key=lambda sort: sort.sides

@@ -28,8 +28,6 @@ def twig_buffers(
 ) -> MeshBuffers | None:
     """Triangles and ribbons in the place of tubes.
 
-    Returns MeshBuffers or None: attributes as of `tubes.tube_buffers`; None without branches.
-
     Parameters
     ----------
     whole : WholeBranches of n
@@ -38,6 +36,11 @@ def twig_buffers(
         How many times as wide each is: it stands for so many twigs.
     parts : (n,) int64, optional
         Quadrilaterals that ribbons consist of; 1, or without it, for triangles.
+
+    Returns
+    -------
+    MeshBuffers or None
+        Attributes as of `tubes.tube_buffers`; None without branches.
     """
     wider = np.ones(len(whole)) if wider is None else wider
     bent = np.zeros(len(whole), bool) if parts is None else parts > 1

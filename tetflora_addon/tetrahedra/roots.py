@@ -66,10 +66,6 @@ _Piece = NDArray[np.float64] | _Cut | _View
 def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
     """Tree whose terminals are the view and the space around it.
 
-    Returns TetrahedralTree: the pyramid of a perspective view is two terminals, the box of an orthographic one six.
-    They are marked `inside`, all others are not; children inherit it. Raises ValueError: if bounds or camera are not
-    finite.
-
     Parameters
     ----------
     camera : Camera or alike
@@ -77,6 +73,17 @@ def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
         counts as part of the view.
     bounds : (2, 3) float64
         Lowest and highest corner of the world box that holds plants, polygons and lights, meters.
+
+    Returns
+    -------
+    TetrahedralTree
+        The pyramid of a perspective view is two terminals, the box of an orthographic one six. They are marked
+        `inside`, all others are not; children inherit it.
+
+    Raises
+    ------
+    ValueError
+        If bounds or camera are not finite.
     """
     bounds = np.asarray(bounds, np.float64)
     if not (np.isfinite(bounds).all() and np.isfinite(camera.position).all() and np.isfinite(camera.window).all()):
@@ -244,13 +251,24 @@ SMALLEST = 1.0
 def world_cubes(bounds: ArrayLike) -> tuple[float, NDArray[np.int64], NDArray[np.int64]]:
     """Cubes around a scene, at most two along each axis.
 
-    Returns ``side``: meters, a power of two; ``low`` (3,): lowest corner, in sides; ``number`` (3,): cubes along each
-    axis, 1 or 2. Raises ValueError: if the bounds are not finite.
-
     Parameters
     ----------
     bounds : (2, 3) float64
         Lowest and highest corner of what is in the scene, meters.
+
+    Returns
+    -------
+    side : float
+        Meters, a power of two.
+    low : (3,) int64
+        Lowest corner, in sides.
+    number : (3,) int64
+        Cubes along each axis, 1 or 2.
+
+    Raises
+    ------
+    ValueError
+        If the bounds are not finite.
     """
     bounds = np.asarray(bounds, np.float64)
     if not np.isfinite(bounds).all():
@@ -265,9 +283,6 @@ def world_cubes(bounds: ArrayLike) -> tuple[float, NDArray[np.int64], NDArray[np
 def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> TetrahedralTree:
     """Tree whose terminals are Kuhn's tetrahedra of the cubes around a scene.
 
-    Returns TetrahedralTree: no terminal is marked `inside`, as nothing of it follows a camera. Raises ValueError: if
-    the bounds are not finite.
-
     Parameters
     ----------
     bounds : (2, 3) float64
@@ -275,6 +290,16 @@ def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Tetrah
         has an order too.
     origin : (3,) float64
         Where in the world coordinates begin, whole meters: cubes are those of the world.
+
+    Returns
+    -------
+    TetrahedralTree
+        No terminal is marked `inside`, as nothing of it follows a camera.
+
+    Raises
+    ------
+    ValueError
+        If the bounds are not finite.
     """
     origin = np.asarray(origin, np.float64)
     side, low, number = world_cubes(np.asarray(bounds, np.float64) + origin)

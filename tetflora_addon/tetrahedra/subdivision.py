@@ -155,10 +155,6 @@ def divide_by_shape(
     Both ways give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on the
     bisection of compact tetrahedra.
 
-    The paper "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra in order to avoid sliver
-    subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
-    with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
-
     Parameters
     ----------
     vertices : (n, 4, 3) float64
@@ -172,6 +168,12 @@ def divide_by_shape(
         Positively oriented, of equal volume.
     eight : (n,) bool
         Which were divided into the canonical eight; the others were bisected three times along their longest edges.
+
+    Notes
+    -----
+    The paper "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra in order to avoid sliver
+    subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
+    with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
     """
     (planes, children), (other, halves) = divide_in_eight(vertices), bisect_thrice(vertices)
     handicap = np.where(quality(vertices) > COMPACT, HANDICAP, 1.0 + TIE)

@@ -98,13 +98,20 @@ class TetrahedralTree:
     def split(self, nodes: ArrayLike) -> NDArray[np.int32]:
         """Divide terminal tetrahedra by longest-edge bisection.
 
-        Returns (n, 2): the children on sides 0 and 1 of the planes; they inherit `inside`. Raises ValueError: if a node
-        is not terminal, has no tetrahedron, or occurs twice.
-
         Parameters
         ----------
         nodes : (n,) int
             Terminal nodes with a tetrahedron, each once.
+
+        Returns
+        -------
+        (n, 2) int32
+            The children on sides 0 and 1 of the planes; they inherit `inside`.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, halves = bisect(self._tetrahedra(nodes))
@@ -115,13 +122,20 @@ class TetrahedralTree:
     def split_by_shape(self, nodes: ArrayLike) -> NDArray[np.int32]:
         """Divide terminal tetrahedra into eight as suits their shape: the canonical eight, or three bisections.
 
-        Returns (n, 8): terminals three levels further down, see `subdivision.divide_by_shape`; they inherit `inside`.
-        Raises ValueError: if a node is not terminal, has no tetrahedron, or occurs twice.
-
         Parameters
         ----------
         nodes : (n,) int
             Terminal nodes with a tetrahedron, each once.
+
+        Returns
+        -------
+        (n, 8) int32
+            Terminals three levels further down, see `subdivision.divide_by_shape`; they inherit `inside`.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, pieces, _ = divide_by_shape(self._tetrahedra(nodes))
@@ -130,15 +144,22 @@ class TetrahedralTree:
     def divide(self, nodes: ArrayLike, planes: ArrayLike) -> NDArray[np.int32]:
         """Divide terminal nodes by given planes; the children have no tetrahedra until `place` gives them some.
 
-        Returns (n, 2): the children on sides 0 and 1; they inherit `inside`. Raises ValueError: if a node is not
-        terminal or occurs twice.
-
         Parameters
         ----------
         nodes : (n,) int
             Terminal nodes, each once.
         planes : (n, 4) float64
             Cutting planes ``(nx, ny, nz, d)``, unit normals.
+
+        Returns
+        -------
+        (n, 2) int32
+            The children on sides 0 and 1; they inherit `inside`.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
         if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
@@ -171,9 +192,6 @@ class TetrahedralTree:
         At every plane the eye's side comes first. Ranks are offsets in that traversal, found without walking it:
         terminals are counted from the deepest level upwards, and places handed out from the root downwards.
 
-        Returns (len,): 0 for the nearest terminal (the farthest if ``back_to_front``) and so on; −1 for inner nodes.
-        Raises ValueError: if neither an eye nor a direction is given.
-
         Parameters
         ----------
         eye : (3,) float64, optional
@@ -182,6 +200,16 @@ class TetrahedralTree:
             Common direction of parallel rays; used if ``eye`` is None.
         back_to_front : bool
             Rank from the farthest terminal instead, as the paper draws its final image.
+
+        Returns
+        -------
+        (len,) int32
+            0 for the nearest terminal (the farthest if ``back_to_front``) and so on; −1 for inner nodes.
+
+        Raises
+        ------
+        ValueError
+            If neither an eye nor a direction is given.
         """
         if eye is None and direction is None:
             raise ValueError("a visibility order requires an eye or a direction")
