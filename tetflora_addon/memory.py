@@ -76,8 +76,15 @@ def resident() -> int | None:
 def limit(max_memory: float) -> float:
     """Bytes that the whole process may take.
 
-    ``max_memory``: `RefinementSettings.max_memory`: gigabytes, or 0 for half of the machine's memory. Returned is
-    infinity where neither the artist sets a limit nor the memory of the machine is known.
+    Parameters
+    ----------
+    max_memory : float
+        `RefinementSettings.max_memory`: gigabytes, or 0 for half of the machine's memory.
+
+    Returns
+    -------
+    float
+        Infinite where neither the artist sets a limit nor the memory of the machine is known.
     """
     if max_memory > 0.0:
         return max_memory * GIGABYTE

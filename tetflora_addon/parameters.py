@@ -245,8 +245,14 @@ class FileReader:
     ) -> Declared:
         """An object of a dataclass: fields that have keys, and those that have a reader of their own.
 
-        ``data``: what `json.load` gave. ``where``: named in errors. ``readers``: for each other key, what makes the
-        value of the field of this name from the data and the key's whole name.
+        Parameters
+        ----------
+        data : object
+            What `json.load` gave.
+        where : str
+            Named in errors.
+        readers : mapping, optional
+            For each other key, what makes the value of the field of this name from the data and the key's whole name.
         """
         readers = readers or {}
         self.keys(data, where, (*keys_of(kind), *readers))

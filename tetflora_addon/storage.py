@@ -97,8 +97,17 @@ def cached(kind: str, content: str, shape: tuple[int, ...], compute: Callable[[]
 def clear(folder: Path | None = None, names: re.Pattern[str] | None = None) -> int:
     """Delete all results of this user in the folder, and nothing else that lies there; returns how many there were.
 
-    ``folder``: another one than that which is used, for files of other names. ``names``: of these. Raises
-    TetFloraError: some cannot be deleted.
+    Parameters
+    ----------
+    folder : Path, optional
+        Another one than that which is used, for files of other names.
+    names : re.Pattern, optional
+        Of these.
+
+    Raises
+    ------
+    TetFloraError
+        Some cannot be deleted.
     """
     number, folder = 0, folder or _folder
     try:
@@ -132,7 +141,12 @@ def _read(path: Path, shape: tuple[int, ...]) -> Floats | None:
 
 
 def refuse_packed(content: bytes, most: int) -> None:
-    """Refuse (ValueError) an archive of more memory than it has bytes: ours are not compressed, and say their size."""
+    """Refuse an archive that would take more memory than it has bytes: ours are not compressed, and say their size.
+
+    Raises
+    ------
+    ValueError
+    """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         for info in archive.infolist():
             if info.compress_type != zipfile.ZIP_STORED or info.file_size > most:
@@ -215,7 +229,10 @@ def memoized(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[...,
     Results are read only, for all who ask for the same get the same arrays. What nobody has asked for longest goes
     first; what is too large for the limit by itself is given, not kept, and makes nothing else go.
 
-    ``most_bytes``: that all results of the function together take.
+    Parameters
+    ----------
+    most_bytes : int
+        That all results of the function together take.
     """
 
     def decorated(function: Callable[..., Arrays]) -> Callable[..., Arrays]:

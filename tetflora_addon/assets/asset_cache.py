@@ -64,7 +64,10 @@ def keep(asset: Asset) -> None:
 def clear() -> int:
     """Delete all compiled assets of this user in the folder, and drop those in memory; returns how many files.
 
-    Raises TetFloraError: as `storage.clear`.
+    Raises
+    ------
+    TetFloraError
+        As `storage.clear`.
     """
     forget()
     used = storage.current_folder()
@@ -109,7 +112,12 @@ def _read(path: Path, digest: str) -> Asset | None:
 
 
 def _check(asset: Asset, digest: str) -> None:
-    """Refuse, by a ValueError, what is not an asset."""
+    """Refuse what is not an asset.
+
+    Raises
+    ------
+    ValueError
+    """
     for kind, rows in ((Clusters, asset.clusters), (SurfaceSamples, asset.samples), (AssetKites, asset.leaves)):
         model = kind.empty()
         for f in fields(kind):

@@ -131,8 +131,12 @@ class Camera:
     def widened(self, margin: float, margin_up: float | None = None) -> Camera:
         """The same camera with more around its image.
 
-        ``margin``: fraction of the image's width that is added on the left and on the right. ``margin_up``: fraction of
-        its height that is added below and above; as ``margin`` if it is not given.
+        Parameters
+        ----------
+        margin : float
+            Fraction of the image's width that is added on the left and on the right.
+        margin_up : float, optional
+            Fraction of its height that is added below and above; as ``margin`` if it is not given.
         """
         left, right, bottom, top = self.window
         # Whole pixels, so that the pixels of the image stay where they are.

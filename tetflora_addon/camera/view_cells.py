@@ -112,6 +112,7 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
     ----------
     camera : Camera
         As it was read, without margins. Its shutter and other eyes should stay in the cell or next to it, see `BEYOND`.
+    cells : ViewCells
     around : Around, optional
         Where things are; cells far from all of them are larger. None for the same cells everywhere.
 
@@ -253,6 +254,8 @@ def _is_whole_sphere(camera: Camera) -> bool:
 def _quaternion(frame: Floats) -> Floats:
     """Unit quaternion (w, x, y, z) of a rotation (3, 3), of either sign.
 
+    Notes
+    -----
     The eigenvector of I. Y. Bar-Itzhack, "New method for extracting the quaternion from a rotation matrix", Journal of
     Guidance, Control, and Dynamics 23 (6), 2000.
     """

@@ -53,6 +53,8 @@ def _joint_turns(row: Table) -> Floats:
 def ring_stretch(rows: Table) -> Floats:
     """Greatest distance (r,) of a tube's vertices from its axis at joints, in radii.
 
+    Notes
+    -----
     A ring at a joint lies along the means of both segments' axes, made unit vectors. These need not be at right angles:
     between frames that a rotation by c separates, the cosine of their angle is at most (1 - cos c) / (3 + cos c),
     where the rotation's axis lies half way between them. A circle becomes an ellipse with the half axis √(1 + cosine).
@@ -139,8 +141,13 @@ def limb_reaches(rows: Table, bounds: Floats) -> Floats:
 def leaf_reaches(rows: Table, bounds: Floats, model_reach: Floats) -> Floats:
     """How far leaves and short shoots stick out beyond the axes of sub-plants at plant scale 1, meters.
 
-    ``rows`` (r,) table. ``bounds`` (r, 3): of `unit_bounds`. ``model_reach`` (r,): distance of the farthest vertex from
-    the base of the leaf that each row bears, for a leaf of size 1.
+    Parameters
+    ----------
+    rows : (r,) table
+    bounds : (r, 3) float64
+        Of `unit_bounds`.
+    model_reach : (r,) float64
+        Distance of the farthest vertex from the base of the leaf that each row bears, for a leaf of size 1.
     """
     reach, widest = own_leaf_reaches(rows, model_reach), widest_radii(rows)
     for index in range(len(rows) - 1, -1, -1):

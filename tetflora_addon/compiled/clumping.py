@@ -97,8 +97,8 @@ def fit_clumping(
     area : (r, r) float64
         Expected optical area of a sub-plant by the row that contributes it.
     polygons, width, length : (r,) float64
-        Expected faces of a sub-plant, width of its leaves (0 without) and length of its branch, meters at plant scale
-        1.
+        Expected faces of a sub-plant, width of its leaves (0 without) and length of its branch, meters at plant
+        scale 1.
     """
     root, density, own = np.zeros((3, len(rows)))
     usual = np.where(length > 0, length, 1.0)
@@ -248,8 +248,14 @@ _PLACES = {"species", "next", "drawn_rows", "sunlit", "dead"}
 def fingerprint(rows: Table, forms: Sequence[Sequence[LeafModel]], method: int) -> str:
     """Hash of a species' parameters and the forms of its leaves: 16 hexadecimal digits.
 
-    ``rows`` (r,): of this species alone. ``forms``: models of leaves. ``method``: counts the ways in
-    which results were found so far.
+    Parameters
+    ----------
+    rows : (r,) parameter table
+        Of this species alone.
+    forms : by kind
+        Models of leaves.
+    method : int
+        Counts the ways in which results were found so far.
     """
     content = hashlib.sha256(f"{method}".encode())
     for name in sorted(set(rows.dtype.names) - _PLACES):

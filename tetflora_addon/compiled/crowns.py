@@ -93,7 +93,10 @@ def known_crown(species: Species) -> Crown | None:
 def crown_of(species: Species) -> Crown:
     """The mean crown of a species; its samples are drawn at the first time, which takes some hundredths of a second.
 
-    Raises SpeciesError: a leaf is still the name of a Blender object.
+    Raises
+    ------
+    SpeciesError
+        A leaf is still the name of a Blender object.
     """
     found = _known.get(species)
     if found is None:
@@ -106,7 +109,10 @@ def crown_of(species: Species) -> Crown:
 def prepare(species: Species) -> None:
     """Find the mean crown of a species, and how finely its leaves may be drawn: what an estimate may have to wait for.
 
-    Raises SpeciesError: as `crown_of`.
+    Raises
+    ------
+    SpeciesError
+        As `crown_of`.
     """
     for form in crown_of(species).forms:
         if form is not None:

@@ -145,7 +145,15 @@ def totals_of_day(
 ) -> tuple[Table, DayTotals] | None:
     """Rows on a day, and totals of their sub-plants; None where no plant is other than in summer.
 
-    ``rows`` (r,) parameter table. ``totals``: of the same rows. ``leaf``: likewise.
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    species : sequence of Species
+    season : seasons.Season
+    totals : Averages
+        Of the same rows.
+    leaf : RowLeaves
+        Likewise.
     """
     if all(one.year is None for one in species):
         return None

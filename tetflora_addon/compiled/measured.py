@@ -47,7 +47,10 @@ _known: WeakKeyDictionary[Flora, dict[int, TwigReach]] = WeakKeyDictionary()
 def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
     """Heights of plants, to the highest leaf or wood, and means of the extents of their crowns to east and north.
 
-    Returns ``height``, ``width`` (n,): meters, about as plants are when all of them has grown.
+    Returns
+    -------
+    height, width : (n,) float64
+        Meters, about as plants are when all of them has grown.
     """
     height, width = np.zeros((2, len(seeds)))
 
@@ -63,6 +66,7 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
 
     Parameters
     ----------
+    flora : Flora
     seeds : Seeds of n
     height, width : (n,) float64
         Meters.

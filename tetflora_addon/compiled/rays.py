@@ -40,8 +40,17 @@ def basis(direction: Floats) -> tuple[Floats, Floats]:
 def covered(corners: Floats, first: Integers, number: Integers) -> tuple[Integers, Integers]:
     """Points of whole coordinates that flat polygons cover, by the even-odd rule.
 
-    ``corners`` (c, 2): polygon after polygon, each in order. ``first``, ``number`` (f,): first corner of each polygon,
-    and how many it has. Returns ``polygon`` (m,); ``point`` (m, 2).
+    Parameters
+    ----------
+    corners : (c, 2) float64
+        Polygon after polygon, each in order.
+    first, number : (f,) int
+        First corner of each polygon, and how many it has.
+
+    Returns
+    -------
+    polygon : (m,) int
+    point : (m, 2) int64
     """
     if len(first) == 0:
         return np.zeros(0, np.intp), np.zeros((0, 2), np.int64)
@@ -78,8 +87,20 @@ def cell_numbers(points: Sequence[Floats], shape: Integers) -> Integers:
 def path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[Integers, Integers, Floats]:
     """Ways of parallel rays through the tetrahedra of a lattice.
 
-    ``origin`` (n, 3): in units of the lattice's cubes. ``direction`` (3,): unit vector. ``shape`` (3,): cubes along
-    each axis. Returns ``ray``, ``cell`` (m,); ``length`` (m,): in the same units.
+    Parameters
+    ----------
+    origin : (n, 3) float64
+        In units of the lattice's cubes.
+    direction : (3,) float64
+        Unit vector.
+    shape : (3,) int64
+        Cubes along each axis.
+
+    Returns
+    -------
+    ray, cell : (m,) int64
+    length : (m,) float64
+        In the same units.
     """
     steep = np.where(np.abs(direction) < 1e-9, 1e-9, direction)
     ends = np.sort(np.stack([-origin / steep, (shape - origin) / steep]), axis=0)
@@ -241,6 +262,7 @@ def elements_of(
 
     Parameters
     ----------
+    rows : parameter table
     forms : by kind
         Models of leaves of the species.
     subplants : Branches of one species

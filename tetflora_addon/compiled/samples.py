@@ -77,8 +77,13 @@ class Samples:
 def draw_samples(rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats) -> Samples:
     """Sample every row.
 
-    ``rows`` (r,) parameter table. ``leaf_area``, ``wood_area`` (r, r): expected area in a sub-plant by the row that
-    contributes it. ``length`` (r,): typical length of a branch, meters.
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    leaf_area, wood_area : (r, r) float64
+        Expected area in a sub-plant by the row that contributes it.
+    length : (r,) float64
+        Typical length of a branch, meters.
     """
     leaves, wood = [], []
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
@@ -375,6 +380,7 @@ def limbs_of(
 
     Parameters
     ----------
+    rows : parameter table
     first, i : int
         First row of the species, and the row that is sampled, counted from there.
     number : (k, s) int

@@ -87,7 +87,13 @@ def _over(own: Floats, plain: Floats) -> Floats:
 def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTotals:
     """Totals of all rows.
 
-    ``rows`` (r,) parameter table. ``totals``: of plants as described. ``polygons`` (r,): faces of a leaf of each row.
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    totals : Averages
+        Of plants as described.
+    polygons : (r,) float64
+        Faces of a leaf of each row.
     """
     every = np.arange(len(rows))
     bearing = (rows["next"][:, (LATERAL, DEAD, FORK)] >= 0).any(axis=1)

@@ -52,7 +52,12 @@ _PALETTE = 3
 def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
     """Read a GeoTIFF, or a TIFF with a world file; yields progress.
 
-    Raises OSError (it cannot be read) or SceneError (it is broken, or of a kind that cannot be used; names the tag).
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken, or of a kind that cannot be used; names the tag.
     """
     check_regular(path)
     with path.open("rb") as file:
@@ -79,7 +84,10 @@ def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
 def place_of_image(path: Path) -> Raster:
     """Where the pixels of an image lie, as a raster of one value: a TIFF by its tags, others by world files.
 
-    Raises OSError or SceneError, as `read_tiff`.
+    Raises
+    ------
+    OSError, SceneError
+        As `read_tiff`.
     """
     check_regular(path)
     if path.suffix.lower() not in (".tif", ".tiff"):

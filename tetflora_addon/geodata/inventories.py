@@ -100,7 +100,12 @@ def read_inventory(
 def preview(path: Path) -> list[Column]:
     """Columns of a file as they are taken from its first rows.
 
-    Raises OSError (it cannot be read) or SceneError (it is broken).
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken.
     """
     table_ = _table(path, True, _PREVIEWED, PLAIN)
     taken = taken_for(table_, {})

@@ -41,8 +41,17 @@ _Feature = dict[str, Any]
 def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
     """Features of a file, of which each is an object with a geometry, and their system.
 
-    ``chosen``: as of `chosen_system`. Raises OSError (it cannot be read) or SceneError (it is broken; names the
-    feature).
+    Parameters
+    ----------
+    chosen : int
+        As of `chosen_system`.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the feature.
     """
     name = path.name
     if path.suffix.lower() in (".shp", ".gpkg"):
@@ -87,7 +96,10 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
 def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]:
     """Points, lines and areas of a geometry: type and coordinates of each, as GeoJSON has them.
 
-    Raises SceneError: it is no geometry of GeoJSON; ``where`` begins the message.
+    Raises
+    ------
+    SceneError
+        It is no geometry of GeoJSON; ``where`` begins the message.
     """
     kind = geometry["type"] if geometry else "Point"
     parts = [geometry] if geometry else []
@@ -108,7 +120,10 @@ def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]
 def list_of(value: Any, where: str) -> list[Any]:
     """Coordinates that are a list.
 
-    Raises SceneError: they are none; ``where`` begins the message.
+    Raises
+    ------
+    SceneError
+        They are none; ``where`` begins the message.
     """
     if not isinstance(value, list):
         raise SceneError(f"{where}: its coordinates are {quoted(value)}, not a list; correct them")

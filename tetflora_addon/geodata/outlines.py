@@ -64,8 +64,19 @@ class MapFeature:
 def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFeature], System, list[str]]:
     """Read areas and lines of a file, and what is to be told of it; points are left out.
 
-    ``epsg``: as of `chosen_system`. ``kind``: what all are taken for; empty to tell them by their keys. Raises OSError
-    (it cannot be read) or SceneError (it is broken, or has no outlines; names the feature).
+    Parameters
+    ----------
+    epsg : int
+        As of `chosen_system`.
+    kind : str
+        What all are taken for; empty to tell them by their keys.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken, or has no outlines; names the feature.
     """
     features, system = read_features(path, epsg)
     found: list[MapFeature] = []

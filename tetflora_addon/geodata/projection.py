@@ -393,7 +393,10 @@ def known_systems() -> dict[int, Definition]:
 def system_of(epsg: int, what: str = "") -> System:
     """The system of an EPSG code, if it is known here.
 
-    Raises SceneError: it is none of those that are known here; says what to do.
+    Raises
+    ------
+    SceneError
+        It is none of those that are known here; says what to do.
     """
     if epsg in known_systems():
         return System(epsg)
@@ -467,7 +470,10 @@ class MapOrigin:
     def local(self, points: Floats, system: System, what: str) -> Floats:
         """Meters from the origin, (n, 2), of points (n, 2) of a system.
 
-        Raises SceneError: nobody can tell where they lie, or they are too far away; ``what`` begins the message.
+        Raises
+        ------
+        SceneError
+            Nobody can tell where they lie, or they are too far away; ``what`` begins the message.
         """
         local = self.offsets(points, system, what)
         far = np.abs(local).max(initial=0.0)
@@ -482,7 +488,10 @@ class MapOrigin:
     def offsets(self, points: Floats, system: System, what: str) -> Floats:
         """Meters from the origin, (n, 2), of points (n, 2) of a system, however far.
 
-        Raises SceneError: nobody can tell where they lie; ``what`` begins the message.
+        Raises
+        ------
+        SceneError
+            Nobody can tell where they lie; ``what`` begins the message.
         """
         if (system.epsg == 0) != (self.system.epsg == 0):
             known, other = ("the scene", "the file") if system.epsg == 0 else ("the file", "the scene")
@@ -500,7 +509,10 @@ MOST_AWAY = 250_000.0
 def place_about(system: System, low: Floats, high: Floats, what: str = "") -> MapOrigin:
     """The place for a scene whose first data lie between two corners, (2,) each; in whole meters.
 
-    Raises SceneError: they are no places on Earth.
+    Raises
+    ------
+    SceneError
+        They are no places on Earth.
     """
     middle = (np.asarray(low, np.float64) + high) / 2.0
     if system.metric or system.epsg == 0:

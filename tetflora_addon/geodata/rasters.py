@@ -111,7 +111,12 @@ def upright(dx: float, dy: float) -> tuple[Floats, Floats]:
 def check_regular(path: Path) -> None:
     """Refuse folders, links, pipes and devices.
 
-    Raises OSError (there is nothing, or it cannot be looked at) or SceneError (it is one of these).
+    Raises
+    ------
+    OSError
+        There is nothing, or it cannot be looked at.
+    SceneError
+        It is one of these.
     """
     if not is_regular(path):
         with suppress(ValueError):  # a zero in its name
@@ -122,7 +127,10 @@ def check_regular(path: Path) -> None:
 def in_degrees(raster: Raster, what: str) -> Raster:
     """A raster of which no file tells the system; its cells may be so small that they are degrees.
 
-    Raises SceneError: nobody can tell; ``what`` begins the message.
+    Raises
+    ------
+    SceneError
+        Nobody can tell; ``what`` begins the message.
     """
     if raster.system != System() or not may_be_degrees(raster.outline):
         return raster
@@ -143,7 +151,10 @@ _DEGREES, _UNCLEAR = 0.003, 0.1  # cells: no ground is as fine in meters, or as 
 def checked_size(width: int, height: int, what: str) -> None:
     """Refuse rasters that are too large, or have no cells.
 
-    ``what`` begins the message of the SceneError.
+    Raises
+    ------
+    SceneError
+        ``what`` begins the message.
     """
     if min(width, height) < 2 or max(width, height) > MAX_SIDE or width * height > MAX_CELLS:
         raise SceneError(
@@ -155,7 +166,12 @@ def checked_size(width: int, height: int, what: str) -> None:
 def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
     """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system.
 
-    Raises OSError (it cannot be read) or SceneError (it is broken; names the line).
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line.
     """
     content = read_whole(path, MAX_TEXT)
     name, header, start = path.name, {}, 0
@@ -278,7 +294,12 @@ def system_beside(path: Path) -> System:
 def world_file(path: Path) -> list[Floats]:
     """Middle of the first cell, and steps along and down, of the world file of an image.
 
-    Raises OSError (it cannot be read) or SceneError (there is none, or it is broken; names the line).
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        There is none, or it is broken; names the line.
     """
     ending = path.suffix.lower()
     endings = f"{ending[:2]}{ending[-1:]}w", f"{ending}w", ".wld"

@@ -58,8 +58,19 @@ class Table:
 def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
     """Read separated values; the first line names the columns, or the second after one such as ``sep=;``.
 
-    ``skip``: leave out rows with other numbers of values than the first line. ``most``: rows at most, for a preview.
-    Raises OSError (it cannot be read) or SceneError (it is broken; names the line).
+    Parameters
+    ----------
+    skip : bool
+        Leave out rows with other numbers of values than the first line.
+    most : int, optional
+        Rows at most, for a preview.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line.
     """
     content = read_whole(path, MAX_BYTES)
     name = path.name
@@ -109,8 +120,19 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
 def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen: int = 0) -> Table:
     """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count.
 
-    ``most``: features at most, for a preview. ``chosen``: as of `read_features`. Raises OSError (it cannot be read) or
-    SceneError (it is broken; names the feature).
+    Parameters
+    ----------
+    most : int, optional
+        Features at most, for a preview.
+    chosen : int
+        As of `read_features`.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the feature.
     """
     features, system = read_features(path, chosen)
     name, without = path.name, 0
@@ -159,7 +181,10 @@ def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
 def coordinates(values: Any, where: str, texts: bool = False) -> Floats:
     """Positions of GeoJSON as (n, 2); heights do not count, and numbers may be texts if asked for.
 
-    Raises SceneError: they are no positions; ``where`` begins the message.
+    Raises
+    ------
+    SceneError
+        They are no positions; ``where`` begins the message.
     """
     try:
         points = np.array([(x, y) for x, y, *_ in values], np.float64).reshape(-1, 2)
@@ -212,7 +237,10 @@ class Quantity(NamedTuple):
 def cell_of(text: str, points: bool = False) -> Quantity:
     """What a cell says.
 
-    ``points``: other cells have decimal points, so that a comma before three digits parts thousands.
+    Parameters
+    ----------
+    points : bool
+        Other cells have decimal points, so that a comma before three digits parts thousands.
     """
     text = text.strip().lower().strip("*").strip()
     if text in _MISSING:
@@ -294,8 +322,12 @@ _WELL_KNOWN = re.compile(
 def place_in(text: str) -> tuple[float, float, int]:
     """A place in one cell: both numbers, nan for none, and how it says it.
 
-    Returns ``x``, ``y``: the middle of what is larger than a point. ``way``: -1 for two plain numbers, whose order
-    nobody tells; else the EPSG code that stands there, or 0.
+    Returns
+    -------
+    x, y : float
+        The middle of what is larger than a point.
+    way : int
+        -1 for two plain numbers, whose order nobody tells; else the EPSG code that stands there, or 0.
     """
     plain = _PAIR.fullmatch(text.strip()) or re.search(r"\((-?\d+\.\d+), *(-?\d+\.\d+)\)\s*$", text)  # below an address
     if plain is not None:
@@ -331,7 +363,10 @@ def _positions(values: object) -> list[list[float]]:
 def middle_of(points: Sequence[Sequence[float]]) -> tuple[float, float]:
     """The centroid of a ring (n, 2), or the mean of less than three points.
 
-    Raises ValueError: they are no points.
+    Raises
+    ------
+    ValueError
+        They are no points.
     """
     ring = np.array([(x, y) for x, y, *_ in points], np.float64).reshape(-1, 2)
     if not np.isfinite(ring).all() or not len(ring):

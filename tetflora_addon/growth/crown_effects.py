@@ -33,7 +33,14 @@ _STEMS = 2.0
 def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> tuple[Floats32, Floats]:
     """The column ``crown`` (n, 5) of trunks, and factors (n,) on their radii.
 
-    ``row`` (n,). ``frame`` (n, 3, 3): of the trunks. ``forms`` (n, 5): crown shapes.
+    Parameters
+    ----------
+    rows : parameter table
+    row : (n,) int
+    frame : (n, 3, 3) float64
+        Of the trunks.
+    forms : (n, 5) float64
+        Crown shapes.
     """
     own = np.where((rows["phantom"][row] | (rows["envelope"][row] > 0))[:, None], PLAIN, forms)
     own[are_stools(rows, row), BASE] = 0.0
@@ -115,7 +122,10 @@ def limb_count_factors(rows: Table, row: Integers, base: ArrayLike) -> Floats:
 def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> tuple[Floats, Floats]:
     """What the form makes of children of a sort that leave parents (m,) at azimuths (m,).
 
-    Returns ``lean``, ``length`` (m,): factors on their angle with the parent, and on their length.
+    Returns
+    -------
+    lean, length : (m,) float64
+        Factors on their angle with the parent, and on their length.
     """
     trunk, one = rows["order"][parent.row] == 0, np.ones(len(parent))
     light = parent.crown[:, LIGHT].astype(np.float64)
@@ -133,8 +143,14 @@ def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> 
 def handed_on(parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, angle: Floats) -> Floats32:
     """The column ``crown`` (m, 5) of children of a sort.
 
-    ``parent``: of each child. ``length`` (m,): factors on the lengths of the children. ``azimuth``, ``angle`` (m,):
-    by which they are turned, see `growth.turned`.
+    Parameters
+    ----------
+    parent : Branches of m
+    sort : int
+    length : (m,) float64
+        Factors on the lengths of the children.
+    azimuth, angle : (m,) float64
+        By which they are turned, see `growth.turned`.
     """
     out = np.zeros((COLUMNS, len(parent)), np.float32)
     out[WIDTH] = length

@@ -40,7 +40,10 @@ class DrawnLines:
 def drawn_lines(branches: DrawnBranches) -> DrawnLines:
     """Drawn branches with even segments, as many as they have themselves, at most `MAX_SEGMENTS`.
 
-    Raises SpeciesError: more than `MAX_DRAWN` branches.
+    Raises
+    ------
+    SpeciesError
+        More than `MAX_DRAWN` branches.
     """
     number = len(branches)
     if number > MAX_DRAWN:

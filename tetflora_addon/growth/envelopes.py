@@ -74,6 +74,7 @@ def leaf_sites(
 
     Parameters
     ----------
+    rows : parameter table
     branches, lines : Branches of n and their Axes
     row : (m,) or (1,) int
     owner : (m,) int
@@ -116,8 +117,13 @@ def inclinations(kind: Integers, number: Floats) -> Floats:
 def inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
     """Frames (m, 3, 3) of leaves that stand by a distribution, all around their branch and turned in their own plane.
 
-    ``frame`` (m, 3, 3): of the branch where each leaf is. ``kind`` (m,) or (1,) int: index into `LEAF_INCLINATIONS`.
-    ``key`` (m,).
+    Parameters
+    ----------
+    frame : (m, 3, 3) float32
+        Of the branch where each leaf is.
+    kind : (m,) or (1,) int
+        Index into `LEAF_INCLINATIONS`.
+    key : (m,) uint64
     """
     angle = inclinations(kind, uniform(key, Draw.LEAF_INCLINATION))
     angle = np.where(uniform(key, Draw.LEAF_SIDE) < 0.5, angle, np.pi - angle)

@@ -122,6 +122,7 @@ def place_leaves(
 
     Parameters
     ----------
+    rows : parameter table
     branches, lines : Branches of n and their Axes
         Fastest where all are of one row, because parameters are then the same for all.
     owner, index : (m,) int
@@ -163,6 +164,7 @@ def leaf_frames(
 
     Parameters
     ----------
+    rows : parameter table
     row : (m,) or (1,) int
     frame : (m, 3, 3) float32
         Of the branch where each leaf sits.
@@ -246,7 +248,12 @@ def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArr
 def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
     """Leaf frames as they are in the end: turned to the light, then hanging, as far as their orders ask for.
 
-    ``row`` (n,) or (1,) int. ``frame``, ``light``, ``sky``: as for `face_light`.
+    Parameters
+    ----------
+    rows : parameter table
+    row : (n,) or (1,) int
+    frame, light, sky
+        As for `face_light`.
     """
     frame = face_light(frame, light, sky)
     droop = rows["leaf_droop"][row]

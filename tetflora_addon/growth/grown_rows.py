@@ -40,6 +40,7 @@ def grow_children(
     ----------
     row : record of `rows.ROW_DTYPE`
         Its count is that of the whole axis, of which it is one part.
+    sort : int
     nodes : Nodes
         Of the whole axis.
     start : pair of float
@@ -118,8 +119,14 @@ def spread_children(
     ``bare`` and ``dead`` are as in `living`; ``among`` (2,) is where the row's children begin and end among those of
     the order's branch, by a crown shape.
 
-    Returns ``t``, ``fraction`` (512,): where they are on the branch, and among those of the order's branch. ``weight``
-    (512,): how many each stands for; 1 on the mean. ``fading`` (512,): factor on their lengths.
+    Returns
+    -------
+    t, fraction : (512,) float64
+        Where they are on the branch, and among those of the order's branch.
+    weight : (512,) float64
+        How many each stands for; 1 on the mean.
+    fading : (512,) float64
+        Factor on their lengths.
     """
     own, number = row["growing"][sort], row["count"][sort, 0]
     law = NodeLaw(own[BEGIN], own[END], own[POWER], own[WHOLE] * number, own[BELOW] * number)
@@ -223,6 +230,7 @@ def grown_nodes(
 
     Parameters
     ----------
+    rows : parameter table
     branches : Branches of n
     sort, path : int
         Of children, and where their child indices begin.

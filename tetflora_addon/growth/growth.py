@@ -189,6 +189,7 @@ def chosen_children(
 
     Parameters
     ----------
+    rows : parameter table
     parents : Branches of n
     lines : Axes of the same n
     owner : (m,) int
@@ -314,8 +315,13 @@ class WholeBranches(Arrays):
     def knots(self, rows: Table) -> tuple[Integers, Floats, Floats]:
         """Where segments begin and end; a flared base has some more.
 
-        Returns ``owner`` (m,): branch of each place, in order; those of a branch from base to tip. ``t`` (m,): fraction
-        of its axis. ``position`` (m, 3).
+        Returns
+        -------
+        owner : (m,) int64
+            Branch of each place, in order; those of a branch from base to tip.
+        t : (m,) float64
+            Fraction of its axis.
+        position : (m, 3) float64
         """
         rings = rows["rings"][self.branches.row]
         owner, index = spread(self.lines.segments + rings + 1)

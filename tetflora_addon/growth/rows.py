@@ -355,8 +355,21 @@ def _exact(some: Order | Dead) -> Order | Dead:
 def ranged(rows: Table, name: str, row: Integers, key: Keys, draw: int) -> NDArray:
     """Value of one parameter for each branch: mean + variation × a signed random number of its key.
 
-    ``name``: a range of `ROW_DTYPE`. ``row`` (n,): or (1,), which stands for all. ``key`` (n,). ``draw``: see
-    `hashing.Draw`. Returns (n,), or (1,) where it is the same for all of one row.
+    Parameters
+    ----------
+    rows : table of `build_rows`
+    name : str
+        A range of `ROW_DTYPE`.
+    row : (n,) int
+        Or (1,), which stands for all.
+    key : (n,) uint64
+    draw : int
+        See `hashing.Draw`.
+
+    Returns
+    -------
+    (n,) float64
+        Or (1,) where it is the same for all of one row.
     """
     return varied(rows[name][row], key, draw)
 

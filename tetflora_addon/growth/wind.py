@@ -74,7 +74,10 @@ sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency,
 class Wind:
     """A wind at a moment. Fields with a label are properties of a scene, and documented by their tooltips.
 
-    Raises TetFloraError: a number that is none, a negative speed or loop, or gusts outside 0 to 1.
+    Raises
+    ------
+    TetFloraError
+        A number that is none, a negative speed or loop, or gusts outside 0 to 1.
     """
 
     speed: float = setting(
@@ -170,7 +173,12 @@ def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:
     For plants drawn by hand ``branches`` are the whole plants: where they stand, and which way is up; what comes out is
     for each meter of height at scale 1.
 
-    ``ahead``: seconds after the moment of the rows.
+    Parameters
+    ----------
+    rows : parameter table in the wind
+    branches : Branches of n
+    ahead : float
+        Seconds after the moment of the rows.
     """
     row, air = branches.row, rows["air"][0]
     drawn = rows["drawn"][row]
@@ -250,8 +258,18 @@ def rotation_vectors(turn: Floats) -> Floats:
 def leaned(points: Floats, up: Floats, turn: Floats) -> Floats:
     """Points of plants drawn by hand, bent over: all at one height turn alike, so that nothing comes apart.
 
-    ``points`` (n, k, 3): from where the plants stand. ``up`` (n, 3): unit vectors along the plants' upright axes.
-    ``turn`` (n, 3): rotation vector across ``up`` for each meter of height. Returns (n, k, 3).
+    Parameters
+    ----------
+    points : (n, k, 3) float64
+        From where the plants stand.
+    up : (n, 3) float64
+        Unit vectors along the plants' upright axes.
+    turn : (n, 3) float64
+        Rotation vector across ``up`` for each meter of height.
+
+    Returns
+    -------
+    (n, k, 3) float64
     """
     height = np.einsum("nki,ni->nk", points, up)
     axis, rate = axis_and_angle(turn)
@@ -275,6 +293,7 @@ def fluttered(rows: Table, row: Integers, frame: Floats32, key: Keys, gust: Floa
 
     Parameters
     ----------
+    rows : parameter table in the wind
     row : (n,) or (1,) int
     frame : (n, 3, 3) float32
         Across, along the midrib, upper side.

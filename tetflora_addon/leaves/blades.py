@@ -42,7 +42,10 @@ def outline(blade: Blade, tolerance: float = FINEST) -> Floats:
 def check_outline(blade: Blade) -> None:
     """Refuse outlines that cross themselves.
 
-    A SpeciesError names what may be changed.
+    Raises
+    ------
+    SpeciesError
+        Names what may be changed.
     """
     if crossings(outline(blade, 0.002)):
         raise SpeciesError(
@@ -68,7 +71,13 @@ def crossings(points: Floats) -> int:
 def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSurface:
     """A blade as polygons, in units of the whole leaf's length.
 
-    ``tolerance``: of the outline, in lengths of the blade. ``amount``: how much its variants differ, 0 to 1.
+    Parameters
+    ----------
+    blade : Blade
+    tolerance : float
+        Of the outline, in lengths of the blade.
+    amount : float
+        How much its variants differ, 0 to 1.
     """
     step = _STEP * np.sqrt(tolerance)
     rows = max(int(np.ceil(1.0 / step)), 1)

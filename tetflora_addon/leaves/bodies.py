@@ -41,6 +41,7 @@ def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
 
     Parameters
     ----------
+    model : LeafModel
     times : int
         Each makes four faces of a triangle.
 
@@ -165,8 +166,19 @@ _BARE = 0.08
 def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel, Floats32]:
     """A model with spines on it.
 
-    ``part`` (f,): its `bodies.closed_parts`, on which spines stand. Returns ``LeafModel``: spines and areoles come
-    after its own faces; ``tint`` (f, 3): what the color of the leaf is times that of each face.
+    Parameters
+    ----------
+    model : LeafModel
+    spines : Spines
+    part : (f,) int64
+        Its `bodies.closed_parts`, on which spines stand.
+
+    Returns
+    -------
+    LeafModel
+        Spines and areoles come after its own faces.
+    tint : (f, 3) float32
+        What the color of the leaf is times that of each face.
     """
     place, normal = _areoles(model, part, spines.distance)
     height, wide = (spines.distance * size for size in _CUSHION)

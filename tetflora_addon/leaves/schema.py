@@ -27,7 +27,10 @@ LEAF_KEYS = ("model", "object", "vertices", "faces", "uv", "outline", "spines")
 def read_forms(reader: FileReader, data: Any, key: str) -> tuple[LeafModel | str, ...]:
     """A leaf, or a list of forms among which each leaf has one by chance.
 
-    A SpeciesError names the field and what it may be.
+    Raises
+    ------
+    SpeciesError
+        Names the field and what it may be.
     """
     if not isinstance(data, list):
         return (_read_leaf(reader, data, key),)
@@ -97,7 +100,10 @@ def _is_list_of_points(value: Any, size: int) -> bool:
 def read_outline(reader: FileReader, data: Any, where: str) -> Blade | Needles | Compound:
     """An outline from what a species file has for it.
 
-    A SpeciesError names the field and what it may be.
+    Raises
+    ------
+    SpeciesError
+        Names the field and what it may be.
     """
     kind = "blade"
     if isinstance(data, dict) and "kind" in data:

@@ -88,8 +88,14 @@ def _along(*factors: float | Floats) -> Floats:
 def surface(positions: Floats, faces: Integers, uv: Floats, solid: bool = False, error: float = 0.0) -> LeafSurface:
     """A surface of triangles and quads.
 
-    ``positions`` (k, v, 3). ``faces`` (f, 4): vertices; of triangles one is named twice in a row, or the last is -1.
-    Less than three different ones are none. ``uv`` (v, 2). ``solid``, ``error``: as of `LeafSurface`.
+    Parameters
+    ----------
+    positions : (k, v, 3) float64
+    faces : (f, 4) int
+        Vertices; of triangles one is named twice in a row, or the last is -1. Less than three different ones are none.
+    uv : (v, 2) float64
+    solid, error
+        As of `LeafSurface`.
     """
     faces = np.where(faces < 0, faces[:, :1], faces)
     kept = faces != np.roll(faces, -1, axis=1)

@@ -54,8 +54,8 @@ class LightBuffer:
     occluders : (t, 3, 3) float64, optional
         Opaque triangles, meters.
     sheets : (m, 4, 3) float64, optional
-        Corners of opaque facets or leaves, which count by the fraction of each pixel that they cover. Their numbers are
-        n to n + m − 1, after the tetrahedra.
+        Corners of opaque facets or leaves, which count by the fraction of each pixel that they cover. Their numbers
+        are n to n + m − 1, after the tetrahedra.
     """
 
     def __init__(
@@ -186,8 +186,8 @@ class LightBuffer:
         cells : (m,) int
             Tetrahedron that holds each or sheet on which it lies, −1 where there is none.
         own_depth : (m,) float64
-            Optical depth of that tetrahedron between where light enters it and the point. However coarse the pixels, no
-            tetrahedron darkens itself by more, and no point is darkened by less.
+            Optical depth of that tetrahedron between where light enters it and the point. However coarse the pixels,
+            no tetrahedron darkens itself by more, and no point is darkened by less.
 
         Returns
         -------

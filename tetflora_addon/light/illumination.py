@@ -189,6 +189,7 @@ class Illumination:
         ----------
         points, color, transmission, cells
             As for `facet_radiance`.
+        camera : Camera
         normal : (m, 3) float64, optional
             Axis of the plane term; both ways are alike.
         plane : (m,) float64, optional

@@ -75,8 +75,12 @@ class Sheet:
     def pairs(self, middle: Floats, reach: Floats) -> Iterator[tuple[Integers, Integers, Floats]]:
         """Cells whose middles may lie within a reach (n,) of points (n, 2), some points at a time.
 
-        Yields ``owner``, ``cell`` (m,): point and cell of each pair; ``away`` (m, 2): from the point to the middle of
-        the cell, meters.
+        Yields
+        ------
+        owner, cell : (m,) int64
+            Point and cell of each pair.
+        away : (m, 2) float64
+            From the point to the middle of the cell, meters.
         """
         size = (self.columns, self.rows)
         first = np.clip(np.ceil((middle - reach[:, None] - self.low) / self.cell - 0.5), 0, size).astype(np.int64)

@@ -60,7 +60,13 @@ class Floor:
     def suits(self, habitat: Habitat, species: int | None, seed: int) -> Suits:
         """How suitable places are for a habitat.
 
-        ``species``: what sheds it; anything if None, nothing that stands if -1. ``seed``: of the patches.
+        Parameters
+        ----------
+        habitat : Habitat
+        species : int or None
+            What sheds it; anything if None, nothing that stands if -1.
+        seed : int
+            Of the patches.
         """
         size, keeps = habitat.value
         key = child_key(key_of_seed(seed), _PATCHES + list(Habitat).index(habitat))

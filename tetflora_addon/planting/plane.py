@@ -265,7 +265,12 @@ _BARE, _FULL = -0.1, 0.25  # values of the noise below which nothing grows, and 
 def gradient_noise(points: Floats, key: Keys) -> Floats:
     """Smooth noise with mean 0 between -1 and 1 (K. Perlin, "Improving noise", SIGGRAPH 2002, in two dimensions).
 
-    ``points`` (n, 2): in cells of the lattice. ``key``: of the whole lattice.
+    Parameters
+    ----------
+    points : (n, 2) float64
+        In cells of the lattice.
+    key : uint64
+        Of the whole lattice.
     """
     corner = np.floor(points)
     part = points - corner
@@ -287,8 +292,15 @@ def gradient_noise(points: Floats, key: Keys) -> Floats:
 def clumps(points: Floats, size: float, clumping: float, key: Keys) -> Floats:
     """How suitable places are, 0 to 1, for plants that grow in clumps, (n,).
 
-    ``points`` (n, 2): places on the map, meters. ``size``: meters from clump to clump, on average. ``clumping``: 0:
-    suitable everywhere; 1: nothing between the clumps.
+    Parameters
+    ----------
+    points : (n, 2) float64
+        Places on the map, meters.
+    size : float
+        Meters from clump to clump, on average.
+    clumping : float
+        0: suitable everywhere; 1: nothing between the clumps.
+    key : uint64
     """
     value = np.zeros(len(points))
     for octave, (frequency, weight) in enumerate(_OCTAVES):

@@ -180,7 +180,10 @@ _NOT_NEGATIVE = (
 def check_rules(rules: Rules) -> None:
     """Look through all rules.
 
-    A SceneError names the first that cannot be.
+    Raises
+    ------
+    SceneError
+        The first that cannot be.
     """
     _check_numbers(rules)
     if not sum(max(weight, 0.0) for weight in rules.weights) > 0.0:

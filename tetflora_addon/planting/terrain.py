@@ -38,8 +38,12 @@ class Terrain:
     def __post_init__(self) -> None:
         """Refuse what cannot be stood on.
 
-        Raises SceneError (no triangles, or some with places that are no numbers) or ValueError (arrays that do not fit
-        each other: a mistake of the caller, not of the artist).
+        Raises
+        ------
+        SceneError
+            No triangles, or some with places that are no numbers.
+        ValueError
+            Arrays that do not fit each other: a mistake of the caller, not of the artist.
         """
         count = len(self.triangles)
         if not count:

@@ -60,8 +60,14 @@ class Level(Arrays):
 class Levels:
     """All levels of a refinement, and the tree in which they stand.
 
-    ``levels``: from coarse to fine, at least one. ``tree``: of the last state. ``camera``: for which it was refined,
-    and from whose `origin` all corners count.
+    Parameters
+    ----------
+    levels : list of Level
+        From coarse to fine, at least one.
+    tree : TetrahedralTree
+        Of the last state.
+    camera : Camera
+        For which it was refined, and from whose `origin` all corners count.
     """
 
     def __init__(self, levels: list[Level], tree: TetrahedralTree, camera: Camera) -> None:
@@ -172,6 +178,7 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
 
     Parameters
     ----------
+    level : Level
     mode : {'LEVEL', 'VISIBILITY', 'FORM', 'CONTRIBUTION'}
         By how often space was divided, by visibility, by what was decided, or by the logarithm of the pixels that are
         changed.

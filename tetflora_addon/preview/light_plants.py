@@ -116,7 +116,10 @@ def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Sha
 def thinned(seeds: Seeds, heights: Floats, most: int = MOST_PLANTS) -> Seeds:
     """At most so many plants, in proportion to how large they look: of a meadow under trees the grass is thinned.
 
-    ``heights`` (s,): of each kind, meters.
+    Parameters
+    ----------
+    heights : (s,) float64
+        Of each kind, meters.
     """
     if len(seeds) <= most:
         return seeds
@@ -187,8 +190,16 @@ def simple_crowns(
 ) -> Shapes:
     """Plants of one size as crowns, stretched and turned as their places are; of very many every second, or third.
 
-    ``matrices`` (n, 4, 4): to world space. ``size``: radius of the crown, its base and its top above the ground,
-    meters. ``color`` (3,): linear RGB. ``boxes``: edges of boxes instead of faces.
+    Parameters
+    ----------
+    matrices : (n, 4, 4) float64
+        To world space.
+    size : tuple of float
+        Radius of the crown, its base and its top above the ground, meters.
+    color : (3,) float
+        Linear RGB.
+    boxes : bool
+        Edges of boxes instead of faces.
     """
     corners, indices = _box(*size) if boxes else _crown(*size)
     of, origin = len(matrices), origin_near(matrices[:, :3, 3])

@@ -49,7 +49,11 @@ class _Unpickler(pickle.Unpickler):
 class Packed:
     """An object as the bytes that are sent, so that they are made once for several receivers.
 
-    ``known``: number of an object within it that is sent apart; None for all others.
+    Parameters
+    ----------
+    thing : object
+    known : callable, optional
+        Number of an object within it that is sent apart; None for all others.
     """
 
     def __init__(self, thing: object, known: Callable[[object], int | None] | None = None) -> None:
@@ -79,7 +83,10 @@ class Packed:
 def send(stream: BinaryIO, *things: object) -> None:
     """Write objects, or what is packed already, as one message.
 
-    Raises Closed or OSError: the receiver has ended.
+    Raises
+    ------
+    Closed, OSError
+        The receiver has ended.
     """
     if stream.closed:
         raise Closed
@@ -95,7 +102,16 @@ def send(stream: BinaryIO, *things: object) -> None:
 def receive(stream: BinaryIO, things: Mapping[int, object] | None = None) -> list[object]:
     """Objects of the next message; their arrays can be written to.
 
-    ``things``: what was sent apart, by number. Raises Closed: the sender has ended.
+    Parameters
+    ----------
+    stream : file
+    things : mapping of int to object, optional
+        What was sent apart, by number.
+
+    Raises
+    ------
+    Closed
+        The sender has ended.
     """
     if stream.closed:
         raise Closed

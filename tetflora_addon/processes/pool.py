@@ -115,7 +115,10 @@ def in_processes(
 def number(limit: float | None = None) -> int:
     """Processes that may work at the same time: none, or two at least.
 
-    ``limit``: bytes that Blender and they may take together; by default as `set_memory_limit` was told.
+    Parameters
+    ----------
+    limit : float, optional
+        Bytes that Blender and they may take together; by default as `set_memory_limit` was told.
     """
     if _pool.stopped or _pool.broken or not _python():
         return 0
@@ -270,7 +273,10 @@ class _Child:
     def greet(self) -> bool:
         """Wait until it is there; whether it still is: it ends by itself when there is nothing to do.
 
-        Raises _StartError: it never was.
+        Raises
+        ------
+        _StartError
+            It never was.
         """
         if not self._ready:
             timer = threading.Timer(_PATIENCE, self.kill)
@@ -290,7 +296,10 @@ class _Child:
     def call(self, function: Callable, shared: _Given, item: object) -> tuple[str, object, str]:
         """What becomes of a call: "made" and the result, or "failed" and the error, with where it was.
 
-        Raises Closed or OSError: the process has ended.
+        Raises
+        ------
+        Closed, OSError
+            The process has ended.
         """
         self.forget()
         if shared.number not in self._known:
@@ -302,7 +311,10 @@ class _Child:
     def forget(self) -> None:
         """Let go of what no call will need again.
 
-        Raises Closed or OSError: the process has ended.
+        Raises
+        ------
+        Closed, OSError
+            The process has ended.
         """
         for number in [number for number, given in self._known.items() if given.forgotten]:
             del self._known[number]
@@ -340,7 +352,12 @@ class _Child:
 def _call(function: Callable[[_Shared, _Item], _Result], shared: _Given, item: _Item) -> _Result:
     """The function's result by a process; another takes over for one that has ended, and in the end this one.
 
-    Raises Closed (`stop` was called) or Exception (what the function raises).
+    Raises
+    ------
+    Closed
+        `stop` was called.
+    Exception
+        What the function raises.
     """
     answer, tried = None, 0
     while answer is None and tried < 2 and (own := _taken()) is not None:

@@ -49,7 +49,13 @@ class AssetParts(Arrays):
 
 
 class PlacedAssets:
-    """Assets and their instances, and what a cluster of an instance is in the world."""
+    """Assets and their instances, and what a cluster of an instance is in the world.
+
+    Parameters
+    ----------
+    assets : AssetTable
+    instances : Instances
+    """
 
     def __init__(self, assets: AssetTable, instances: Instances) -> None:
         self.assets, self.instances = assets, instances
@@ -154,7 +160,12 @@ class PlacedAssets:
 class SharedAssets(SharedParts[AssetParts]):
     """All instances of assets of a refinement, as clusters and the points on them.
 
-    ``filled``: whether proxies fill their tetrahedra, so that small ones without points would be holes.
+    Parameters
+    ----------
+    placed : PlacedAssets
+    camera : Camera
+    filled : bool
+        Whether proxies fill their tetrahedra, so that small ones without points would be holes.
     """
 
     def __init__(self, placed: PlacedAssets, camera: Camera, filled: bool = False) -> None:

@@ -240,8 +240,11 @@ def large_polygons(polygons: Polygons, camera: Camera) -> Mask:
 def bounding_capsules(flora: Flora, subplants: Branches) -> Floats:
     """Bodies that hold all vertices of sub-plants, from the compiled bounds alone.
 
-    Returns (9, n): a cylinder, and how far whatever is not within it reaches beyond: center (3), axis (3), radius, half
-    of the height, and that pad. Meters, world space.
+    Returns
+    -------
+    (9, n) float64
+        A cylinder, and how far whatever is not within it reaches beyond: center (3), axis (3), radius, half of the
+        height, and that pad. Meters, world space.
     """
     bound, pad = bounds(flora, subplants)
     bound = bound.T
@@ -256,8 +259,12 @@ def bounding_capsules(flora: Flora, subplants: Branches) -> Floats:
 def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDArray, NDArray]:
     """Cylinders about the sub-plants' branches that hold all of their vertices, whatever the seed.
 
-    Returns ``center`` (n, 3): meters, world space; ``radius``, ``half_height`` (n,): across and along the branch's
-    axis, meters.
+    Returns
+    -------
+    center : (n, 3) float64
+        Meters, world space.
+    radius, half_height : (n,) float64
+        Across and along the branch's axis, meters.
     """
     capsules = bounding_capsules(flora, subplants)
     return capsules[:3].T, capsules[6] + capsules[8], capsules[7] + capsules[8]
@@ -283,8 +290,14 @@ def cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tupl
 
     Triangles that reach beyond their plane by no more than ``slack`` (n,), in meters, stay whole.
 
-    Returns ``owner`` (k,): polygon that each fragment comes from; ``side`` (k,): 0 where the distance is negative, 1
-    elsewhere; ``fragments`` (of k): a triangle that crosses leaves one fragment on one side and two on the other.
+    Returns
+    -------
+    owner : (k,) int64
+        Polygon that each fragment comes from.
+    side : (k,) int64
+        0 where the distance is negative, 1 elsewhere.
+    fragments : Polygons of k
+        A triangle that crosses leaves one fragment on one side and two on the other.
     """
     owner, whole = polygons.as_fragments()
     distance = whole.corner_distances(planes[owner])

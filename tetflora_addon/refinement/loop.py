@@ -134,6 +134,8 @@ def refine(
         Compiled species, in the order of ``seeds.identifiers``.
     seeds : Seeds
         At least one plant, or none where there are polygons or assets.
+    camera : Camera
+    settings : RefinementSettings
     occluders : (t, 3, 3) float64, optional
         Triangles of explicit polygons that hide what is behind them, meters.
     polygons : Polygons, optional

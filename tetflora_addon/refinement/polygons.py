@@ -61,6 +61,7 @@ class Meshes:
 
     Parameters
     ----------
+    surfaces : sequence of Surface
     surface : (i,) int
         Which of them each instance shows.
     matrices : (i, 4, 4) float64
@@ -257,8 +258,13 @@ class Polygons(Arrays):
     def triangles(self) -> tuple[Integers, Integers, Floats]:
         """Triangles of whole faces, and fragments, in the order of the polygons.
 
-        Returns ``owner`` (k,): polygon that each belongs to. ``triangle`` (k,). ``fraction`` (k,): of the triangle's
-        area; 1 except for fragments.
+        Returns
+        -------
+        owner : (k,) int64
+            Polygon that each belongs to.
+        triangle : (k,) int64
+        fraction : (k,) float64
+            Of the triangle's area; 1 except for fragments.
         """
         cut = self.part >= 0
         owner, index = spread(self.triangle_counts)

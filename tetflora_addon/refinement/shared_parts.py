@@ -105,6 +105,10 @@ class SharedParts(Generic[Parts]):
 
     Parts are `Arrays` with the columns ``totals`` and ``extent``, meters. Subclasses say what can be opened, into what,
     and which points are on it.
+
+    Parameters
+    ----------
+    camera : Camera
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -159,8 +163,18 @@ class SharedParts(Generic[Parts]):
     def update(self, tree: TetrahedralTree, dividing: Mask, edge: Floats) -> NDArray:
         """Hand points in divided nodes on, and open what is large there.
 
-        ``dividing`` (nodes,): nodes that have been divided. ``edge`` (nodes,): their longest edge, meters. Returns
-        (nodes,): nodes whose contents have changed.
+        Parameters
+        ----------
+        tree : TetrahedralTree
+        dividing : (nodes,) bool
+            Nodes that have been divided.
+        edge : (nodes,) float64
+            Their longest edge, meters.
+
+        Returns
+        -------
+        (nodes,) bool
+            Nodes whose contents have changed.
         """
         points = self._points.rows
         changed = dividing.copy()

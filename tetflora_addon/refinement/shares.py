@@ -61,6 +61,7 @@ def share_points(
 
     Parameters
     ----------
+    flora : Flora
     parts : PlantParts of n
         Sub-plants, or if ``lines`` are given branches alone.
     pixels : (n,) float64
@@ -135,8 +136,10 @@ def _sampled(
 def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, Integers, Axes | None]]:
     """Open sub-plants into branches alone and the sub-plants of the next order.
 
-    Yielded are some of the new parts, of one of the two kinds, the part that each comes from, and the axes of branches
-    alone.
+    Yields
+    ------
+    PlantParts of m, (m,) int64, Axes or None
+        Some of the new parts, of one of the two kinds, the part that each comes from, and the axes of branches alone.
     """
     segments = flora.rows["segments"][parts.branches.row]
     for number in np.flatnonzero(np.bincount(segments)):  # bending takes as long for all as for the most
@@ -151,7 +154,13 @@ def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, Intege
 class SharedPlants(SharedParts[PlantParts]):
     """All plants of a refinement, as parts and the points on them.
 
-    ``filled``: whether proxies fill their tetrahedra, so that small ones without points would be holes.
+    Parameters
+    ----------
+    flora : Flora
+    seeds : Seeds
+    camera : Camera
+    filled : bool
+        Whether proxies fill their tetrahedra, so that small ones without points would be holes.
     """
 
     def __init__(self, flora: Flora, seeds: Seeds, camera: Camera, filled: bool = False) -> None:

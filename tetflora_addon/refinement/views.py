@@ -64,8 +64,14 @@ def pixels_per_solid_angle(camera: Camera, directions: Floats) -> Floats:
 class PanoramaBuffer:
     """The fragments of all tetrahedra around the eye; to be used as an `AlphaBuffer`.
 
-    ``camera``: a panorama. ``side``: of each of the six faces, pixels. ``occluders`` (t, 3, 3): opaque triangles,
-    meters.
+    Parameters
+    ----------
+    camera : Camera
+        A panorama.
+    side : int
+        Of each of the six faces, pixels.
+    occluders : (t, 3, 3) float64, optional
+        Opaque triangles, meters.
     """
 
     def __init__(self, camera: Camera, side: int, occluders: Floats | None = None) -> None:

@@ -100,6 +100,7 @@ class AlphaBuffer:
             Positively oriented, overlapping with none that is there, meters, world space.
         extinction : (n,) float64
             κ ≥ 0 along the way from the eye, 1/m; may be infinite.
+
         """
         count = len(vertices)
         fragments = tetrahedron_fragments(vertices, self.camera, self.width, self.height)
@@ -185,8 +186,13 @@ def fitting(cells: int, finest: int) -> int:
 class Buffers:
     """Alpha buffers as fine as what is drawn into them: a few large tetrahedra need few pixels.
 
-    ``resolution``: longer side of the finest buffer, pixels. ``occluders`` (t, 3, 3): triangles of explicit polygons
-    that hide what is behind them, meters.
+    Parameters
+    ----------
+    camera : Camera
+    resolution : int
+        Longer side of the finest buffer, pixels.
+    occluders : (t, 3, 3) float64, optional
+        Triangles of explicit polygons that hide what is behind them, meters.
     """
 
     def __init__(self, camera: Camera, resolution: int, occluders: Floats | None = None) -> None:

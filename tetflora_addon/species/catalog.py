@@ -65,7 +65,10 @@ def _stamp(path: Path) -> tuple[int, int]:
 def checked_identifier(text: str) -> str:
     """An identifier of a species, which may have come from any file.
 
-    Raises SpeciesError: it could name no file of a species.
+    Raises
+    ------
+    SpeciesError
+        It could name no file of a species.
     """
     if not is_identifier(text):
         raise SpeciesError(f"{quoted(text)} cannot name a species. Use only {IDENTIFIER_RULE}")
@@ -98,8 +101,11 @@ def in_order(found: Mapping[str, SpeciesInfo]) -> dict[str, SpeciesInfo]:
 def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
     """All species by identifier, as `in_order` sorts them.
 
-    ``folders``: folders of the user's own; a file there replaces a shipped one of the same name. Missing folders are
-    passed over, and so are files that `odd_files` names.
+    Parameters
+    ----------
+    folders : sequence of Path
+        Folders of the user's own; a file there replaces a shipped one of the same name. Missing folders are passed
+        over, and so are files that `odd_files` names.
     """
     found: dict[str, SpeciesInfo] = {}
     for folder in (builtin_folder(), *folders):
@@ -114,8 +120,18 @@ def load_species(
 ) -> Species:
     """Read a species; unchanged files are read once.
 
-    ``folders``: as of `list_species`. ``known``: what `list_species` returned a moment ago. Raises SpeciesError:
-    unknown identifier (the message lists the known ones), or a broken file.
+    Parameters
+    ----------
+    identifier : str
+    folders : sequence of Path
+        As of `list_species`.
+    known : mapping, optional
+        What `list_species` returned a moment ago.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown identifier (the message lists the known ones), or a broken file.
     """
     known = list_species(folders) if known is None else known
     if identifier not in known:

@@ -55,8 +55,14 @@ class Chains:
 def bezier_chains(control: Chains, left: Floats, right: Floats, steps: Integers) -> Chains:
     """Cubic Bezier splines; radii run evenly from one control point to the next.
 
-    ``control``: control points. ``left``, ``right`` (p, 3): handles before and after each control point. ``steps``
-    (s,): pieces between two control points of each spline, 1 or more; 1 gives straight lines.
+    Parameters
+    ----------
+    control : Chains
+        Control points.
+    left, right : (p, 3) float64
+        Handles before and after each control point.
+    steps : (s,) int
+        Pieces between two control points of each spline, 1 or more; 1 gives straight lines.
     """
     counts = np.diff(control.first)
     owner = np.repeat(np.arange(len(counts)), counts)
@@ -112,8 +118,8 @@ def nurbs_chain(
     steps : int
         Pieces of each span between two knots.
     cyclic, endpoint, bezier : bool
-        As Blender places its knots: around, with the ends at the outer control points, in pieces of Bezier splines. A
-        spline that goes around has evenly spaced knots whatever else is asked for.
+        As Blender places its knots: around, with the ends at the outer control points, in pieces of Bezier splines.
+        A spline that goes around has evenly spaced knots whatever else is asked for.
 
     Returns
     -------
@@ -160,7 +166,12 @@ def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
     A chain begins on another where its first point, or else its last, is nearer to the other's line than its radius
     there, or than 1 % of the size of all.
 
-    Returns ``points`` (p, 4); ``edges`` (e, 2); ``line`` (e,): chain of each edge.
+    Returns
+    -------
+    points : (p, 4) float64
+    edges : (e, 2) int64
+    line : (e,) int64
+        Chain of each edge.
     """
     points, edges = chains.points.copy(), chains.edges()
     owner = np.repeat(np.arange(len(chains.cyclic)), np.diff(chains.first))

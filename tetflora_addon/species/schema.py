@@ -86,8 +86,19 @@ def _read_leaf_year(reader: FileReader, data: Any, name: str) -> LeafYear:
 def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     """Check a decoded species file and turn it into a `Species`.
 
-    ``data``: what `json.load` gave. ``identifier``: name by which plants refer to the species. ``source``: named in
-    errors, usually the file's path. A SpeciesError names the source, the key and what is allowed.
+    Parameters
+    ----------
+    data : object
+        What `json.load` gave.
+    identifier : str
+        Name by which plants refer to the species.
+    source : str
+        Named in errors, usually the file's path.
+
+    Raises
+    ------
+    SpeciesError
+        Names the source, the key and what is allowed.
     """
     reader = FileReader(source)
     if not isinstance(data, dict):
@@ -135,7 +146,10 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
 def species_from_json(content: bytes | str, identifier: str, source: str) -> Species:
     """Check the text of a species file, as `species_from_dict` checks what it decodes to.
 
-    Raises SpeciesError: it is not JSON, or breaks a rule of the format.
+    Raises
+    ------
+    SpeciesError
+        It is not JSON, or breaks a rule of the format.
     """
     try:
         data = parse_json(content)
@@ -147,7 +161,10 @@ def species_from_json(content: bytes | str, identifier: str, source: str) -> Spe
 def read_species(path: Path) -> Species:
     """Read and check one species file.
 
-    Raises SpeciesError: the file cannot be read, is not JSON, or breaks a rule of the format.
+    Raises
+    ------
+    SpeciesError
+        The file cannot be read, is not JSON, or breaks a rule of the format.
     """
     return species_from_json(species_file(path), path.stem, path.name)
 
@@ -155,7 +172,10 @@ def read_species(path: Path) -> Species:
 def species_file(path: Path) -> bytes:
     """The content of a species file.
 
-    Raises SpeciesError: it cannot be read.
+    Raises
+    ------
+    SpeciesError
+        It cannot be read.
     """
     try:
         return read_whole(path, MAX_FILE_BYTES)

@@ -33,7 +33,10 @@ _SAME = 1e-6  # of the largest; radii and lengths that differ by less are equal
 class Skeleton:
     """Points of a plant's drawn branches; equal where the numbers are.
 
-    Raises ValueError: arrays that do not fit each other, or a parent that does not stand before its child.
+    Raises
+    ------
+    ValueError
+        Arrays that do not fit each other, or a parent that does not stand before its child.
     """
 
     points: Floats  # (p, 3): meters in the plant's space: z up, the origin at its foot

@@ -63,7 +63,12 @@ def grown(
 ) -> Plants:
     """Some plants a year later.
 
-    ``crowns``, ``taken``: of these plants: where they are, and the light that they take, m². ``block``: of all plants.
+    Parameters
+    ----------
+    crowns, taken
+        Of these plants: where they are, and the light that they take, m².
+    block : slice
+        Of all plants.
     """
     one = plants.take(block)
     x, y, radius, base, height = (
@@ -184,7 +189,12 @@ _OUTSIDE = 0.1
 def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: float, seed: int) -> Plants:
     """Plants evenly spread, each somewhere in a square of its own.
 
-    ``suitability`` (g, cells): how well each species grows. ``density``: plants on a hectare.
+    Parameters
+    ----------
+    suitability : (g, cells) float64
+        How well each species grows.
+    density : float
+        Plants on a hectare.
     """
     if density <= 0.0 or traits.planted.sum() <= 0.0:
         return Plants.empty()
@@ -224,7 +234,12 @@ class SeedDispersal:
     def __init__(self, site: StandSite, traits: StandTraits, suitability: Floats, most: float, outside: float) -> None:
         """Of a site, for species that grow so well on its cells.
 
-        ``most``: plants that come on a hectare and year at most. ``outside``: factor on the seeds from outside.
+        Parameters
+        ----------
+        most : float
+            Plants that come on a hectare and year at most.
+        outside : float
+            Factor on the seeds from outside.
         """
         self.site, self.traits, self.suitability, self.most = site, traits, suitability, most
         width, depth = site.size

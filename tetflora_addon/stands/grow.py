@@ -74,7 +74,10 @@ def grow(
     These are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
     gone; with an interval of 0 those of the end alone.
 
-    Raises TetFloraError: a setting cannot be, or the ground is too large; names it.
+    Raises
+    ------
+    TetFloraError
+        A setting cannot be, or the ground is too large; names it.
     """
     stand = begun(site, species, settings)
     for year in range(settings.years):

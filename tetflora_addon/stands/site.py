@@ -47,7 +47,10 @@ class StandSite:
     def __post_init__(self) -> None:
         """Refuse what is no site.
 
-        A TetFloraError names what is wrong.
+        Raises
+        ------
+        TetFloraError
+            Names what is wrong.
         """
         if not self.cell > 0.0:
             raise TetFloraError(f"The cells of a site must be larger than 0 m, not {self.cell:g} m")

@@ -47,8 +47,15 @@ _ROW_BATCH = 4096
 class LeafCopies:
     """A mesh of copies under construction.
 
-    ``number``: of copies in the end, at most. ``transmission``: fraction of the light scattered through the leaf, the
-    same for all. ``moving``: whether they have velocities.
+    Parameters
+    ----------
+    model : LeafModel
+    number : int
+        Of copies in the end, at most.
+    transmission : float
+        Fraction of the light scattered through the leaf, the same for all.
+    moving : bool
+        Whether they have velocities.
     """
 
     def __init__(
@@ -140,7 +147,11 @@ class LeafCopies:
 class KiteCopies(LeafCopies):
     """Copies of a leaf model as one kite each, in planes that their keys choose.
 
-    ``number``, ``transmission``, ``moving``: as of `LeafCopies`.
+    Parameters
+    ----------
+    kites : LeafKites
+    number, transmission, moving
+        As of `LeafCopies`.
     """
 
     def __init__(
@@ -165,7 +176,11 @@ class KiteCopies(LeafCopies):
 class LevelCopies(LeafCopies):
     """Copies of a finer level of a leaf, of which their keys choose a variant; shaded smooth.
 
-    ``number``, ``transmission``, ``moving``: as of `LeafCopies`.
+    Parameters
+    ----------
+    level : LeafLevel
+    number, transmission, moving
+        As of `LeafCopies`.
     """
 
     def __init__(self, level: LeafLevel, number: int, transmission: float, moving: bool = False) -> None:
@@ -256,13 +271,16 @@ def leaf_meshes(
 
     Parameters
     ----------
+    flora : Flora
     species : int
         Index into the flora's species.
+    whole : sequence of WholeBranches
     fractions_of : callable, optional
         Fractions (n,), (n,) of the leaves of branches that are wanted, and of these that are kites; the leaves' own
         random numbers decide which.
     lengths_of : callable, optional
         Lengths (n,) of the leaves of branches in the image, in errors that do not show; those of long ones are finer.
+    thin : Thin, optional
     """
     groups = [group for some in whole for group in _bearers(flora, some)]
     if fractions_of is not None:

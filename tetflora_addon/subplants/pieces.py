@@ -101,7 +101,10 @@ def wood_areas(flora: Flora, pieces: Pieces) -> Floats:
 def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, Integers, Pieces, Integers]:
     """Open sub-plants into the sub-plants of the next order and the pieces of their own branch.
 
-    Returned are children with the index (m,) of the sub-plant that each comes from, and pieces with theirs (k,).
+    Returns
+    -------
+    Branches, (m,) int64, Pieces, (k,) int64
+        Children with the index of the sub-plant that each comes from, and pieces with theirs.
     """
     whole, body, grown, owner = open_branches(flora, subplants)
     pieces, piece_owner = whole_pieces(flora.rows, whole)
@@ -111,6 +114,8 @@ def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, Integer
 def expand(flora: Flora, subplants: Branches) -> Iterator[WholeBranches]:
     """All branches of sub-plants, to the last twig, order by order.
 
+    Notes
+    -----
     Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
     """
     while len(subplants):

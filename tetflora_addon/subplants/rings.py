@@ -379,8 +379,13 @@ def swelling(
 def roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Floats, Integers]:
     """Surface roots of trunks (n,): they leave the buttresses, wind along the ground and lead into it.
 
-    Returns ``path`` (m, PLACES, 3): in the frames of the trunks' bases, meters; ``width`` (m, PLACES): radii, meters;
-    ``trunk`` (m,).
+    Returns
+    -------
+    path : (m, PLACES, 3) float64
+        In the frames of the trunks' bases, meters.
+    width : (m, PLACES) float64
+        Radii, meters.
+    trunk : (m,) int64
     """
     angle, size = buttresses(trunks.key)
     trunk, which = spread(root_number(trunks.key))

@@ -45,6 +45,8 @@ def tube_buffers(
 
     Parameters
     ----------
+    flora : Flora
+    whole : sequence of WholeBranches
     pixels : Pixels, optional
         How large they are; near branches are rounder then, and bent, and have feet.
     most_sides : int, optional

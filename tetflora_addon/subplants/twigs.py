@@ -30,6 +30,7 @@ def twig_buffers(
 
     Parameters
     ----------
+    flora : Flora
     whole : WholeBranches of n
         Of any rows.
     wider : (n,) float64, optional

@@ -131,8 +131,13 @@ class Curve:
 def curve(lines: Axes, radius: Floats, weight: Floats) -> Curve:
     """The curves of branches.
 
-    ``radius`` (n, S + 1): at joints; curves stay within a part of it. ``weight`` (n,): 0 for straight
-    segments, 1 for the whole curve.
+    Parameters
+    ----------
+    lines : Axes of n
+    radius : (n, S + 1) float64
+        At joints; curves stay within a part of it.
+    weight : (n,) float64
+        0 for straight segments, 1 for the whole curve.
     """
     n, most = len(lines.segments), lines.frames.shape[1]
     segment = np.arange(most)

@@ -21,7 +21,15 @@ FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
 def signed_volume(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Volume, positive where the tetrahedron is positively oriented.
 
-    ``vertices`` (..., 4, 3): tetrahedra, meters. Returns (...): det(v1 − v0, v2 − v0, v3 − v0) / 6, cubic meters.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (...) float64
+        det(v1 − v0, v2 − v0, v3 − v0) / 6, cubic meters.
     """
     a, b, c = (vertices[..., i, :] - vertices[..., 0, :] for i in (1, 2, 3))
     return np.sum(np.cross(a, b) * c, axis=-1) / 6.0
@@ -44,9 +52,18 @@ def squared_edges(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
 def quality(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean-ratio quality η = 12 (3V)^(2/3) / Σ l², 1 for the regular tetrahedron and 0 for a flat one.
 
-    ``vertices`` (..., 4, 3): tetrahedra, meters. Returns (...): quality, without unit. A tetrahedron that is a single
-    point has quality 0.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
 
+    Returns
+    -------
+    (...) float64
+        Quality, without unit. A tetrahedron that is a single point has quality 0.
+
+    Notes
+    -----
     Liu and Joe, "Relationship between tetrahedron shape measures", BIT 34 (1994).
     """
     total = np.sum(squared_edges(vertices), axis=-1)
@@ -56,8 +73,16 @@ def quality(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
 def face_area_vectors(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Outward normals times area of the four faces of positive tetrahedra.
 
-    ``vertices`` (..., 4, 3): tetrahedra, meters. Returns (..., 4, 3): vector ``i`` belongs to the face opposite vertex
-    ``i``; square meters. The four add up to zero. They point inwards where the orientation is negative.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (..., 4, 3) float64
+        Vector ``i`` belongs to the face opposite vertex ``i``; square meters. The four add up to zero. They point
+        inwards where the orientation is negative.
     """
     a, b, c, d = (vertices[..., i, :] for i in range(4))
     ab, ac, ad = b - a, c - a, d - a
@@ -69,8 +94,17 @@ def face_area_vectors(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
 def projected_area(vertices: NDArray[np.float64], direction: NDArray[np.float64]) -> NDArray[np.float64]:
     """Area of the silhouette in parallel projection: half of Σ |A_i · ω|.
 
-    ``vertices`` (..., 4, 3): tetrahedra of either orientation, meters. ``direction`` (3,) or (..., 3) float64: unit
-    viewing directions. Returns (...): square meters, measured across the direction.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra of either orientation, meters.
+    direction : (3,) or (..., 3) float64
+        Unit viewing directions.
+
+    Returns
+    -------
+    (...) float64
+        Square meters, measured across the direction.
     """
     areas = face_area_vectors(vertices)
     return np.sum(np.abs(np.sum(areas * np.asarray(direction)[..., None, :], axis=-1)), axis=-1) / 2.0
@@ -79,8 +113,15 @@ def projected_area(vertices: NDArray[np.float64], direction: NDArray[np.float64]
 def barycentric_gradients(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Gradients of the four barycentric coordinates.
 
-    ``vertices`` (..., 4, 3): tetrahedra of either orientation, meters. Returns (..., 4, 3): ∇λ_i = −A_i / (3V), 1/m;
-    zero for tetrahedra without volume.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra of either orientation, meters.
+
+    Returns
+    -------
+    (..., 4, 3) float64
+        ∇λ_i = −A_i / (3V), 1/m; zero for tetrahedra without volume.
     """
     triple = 3.0 * signed_volume(vertices)[..., None, None]
     flat = triple == 0.0
@@ -90,8 +131,17 @@ def barycentric_gradients(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
 def barycentric(vertices: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Barycentric coordinates of points, one tetrahedron each (leading axes broadcast).
 
-    ``vertices`` (..., 4, 3): tetrahedra, meters. ``points`` (..., 3): points, meters. Returns (..., 4): λ with Σ λ = 1
-    and Σ λ_i v_i = point.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+    points : (..., 3) float64
+        Points, meters.
+
+    Returns
+    -------
+    (..., 4) float64
+        λ with Σ λ = 1 and Σ λ_i v_i = point.
     """
     gradients = barycentric_gradients(vertices)[..., 1:, :]
     rest = np.sum(gradients * (points - vertices[..., 0, :])[..., None, :], axis=-1)
@@ -101,8 +151,17 @@ def barycentric(vertices: NDArray[np.float64], points: NDArray[np.float64]) -> N
 def plane_through(points: NDArray[np.float64], negative: NDArray[np.float64]) -> NDArray[np.float64]:
     """Planes through three points each, turned so that a fourth one is on the negative side.
 
-    ``points`` (..., 3, 3): three points of each plane, meters; not on one line. ``negative`` (..., 3): a point on side
-    0 of each plane. Returns (..., 4): ``(nx, ny, nz, d)`` with unit normal.
+    Parameters
+    ----------
+    points : (..., 3, 3) float64
+        Three points of each plane, meters; not on one line.
+    negative : (..., 3) float64
+        A point on side 0 of each plane.
+
+    Returns
+    -------
+    (..., 4) float64
+        ``(nx, ny, nz, d)`` with unit normal.
     """
     a, b, c = (points[..., i, :] for i in range(3))
     normal = np.cross(b - a, c - a)

@@ -28,7 +28,14 @@ TIE = 1e-9
 def longest_edge(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
     """Index into `geometry.EDGES` of the longest edge; the first of those that are equally long.
 
-    ``vertices`` (n, 4, 3): meters.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (n,) intp
     """
     squared = squared_edges(vertices)
     return np.argmax(squared >= np.max(squared, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
@@ -102,9 +109,19 @@ _CHILDREN, _PLANES = _tables()
 def best_diagonal(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
     """Diagonal along which the worst of the inner tetrahedra has the best quality.
 
-    ``vertices`` (n, 4, 3): tetrahedra, meters. Returns (n,): diagonal ``k`` joins the middles of edges ``k`` and ``5 -
-    k`` of `geometry.EDGES`; the first of those that are equally good.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Tetrahedra, meters.
 
+    Returns
+    -------
+    (n,) intp
+        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of those that are
+        equally good.
+
+    Notes
+    -----
     All children have the same volume. Let S be the sum of the squared edges, D² the squared diagonal, and p and q the
     squares of the edges whose middles it joins. Two of the inner tetrahedra have edges of (S − p + 4 D²) / 4, two of
     (S − q + 4 D²) / 4, where 4 D² = S − 2 (p + q). The three 4 D² add up to S, so that of the shortest diagonal is

@@ -25,8 +25,11 @@ class TetrahedralTree:
     once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that). Between a tetrahedron and those that
     `split_by_shape` makes of it there may be such regions too.
 
-    ``vertices`` (4, 3): tetrahedron of the root, positively oriented, meters. Without it the root is a region to be
-    divided by `divide`.
+    Parameters
+    ----------
+    vertices : (4, 3) float64, optional
+        Tetrahedron of the root, positively oriented, meters. Without it the root is a region to be divided by
+        `divide`.
     """
 
     def __init__(self, vertices: ArrayLike | None = None) -> None:
@@ -235,7 +238,15 @@ class TetrahedralTree:
     def locate(self, points: ArrayLike) -> NDArray[np.int32]:
         """Terminal that holds each point; points outside the root go to the one on their side of all planes.
 
-        ``points`` (n, 3): meters, world space. Returns (n,): node numbers. A point on a plane belongs to side 1.
+        Parameters
+        ----------
+        points : (n, 3) float64
+            Meters, world space.
+
+        Returns
+        -------
+        (n,) int32
+            Node numbers. A point on a plane belongs to side 1.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
         found = np.zeros(len(points), np.int32)
