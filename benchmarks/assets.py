@@ -39,7 +39,7 @@ from devtools.formats import set_format
 from examples import stage
 from tetflora_addon import parallel, storage
 from tetflora_addon.assets import asset_cache
-from tetflora_addon.assets.compiled import compile_asset
+from tetflora_addon.assets.compiled import compile_steps
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.assets.parts import Target, digest_of, read_source_steps
 from tetflora_addon.blender.job import refine
@@ -470,7 +470,7 @@ def compiled(kind: str, quick: bool) -> dict[str, float]:
     before, begun = resident_mb("VmRSS"), cpu_s()
     source, _ = run_to_end(read_source_steps(target, depsgraph))
     read = cpu_s()
-    asset = compile_asset(source)
+    asset = run_to_end(compile_steps(source))
     done = cpu_s()
     triangles = sum(len(source.surfaces[i].triangles) for i in source.surface.tolist())
     figures = {

@@ -76,7 +76,7 @@ def stand(species: str) -> tuple[list[Figure], tuple[float, float]]:
         thinned.append(
             (
                 len(plants) / area,
-                float(traits.masses(plants.species, plants.basal, plants.height).mean()),
+                float((traits.mass_factor[plants.species] * plants.basal**2 * plants.height).mean()),
                 float(np.sqrt((diameter**2).mean())),
             )
         )

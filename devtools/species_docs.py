@@ -12,8 +12,7 @@ import datetime
 import json
 import re
 
-from tetflora_addon.leaves.models import LEAF_MODELS, Spines
-from tetflora_addon.leaves.schema import OUTLINES
+from tetflora_addon.leaves.models import LEAF_MODELS, OUTLINES, Spines
 from tetflora_addon.parameters import Key, keys_of
 from tetflora_addon.species.catalog import builtin_folder, load_species
 from tetflora_addon.species.schema import LENGTH_HIGH, ORDER_KEYS

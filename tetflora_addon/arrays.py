@@ -13,8 +13,8 @@ columns that nobody looks at before all is done.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any, Generic, Self, TypeVar
 
@@ -24,8 +24,8 @@ from numpy.typing import DTypeLike, NDArray
 from .parallel import blocks
 
 #: Arrays by what they hold. A table has one structured row for each kind of branch, see `growth.rows`.
-Floats = NDArray[np.float64]
-Integers = NDArray[np.integer]
+Floats, Floats32, Floats16 = NDArray[np.float64], NDArray[np.float32], NDArray[np.float16]
+Integers, Integers32 = NDArray[np.integer], NDArray[np.int32]
 Keys = NDArray[np.uint64]
 Mask = NDArray[np.bool_]
 Table = NDArray[np.void]
@@ -133,21 +133,30 @@ class Arrays:
         )
 
     @classmethod
+    def zeros(cls, number: int) -> Self:
+        """So many things, all columns 0; these are (n,) float64 unless their fields are by `column` or `nested`."""
+        every = (f.metadata.get("zeros", np.zeros) for f in fields(cls) if f.name not in _optional(cls))
+        return cls(*(zeros(number) for zeros in every))
+
+    @classmethod
     def empty(cls) -> Self:
-        """No things. Columns are (0,) float64 unless their fields have metadata by `column` or `nested`."""
-        return cls(
-            *(f.metadata.get("empty", lambda: np.zeros(0))() for f in fields(cls) if f.name not in _optional(cls))
-        )
+        """No things."""
+        return cls.zeros(0)
+
+    @classmethod
+    def typed(cls, *columns: NDArray) -> Self:
+        """Things from all their columns, which get the types that fields have."""
+        return cls(*(c.astype(of.dtype) for c, of in zip(columns, vars(cls.empty()).values(), strict=True)))
 
 
-def column(*shape: int, dtype: DTypeLike = np.float64) -> dict[str, Callable]:
-    """Metadata of a field that is an array (n, *shape), for `Arrays.empty`."""
-    return {"empty": lambda: np.zeros((0, *shape), dtype)}
+def column(*shape: int, dtype: DTypeLike = np.float64) -> Any:
+    """Field of a structure that is an array (n, *shape), see `Arrays.zeros`."""
+    return field(metadata={"zeros": lambda number: np.zeros((number, *shape), dtype)})
 
 
-def nested(kind: type[Arrays]) -> dict[str, Callable]:
-    """Metadata of a field that is another structure of arrays, for `Arrays.empty`."""
-    return {"empty": kind.empty}
+def nested(kind: type[Arrays]) -> Any:
+    """Field of a structure that is another structure of arrays, see `Arrays.zeros`."""
+    return field(metadata={"zeros": kind.zeros})
 
 
 def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
@@ -170,16 +179,20 @@ def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
     return owner, np.arange(len(owner)) - first[owner]
 
 
-def connected(n: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:
+def connected(n: int, a: Integers, b: Integers) -> NDArray[np.int32]:
     """(n,) smallest index in the part of each of n things, of which a (e,) and b (e,) are connected."""
-    label = np.arange(n)
-    while (label[a] != label[b]).any():
-        np.minimum.at(label, np.maximum(label[a], label[b]), np.minimum(label[a], label[b]))
+    label = np.arange(n, dtype=np.int32)
+    while True:
+        one, other = label[a], label[b]
+        apart = one != other
+        if not apart.any():
+            return label
+        a, b, one, other = a[apart], b[apart], one[apart], other[apart]
+        np.minimum.at(label, np.maximum(one, other), np.minimum(one, other))
         label = top(label)
-    return label
 
 
-def top(up: NDArray[np.int64]) -> NDArray[np.int64]:
+def top(up: Integers) -> Integers:
     """Where each thing (n,) comes to by following ``up`` until it stays; the steps double each time."""
     while (up[up] != up).any():
         up = up[up]
@@ -371,24 +384,27 @@ class Chunks(Generic[Rows]):
         out, start = [], 0
         ends = np.cumsum([len(chunk) for chunk in self._chunks])
         runs = np.split(rows, np.searchsorted(rows, ends[:-1]))
-        for chunk, there, own in zip(self._chunks, self._there, runs, strict=True):
+        for (chunk, there), own in zip(self.chunks(), runs, strict=True):
             if len(own):
                 out.append(chunk.take(own - start))
                 there[own - start] = False
             start += len(chunk)
         self.marked += len(rows)
-        return self.kind.concatenate(out)
+        return self.kind.concatenate(out or [self._chunks[0].take(slice(0))])
 
     @property
     def there(self) -> NDArray[np.bool_]:
         """Rows (n,) that are not marked."""
         return np.concatenate(self._there)
 
+    def chunks(self) -> Iterator[tuple[Rows, NDArray[np.bool_]]]:
+        """Each chunk (k), and which of its rows (k,) are not marked."""
+        return zip(self._chunks, self._there, strict=True)
+
     def joined(self) -> Rows:
         """All that is not marked, as the only chunk from now on: rows have new numbers, in the same order."""
         if len(self._chunks) > 1 or self.marked:
-            some = zip(self._chunks, self._there, strict=True)
-            one = self.kind.concatenate([chunk.take(there) for chunk, there in some])
+            one = self.kind.concatenate([chunk.take(there) for chunk, there in self.chunks()])
             self._chunks, self._there, self._number, self.marked = [], [], 0, 0
             self.append(one)
         return self._chunks[0]

@@ -182,6 +182,11 @@ class _Twice(ValueError):
     """A key comes twice."""
 
 
+def beside(module: str, name: str) -> Any:
+    """What a JSON file of ours beside a module holds, each time anew."""
+    return json.loads(Path(module).with_name(name).read_text(encoding="utf-8"))
+
+
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     data = dict(pairs)
     if len(data) < len(pairs):

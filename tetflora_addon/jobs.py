@@ -18,24 +18,11 @@ _MOMENT = 0.005  # seconds of sleep while a thread computes
 
 @dataclass(frozen=True)
 class Progress:
-    """One step of a job.
+    """One step of a job."""
 
-    Attributes
-    ----------
-    fraction : float
-        0 to 1, an estimate.
-    message : str
-        For the status bar.
-    waiting : bool
-        Whether nothing is new: the next step waits as well.
-    partial : bool
-        Whether something small is half done: whoever looks after the job may do that later.
-    """
-
-    fraction: float
-    message: str
-    waiting: bool = False
-    partial: bool = False
+    fraction: float  # 0 to 1, an estimate
+    message: str  # for the status bar
+    waiting: bool = False  # whether nothing is new: the next step waits as well
 
     @property
     def repeated(self) -> Progress:
@@ -44,8 +31,7 @@ class Progress:
 
     def during(self, steps: Generator[object, None, _Result]) -> Generator[Progress, object, _Result]:
         """The same after each of some small steps; returns what these return."""
-        partial = replace(self, partial=True)
-        return mapped(steps, lambda _: partial)
+        return mapped(steps, lambda _: self)
 
 
 def mapped(steps: Generator[_Item, Any, _Result], change: Callable[[_Item], _Step]) -> Generator[_Step, Any, _Result]:

@@ -25,11 +25,6 @@ def recollision_albedo(albedo: Floats, weight: Floats) -> Floats:
     return albedo * (1.0 - p) / (1.0 - p * albedo)
 
 
-def surface_albedo(albedo: NDArray[np.floating], p: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Albedo (..., 3) of surfaces whose clusters have albedos (..., 3), by their recollision probability (..., 1)."""
-    return albedo / (1.0 - p + p * albedo)
-
-
 def cluster_color(color: Floats, gloss: Floats, weight: Floats) -> Floats:
     """Color (n, 3) of clusters of leaves that mirror ``gloss`` (n,), of which they mirror ``weight`` (n,) as clusters.
 
@@ -41,7 +36,8 @@ def cluster_color(color: Floats, gloss: Floats, weight: Floats) -> Floats:
 
 def needle_color(color: NDArray[np.floating], p: NDArray[np.floating]) -> NDArray[np.floating]:
     """Color (..., 3) of needles whose shoots have colors (..., 3), by their recollision probability (..., 1)."""
-    return _color(surface_albedo(_albedo(color, GLOSS * (1.0 - p)), p), np.where(p > 0.0, GLOSS, 0.0))
+    whole = _albedo(color, GLOSS * (1.0 - p))
+    return _color(whole / (1.0 - p + p * whole), np.where(p > 0.0, GLOSS, 0.0))
 
 
 def _albedo(color: NDArray[np.floating], gloss: NDArray[np.floating]) -> NDArray[np.floating]:

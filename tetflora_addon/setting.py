@@ -7,8 +7,9 @@ from __future__ import annotations
 from dataclasses import field
 from typing import Any
 
-#: Options of lengths in meters.
+#: Options of lengths in meters, and of what is from 0 to 1.
 LENGTH = {"subtype": 'DISTANCE', "unit": 'LENGTH'}
+FACTOR = {"subtype": 'FACTOR', "min": 0.0, "max": 1.0}
 
 
 def setting(default: bool | int | float, label: str, description: str, /, **options: Any) -> Any:
@@ -30,3 +31,13 @@ def setting(default: bool | int | float, label: str, description: str, /, **opti
 def script_setting(default: bool | int | float, /, **options: Any) -> Any:
     """The same for what only scripts set, as its value follows from others: panels do not show it."""
     return field(default=default, metadata={"options": {'HIDDEN', 'ANIMATABLE'}, **options})
+
+
+def within(low: float, soft: float | None = None, high: float | None = None) -> dict[str, Any]:
+    """Options of what has a lowest value, and maybe one that dragging does not exceed, and a highest."""
+    return {"min": low} | ({} if soft is None else {"soft_max": soft}) | ({} if high is None else {"max": high})
+
+
+def meters(low: float, soft: float, high: float | None = None) -> dict[str, Any]:
+    """The same of lengths."""
+    return within(low, soft, high) | LENGTH

@@ -28,6 +28,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats
 from .errors import TetFloraError
 from .files import PART, path_in, read_whole, write_whole
 
@@ -67,9 +68,7 @@ def last_problem() -> str:
     return _problem
 
 
-def cached(
-    kind: str, content: str, shape: tuple[int, ...], compute: Callable[[], NDArray[np.float64]]
-) -> NDArray[np.float64]:
+def cached(kind: str, content: str, shape: tuple[int, ...], compute: Callable[[], Floats]) -> Floats:
     """A result from the cache folder, or computed now and stored there.
 
     Parameters
@@ -123,7 +122,7 @@ def clear(folder: Path | None = None, names: re.Pattern[str] | None = None) -> i
     return number
 
 
-def _read(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
+def _read(path: Path, shape: tuple[int, ...]) -> Floats | None:
     most = 8 * prod(shape) + _HEADERS
     try:
         content = read_whole(path, most)
@@ -164,7 +163,7 @@ def _damaged(path: Path) -> None:
     warn(f"{path} is damaged or unreadable and will be rebuilt")
 
 
-def _write(path: Path, values: NDArray[np.float64]) -> None:
+def _write(path: Path, values: Floats) -> None:
     content = io.BytesIO()
     np.savez(content, values=values, name=np.array(path.name))
     try:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from hypothesis import given
@@ -19,15 +19,15 @@ from tetflora_addon.arrays import Arrays, Chunks, Growing, column, nested, renum
 class Marks(Arrays):
     """Things with a number, and a place that follows from it."""
 
-    number: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    place: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    number: NDArray[np.int32] = column(dtype=np.int32)
+    place: NDArray[np.float32] = column(3, dtype=np.float32)
 
 
 @dataclass(frozen=True)
 class Boxes(Arrays):
     """Things with marks."""
 
-    marks: Marks = field(metadata=nested(Marks))
+    marks: Marks = nested(Marks)
     size: NDArray[np.float64]
 
 

@@ -8,13 +8,13 @@ What an asset is before it is compiled: all of its faces, in its own space, and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column
+from ..arrays import Arrays, Floats, Floats16, Floats32, Integers, Integers32, Mask, column
 
 #: Faces up to which a cluster is drawn as a mesh of its own, where it is near.
 MESH_FACES = 2048
@@ -24,81 +24,57 @@ COUNTS = 4.0 ** np.arange(-1, 6)
 
 @dataclass(frozen=True)
 class Clusters(Arrays):
-    """Clusters (c) in the space of their asset: parents before children, those of one parent together.
+    """Clusters (c) in the space of their asset: parents before children, those of one parent together."""
 
-    Attributes
-    ----------
-    parent, child, children : (c,) int32
-        Parent or −1, first child, and number of children.
-    low, high : (c, 3) float64
-        Bounds of all vertices, meters.
-    leaf_area, wood_area : (c,) float64
-        One-sided area of sheets, and surface of solids, m², without what is transparent.
-    closed_leaf_area : (c,) float64
-        The part of that of solids which are as many as leaves: closed leaves, berries, twigs. Facets stand for them as
-        for leaves.
-    faces : (c,) int32
-    first_face : (c,) int64
-        First of its faces in the asset's order.
-    width : (c,) float64
-        Mean width of its leaves and wood, by area, meters.
-    one_leaf : (c,) float64
-        Mean optical area of its leaves, m²; 0 where there are none.
-    color : (c, 3) float64
-    transmission : (c,) float64
-    moment : (c, 6) float64
-        Mean of n nᵀ by optical area: xx, yy, zz, xy, xz, yz.
-    first_leaf : (c,) int64
-        First of its leaves in the asset's order.
-    leaves : (c,) int32
-        Leaves, and other islands as small.
-    leaf_sample, leaf_samples, wood_sample, wood_samples : (c,) int32
-        First sample and number of samples on leaves, and on wood; each of either stands for an equal optical area.
-    weights : (c, 7) float64
-        Fraction of their area that facets need to block as much light, for each of `COUNTS`.
-    """
-
-    parent: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    child: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    children: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    low: NDArray[np.float64] = field(metadata=column(3))
-    high: NDArray[np.float64] = field(metadata=column(3))
-    leaf_area: NDArray[np.float64]
-    wood_area: NDArray[np.float64]
-    closed_leaf_area: NDArray[np.float64]
-    faces: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    first_face: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
-    width: NDArray[np.float64]
-    one_leaf: NDArray[np.float64]
-    color: NDArray[np.float64] = field(metadata=column(3))
-    transmission: NDArray[np.float64]
-    moment: NDArray[np.float64] = field(metadata=column(6))
-    first_leaf: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
-    leaves: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    leaf_sample: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    leaf_samples: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    wood_sample: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    wood_samples: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    weights: NDArray[np.float64] = field(metadata=column(len(COUNTS)))
+    #: parent, child and children, (c,): parent or −1, first child, and number of children.
+    parent: Integers32 = column(dtype=np.int32)
+    child: Integers32 = column(dtype=np.int32)
+    children: Integers32 = column(dtype=np.int32)
+    #: low and high, (c, 3): bounds of all vertices, meters.
+    low: Floats = column(3)
+    high: Floats = column(3)
+    #: leaf_area and wood_area, (c,): one-sided area of sheets, and surface of solids, m², without what is transparent.
+    leaf_area: Floats
+    wood_area: Floats
+    #: (c,): the part of that of solids which are as many as leaves: closed leaves, berries, twigs. Facets stand for
+    #: them as for leaves.
+    closed_leaf_area: Floats
+    faces: Integers32 = column(dtype=np.int32)  # (c,)
+    first_face: Integers = column(dtype=np.int64)  # (c,): first of its faces in the asset's order
+    width: Floats  # (c,): mean width of its leaves and wood, by area, meters
+    one_leaf: Floats  # (c,): mean optical area of its leaves, m²; 0 where there are none
+    color: Floats = column(3)  # (c, 3)
+    transmission: Floats  # (c,)
+    moment: Floats = column(6)  # (c, 6): mean of n nᵀ by optical area: xx, yy, zz, xy, xz, yz
+    first_leaf: Integers = column(dtype=np.int64)  # (c,): first of its leaves in the asset's order
+    leaves: Integers32 = column(dtype=np.int32)  # (c,): leaves, and other islands as small
+    #: leaf_sample, leaf_samples, wood_sample and wood_samples, (c,): first sample and number of samples on leaves, and
+    #: on wood; each of either stands for an equal optical area.
+    leaf_sample: Integers32 = column(dtype=np.int32)
+    leaf_samples: Integers32 = column(dtype=np.int32)
+    wood_sample: Integers32 = column(dtype=np.int32)
+    wood_samples: Integers32 = column(dtype=np.int32)
+    #: (c, 7): fraction of their area that facets need to block as much light, for each of `COUNTS`.
+    weights: Floats = column(len(COUNTS))
 
     @property
-    def optical_area(self) -> NDArray[np.float64]:
+    def optical_area(self) -> Floats:
         """Area (c,) that can block light, m²: sheets, and half of what is closed."""
         return self.leaf_area + self.wood_area / 2
 
     @property
-    def leaf_optical(self) -> NDArray[np.float64]:
+    def leaf_optical(self) -> Floats:
         """The part (c,) of the optical area that facets stand for as for leaves, m²."""
         return self.leaf_area + self.closed_leaf_area / 2
 
     @property
-    def leaf_faces(self) -> NDArray[np.float64]:
+    def leaf_faces(self) -> Floats:
         """Mean number (c,) of faces of a leaf; 1 where there are none, or more wood than leaves."""
         leafy = (self.leaf_optical >= 0.5 * self.optical_area) & (self.leaves > 0)
         return np.where(leafy, self.faces / np.maximum(self.leaves, 1), 1.0)
 
     @property
-    def meshes(self) -> NDArray[np.bool_]:
+    def meshes(self) -> Mask:
         """Clusters (c,) that are drawn as meshes where they are near: the largest with no more than `MESH_FACES`.
 
         None has both leaves and wood where its children have either: kites take the place of leaves alone.
@@ -111,22 +87,13 @@ class Clusters(Arrays):
 
 @dataclass(frozen=True)
 class SurfaceSamples(Arrays):
-    """Places (s) on the surfaces of clusters, in the space of their asset.
+    """Places (s) on the surfaces of clusters, in the space of their asset."""
 
-    Attributes
-    ----------
-    position : (s, 3) float32
-        Meters.
-    normal : (s, 3) float16
-    color : (s, 3) float16
-    transmission, roughness : (s,) float16
-    """
-
-    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    normal: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
-    color: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
-    transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
-    roughness: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
+    position: Floats32 = column(3, dtype=np.float32)  # (s, 3): meters
+    normal: Floats16 = column(3, dtype=np.float16)  # (s, 3)
+    color: Floats16 = column(3, dtype=np.float16)  # (s, 3)
+    transmission: Floats16 = column(dtype=np.float16)  # (s,)
+    roughness: Floats16 = column(dtype=np.float16)  # (s,)
 
 
 @dataclass(frozen=True)
@@ -135,49 +102,30 @@ class AssetKites(Arrays):
 
     A kite lies in the plane of one of the leaf's faces, chosen in proportion to their areas: on average it shows the
     same area from everywhere.
-
-    Attributes
-    ----------
-    center : (l, 3) float32
-        Meters.
-    along, across : (l, 3) float32
-        Halves of its diagonals, meters.
-    color : (l, 3) float16
-    transmission, roughness : (l,) float16
     """
 
-    center: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    along: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    across: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    color: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
-    transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
-    roughness: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
+    center: Floats32 = column(3, dtype=np.float32)  # (l, 3): meters
+    #: along and across, (l, 3): halves of its diagonals, meters.
+    along: Floats32 = column(3, dtype=np.float32)
+    across: Floats32 = column(3, dtype=np.float32)
+    color: Floats16 = column(3, dtype=np.float16)  # (l, 3)
+    transmission: Floats16 = column(dtype=np.float16)  # (l,)
+    roughness: Floats16 = column(dtype=np.float16)  # (l,)
 
 
 @dataclass(frozen=True)
 class Asset:
-    """A compiled asset.
-
-    Attributes
-    ----------
-    name : str
-    digest : str
-        Of the source.
-    clusters : Clusters of c
-    samples : SurfaceSamples of s
-    leaves : AssetKites of l
-        Those of a cluster together.
-    part, face : (f,) int32
-        Part of the source, and face of that part's surface, for each face, those of a cluster together.
-    """
+    """A compiled asset."""
 
     name: str
-    digest: str
-    clusters: Clusters
-    samples: SurfaceSamples
-    leaves: AssetKites
-    part: NDArray[np.int32]
-    face: NDArray[np.int32]
+    digest: str  # of the source
+    clusters: Clusters  # of c
+    samples: SurfaceSamples  # of s
+    leaves: AssetKites  # of l: those of a cluster together
+    #: part and face, (f,): part of the source, and face of that part's surface, for each face, those of a cluster
+    #: together.
+    part: Integers32
+    face: Integers32
 
     @property
     def faces(self) -> int:
@@ -189,7 +137,7 @@ class Asset:
         """Bytes of all arrays."""
         return self.clusters.nbytes + self.samples.nbytes + self.leaves.nbytes + self.part.nbytes + self.face.nbytes
 
-    def faces_of(self, cluster: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def faces_of(self, cluster: int) -> tuple[Integers32, Integers32]:
         """Parts (k,) and faces (k,) of a cluster."""
         start = int(self.clusters.first_face[cluster])
         some = slice(start, start + int(self.clusters.faces[cluster]))
@@ -203,21 +151,12 @@ class Asset:
 
 @dataclass(frozen=True)
 class AssetTable:
-    """Several assets as one: their clusters and samples, one asset after the other.
-
-    Attributes
-    ----------
-    every : tuple of Asset
-    clusters : Clusters of c
-    samples : SurfaceSamples of s
-    root : (a + 1,) int64
-        First cluster of each, and their number.
-    """
+    """Several assets as one: their clusters and samples, one asset after the other."""
 
     every: tuple[Asset, ...]
-    clusters: Clusters
-    samples: SurfaceSamples
-    root: NDArray[np.int64]
+    clusters: Clusters  # of c
+    samples: SurfaceSamples  # of s
+    root: Integers  # (a + 1,): first cluster of each, and their number
 
     @classmethod
     def of(cls, assets: Sequence[Asset]) -> AssetTable:
@@ -257,17 +196,17 @@ class AssetTable:
         return AssetKites.concatenate([asset.leaves for asset in self.every])
 
     @cached_property
-    def first_leaf(self) -> NDArray[np.int64]:
+    def first_leaf(self) -> Integers:
         """The first (a,) of each asset."""
         return np.cumsum([0, *(len(asset.leaves) for asset in self.every)])
 
     @cached_property
-    def leaf_faces(self) -> NDArray[np.float64]:
+    def leaf_faces(self) -> Floats:
         """As of `Clusters`."""
         return self.clusters.leaf_faces
 
     @cached_property
-    def mesh_of(self) -> NDArray[np.int64]:
+    def mesh_of(self) -> Integers:
         """The cluster (c,) with a mesh of its own that each is or lies in; −1 for those above such."""
         out = np.where(self.clusters.meshes, np.arange(len(self.clusters)), -1)
         while True:  # a level at a time
@@ -280,35 +219,25 @@ class AssetTable:
 
 @dataclass(frozen=True)
 class Instances(Arrays):
-    """Places of assets (n).
+    """Places of assets (n)."""
 
-    Attributes
-    ----------
-    asset : (n,) int32
-    linear : (n, 3, 3) float64
-        From the space of the asset to the world, without the translation: turned, stretched or mirrored.
-    position : (n, 3) float64
-        Of the asset's origin, meters.
-    key : (n,) uint64
-        Tells individuals apart.
-    """
+    asset: Integers32 = column(dtype=np.int32)  # (n,)
+    #: (n, 3, 3): from the space of the asset to the world, without the translation: turned, stretched or mirrored.
+    linear: Floats = column(3, 3)
+    position: Floats = column(3)  # (n, 3): of the asset's origin, meters
+    key: NDArray[np.uint64] = column(dtype=np.uint64)  # (n,): tells individuals apart
 
-    asset: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    linear: NDArray[np.float64] = field(metadata=column(3, 3))
-    position: NDArray[np.float64] = field(metadata=column(3))
-    key: NDArray[np.uint64] = field(metadata=column(dtype=np.uint64))
-
-    def counted_from(self, origin: NDArray[np.float64]) -> Instances:
+    def counted_from(self, origin: Floats) -> Instances:
         """The same in coordinates that begin at a place (3,)."""
         return replace(self, position=self.position - origin) if origin.any() else self
 
     @property
-    def scale(self) -> NDArray[np.float64]:
+    def scale(self) -> Floats:
         """Mean scale (n,): the cube root of the factor on volumes."""
         return np.cbrt(np.abs(np.linalg.det(self.linear)))
 
     @property
-    def largest(self) -> NDArray[np.float64]:
+    def largest(self) -> Floats:
         """Largest factor (n,) on any length, or somewhat more where an instance is stretched (Frobenius norm)."""
         length = np.linalg.norm(self.linear, axis=1)
         even = length.max(axis=1, initial=0.0)
@@ -319,35 +248,16 @@ class Instances(Arrays):
 
 @dataclass(frozen=True)
 class AssetSurface:
-    """Faces of one mesh.
-
-    Attributes
-    ----------
-    name : str
-    positions : (v, 3) float32
-        In the space of the mesh, meters.
-    triangles : (t, 3) int32
-        Vertices of each.
-    face : (t,) int32
-        The mesh's face that each is a part of; ascending.
-    color : (f, 3) float16
-        Mean linear color of what is not transparent of each face.
-    transmission : (f,) float16
-        Fraction of light that is scattered through; NaN where nobody knows.
-    coverage : (f,) float16
-        Fraction of each that is not transparent.
-    roughness : (f,) float16 or None
-        Of its gloss; None where nobody knows.
-    """
+    """Faces of one mesh."""
 
     name: str
-    positions: NDArray[np.float32]
-    triangles: NDArray[np.int32]
-    face: NDArray[np.int32]
-    color: NDArray[np.float16]
-    transmission: NDArray[np.float16]
-    coverage: NDArray[np.float16]
-    roughness: NDArray[np.float16] | None = None
+    positions: Floats32  # (v, 3): in the space of the mesh, meters
+    triangles: Integers32  # (t, 3): vertices of each
+    face: Integers32  # (t,): the mesh's face that each is a part of; ascending
+    color: Floats16  # (f, 3): mean linear color of what is not transparent of each face
+    transmission: Floats16  # (f,): fraction of light that is scattered through; NaN where nobody knows
+    coverage: Floats16  # (f,): fraction of each that is not transparent
+    roughness: Floats16 | None = None  # (f,): of its gloss; None where nobody knows
 
     @property
     def faces(self) -> int:
@@ -357,26 +267,13 @@ class AssetSurface:
 
 @dataclass(frozen=True)
 class AssetSource:
-    """All surfaces of an asset, and where it shows them: a leaf may be a surface that it shows ten thousand times.
+    """All surfaces of an asset, and where it shows them: a leaf may be a surface that it shows ten thousand times."""
 
-    Attributes
-    ----------
-    name : str
-        Of the object or collection, for messages.
-    surfaces : tuple of AssetSurface
-    surface : (n,) int32
-        Surface of each part.
-    matrices : (n, 4, 4) float64
-        From the space of that surface to that of the asset.
-    digest : str
-        Hexadecimal; of all that the above follows from.
-    """
-
-    name: str
+    name: str  # of the object or collection, for messages
     surfaces: tuple[AssetSurface, ...]
-    surface: NDArray[np.int32]
-    matrices: NDArray[np.float64]
-    digest: str
+    surface: Integers32  # (n,): surface of each part
+    matrices: Floats  # (n, 4, 4): from the space of that surface to that of the asset
+    digest: str  # hexadecimal; of all that the above follows from
 
     @property
     def faces(self) -> int:

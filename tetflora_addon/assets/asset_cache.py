@@ -25,8 +25,6 @@ METHOD = 8
 #: Bytes of a file at most, of all files of a user, and of what is kept in memory.
 _MOST, _MOST_FILES, _MOST_MEMORY = 1 << 30, 4 << 30, 768 << 20
 _NAMES = re.compile(r"tetflora-compiled-\d+-[0-9a-f]+\.npz")
-_NUMBERS = ("child", "children", "first_face", "faces", "first_leaf", "leaves")
-_NUMBERS += ("leaf_sample", "leaf_samples", "wood_sample", "wood_samples")
 _KINDS = {"clusters": Clusters, "samples": SurfaceSamples, "leaves": AssetKites}
 
 _known: dict[str, Asset] = {}  # least recently asked for first
@@ -133,22 +131,7 @@ def _check(asset: Asset, digest: str) -> None:
     runs += [(clusters.leaf_sample, clusters.leaf_samples, len(asset.samples))]
     runs += [(clusters.wood_sample, clusters.wood_samples, len(asset.samples))]
     runs += [(clusters.first_leaf, clusters.leaves, len(asset.leaves))]
-    numbers = (
-        clusters.first_leaf,
-        clusters.leaves,
-        clusters.child,
-        clusters.children,
-        clusters.first_face,
-        clusters.faces,
-    )
-    numbers += (
-        clusters.leaf_sample,
-        clusters.leaf_samples,
-        clusters.wood_sample,
-        clusters.wood_samples,
-        asset.part,
-        asset.face,
-    )
+    numbers = [*(own for first, number, _ in runs for own in (first, number)), asset.part, asset.face]
     sound = (
         count > 0
         and asset.digest == digest

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Integers, Integers32
+
 #: Triangles up to which a cluster has no children.
 SMALL = 256
 #: Divisions between a cluster and its children.
@@ -21,29 +23,19 @@ GENERATIONS = 3
 
 @dataclass(frozen=True)
 class Hierarchy:
-    """Clusters (c), parents before children and children of one parent together; the first is all of the asset.
+    """Clusters (c), parents before children and children of one parent together; the first is all of the asset."""
 
-    Attributes
-    ----------
-    order : (p,) int64
-        Patches, those of each cluster together.
-    first, last : (c,) int64
-        Which of them are of each: from the first on, before the last.
-    parent : (c,) int32
-        −1 for the first.
-    child, children : (c,) int32
-        First child, and how many there are; 0 where there are none.
-    """
-
-    order: NDArray[np.int64]
-    first: NDArray[np.int64]
-    last: NDArray[np.int64]
-    parent: NDArray[np.int32]
-    child: NDArray[np.int32]
-    children: NDArray[np.int32]
+    order: Integers  # (p,): patches, those of each cluster together
+    #: first and last, (c,): which of them are of each: from the first on, before the last.
+    first: Integers
+    last: Integers
+    parent: Integers32  # (c,): −1 for the first
+    #: child and children, (c,): first child, and how many there are; 0 where there are none.
+    child: Integers32
+    children: Integers32
 
 
-def hierarchy_of(center: NDArray[np.floating], triangles: NDArray[np.integer], kind: NDArray[np.integer]) -> Hierarchy:
+def hierarchy_of(center: NDArray[np.floating], triangles: Integers, kind: Integers) -> Hierarchy:
     """Clusters of patches with middles (p, 3) and so many triangles (p,) each, at least one patch.
 
     Kinds (p,) are divided before anything else: a trunk among leaves would be as small as these for all that asks.
@@ -79,13 +71,8 @@ def hierarchy_of(center: NDArray[np.floating], triangles: NDArray[np.integer], k
 
 
 def _divided(
-    order: NDArray[np.int64],
-    low: NDArray[np.int64],
-    high: NDArray[np.int64],
-    number: NDArray[np.int64],
-    center: NDArray[np.floating],
-    triangles: NDArray[np.integer],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    order: Integers, low: Integers, high: Integers, number: Integers, center: NDArray[np.floating], triangles: Integers
+) -> tuple[Integers, Integers, Integers, Integers]:
     """Divide runs (r,) of the order in two where they are large; new order, runs, and where each comes from."""
     size = high - low
     owner = np.repeat(np.arange(len(low)), size)

@@ -9,13 +9,14 @@ what refinement asks of a cluster is known without looking at its polygons again
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
-from ..jobs import run_to_end
 from .asset import COUNTS, Asset, AssetKites, AssetSource, Clusters, SurfaceSamples
 from .clusters import Hierarchy, hierarchy_of
 from .facet_weights import facet_weights_of
@@ -24,11 +25,6 @@ from .patches import patches_of
 
 #: Samples of a cluster with children.
 SAMPLES_ABOVE = 64
-
-
-def compile_asset(source: AssetSource) -> Asset:
-    """Compile an asset at once; errors as `compile_steps`."""
-    return run_to_end(compile_steps(source))
 
 
 def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
@@ -62,13 +58,13 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
 
     weights = yield from facet_weights_of(clusters, samples, triangles, 0.85)
     part, face = (np.concatenate([getattr(p, name) for p in parts]) for name in ("part", "face"))
-    clusters = Clusters(*(weights if name == "weights" else getattr(clusters, name) for name in vars(clusters)))
+    clusters = replace(clusters, weights=weights)
     return Asset(
         source.name, source.digest, clusters, samples, AssetKites.concatenate([p.leaves for p in parts]), part, face
     )
 
 
-def _smallest(hierarchy: Hierarchy) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
+def _smallest(hierarchy: Hierarchy) -> tuple[NDArray[np.intp], Integers]:
     """Clusters (k,) without children, in their order, and which of these each cluster has: (2, c), first and end."""
     small = np.flatnonzero(hierarchy.children == 0)
     small = small[np.argsort(hierarchy.first[small], kind="stable")]
@@ -99,41 +95,21 @@ def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Su
     leaf, wood, optical, faces, leaves, closed_leaves = every[:, :6].T
     mean = every[:, 6:] / np.maximum(optical, 1e-300)[:, None]
     before, leaves_before = (np.cumsum(np.append(0, sums[:, k])) for k in (3, 4))
-    clusters = Clusters(
-        hierarchy.parent,
-        hierarchy.child,
-        hierarchy.children,
-        bounds[:, 0],
-        bounds[:, 1],
-        leaf,
-        wood,
-        np.minimum(closed_leaves, wood),
-        faces.astype(np.int32),
-        before[first].astype(np.int64),
-        mean[:, 0],
-        (leaf + closed_leaves / 2) / np.maximum(leaves, 1.0),
-        mean[:, 1:4],
-        mean[:, 4],
-        mean[:, 5:],
-        leaves_before[first].astype(np.int64),
-        leaves.astype(np.int32),
-        begin.astype(np.int32),
-        every_counts[:, 0].astype(np.int32),
-        (begin + every_counts[:, 0]).astype(np.int32),
-        every_counts[:, 1].astype(np.int32),
+    areas = leaf, wood, np.minimum(closed_leaves, wood)
+    one_leaf = (leaf + closed_leaves / 2) / np.maximum(leaves, 1.0)
+    look = mean[:, 0], one_leaf, mean[:, 1:4], mean[:, 4], mean[:, 5:]
+    of_samples = begin, every_counts[:, 0], begin + every_counts[:, 0], every_counts[:, 1]
+    clusters = Clusters.typed(
+        *(hierarchy.parent, hierarchy.child, hierarchy.children, *bounds.swapaxes(0, 1)),
+        *(*areas, faces, before[first], *look, leaves_before[first], leaves, *of_samples),
         np.ones((len(first), len(COUNTS))),
     )
     return clusters, SurfaceSamples.concatenate([samples, above])
 
 
 def _samples_above(
-    hierarchy: Hierarchy,
-    sums: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    samples: SurfaceSamples,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-) -> tuple[SurfaceSamples, NDArray[np.int64]]:
+    hierarchy: Hierarchy, sums: Floats, counts: Integers, samples: SurfaceSamples, first: Integers, last: Integers
+) -> tuple[SurfaceSamples, Integers]:
     """Samples of clusters with children (k): some of those of the smallest clusters, in proportion to their areas."""
     inner = np.flatnonzero(hierarchy.children > 0)
     areas = np.stack([sums[:, 0] + sums[:, 5] / 2, (sums[:, 1] - sums[:, 5]) / 2], axis=1)

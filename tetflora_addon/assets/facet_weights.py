@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import perpendicular, unit
+from ..arrays import Floats, Integers, perpendicular, unit
 from ..compiled.rays import basis, covered
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .asset import COUNTS, Clusters, SurfaceSamples
@@ -34,7 +34,7 @@ _CORNERS = np.array([[0.0, 1.0], [-np.sqrt(3) / 2, -0.5], [np.sqrt(3) / 2, -0.5]
 
 def facet_weights_of(
     clusters: Clusters, samples: SurfaceSamples, triangles: Callable[[int], Iterator[Run]], start: float = 0.0
-) -> Generator[float, None, NDArray[np.float64]]:
+) -> Generator[float, None, Floats]:
     """Weights (c, counts) for each of `asset.COUNTS`; yields the fraction that is done, from a start to 1.
 
     triangles: those of a cluster, in runs.
@@ -54,7 +54,7 @@ def facet_weights_of(
     return weights
 
 
-def _fitting(found: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fitting(found: Floats) -> Floats:
     """Weights (counts,) with which facets block as much: areas (2, counts, tried) of the cluster, and of its facets."""
     wanted, made = found
     out = np.ones(len(COUNTS))
@@ -70,27 +70,27 @@ def _fitting(found: NDArray[np.float64]) -> NDArray[np.float64]:
 class _View:
     """A lattice of rays through the bound of a cluster, all in one direction: one a step of u and of v."""
 
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
-    origin: NDArray[np.float64]
+    u: Floats
+    v: Floats
+    origin: Floats
     step: float
 
     @classmethod
-    def of(cls, clusters: Clusters, cluster: int, direction: NDArray[np.float64]) -> _View:
+    def of(cls, clusters: Clusters, cluster: int, direction: Floats) -> _View:
         u, v = basis(direction / np.linalg.norm(direction))
         bound = np.stack([clusters.low[cluster], clusters.high[cluster]])
         box = np.stack(np.meshgrid(*bound.T, indexing="ij"), -1).reshape(-1, 3)
         flat = np.stack([box @ u, box @ v], axis=1)
         return cls(u, v, flat.min(axis=0), max(float(np.ptp(flat, axis=0).max()), 1e-12) / RAYS)
 
-    def met(self, corners: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
+    def met(self, corners: Floats) -> tuple[NDArray[np.intp], Integers]:
         """Triangles (k,) of some (t, 3, 3), and rays (k, 2), that meet."""
         flat = (np.stack([corners @ self.u, corners @ self.v], axis=-1).reshape(-1, 2) - self.origin) / self.step
         first = np.arange(0, len(flat), 3)
         return covered(flat, first, np.full(len(first), 3))
 
 
-def _looked(clusters: Clusters, samples: SurfaceSamples, cluster: int, runs: Iterator[Run]) -> NDArray[np.float64]:
+def _looked(clusters: Clusters, samples: SurfaceSamples, cluster: int, runs: Iterator[Run]) -> Floats:
     """Areas (2, counts, tried) that a cluster blocks, and that its facets do, over those of its bound."""
     views = [_View.of(clusters, cluster, direction) for direction in DIRECTIONS]
     through = np.zeros((len(views), RAYS * RAYS))

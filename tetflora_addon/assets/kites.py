@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import unit
+from ..arrays import Floats, Integers, unit
 from ..buffers import MeshBuffers
 from ..growth.hashing import key_of_seed, uniform
 from .asset import AssetKites
@@ -19,14 +19,14 @@ _PLANE = 248
 
 
 def kites_of(
-    corners: NDArray[np.float64],
-    optical: NDArray[np.float64],
-    normal: NDArray[np.float64],
+    corners: Floats,
+    optical: Floats,
+    normal: Floats,
     color: NDArray[np.floating],
     transmission: NDArray[np.floating],
     roughness: NDArray[np.floating],
-    first: NDArray[np.integer],
-    number: NDArray[np.integer],
+    first: Integers,
+    number: Integers,
 ) -> AssetKites:
     """Kites for leaves that are runs of triangles.
 
@@ -74,14 +74,8 @@ def kites_of(
     width = 2.0 * area / np.maximum(length, 1e-300)
     mean = np.add.reduceat(optical[:, None] * color, first, axis=0) / whole
     through, rough = (np.add.reduceat(optical * own, first) / whole[:, 0] for own in (transmission, roughness))
-    return AssetKites(
-        center.astype(np.float32),
-        (length[:, None] / 2 * along).astype(np.float32),
-        (width[:, None] / 2 * np.cross(plane, along)).astype(np.float32),
-        mean.astype(np.float16),
-        through.astype(np.float16),
-        rough.astype(np.float16),
-    )
+    along, across = length[:, None] / 2 * along, width[:, None] / 2 * np.cross(plane, along)
+    return AssetKites.typed(center, along, across, mean, through, rough)
 
 
 def kite_mesh(leaves: AssetKites) -> MeshBuffers:

@@ -8,12 +8,12 @@ A run is of whole clusters without children. What it takes does not grow with th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, column, spread
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .asset import AssetKites, AssetSource, SurfaceSamples
 from .clusters import Hierarchy
@@ -42,30 +42,16 @@ _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True)
 class PatchTable:
-    """Patches (p) of all parts of a source.
+    """Patches (p) of all parts of a source."""
 
-    Attributes
-    ----------
-    patches : tuple of Patches or None
-        By surface.
-    part, patch : (p,) int32
-        Part of the source, and patch of its surface.
-    center : (p, 3) float32
-        In the space of the asset.
-    triangles : (p,) int32
-    woody : (p,) bool
-        Of a large solid: a trunk, not a berry or a closed leaf.
-    kind : (p,) int8
-        0 for leaves, 1 for thin wood, 2 for thick.
-    """
-
-    patches: tuple[Patches | None, ...]
-    part: NDArray[np.int32]
-    patch: NDArray[np.int32]
-    center: NDArray[np.float32]
-    triangles: NDArray[np.int32]
-    woody: NDArray[np.bool_]
-    kind: NDArray[np.int8]
+    patches: tuple[Patches | None, ...]  # by surface
+    #: part and patch, (p,): part of the source, and patch of its surface.
+    part: Integers32
+    patch: Integers32
+    center: Floats32  # (p, 3): in the space of the asset
+    triangles: Integers32  # (p,)
+    woody: Mask  # (p,): of a large solid: a trunk, not a berry or a closed leaf
+    kind: NDArray[np.int8]  # (p,): 0 for leaves, 1 for thin wood, 2 for thick
 
 
 def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> PatchTable:
@@ -93,38 +79,23 @@ def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> 
 
 
 @dataclass(frozen=True)
-class Run:
-    """Triangles (t) of a run of clusters.
+class Run(Arrays):
+    """Triangles (t) of a run of clusters."""
 
-    Attributes
-    ----------
-    cluster : (t,) int64
-        Among those without children, in their order; ascending.
-    corners : (t, 3, 3) float64
-        In the space of the asset, meters.
-    part, face : (t,) int32
-    new_face, new_patch : (t,) bool
-        The first triangle of a face, and of a patch.
-    color : (t, 3) float32
-    transmission, coverage, roughness : (t,) float32
-    solid, woody : (t,) bool
-    width : (t,) float32
-        Meters.
-    """
-
-    cluster: NDArray[np.int64]
-    corners: NDArray[np.float64]
-    part: NDArray[np.int32]
-    face: NDArray[np.int32]
-    new_face: NDArray[np.bool_]
-    new_patch: NDArray[np.bool_]
-    color: NDArray[np.float32]
-    transmission: NDArray[np.float32]
-    coverage: NDArray[np.float32]
-    roughness: NDArray[np.float32]
-    solid: NDArray[np.bool_]
-    woody: NDArray[np.bool_]
-    width: NDArray[np.float32]
+    cluster: Integers = column(dtype=np.int64)  # (t,): among those without children, in their order; ascending
+    corners: Floats = column(3, 3)  # (t, 3, 3): in the space of the asset, meters
+    part: Integers32 = column(dtype=np.int32)  # (t,)
+    face: Integers32 = column(dtype=np.int32)  # (t,)
+    #: new_face and new_patch, (t,): the first triangle of a face, and of a patch.
+    new_face: Mask = column(dtype=bool)
+    new_patch: Mask = column(dtype=bool)
+    color: Floats32 = column(3, dtype=np.float32)  # (t, 3)
+    transmission: Floats32 = column(dtype=np.float32)  # (t,)
+    coverage: Floats32 = column(dtype=np.float32)  # (t,)
+    roughness: Floats32 = column(dtype=np.float32)  # (t,)
+    solid: Mask = column(dtype=bool)  # (t,)
+    woody: Mask = column(dtype=bool)  # (t,)
+    width: Floats32 = column(dtype=np.float32)  # (t,): meters
 
 
 def runs_of(
@@ -141,15 +112,12 @@ def runs_of(
         yield _run(source, pool, hierarchy.order[hierarchy.first[own][of] + index], first + block[of])
 
 
-def _run(source: AssetSource, pool: PatchTable, some: NDArray[np.int64], cluster: NDArray[np.int64]) -> Run:
+def _run(source: AssetSource, pool: PatchTable, some: Integers, cluster: Integers) -> Run:
     """Triangles of some patches (k,), each of a cluster (k,)."""
     of, index = spread(pool.triangles[some])
-    count = len(of)
-    corners = np.zeros((count, 3, 3))
-    part, face = pool.part[some][of], np.zeros(count, np.int32)
-    color, solid = np.zeros((count, 3), np.float32), np.zeros(count, bool)
-    transmission, coverage, width, roughness = np.zeros((4, count), np.float32)
-    surface, woody = source.surface[part], pool.woody[some][of]
+    part, woody = pool.part[some][of], pool.woody[some][of]
+    run = replace(Run.zeros(len(of)), cluster=cluster[of], part=part, new_patch=index == 0, woody=woody)
+    surface, color, transmission = source.surface[part], run.color, run.transmission
     for s in np.unique(surface):
         at = np.flatnonzero(surface == s)
         own, shown = pool.patches[s], source.surfaces[s]
@@ -160,62 +128,35 @@ def _run(source: AssetSource, pool: PatchTable, some: NDArray[np.int64], cluster
         # By component: numpy multiplies small matrices one by one.
         for i in range(3):
             along = sum(matrix[:, i, k, None] * local[:, :, k] for k in range(3))
-            corners[at, :, i] = along + matrix[:, i, 3, None]
-        face[at] = of_face = shown.face[triangle]
-        color[at], coverage[at] = shown.color[of_face], shown.coverage[of_face]
-        roughness[at] = _ROUGHNESS if shown.roughness is None else shown.roughness[of_face]
-        solid[at] = own.solid[patch]
+            run.corners[at, :, i] = along + matrix[:, i, 3, None]
+        run.face[at] = of_face = shown.face[triangle]
+        color[at], run.coverage[at] = shown.color[of_face], shown.coverage[of_face]
+        run.roughness[at] = _ROUGHNESS if shown.roughness is None else shown.roughness[of_face]
+        run.solid[at] = solid = own.solid[patch]
         through = shown.transmission[of_face].astype(np.float32)
-        unknown = np.where(solid[at], np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
+        unknown = np.where(solid, np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
         transmission[at] = np.where(np.isnan(through), unknown, through)
-        both = at[solid[at] & ~woody[at]]  # a facet or a kite is one sheet in place of the two sides of a closed leaf
+        both = at[solid & ~woody[at]]  # a facet or a kite is one sheet in place of the two sides of a closed leaf
         color[both], transmission[both] = through_both_sides(color[both], transmission[both])
-        width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
-    new_face = (np.diff(face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0)
-    return Run(
-        cluster[of],
-        corners,
-        part,
-        face,
-        new_face,
-        index == 0,
-        color,
-        transmission,
-        coverage,
-        roughness,
-        solid,
-        woody,
-        width,
-    )
+        run.width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
+    return replace(run, new_face=(np.diff(run.face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0))
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What is known of the smallest clusters (c) of a run, and samples on them.
+    """What is known of the smallest clusters (c) of a run, and samples on them."""
 
-    Attributes
-    ----------
-    low, high : (c, 3) float64
-    sums : (c, 17) float64
-        Areas of sheets and solids, optical area; faces; patches that are not wood; area of solids that are not;
-        optical area times width, color (3), transmission, and n nᵀ (6).
-    samples : SurfaceSamples of s
-    counts : (c, 2) int64
-        Samples on leaves and on wood of each.
-    leaves : AssetKites of l
-        Those of the clusters, one after the other; patches that are not wood.
-    part, face : (f,) int32
-        Faces of the clusters, one after the other.
-    """
-
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    sums: NDArray[np.float64]
-    samples: SurfaceSamples
-    counts: NDArray[np.int64]
-    leaves: AssetKites
-    part: NDArray[np.int32]
-    face: NDArray[np.int32]
+    low: Floats  # (c, 3)
+    high: Floats  # (c, 3)
+    #: (c, 17): areas of sheets and solids, optical area; faces; patches that are not wood; area of solids that are not;
+    #: optical area times width, color (3), transmission, and n nᵀ (6).
+    sums: Floats
+    samples: SurfaceSamples  # of s
+    counts: Integers  # (c, 2): samples on leaves and on wood of each
+    leaves: AssetKites  # of l: those of the clusters, one after the other; patches that are not wood
+    #: part and face, (f,): faces of the clusters, one after the other.
+    part: Integers32
+    face: Integers32
 
 
 def measured(run: Run) -> Measured:
@@ -247,7 +188,7 @@ def measured(run: Run) -> Measured:
     )
 
 
-def _leaves(run: Run, optical: NDArray[np.float64], normal: NDArray[np.float64]) -> AssetKites:
+def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:
     """Patches that are not wood, as kites."""
     some = np.flatnonzero(~run.woody)
     if not len(some):
@@ -262,7 +203,7 @@ def _leaves(run: Run, optical: NDArray[np.float64], normal: NDArray[np.float64])
     return kites_of(*seen, first, number)
 
 
-def shared_out(leaf: NDArray[np.float64], wood: NDArray[np.float64], number: int) -> NDArray[np.int64]:
+def shared_out(leaf: Floats, wood: Floats, number: int) -> Integers:
     """How many of a number of samples are on leaves and how many on wood (c, 2), by their optical areas (c,)."""
     total = np.maximum(leaf + wood, 1e-300)
     on_leaves = np.clip(np.rint(number * leaf / total), FEWEST, number - FEWEST)
@@ -271,7 +212,7 @@ def shared_out(leaf: NDArray[np.float64], wood: NDArray[np.float64], number: int
     return np.stack([on_leaves, on_wood], axis=1).astype(np.int64)
 
 
-def well_spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def well_spread(counts: Integers) -> tuple[Integers, Integers]:
     """Owner (m,) and place (m,) of so many things each, in an order in which any run is spread over all of an owner."""
     owner, index = spread(counts)
     place = np.lexsort([index * _GOLDEN % 1.0, owner])
@@ -281,8 +222,8 @@ def well_spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[n
 
 
 def _samples(
-    run: Run, owner: NDArray[np.int64], start: NDArray[np.intp], optical: NDArray[np.float64], normal: NDArray
-) -> tuple[SurfaceSamples, NDArray[np.int64]]:
+    run: Run, owner: Integers, start: NDArray[np.intp], optical: Floats, normal: NDArray
+) -> tuple[SurfaceSamples, Integers]:
     """Samples of equal areas on leaves, and on wood, of the clusters of a run; leaves first, cluster by cluster."""
     kinds = [np.where(run.woody, 0.0, optical), np.where(run.woody, optical, 0.0)]
     areas = [np.add.reduceat(kind, start) for kind in kinds]
@@ -300,15 +241,8 @@ def _samples(
         root, v = np.sqrt(uniform(key, _U)), uniform(key, _V)
         weight = np.stack([1 - root, root * (1 - v), root * v], axis=1)
         place = np.einsum("nk,nki->ni", weight, run.corners[pick])
-        made.append(
-            SurfaceSamples(
-                place.astype(np.float32),
-                normal[pick].astype(np.float16),
-                run.color[pick].astype(np.float16),
-                run.transmission[pick].astype(np.float16),
-                run.roughness[pick].astype(np.float16),
-            )
-        )
+        look = (own[pick] for own in (normal, run.color, run.transmission, run.roughness))
+        made.append(SurfaceSamples.typed(place, *look))
         order.append(cluster)
     cluster = np.concatenate(order)
     return SurfaceSamples.concatenate(made).take(np.argsort(cluster, kind="stable")), counts

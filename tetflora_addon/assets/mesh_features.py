@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Mask, connected
 from ..storage import memoized
 
 #: Bytes of cached features, ten a face.
@@ -25,9 +26,7 @@ _ONE_OF_MANY = 1 / 64
 _ROUNDS = 6
 
 
-def classified(
-    positions: NDArray[np.float64], corner_verts: NDArray[np.integer], face_offsets: NDArray[np.integer]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
+def classified(positions: Floats, corner_verts: Integers, face_offsets: Integers) -> tuple[Mask, Mask, Floats]:
     """Classify the faces of a mesh.
 
     Parameters
@@ -95,7 +94,7 @@ def classified(
     return solid, leaf, width
 
 
-def _welded(positions: NDArray[np.float64]) -> NDArray[np.int64]:
+def _welded(positions: Floats) -> Integers:
     """Number (v,) of the place of each vertex."""
     order = np.lexsort(positions.T)
     sorted_ = positions[order]
@@ -106,27 +105,9 @@ def _welded(positions: NDArray[np.float64]) -> NDArray[np.int64]:
     return place
 
 
-def connected(number: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int32]:
-    """The least of all that each of a number of vertices hangs together with, by pairs (n,), (n,)."""
-    label = np.arange(number, dtype=np.int32)
-    while True:
-        la, lb = label[a], label[b]
-        apart = la != lb
-        if not apart.any():
-            return label
-        a, b, la, lb = a[apart], b[apart], la[apart], lb[apart]
-        # The larger of two roots gets the smaller one as its parent; then all point to their roots.
-        np.minimum.at(label, np.maximum(la, lb), np.minimum(la, lb))
-        while True:
-            shorter = label[label]
-            if (shorter == label).all():
-                break
-            label = shorter
-
-
 def _measures(
     positions: NDArray, corner_verts: NDArray, face_offsets: NDArray, following: NDArray, sizes: NDArray
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Area vectors and mean corners (f, 3) of faces."""
     points = positions[corner_verts]
     center = np.add.reduceat(points, face_offsets[:-1], axis=0) / sizes[:, None]
@@ -134,7 +115,7 @@ def _measures(
     return 0.5 * np.add.reduceat(np.cross(points, points[following]), face_offsets[:-1], axis=0), center
 
 
-def _extents(points: NDArray[np.float64], component: NDArray, number: int) -> NDArray[np.float64]:
+def _extents(points: Floats, component: NDArray, number: int) -> Floats:
     """Diagonals (n,) of the boxes around components."""
     order = np.argsort(component, kind="stable")
     first = np.searchsorted(component[order], np.arange(number))
@@ -144,7 +125,7 @@ def _extents(points: NDArray[np.float64], component: NDArray, number: int) -> ND
 
 def _mean_curvature(
     vector: NDArray, area: NDArray, center: NDArray, a: NDArray, b: NDArray, length: NDArray, faces: int
-) -> NDArray[np.float64]:
+) -> Floats:
     """Mean curvature H (f,), averaged over neighbors; positive where the surface bulges to the side of its normals.
 
     Faces that are turned inside out would make it negative; what counts is its amount.

@@ -11,13 +11,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Floats32, Integers, Integers32, Mask, connected, spread
 from ..growth.hashing import mix
 from ..parallel import blocks
 from .asset import AssetSurface
-from .mesh_features import classified, connected
+from .mesh_features import classified
 
 #: Faces of a patch at most; an island with more is cut into pieces of about so many that lie together.
 MOST_FACES = 48
@@ -29,36 +28,16 @@ _BITS = 10
 
 @dataclass(frozen=True)
 class Patches:
-    """Patches (p) of a surface, and its triangles in their order.
+    """Patches (p) of a surface, and its triangles in their order."""
 
-    Attributes
-    ----------
-    triangle : (t,) int32
-        Triangles of the surface, patch after patch, those of a face together.
-    first : (p + 1,) int64
-        First of these of each patch.
-    faces : (p,) int32
-        Faces of each.
-    solid : (p,) bool
-        Of a closed surface, or a tube with open ends: half of it is never seen.
-    width : (p,) float32
-        Of the leaf, or the local thickness of the solid, in the unit of the positions.
-    center : (p, 3) float32
-        Mean of its corners.
-    island : (p,) float32
-        Area of the island that each is or is cut from, in that unit squared.
-    pieces : (p,) int32
-        How many that island is cut into.
-    """
-
-    triangle: NDArray[np.int32]
-    first: NDArray[np.int64]
-    faces: NDArray[np.int32]
-    solid: NDArray[np.bool_]
-    width: NDArray[np.float32]
-    center: NDArray[np.float32]
-    island: NDArray[np.float32]
-    pieces: NDArray[np.int32]
+    triangle: Integers32  # (t,): triangles of the surface, patch after patch, those of a face together
+    first: Integers  # (p + 1,): first of these of each patch
+    faces: Integers32  # (p,): faces of each
+    solid: Mask  # (p,): of a closed surface, or a tube with open ends: half of it is never seen
+    width: Floats32  # (p,): of the leaf, or the local thickness of the solid, in the unit of the positions
+    center: Floats32  # (p, 3): mean of its corners
+    island: Floats32  # (p,): area of the island that each is or is cut from, in that unit squared
+    pieces: Integers32  # (p,): how many that island is cut into
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -109,7 +88,7 @@ def patches_of(surface: AssetSurface) -> Patches:
     )
 
 
-def islands(surface: AssetSurface) -> NDArray[np.int32]:
+def islands(surface: AssetSurface) -> Integers32:
     """Island (t,) of each triangle of a surface: many files split vertices at seams, so those of one place are one."""
     place = _places(surface.positions)
     corners = place[surface.triangles]
@@ -117,11 +96,10 @@ def islands(surface: AssetSurface) -> NDArray[np.int32]:
     same = np.flatnonzero(np.diff(surface.face) == 0)
     a = np.concatenate([corners[:, 0], corners[:, 1], corners[same, 0]])
     b = np.concatenate([corners[:, 1], corners[:, 2], corners[same + 1, 0]])
-    label = connected(int(place.max(initial=-1)) + 1, a, b)
-    return label[corners[:, 0]]
+    return connected(int(place.max(initial=-1)) + 1, a, b)[corners[:, 0]]
 
 
-def _places(positions: NDArray[np.float32]) -> NDArray[np.int32]:
+def _places(positions: Floats32) -> Integers32:
     """Number (v,) of the place of each vertex, by a hash of its coordinates."""
     bits = np.ascontiguousarray(positions + np.float32(0.0)).view(np.uint32)  # no negative zeros
     key = mix(mix(bits[:, 0].astype(np.uint64) << np.uint64(32) | bits[:, 1]) ^ bits[:, 2])
@@ -134,9 +112,7 @@ def _places(positions: NDArray[np.float32]) -> NDArray[np.int32]:
     return place
 
 
-def _features(
-    surface: AssetSurface, triangle: NDArray[np.int32], island: NDArray[np.int32]
-) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+def _features(surface: AssetSurface, triangle: Integers32, island: Integers32) -> tuple[Mask, Floats32]:
     """Whether triangles (t,), sorted by island, are of solids, and how wide what they are of is."""
     solid, width = np.zeros(len(triangle), bool), np.zeros(len(triangle), np.float32)
     for run in _whole_runs(island):
@@ -148,7 +124,7 @@ def _features(
     return solid, width
 
 
-def _whole_runs(island: NDArray[np.int32]) -> Iterator[slice]:
+def _whole_runs(island: Integers32) -> Iterator[slice]:
     """Slices of triangles, sorted by island (t,), with whole islands and about `BATCH` triangles."""
     first = np.flatnonzero(np.diff(island, prepend=-1))
     block = first // BATCH
@@ -158,8 +134,8 @@ def _whole_runs(island: NDArray[np.int32]) -> Iterator[slice]:
 
 
 def _along_a_curve(
-    surface: AssetSurface, triangle: NDArray[np.int32], new_island: NDArray[np.bool_], large: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    surface: AssetSurface, triangle: Integers32, new_island: Mask, large: Mask
+) -> tuple[Integers, Integers]:
     """Places (k,) of the triangles of large islands, and what is to be there (k,) to follow a curve that fills space.
 
     All triangles of a face stay together. The curve is Morton's ("A computer oriented geodetic data base", 1966).
@@ -181,7 +157,7 @@ def _along_a_curve(
     return at, at[order]
 
 
-def _spaced(value: NDArray[np.int64]) -> NDArray[np.int64]:
+def _spaced(value: Integers) -> Integers:
     """Bits of numbers (n,) below 1,024 with two zeros between them."""
     value = (value | value << 16) & 0x030000FF
     value = (value | value << 8) & 0x0300F00F

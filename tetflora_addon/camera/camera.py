@@ -18,9 +18,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import in_axes, length
+from ..arrays import Floats, in_axes, length
 
 #: Side of the grid, meters. Up to half of it from the world's origin, coordinates are those of the world.
 GRID = 1024.0
@@ -30,7 +30,7 @@ LEAST_COSINE = 0.1
 _OPEN = 2.0
 
 
-def origin_near(points: ArrayLike) -> NDArray[np.float64]:
+def origin_near(points: ArrayLike) -> Floats:
     """The corner (3,) of the grid that is nearest to most points (n, 3), or to one (3,); meters, world space."""
     points = np.asarray(points, np.float64).reshape(-1, 3)
     if not len(points):
@@ -43,58 +43,39 @@ class Camera:
     """A perspective, orthographic or panoramic camera.
 
     Camera space is Blender's: +x right, +y up, looking along −z. *Depth* is the distance along the viewing direction.
-
-    Attributes
-    ----------
-    kind : {'PERSP', 'ORTHO', 'PANO'}
-        Perspective, parallel rays along the viewing direction, or an equirectangular panorama: columns are longitudes
-        and rows are latitudes.
-    position : (3,) float64
-        The eye; for ``'ORTHO'`` the point from which depth is counted.
-    frame : (3, 3) float64
-        Rotation; columns are the camera's x, y and z axes in world space.
-    window : tuple of float
-        ``(left, right, bottom, top)`` of the image at depth 1 (``'PERSP'``), at any depth in meters (``'ORTHO'``), or
-        in radians (``'PANO'``): longitude from the viewing direction to the right, latitude from its plane upwards.
-        Lens shift, sensor fit and pixel aspect are in it; it need not be symmetric.
-    near, far : float
-        Clipping depths, meters, ``0 < near < far``.
-    width, height : int
-        Size of the final image in pixels.
-    lens_radius : float
-        Radius of the lens, meters; 0 where all is sharp.
-    focus : float
-        Depth that is sharp, meters.
-    shutter : tuple of Camera
-        The camera at other times while the shutter is open, and the other eyes of a stereoscopic image; often empty.
-    setback : float
-        How far, in depth, the position lies behind the eye, meters: not 0 where the camera stands for several.
-    cell_radius : float
-        Largest distance from that eye to the others that the camera stands for, meters; see `view_cells`.
-    origin : (3,) float64
-        Where in the world coordinates begin, meters: those of the camera, and of all that is refined for it.
     """
 
+    #: Perspective, parallel rays along the viewing direction, or an equirectangular panorama: columns are longitudes
+    #: and rows are latitudes.
     kind: Literal["PERSP", "ORTHO", "PANO"]
-    position: NDArray[np.float64]
-    frame: NDArray[np.float64]
+    position: Floats  # (3,): the eye; for ``'ORTHO'`` the point from which depth is counted
+    frame: Floats  # (3, 3): rotation; columns are the camera's x, y and z axes in world space
+    #: ``(left, right, bottom, top)`` of the image at depth 1 (``'PERSP'``), at any depth in meters (``'ORTHO'``), or in
+    #: radians (``'PANO'``): longitude from the viewing direction to the right, latitude from its plane upwards. Lens
+    #: shift, sensor fit and pixel aspect are in it; it need not be symmetric.
     window: tuple[float, float, float, float]
+    #: near and far: clipping depths, meters, ``0 < near < far``.
     near: float
     far: float
+    #: width and height: size of the final image in pixels.
     width: int
     height: int
-    lens_radius: float = 0.0
-    focus: float = np.inf
+    lens_radius: float = 0.0  # radius of the lens, meters; 0 where all is sharp
+    focus: float = np.inf  # depth that is sharp, meters
+    #: The camera at other times while the shutter is open, and the other eyes of a stereoscopic image; often empty.
     shutter: tuple[Camera, ...] = ()
+    #: How far, in depth, the position lies behind the eye, meters: not 0 where the camera stands for several.
     setback: float = 0.0
+    #: Largest distance from that eye to the others that the camera stands for, meters; see `view_cells`.
     cell_radius: float = 0.0
-    origin: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    #: (3,): where in the world coordinates begin, meters: those of the camera, and of all that is refined for it.
+    origin: Floats = field(default_factory=lambda: np.zeros(3))
 
     def local(self) -> Camera:
         """The same camera in coordinates that begin near it."""
         return self.counted_from(origin_near(self.position + self.origin))
 
-    def counted_from(self, origin: NDArray[np.float64]) -> Camera:
+    def counted_from(self, origin: Floats) -> Camera:
         """The same camera in coordinates that begin at a place (3,) in the world."""
         by = origin - self.origin
         if not by.any():
@@ -110,14 +91,14 @@ class Camera:
         return replace(self, width=width, height=height, shutter=shutter)
 
     @property
-    def eye(self) -> NDArray[np.float64]:
+    def eye(self) -> Floats:
         """Where the image is seen from (3,), meters: before the position where the camera stands for several."""
         left, right, bottom, top = self.window
         ahead = np.array([(left + right) / 2.0, (bottom + top) / 2.0, -1.0])
         return self.position + self.setback * (self.frame @ ahead)
 
     @property
-    def line_of_sight(self) -> dict[str, NDArray[np.float64]]:
+    def line_of_sight(self) -> dict[str, Floats]:
         """What `TetrahedralTree.order` needs to know of the camera: the eye or the direction of its rays."""
         return {"direction": -self.frame[:, 2]} if self.kind == "ORTHO" else {"eye": self.position}
 
@@ -127,11 +108,11 @@ class Camera:
         left, right, bottom, top = self.window
         return float(np.sqrt((right - left) * (top - bottom) / (self.width * self.height)))
 
-    def to_camera_space(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_camera_space(self, points: Floats) -> Floats:
         """World points ``(..., 3)`` to (x right, y up, depth) ``(..., 3)``, meters."""
         return in_axes(np.asarray(points, np.float64), self.frame * [1.0, 1.0, -1.0], self.position)
 
-    def distance_to_view(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distance_to_view(self, points: Floats) -> Floats:
         """Distance of world points (n, 3) from the space that the image shows, meters; negative within it."""
         x, y, depth = self.to_camera_space(points).T
         left, right, bottom, top = self.window
@@ -173,7 +154,7 @@ class Camera:
             height=self.height + 2 * up,
         )
 
-    def longitude_latitude(self, local: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def longitude_latitude(self, local: Floats) -> tuple[Floats, Floats]:
         """Place on a panorama of points ``(..., 3)`` in camera space, radians.
 
         The longitude is the one nearest to the middle of the window.
@@ -184,12 +165,12 @@ class Camera:
         longitude = middle + longitude - 2.0 * np.pi * np.round(longitude / (2.0 * np.pi))
         return longitude, np.arctan2(y, np.hypot(x, depth))
 
-    def _beside_panorama(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _beside_panorama(self, local: Floats) -> Floats:
         left, right, bottom, top = self.window
         longitude, latitude = self.longitude_latitude(local)
         far, across = np.linalg.norm(local, axis=-1), np.hypot(local[..., 0], local[..., 2])
 
-        def beyond(angle: NDArray[np.float64], meters: NDArray[np.float64]) -> NDArray[np.float64]:
+        def beyond(angle: Floats, meters: Floats) -> Floats:
             return meters * np.sin(np.clip(angle, -np.pi / 2.0, np.pi / 2.0))
 
         # What goes all the way round or to a pole has no walls there.
@@ -202,7 +183,7 @@ class Camera:
             outside = np.maximum(outside, beyond(bottom - latitude, far))
         return outside
 
-    def pixel_extent(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def pixel_extent(self, points: Floats) -> Floats:
         """Meters that one pixel spans at each of the world points ``(..., 3)``; result ``(...)``.
 
         Points nearer than the near plane count as lying on it.
@@ -228,7 +209,7 @@ class Camera:
         """Depth from which on things hide what is behind them, meters: nearer ones not from all eyes; 0 for one eye."""
         return self.setback + _OPEN * self.cell_radius
 
-    def pixel_gain(self, points: NDArray[np.float64]) -> NDArray[np.float64] | float:
+    def pixel_gain(self, points: Floats) -> Floats | float:
         """Pixels ``(...)`` of what is at points ``(..., 3)`` for each that it has as seen from the position.
 
         1 but where the camera stands for several, of which the nearest counts.
@@ -238,14 +219,14 @@ class Camera:
         depth = np.maximum(self.to_camera_space(points)[..., 2], self.near)
         return (self.pixel_size * depth / self.pixel_extent(points)) ** 2
 
-    def _nearest(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _nearest(self, distance: Floats) -> Floats:
         """Distances from the nearest of the eyes, given those from the one in the middle, meters.
 
         Within the cell nobody knows: half of its radius is as near as it comes to what is not grazed.
         """
         return np.maximum(distance - self.cell_radius, self.closest)
 
-    def extent_around(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def extent_around(self, points: Floats) -> Floats:
         """Meters (n,) that one pixel spans at points (n, 3), in view or not.
 
         Beside and behind the camera depth says nothing, but distance does.
@@ -262,7 +243,7 @@ class Camera:
 MOST = 0.5
 
 
-def to_eye(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_eye(camera: Camera, points: Floats) -> Floats:
     """Unit vectors (m, 3) from points to the camera."""
     if camera.kind == "ORTHO":
         return np.tile(camera.frame[:, 2], (len(points), 1))
@@ -270,7 +251,7 @@ def to_eye(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
     return away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
 
 
-def blur_margins(camera: Camera, center: NDArray[np.float64], reach: NDArray[np.float64]) -> tuple[float, float]:
+def blur_margins(camera: Camera, center: Floats, reach: Floats) -> tuple[float, float]:
     """Fractions of the image's width and height by which blur reaches beyond it.
 
     Parameters
@@ -308,7 +289,7 @@ def blur_margins(camera: Camera, center: NDArray[np.float64], reach: NDArray[np.
     return across, up
 
 
-def circle_of_confusion(camera: Camera, depth: NDArray[np.float64]) -> NDArray[np.float64]:
+def circle_of_confusion(camera: Camera, depth: Floats) -> Floats:
     """Radius (n,) on the window of the discs that points at depths (n,), meters, are drawn as; see the module."""
     if camera.lens_radius <= 0.0:
         return np.zeros(len(depth))
@@ -317,13 +298,13 @@ def circle_of_confusion(camera: Camera, depth: NDArray[np.float64]) -> NDArray[n
     return camera.lens_radius * np.abs(1.0 / np.maximum(depth, camera.closest) - 1.0 / camera.focus)
 
 
-def _depths(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _depths(camera: Camera, points: Floats) -> Floats:
     """Depths (n,) from the eye, meters, or distances where an image is all around it."""
     local = camera.to_camera_space(points)
     return np.linalg.norm(local, axis=-1) if camera.kind == "PANO" else local[..., 2] - camera.setback
 
 
-def _movement(camera: Camera, other: Camera, depths: tuple[float, float]) -> NDArray[np.float64]:
+def _movement(camera: Camera, other: Camera, depths: tuple[float, float]) -> Floats:
     """How far beyond the window of a camera (2,) the view of another reaches between two depths.
 
     That view is convex, and so is its image: the corners are enough.

@@ -9,13 +9,13 @@ Names: ``local`` is camera space (x right, y up, depth), meters; the *window* is
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Mask
 from ..tetrahedra.geometry import EDGES, FACES, projected_area
 from .camera import Camera
 
 
-def silhouette_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def silhouette_pixels(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
     """Exact silhouette areas of tetrahedra on the final image.
 
     Parameters
@@ -39,7 +39,7 @@ def silhouette_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[ND
     return area * (camera.width * camera.height / ((right - left) * (top - bottom))), whole
 
 
-def expected_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def expected_pixels(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
     """Silhouette areas of tetrahedra on the final image, also of those that are partly in view.
 
     Parameters
@@ -65,7 +65,7 @@ def expected_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDAr
     return area / camera.pixel_size**2 * camera.pixel_gain(vertices.mean(axis=1)), whole
 
 
-def _on_the_sphere(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _on_the_sphere(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
     middle = vertices.mean(axis=1)
     toward = middle - camera.position
     distance = np.linalg.norm(toward, axis=1)
@@ -76,20 +76,18 @@ def _on_the_sphere(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArr
     return np.where((outside > 0.0).all(axis=1), 0.0, pixels), (outside <= 0.0).all(axis=1)
 
 
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cross(a: Floats, b: Floats) -> Floats:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def _project(local: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+def _project(local: Floats, camera: Camera) -> Floats:
     """Camera space ``(..., 3)`` to the window ``(..., 2)``; what is before the near plane counts as lying on it."""
     if camera.kind == "ORTHO":
         return local[..., :2]
     return local[..., :2] / np.maximum(local[..., 2:], camera.near)
 
 
-def silhouette_area(
-    local: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64], camera: Camera
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def silhouette_area(local: Floats, low: Floats, high: Floats, camera: Camera) -> tuple[Floats, Mask]:
     """Areas ``(n,)`` on the window of tetrahedra beyond the near plane, 0 where not known, and where they are known."""
     left, right, bottom, top = camera.window
     near, far = camera.near, camera.far
@@ -111,7 +109,7 @@ def silhouette_area(
     return np.where(whole, total, 0.0), whole
 
 
-def _clipped_area(triangles: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+def _clipped_area(triangles: Floats, camera: Camera) -> Floats:
     """Signed areas ``(n,)`` on the window of the parts of triangles ``(n, 3, 3)`` beyond the near plane."""
     ahead = triangles[..., 2] >= camera.near
     flat = _project(triangles, camera)
@@ -130,9 +128,7 @@ def _clipped_area(triangles: NDArray[np.float64], camera: Camera) -> NDArray[np.
     return (area + _cross(leaves, enters)) / 2.0
 
 
-def window_bounds(
-    local: NDArray[np.float64], camera: Camera
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def window_bounds(local: Floats, camera: Camera) -> tuple[Floats, Floats, Floats]:
     """Boxes ``low``, ``high`` (n, 2) on the window, and a point (n, 2) on it that lies within the silhouette.
 
     The part before the near plane is cut off; boxes of what lies wholly before it or wholly beyond the far plane are

@@ -19,6 +19,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..setting import script_setting, setting
 from .camera import Camera
 
@@ -70,10 +71,10 @@ class ViewCells:
 class Around:
     """Spheres about all that is refined: centers (n, 3) and radii (n,), meters. Roughly will do."""
 
-    centers: NDArray[np.float64]
-    radii: NDArray[np.float64]
+    centers: Floats
+    radii: Floats
 
-    def leaves_clear(self, place: NDArray[np.float64], distance: float) -> bool:
+    def leaves_clear(self, place: Floats, distance: float) -> bool:
         """Whether all of them are at least so far from a place (3,), meters."""
         away = np.linalg.norm(self.centers - place, axis=1) - self.radii
         return bool((away >= distance).all())
@@ -84,22 +85,22 @@ class _Turns:
     """A cell of rotations: in the projection of unit quaternions from their center, coordinates of its middle (3,)."""
 
     largest: int
-    middle: NDArray[np.float64]
+    middle: Floats
     step: float
 
     @classmethod
-    def around(cls, frame: NDArray[np.float64], turn: float) -> _Turns:
+    def around(cls, frame: Floats, turn: float) -> _Turns:
         """The cell in which a rotation (3, 3) is; cells are ``turn`` radians wide."""
         largest = int(np.argmax(np.abs(_product(_BEFORE, _quaternion(frame)))))
         step = turn / 2.0  # an angle is twice that between quaternions
         return cls(largest, _middle(_projected(frame, largest), step), step)
 
-    def frame(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+    def frame(self, away: Floats) -> Floats:
         """Rotation (3, 3) so many steps (3,) away from the middle."""
         quaternion = np.insert(self.middle + away * self.step, self.largest, 1.0)
         return _matrix(_product(_BACK, quaternion / np.linalg.norm(quaternion)))
 
-    def holds(self, frame: NDArray[np.float64], reach: float) -> bool:
+    def holds(self, frame: Floats, reach: float) -> bool:
         """Whether a rotation is within so many steps of the middle."""
         return bool((np.abs(_projected(frame, self.largest) - self.middle) <= reach * self.step).all())
 
@@ -132,7 +133,10 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
     narrow = np.minimum(ACROSS * half, 1.0) if camera.kind == "PERSP" else np.ones(2)
     steps = cells.length * np.array([*narrow, 1.0])
     if around is not None and len(around.radii) and camera.kind != "ORTHO":
-        steps = _enlarged(camera.position @ frame, frame, steps, around)
+        place = camera.position @ frame
+        # Doubled as often as nothing is near the cell then. What decides is the cell, not where in it the camera is.
+        while around.leaves_clear(frame @ _middle(place, 2.0 * steps), CLEAR * np.linalg.norm(steps)):
+            steps = 2.0 * steps
     eye = frame @ _middle(camera.position @ frame, steps)
     reach = (0.5 + BEYOND) * steps
     for other in others:
@@ -148,19 +152,7 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
     return _standing_back(alike, np.array([frame.T @ corner for corner in corners]), reach)
 
 
-def _enlarged(
-    place: NDArray[np.float64], frame: NDArray[np.float64], steps: NDArray[np.float64], around: Around
-) -> NDArray[np.float64]:
-    """Sides (3,) of the cell in which a place is, doubled as often as nothing is near the cell then.
-
-    What decides is the cell, not where in it the camera is: so all of its cameras agree.
-    """
-    while around.leaves_clear(frame @ _middle(place, 2.0 * steps), CLEAR * np.linalg.norm(steps)):
-        steps = 2.0 * steps
-    return steps
-
-
-def _standing_back(camera: Camera, turned: NDArray[np.float64], reach: NDArray[np.float64]) -> Camera | None:
+def _standing_back(camera: Camera, turned: Floats, reach: Floats) -> Camera | None:
     """A camera that sees what it sees from a box of half sizes (3,) around the eye, turned (n, 3, 3) in each way."""
     left, right, bottom, top = camera.window
     middle = np.array([left + right, bottom + top]) / 2.0
@@ -243,12 +235,12 @@ def _lens_of_cell(camera: Camera) -> tuple[float, float]:
     return float(radius * 2.0 ** (0.5 / FOCI)), float(focus)
 
 
-def _middle(place: NDArray | float, step: NDArray | float) -> NDArray[np.float64]:
+def _middle(place: NDArray | float, step: NDArray | float) -> Floats:
     """Middle of the cell of a lattice in which a place is."""
     return (np.floor(place / np.asarray(step) - _BEGIN) + _BEGIN + 0.5) * step
 
 
-def _projected(frame: NDArray[np.float64], largest: int) -> NDArray[np.float64]:
+def _projected(frame: Floats, largest: int) -> Floats:
     """The other three parts (3,) of the quaternion of a rotation (3, 3), scaled so that one of the four is 1."""
     quaternion = _product(_BEFORE, _quaternion(frame))
     return np.delete(quaternion, largest) / quaternion[largest]
@@ -259,7 +251,7 @@ def _is_whole_sphere(camera: Camera) -> bool:
     return right - left > 2.0 * np.pi - 1e-3 and top - bottom > np.pi - 1e-3
 
 
-def _quaternion(frame: NDArray[np.float64]) -> NDArray[np.float64]:
+def _quaternion(frame: Floats) -> Floats:
     """Unit quaternion (w, x, y, z) of a rotation (3, 3), of either sign.
 
     Notes
@@ -277,13 +269,13 @@ def _quaternion(frame: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.linalg.eigh(np.array(k))[1][:, -1]
 
 
-def _product(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
+def _product(p: Floats, q: Floats) -> Floats:
     """Hamilton's product of quaternions (4,)."""
     vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
     return np.array([p[0] * q[0] - p[1:] @ q[1:], *vector])
 
 
-def _matrix(q: NDArray[np.float64]) -> NDArray[np.float64]:
+def _matrix(q: Floats) -> Floats:
     """Rotation (3, 3) of a unit quaternion."""
     w, v = q[0], q[1:]
     cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

@@ -33,57 +33,33 @@ _GAUSS = _GAUSS + 0.5
 
 @dataclass(frozen=True)
 class RowLeaves:
-    """Means over the forms of the leaf that each row bears; arrays (r,).
+    """Means over the forms of the leaf that each row bears; arrays (r,)."""
 
-    Attributes
-    ----------
-    area : (r,) float64
-        One-sided, of a leaf of size 1.
-    polygons, width, reach : (r,) float64
-        Faces, width and farthest vertex of such a leaf; of the reach the greatest.
-    transmission : (r,) float64
-    dull : (r,) float64
-        Part of their gloss that leaves for which such a leaf stands hide from each other.
-    """
-
-    area: Floats
+    area: Floats  # (r,): one-sided, of a leaf of size 1
+    #: polygons, width and reach, (r,): faces, width and farthest vertex of such a leaf; of the reach the greatest.
     polygons: Floats
     width: Floats
     reach: Floats
-    transmission: Floats
-    dull: Floats
+    transmission: Floats  # (r,)
+    dull: Floats  # (r,): part of their gloss that leaves for which such a leaf stands hide from each other
 
 
 @dataclass(frozen=True)
 class Averages:
-    """Expected totals of the sub-plant of each row, by contributing row.
+    """Expected totals of the sub-plant of each row, by contributing row."""
 
-    Attributes
-    ----------
-    leaves : (r, r) float64
-        Number of leaves.
-    leaf_area : (r, 3, r) float64
-        One-sided area at `NODES`, m² at plant scale 1.
-    leaf_color : (r, 3, 3) float64
-        Area times linear RGB at `NODES`.
-    fixed_wood, full_wood : (r, r) float64
-        Surface over length × radius of the own branch: what every sub-plant has, and what follows its fullness.
-    spur_wood : (r, r) float64
-        Surface of short shoots and what they bear, m² at plant scale 1; follows the fullness.
-    fixed_faces, full_faces : (r, r) float64
-        Faces of branches, likewise.
-    length, radius : (r,) float64
-        Typical size of a branch of the row at plant scale 1, meters.
-    """
-
-    leaves: Floats
-    leaf_area: Floats
-    leaf_color: Floats
+    leaves: Floats  # (r, r): number of leaves
+    leaf_area: Floats  # (r, 3, r): one-sided area at `NODES`, m² at plant scale 1
+    leaf_color: Floats  # (r, 3, 3): area times linear RGB at `NODES`
+    #: fixed_wood and full_wood, (r, r): surface over length × radius of the own branch: what every sub-plant has, and
+    #: what follows its fullness.
     fixed_wood: Floats
     full_wood: Floats
-    spur_wood: Floats
+    spur_wood: Floats  # (r, r): surface of short shoots and what they bear, m² at plant scale 1; follows the fullness
+    #: fixed_faces and full_faces, (r, r): faces of branches, likewise.
     fixed_faces: Floats
     full_faces: Floats
+    #: length and radius, (r,): typical size of a branch of the row at plant scale 1, meters.
     length: Floats
     radius: Floats
 

@@ -57,24 +57,14 @@ LEAST, MOST = 0.1, 1.5
 
 @dataclass(frozen=True)
 class Clumping:
-    """What the factor of every row follows from; arrays by row.
+    """What the factor of every row follows from; arrays by row."""
 
-    Attributes
-    ----------
-    whole, own : (r,) float64
-        Offsets: of a whole sub-plant, and of what its branch itself bears.
-    root : (r,) float64
-        √m, at plant scale 1.
-    density : (r,) float64
-    length : (r,) float64
-        Usual length of the branch at plant scale 1, meters.
-    """
-
+    #: whole and own, (r,): offsets: of a whole sub-plant, and of what its branch itself bears.
     whole: Floats
     own: Floats
-    root: Floats
-    density: Floats
-    length: Floats
+    root: Floats  # (r,): √m, at plant scale 1
+    density: Floats  # (r,)
+    length: Floats  # (r,): usual length of the branch at plant scale 1, meters
 
     def coefficients(self, branches: Branches, offset: Floats) -> Floats:
         """What is constant and what is divided by √h (n, 2), for branches with the offsets of `whole` or `own`."""

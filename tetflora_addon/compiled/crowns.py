@@ -34,39 +34,22 @@ _known: dict[Species, Crown] = {}
 
 @dataclass(frozen=True)
 class CrownParts(Arrays):
-    """Some leaves and branches (n) of a plant of scale 1, each of which stands for a number of its like.
+    """Some leaves and branches (n) of a plant of scale 1, each of which stands for a number of its like."""
 
-    Attributes
-    ----------
-    position : (n, 3) float64
-        In the axes of the plant, meters.
-    number : (n,) float64
-        How many it stands for.
-    area : (n,) float64
-        One-sided area of one leaf, half the surface of one branch, m².
-    width, length : (n,) float64
-        Of the leaf, or the branch; meters.
-    reach : (n,) float64
-        How far the branch that bears a leaf reaches with all its leaves, and a branch itself, from any point of it and
-        turned any way; meters.
-    sides, segments : (n,) int64
-        Of the tube of a branch.
-    buds : (n,) float64
-        On a branch.
-    form : (n,) int64
-        Which of `Crown.forms` a leaf has; -1 of branches.
-    """
-
-    position: Floats = field(metadata=column(3))
-    number: Floats
-    area: Floats
+    position: Floats = column(3)  # (n, 3): in the axes of the plant, meters
+    number: Floats  # (n,): how many it stands for
+    area: Floats  # (n,): one-sided area of one leaf, half the surface of one branch, m²
+    #: width and length, (n,): of the leaf, or the branch; meters.
     width: Floats
     length: Floats
+    #: (n,): how far the branch that bears a leaf reaches with all its leaves, and a branch itself, from any point of it
+    #: and turned any way; meters.
     reach: Floats
-    sides: Integers = field(metadata=column(dtype=np.int64))
-    segments: Integers = field(metadata=column(dtype=np.int64))
-    buds: Floats
-    form: Integers = field(metadata=column(dtype=np.int64))
+    #: sides and segments, (n,): of the tube of a branch.
+    sides: Integers = column(dtype=np.int64)
+    segments: Integers = column(dtype=np.int64)
+    buds: Floats  # (n,): on a branch
+    form: Integers = column(dtype=np.int64)  # (n,): which of `Crown.forms` a leaf has; -1 of branches
 
     def with_leaves(self, fraction: float) -> CrownParts:
         """The same with a fraction of the leaves."""
@@ -75,34 +58,20 @@ class CrownParts(Arrays):
 
 @dataclass(frozen=True)
 class Crown:
-    """Of a plant of scale 1.
+    """Of a plant of scale 1."""
 
-    Attributes
-    ----------
-    radius, height : float
-        Meters.
-    polygons : float
-        Expected number of the whole plant.
-    base : float
-        Meters below which there are next to no leaves.
-    leaves, wood : float
-        Expected one-sided area of the leaves and surface of the branches, m².
-    color : tuple of float
-        Mean linear RGB of both, weighted by how much of them is seen from above.
-    forms : tuple of LeafModel or None
-        One of its leaves and one of its blossoms, where these are known.
-    parts : CrownParts
-        Where nobody has looked, all its polygons are leaves that fill the crown evenly.
-    """
-
+    #: radius and height: meters.
     radius: float
     height: float
-    polygons: float
-    base: float = 0.0
+    polygons: float  # expected number of the whole plant
+    base: float = 0.0  # meters below which there are next to no leaves
+    #: leaves and wood: expected one-sided area of the leaves and surface of the branches, m².
     leaves: float = 0.0
     wood: float = 0.0
+    #: Mean linear RGB of both, weighted by how much of them is seen from above.
     color: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    forms: tuple[LeafModel | None, ...] = (None,)
+    forms: tuple[LeafModel | None, ...] = (None,)  # one of its leaves and one of its blossoms, where these are known
+    #: Where nobody has looked, all its polygons are leaves that fill the crown evenly.
     parts: CrownParts = field(default_factory=CrownParts.empty, compare=False)
 
     def __post_init__(self) -> None:

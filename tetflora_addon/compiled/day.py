@@ -24,36 +24,19 @@ _SEEN = (seasons.AREA, seasons.FRESH, seasons.AUTUMN, seasons.DRY)
 
 @dataclass(frozen=True, eq=False)
 class DayTotals:
-    """Totals of sub-plants by row (r) and kind of leaf (k) in summer, and what a day leaves of each.
+    """Totals of sub-plants by row (r) and kind of leaf (k) in summer, and what a day leaves of each."""
 
-    Attributes
-    ----------
-    years : (r, k) array of the column ``year``
-        Of the species of each row.
-    table : (r, k) int64
-        Index into ``tables``.
-    tables : (t, 6, d) float64
-        See `growth.seasons.leaf_table`.
-    origin : (t,) float64
-        Days on which these begin.
-    area : (r, 3, k) float64
-        Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
-    color : (r, 3, k, 3) float64
-        Area times mean color in summer at the same places.
-    count, faces : (r, k) float64
-        Expected numbers of leaves and of their faces.
-    twig : (r,) float64
-        Mean width of what bears the leaves of sub-plants, meters at plant scale 1; without leaves that of the branch.
-    """
-
-    years: Table
-    table: Integers
-    tables: Floats
-    origin: Floats
-    area: Floats
-    color: Floats
+    years: Table  # (r, k) array of the column ``year``: of the species of each row
+    table: Integers  # (r, k): index into ``tables``
+    tables: Floats  # (t, 6, d): see `growth.seasons.leaf_table`
+    origin: Floats  # (t,): days on which these begin
+    area: Floats  # (r, 3, k): expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1
+    color: Floats  # (r, 3, k, 3): area times mean color in summer at the same places
+    #: count and faces, (r, k): expected numbers of leaves and of their faces.
     count: Floats
     faces: Floats
+    #: (r,): mean width of what bears the leaves of sub-plants, meters at plant scale 1; without leaves that of the
+    #: branch.
     twig: Floats
 
     @property

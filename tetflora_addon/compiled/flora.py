@@ -52,81 +52,42 @@ class Flora:
 
     Totals are those of a sub-plant where the crown's branches are longest (vigor 1); of what follows the length, a
     shorter one has the fraction that `growth.fullness` gives.
-
-    Attributes
-    ----------
-    species : tuple of Species
-    forms : tuple of tuple of tuple of LeafModel
-        By species and kind of leaf.
-    rows : (r,) structured array
-        Parameters, see `rows.ROW_DTYPE`.
-    first_row : (species,) int64
-        Row of each species' trunk.
-    leaf : RowLeaves
-        Means over the forms of the leaf that each row's own branch bears.
-    bound : (r, 3) float64
-        Radius, lowest and highest z of the sub-plant's axes for a branch of length 1, see `bounds.unit_bounds`.
-    widest : (r,) float64
-        Greatest distance of the sub-plant's wood from its axes, in radii of its base, see `bounds.widest_radii`.
-    leaf_reach : (r,) float64
-        How far leaves and short shoots of the sub-plant stick out beyond its axes at plant scale 1, meters.
-    leaf_width : (r,) float64
-        Mean width of its leaves at plant scale 1, meters; 0 without leaves.
-    leaf_count : (r,) float64
-        Expected number of the leaves of the sub-plant.
-    fixed_wood, full_wood : (r,) float64
-        Expected surface of the branches of the sub-plant divided by length × radius of its own branch: what every one
-        has, and what follows its fullness.
-    spur_wood : (r,) float64
-        Surface of its short shoots, m² at plant scale 1; follows the fullness.
-    polygons, leaf_faces, fixed_faces : (r,) float64
-        Expected number of faces of the sub-plant, leaves and branches; those of the leaves; and those of the tubes that
-        every one has.
-    wood_color : (r, 3) float64
-        Area-weighted mean.
-    transmission : (r,) float64
-        Fraction of scattered light that goes through the leaves of the sub-plant.
-    averages : Averages
-        All expected totals by the row that contributes them.
-    area_nodes : (r, 3) float64
-        Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
-    color_nodes : (r, 3, 3) float64
-        Area times mean color at the same places.
-    calm : Flora or None
-        The same without the wind that this one is in.
-    summer : Flora or None
-        The same in summer, where this one is on another day of the year.
-    day : DayTotals or None
-        What the day leaves of leaves; with ``summer``.
     """
 
     #: Other processes keep it, and what it has computed for itself, see `processes.pool`.
     sent_once: ClassVar[bool] = True
 
     species: tuple[Species, ...]
-    forms: tuple[tuple[tuple[LeafModel, ...], ...], ...]
-    rows: Table
-    first_row: Integers
-    leaf: RowLeaves
+    forms: tuple[tuple[tuple[LeafModel, ...], ...], ...]  # by species and kind of leaf
+    rows: Table  # (r,) structured array: parameters, see `rows.ROW_DTYPE`
+    first_row: Integers  # (species,): row of each species' trunk
+    leaf: RowLeaves  # means over the forms of the leaf that each row's own branch bears
+    #: (r, 3): radius, lowest and highest z of the sub-plant's axes for a branch of length 1, see `bounds.unit_bounds`.
     bound: Floats
+    #: (r,): greatest distance of the sub-plant's wood from its axes, in radii of its base, see `bounds.widest_radii`.
     widest: Floats
+    #: (r,): how far leaves and short shoots of the sub-plant stick out beyond its axes at plant scale 1, meters.
     leaf_reach: Floats
-    leaf_width: Floats
-    leaf_count: Floats
+    leaf_width: Floats  # (r,): mean width of its leaves at plant scale 1, meters; 0 without leaves
+    leaf_count: Floats  # (r,): expected number of the leaves of the sub-plant
+    #: fixed_wood and full_wood, (r,): expected surface of the branches of the sub-plant divided by length × radius of
+    #: its own branch: what every one has, and what follows its fullness.
     fixed_wood: Floats
     full_wood: Floats
-    spur_wood: Floats
+    spur_wood: Floats  # (r,): surface of its short shoots, m² at plant scale 1; follows the fullness
+    #: polygons, leaf_faces and fixed_faces, (r,): expected number of faces of the sub-plant, leaves and branches; those
+    #: of the leaves; and those of the tubes that every one has.
     polygons: Floats
     leaf_faces: Floats
     fixed_faces: Floats
-    wood_color: Floats
-    transmission: Floats
-    averages: Averages
-    area_nodes: Floats
-    color_nodes: Floats
-    calm: Flora | None = None
-    summer: Flora | None = None
-    day: DayTotals | None = None
+    wood_color: Floats  # (r, 3): area-weighted mean
+    transmission: Floats  # (r,): fraction of scattered light that goes through the leaves of the sub-plant
+    averages: Averages  # all expected totals by the row that contributes them
+    area_nodes: Floats  # (r, 3): expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1
+    color_nodes: Floats  # (r, 3, 3): area times mean color at the same places
+    calm: Flora | None = None  # the same without the wind that this one is in
+    summer: Flora | None = None  # the same in summer, where this one is on another day of the year
+    day: DayTotals | None = None  # what the day leaves of leaves; with ``summer``
 
     @property
     def at_rest(self) -> Flora:

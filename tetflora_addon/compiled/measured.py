@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Mask, Table, spread
+from ..arrays import Floats, Floats32, Integers, Integers32, Mask, Table, spread
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.crown_effects import MOST_LEANING, are_stools, bare_part, child_factors, lateral_fractions, length_factors
@@ -165,45 +164,26 @@ _ASIDE = 0.4
 
 @dataclass(frozen=True)
 class TwigReach:
-    """How far twigs and leaves of a species reach beyond its limbs.
+    """How far twigs and leaves of a species reach beyond its limbs."""
 
-    Attributes
-    ----------
-    side, up : pair of float
-        Meters at plant scale 1, and fraction of the limb's length.
-    top : float
-        How far leaves of trunks and stems reach beyond these, meters at plant scale 1.
-    whole : pair of float
-        Height and crown width of plants without limbs, in lengths of their trunks; 0 where there are limbs.
-    """
-
+    #: side and up: meters at plant scale 1, and fraction of the limb's length.
     side: tuple[float, float] = (0.0, 0.0)
     up: tuple[float, float] = (0.0, 0.0)
-    top: float = 0.0
+    top: float = 0.0  # how far leaves of trunks and stems reach beyond these, meters at plant scale 1
+    #: Height and crown width of plants without limbs, in lengths of their trunks; 0 where there are limbs.
     whole: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class OuterLimbs:
-    """What reaches farthest on plants (n).
+    """What reaches farthest on plants (n)."""
 
-    Attributes
-    ----------
-    plant : (m,) int32
-        Whose limb it is; in order.
-    root, limb : (5, m) float64
-        How far limbs begin in each of `DIRECTIONS`, and how much farther they lead; meters.
-    stem : (m,) bool
-        Whether they begin on stems beyond a fork, which lean more or less.
-    width : (n,) float64
-        Factor on the lengths of limbs that plants have already.
-    """
-
-    plant: NDArray[np.int32]
+    plant: Integers32  # (m,): whose limb it is; in order
+    #: root and limb, (5, m): how far limbs begin in each of `DIRECTIONS`, and how much farther they lead; meters.
     root: Floats
     limb: Floats
-    stem: Mask
-    width: Floats
+    stem: Mask  # (m,): whether they begin on stems beyond a fork, which lean more or less
+    width: Floats  # (n,): factor on the lengths of limbs that plants have already
 
     def sizes(self, factor: Floats | None = None) -> tuple[Floats, Floats]:
         """Heights and crown widths (n,), (n,) if limbs were so many times (n,) as long, about; meters."""
@@ -307,7 +287,7 @@ def _likely(rows: Table, stems: list[tuple[Branches, Axes]], n: int) -> list[tup
     return out
 
 
-def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Integers, Integers, NDArray[np.float32]]:
+def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Integers, Integers, Floats32]:
     """Limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `DIRECTIONS`.
 
     As `growth.chosen_children` has it, but for what differs at random from limb to limb.

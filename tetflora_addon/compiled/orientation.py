@@ -45,21 +45,14 @@ _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True)
 class Orientation:
-    """Polynomials of moments; arrays by row.
+    """Polynomials of moments; arrays by row."""
 
-    Attributes
-    ----------
-    leaves, own_leaves : (r, 3, 33, 6) float64
-        Coefficients of xx, yy, zz, xy, xz, yz of the mean of n nᵀ: over all leaves of the sub-plant, and over those of
-        its branch itself where that is straight; at `averages.NODES` between inside and outside of the crown, or
-        (r, 1, 33, 6) where no leaves turn to the sky otherwise outside than inside.
-    wood : (r, 1, 33, 6) float64
-        The same over its wood.
-    """
-
+    #: leaves and own_leaves, (r, 3, 33, 6): coefficients of xx, yy, zz, xy, xz, yz of the mean of n nᵀ: over all leaves
+    #: of the sub-plant, and over those of its branch itself where that is straight; at `averages.NODES` between inside
+    #: and outside of the crown, or (r, 1, 33, 6) where no leaves turn to the sky otherwise outside than inside.
     leaves: Floats
     own_leaves: Floats
-    wood: Floats
+    wood: Floats  # (r, 1, 33, 6): the same over its wood
 
 
 def leaf_moments(orientation: Orientation, subplants: Branches) -> Floats:

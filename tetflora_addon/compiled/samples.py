@@ -13,12 +13,12 @@ Those of trunks know which limbs they are on, so that they can be moved as the c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Table, column, dot, gathered
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Table, column, dot, gathered
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, youth
@@ -45,38 +45,20 @@ _PICK, _ALONG, _TILT, _ROLL, _CHILD = range(101, 106)  # draws of this module, b
 
 @dataclass(frozen=True)
 class Points:
-    """Sample points of one sub-plant after the other; each row has one run of them, or one for each class of stand.
+    """Sample points of one sub-plant after the other; each row has one run of them, or one for each class of stand."""
 
-    Attributes
-    ----------
-    first, number : (r, c) int64
-        Run of each row and class (tilt of the branch, and how it lies); rows that do not care have the same for all.
-    position : (k, 3) float32
-        In units of the branch's length, in its own axes.
-    frame : (k, 3, 3) float32
-        Of leaves, before they turn to the light; of wood the axis is the third column.
-    row : (k,) int32
-        Row that describes the leaf (its size, color and turn to the light) or the branch.
-    outward : (k,) float32
-        Place between the inside and the outside of the crown.
-    light : (k,) float32
-        How far a leaf turns to the sky.
-    young : (k,) float32
-        How young it is, see `growth.foliage.youth`.
-    limbs : Limbs of k
-    shares : Shares of r
-    """
-
+    #: first and number, (r, c): run of each row and class (tilt of the branch, and how it lies); rows that do not care
+    #: have the same for all.
     first: Integers
     number: Integers
-    position: NDArray[np.float32]
-    frame: NDArray[np.float32]
-    row: NDArray[np.int32]
-    outward: NDArray[np.float32]
-    light: NDArray[np.float32]
-    young: NDArray[np.float32]
-    limbs: Limbs
-    shares: Shares
+    position: Floats32  # (k, 3): in units of the branch's length, in its own axes
+    frame: Floats32  # (k, 3, 3): of leaves, before they turn to the light; of wood the axis is the third column
+    row: Integers32  # (k,): row that describes the leaf (its size, color and turn to the light) or the branch
+    outward: Floats32  # (k,): place between the inside and the outside of the crown
+    light: Floats32  # (k,): how far a leaf turns to the sky
+    young: Floats32  # (k,): how young it is, see `growth.foliage.youth`
+    limbs: Limbs  # of k
+    shares: Shares  # of r
 
     def runs(self, subplants: Branches) -> tuple[Integers, Integers]:
         """First sample and number of samples (n,), (n,) that stand for sub-plants as they are turned to the sky."""
@@ -141,11 +123,11 @@ class _Points(Arrays):
     position that does not follow the length of the branches that lead there: the way along a short shoot.
     """
 
-    line: NDArray[np.int32]
+    line: Integers32
     position: Floats
     offset: Floats
     frame: NDArray[np.floating]
-    row: NDArray[np.int32]
+    row: Integers32
     outward: Floats
     light: Floats
     young: Floats
@@ -171,7 +153,7 @@ class _Arrived:
 
     branches: Branches
     weight: Floats
-    line: NDArray[np.int32]
+    line: Integers32
 
 
 class _Walk:
@@ -367,37 +349,20 @@ TRUNK, STEM, LIMB, STEM_LIMB = range(4)
 
 @dataclass(frozen=True)
 class Limbs(Arrays):
-    """The limbs that samples (k) are on.
+    """The limbs that samples (k) are on."""
 
-    Attributes
-    ----------
-    root : (k, 3) float32
-        Where the limb leaves the trunk, in the axes and units of samples; 0 where there is none.
-    kind : (k,) int8
-        Class of the sample; `TRUNK` on all that is not a trunk.
-    follows : (k,) float32
-        Fraction of what is there that follows the limb's length.
-    """
-
-    root: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    kind: NDArray[np.int8] = field(metadata=column(dtype=np.int8))
-    follows: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
+    #: (k, 3): where the limb leaves the trunk, in the axes and units of samples; 0 where there is none.
+    root: Floats32 = column(3, dtype=np.float32)
+    kind: NDArray[np.int8] = column(dtype=np.int8)  # (k,): class of the sample; `TRUNK` on all that is not a trunk
+    follows: Floats32 = column(dtype=np.float32)  # (k,): fraction of what is there that follows the limb's length
 
 
 @dataclass(frozen=True)
 class Shares:
-    """What samples of each row stand for.
+    """What samples of each row stand for."""
 
-    Attributes
-    ----------
-    kinds : (r, 4) float64
-        Fractions of each class.
-    follows : (r,) float64
-        Mean over those on limbs.
-    """
-
-    kinds: Floats
-    follows: Floats
+    kinds: Floats  # (r, 4): fractions of each class
+    follows: Floats  # (r,): mean over those on limbs
 
     @classmethod
     def of(cls, limbs: Limbs, row: Integers, rows: int) -> Shares:

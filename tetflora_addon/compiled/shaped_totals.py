@@ -45,17 +45,10 @@ _OF_WOOD = ("fixed_faces", "full_faces", "fixed_wood", "full_wood", "spur_wood")
 
 @dataclass(frozen=True)
 class ShapedTotals:
-    """Totals of sub-plants that are trunks, or stems of these, for some crown bases.
+    """Totals of sub-plants that are trunks, or stems of these, for some crown bases."""
 
-    Attributes
-    ----------
-    shaped : (r,) bool
-        Rows that crown shapes change.
-    power : (r, b, 3, t) float64
-        Of what follows the power 0, 1 or 2 of the factor on the lengths of limbs, for `_BASES`.
-    """
-
-    shaped: Mask
+    shaped: Mask  # (r,): rows that crown shapes change
+    #: (r, b, 3, t): of what follows the power 0, 1 or 2 of the factor on the lengths of limbs, for `_BASES`.
     power: Floats
 
     def leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats:

@@ -104,7 +104,7 @@ class ClusterRows(AssetParts):
         Drawn as they are: only what they cover is to be found.
     """
 
-    shown: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    shown: NDArray[np.bool_] = column(dtype=bool)
 
     @classmethod
     def of(cls, parts: AssetParts, shown: NDArray[np.bool_]) -> ClusterRows:

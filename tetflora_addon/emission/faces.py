@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,9 +50,9 @@ class FaceRows(Arrays):
         Area that each blocks, m².
     """
 
-    face: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    instance: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    center: NDArray[np.float64] = field(metadata=column(3))
+    face: NDArray[np.int32] = column(dtype=np.int32)
+    instance: NDArray[np.int32] = column(dtype=np.int32)
+    center: NDArray[np.float64] = column(3)
     reach: NDArray[np.float64]
     optical: NDArray[np.float64]
 

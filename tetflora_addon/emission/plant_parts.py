@@ -9,7 +9,7 @@ tubes while they are macroscopic, and else one thin triangle each, with the dire
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,8 +66,8 @@ class PlantRows(PlantParts):
         How far they reach from it, meters.
     """
 
-    start: NDArray[np.float64] = field(metadata=column(3))
-    end: NDArray[np.float64] = field(metadata=column(3))
+    start: NDArray[np.float64] = column(3)
+    end: NDArray[np.float64] = column(3)
     beside: NDArray[np.float64]
 
     @classmethod

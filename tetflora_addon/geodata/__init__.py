@@ -5,13 +5,13 @@
 Texts called ``what`` or ``where`` begin messages of a `SceneError`, which says what to do.
 """
 
-import json
 from functools import cache
-from pathlib import Path
 from typing import Any
+
+from ..files import beside
 
 
 @cache
 def table(name: str) -> dict[str, Any]:
     """What a JSON file of this room holds."""
-    return json.loads(Path(__file__).with_name(f"{name}.json").read_text(encoding="utf-8"))
+    return beside(__file__, f"{name}.json")

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Floats32, Integers, Mask
 from ..errors import SceneError
 from ..jobs import Progress
 from .projection import between
@@ -35,23 +36,15 @@ _AROUND = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 
 
 @dataclass(frozen=True)
 class Trees:
-    """Trees that were found.
+    """Trees that were found."""
 
-    Attributes
-    ----------
-    column, row : (n,) float64
-        Places of the tops in cells.
-    height, width : (n,) float64
-        Meters; the width is that of a circle of the crown's area.
-    offset : (n, 2) float64
-        From the top to the middle of the crown, in radii, along rows and down columns.
-    """
-
-    column: NDArray[np.float64]
-    row: NDArray[np.float64]
-    height: NDArray[np.float64]
-    width: NDArray[np.float64]
-    offset: NDArray[np.float64]
+    #: column and row, (n,): places of the tops in cells.
+    column: Floats
+    row: Floats
+    #: height and width, (n,): meters; the width is that of a circle of the crown's area.
+    height: Floats
+    width: Floats
+    offset: Floats  # (n, 2): from the top to the middle of the crown, in radii, along rows and down columns
 
 
 def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
@@ -78,7 +71,7 @@ def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
     return replace(surface, values=out)
 
 
-def checked_canopy(values: NDArray[np.float32], what: str) -> tuple[NDArray[np.float32], list[str]]:
+def checked_canopy(values: Floats32, what: str) -> tuple[Floats32, list[str]]:
     """Canopy heights without what no tree can be, and what is to be told of them.
 
     Raises
@@ -108,7 +101,7 @@ def checked_canopy(values: NDArray[np.float32], what: str) -> tuple[NDArray[np.f
     return np.where(tall, np.float32(np.nan), values), notes
 
 
-def without_areas(raster: Raster, areas: Sequence[NDArray[np.float64]]) -> tuple[Raster, int]:
+def without_areas(raster: Raster, areas: Sequence[Floats]) -> tuple[Raster, int]:
     """A raster with nothing known within areas (k, 2) in its own coordinates, and how many cells that are."""
     h, w = raster.values.shape
     inside = np.zeros((h, w), bool)
@@ -125,7 +118,7 @@ def without_areas(raster: Raster, areas: Sequence[NDArray[np.float64]]) -> tuple
     return replace(raster, values=values), int((inside & np.isfinite(raster.values)).sum())
 
 
-def find_trees(values: NDArray[np.float32], cell: float, least: float) -> Generator[Progress, object, Trees]:
+def find_trees(values: Floats32, cell: float, least: float) -> Generator[Progress, object, Trees]:
     """Find trees; yields progress.
 
     Parameters
@@ -181,9 +174,7 @@ def _window(height: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.minimum((WINDOW[0] + WINDOW[1] * height**2) / 2.0, _MOST_WINDOW)
 
 
-def _hidden_by(
-    flat: NDArray[np.float32], summits: NDArray[np.int64], stride: int, cell: float
-) -> Generator[Progress, object, NDArray[np.int64]]:
+def _hidden_by(flat: Floats32, summits: Integers, stride: int, cell: float) -> Generator[Progress, object, Integers]:
     """For each summit the cell that is highest in its window: itself if it is a top."""
     radius = _window(flat[summits].astype(np.float64)) / cell
     order = np.argsort(-radius, kind="stable")
@@ -191,7 +182,7 @@ def _hidden_by(
     most = int(radius.max(initial=0.0))
     rows = len(flat) // stride
     for i in range(-most, most + 1):
-        yield Progress(0.3 + 0.4 * (i + most) / max(2 * most, 1), "Looking for treetops", partial=True)
+        yield Progress(0.3 + 0.4 * (i + most) / max(2 * most, 1), "Looking for treetops")
         for j in range(-most, most + 1):
             reach = np.hypot(i, j)
             some = order[: np.searchsorted(-radius[order], -reach, side="right")]  # those with windows as wide
@@ -205,8 +196,6 @@ def _hidden_by(
     return target
 
 
-def _before(
-    value: NDArray[np.float32], cell: NDArray[np.int64], other: NDArray[np.float32], than: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _before(value: Floats32, cell: Integers, other: Floats32, than: Integers) -> Mask:
     """Whether cells are higher than others; of equal ones the first is."""
     return (value > other) | ((value == other) & (cell < than))

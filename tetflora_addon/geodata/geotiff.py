@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers, Mask
 from ..errors import SceneError, quoted
 from ..jobs import Progress
 from . import table
@@ -97,7 +98,7 @@ def place_of_image(path: Path) -> Raster:
     return Raster(np.zeros((1, 1), np.float32), *place, system)
 
 
-def _place(path: Path, tags: _Tags | None = None) -> tuple[list[NDArray[np.float64]], System]:
+def _place(path: Path, tags: _Tags | None = None) -> tuple[list[Floats], System]:
     """Middle of the first pixel, steps along and down, and the system, by tags or else by files beside the image."""
     place, system = (tags.place(), tags.system()) if tags is not None else (None, System())
     return world_file(path) if place is None else place, system_beside(path) if system == System() else system
@@ -185,7 +186,7 @@ class _Tags:
                 "SamplesPerPixel", f"is {bands}; write one band only, for example with gdal_translate -b 1"
             )
 
-    def pixels(self) -> Generator[Progress, object, tuple[NDArray[Any], NDArray[np.bool_]]]:
+    def pixels(self) -> Generator[Progress, object, tuple[NDArray[Any], Mask]]:
         """Values (h, w) of the first sample, and which pixels are not in the file, (h, w); yields progress."""
         width, height = self.one("ImageWidth"), self.one("ImageLength")
         checked_size(width, height, f"{self.name}: ")
@@ -255,7 +256,7 @@ class _Tags:
             )
         return np.dtype(f"{self.order}{letter}{bits // 8}")
 
-    def mask(self, shape: tuple[int, int]) -> Generator[Progress, object, NDArray[np.bool_]]:
+    def mask(self, shape: tuple[int, int]) -> Generator[Progress, object, Mask]:
         """Which pixels count, (h, w), by a mask that is another image of the file; yields progress."""
         own, seen = self.found, set()
         try:
@@ -314,7 +315,7 @@ class _Tags:
         except (ValueError, ZeroDivisionError, OverflowError):
             return System(unit=unit)
 
-    def place(self) -> list[NDArray[np.float64]] | None:
+    def place(self) -> list[Floats] | None:
         """Middle of the first pixel, and steps along and down, in the units of the file."""
         matrix = self.numbers("ModelTransformation", 16)
         if matrix:
@@ -396,7 +397,7 @@ def _lzw(data: bytes, most: int) -> bytes:
     bits = np.unpackbits(np.frombuffer(data, np.uint8))
     out, at, size, ended = [], 0, 0, False
     while size < most and not ended:
-        found: list[NDArray[np.int64]] = []
+        found: list[Integers] = []
         for width, number in _WIDTHS:
             whole = min(number, (len(bits) - at) // width)
             codes = bits[at : at + whole * width].reshape(whole, width) @ _PLACES[12 - width :]
@@ -419,7 +420,7 @@ def _lzw(data: bytes, most: int) -> bytes:
 _PLACES = 1 << np.arange(11, -1, -1, dtype=np.int64)
 
 
-def _strings(codes: NDArray[np.int64]) -> tuple[bytes, bool]:
+def _strings(codes: Integers) -> tuple[bytes, bool]:
     """Bytes that codes (n,) after a cleared table stand for, up to one that cannot be, and whether there is such."""
     index = np.arange(len(codes))
     bad = np.flatnonzero(codes - _END > index)

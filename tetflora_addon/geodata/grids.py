@@ -12,8 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import SceneError
 from ..files import read_whole
 from ..jobs import Progress
@@ -96,7 +96,7 @@ def _xyz(path: Path) -> Generator[Progress, object, Raster]:
     return _gridded(places, steps, name, system_beside(path), nothing=-9999.0)
 
 
-def _step(values: NDArray[np.float64], name: str, what: str) -> float:
+def _step(values: Floats, name: str, what: str) -> float:
     """The step of evenly spaced places."""
     some = np.unique(values)
     gaps = np.diff(some)
@@ -112,7 +112,7 @@ def _step(values: NDArray[np.float64], name: str, what: str) -> float:
 
 
 def _gridded(
-    places: NDArray[np.float64],
+    places: Floats,
     steps: tuple[float, float],
     name: str,
     system: System,

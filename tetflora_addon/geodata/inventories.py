@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Floats32, Integers, Mask
 from ..errors import SceneError, quoted
 from . import table
 from .layers import ENDINGS
@@ -45,39 +46,19 @@ _NAMED = 6  # rows that a message names
 
 @dataclass(frozen=True)
 class Inventory:
-    """Trees of a file, in the order of their rows; sizes in meters, 0 where nobody knows.
+    """Trees of a file, in the order of their rows; sizes in meters, 0 where nobody knows."""
 
-    Attributes
-    ----------
-    names : tuple of tuple of str
-        Names of a tree in the order in which they count, each combination once.
-    name : (n,) int64
-        Index into them.
-    points : (n, 2) float64
-        Coordinates.
-    system : System
-    sizes : dict
-        ``height``, ``diameter`` (of the trunk), ``crown_width``, ``crown_base``, ``age`` and ``dead`` (years since
-        then), each (n,) float32.
-    notes : list of str
-        What was guessed, and which columns were used and which not.
-    skipped : int
-        Rows that were broken.
-    first : str
-        What was wrong with the first of them.
-    left_out : Counter
-        Rows that are no trees, by what they are.
-    """
-
-    names: tuple[tuple[str, ...], ...]
-    name: NDArray[np.int64]
-    points: NDArray[np.float64]
+    names: tuple[tuple[str, ...], ...]  # names of a tree in the order in which they count, each combination once
+    name: Integers  # (n,): index into them
+    points: Floats  # (n, 2): coordinates
     system: System
-    sizes: dict[str, NDArray[np.float32]]
-    notes: list[str] = field(default_factory=list)
-    skipped: int = 0
-    first: str = ""
-    left_out: Counter = field(default_factory=Counter)
+    #: ``height``, ``diameter`` (of the trunk), ``crown_width``, ``crown_base``, ``age`` and ``dead`` (years since
+    #: then), each (n,) float32.
+    sizes: dict[str, Floats32]
+    notes: list[str] = field(default_factory=list)  # what was guessed, and which columns were used and which not
+    skipped: int = 0  # rows that were broken
+    first: str = ""  # what was wrong with the first of them
+    left_out: Counter = field(default_factory=Counter)  # rows that are no trees, by what they are
 
 
 class Column(NamedTuple):
@@ -285,7 +266,7 @@ class _Reading:
         distinct, index = np.unique(self._texts(title), return_inverse=True)
         return np.array([what(text) for text in distinct.tolist()])[index]
 
-    def _refuse(self, bad: NDArray[np.bool_], column: str, why: Callable[[int], str]) -> None:
+    def _refuse(self, bad: Mask, column: str, why: Callable[[int], str]) -> None:
         """Refuse the file, or leave out rows."""
         bad = bad & self.good
         if not bad.any():
@@ -309,7 +290,7 @@ class _Reading:
                 self.left_out.update(what[(what != "") & self.good].tolist())
                 self.good &= what == ""
 
-    def _size(self, name: str) -> NDArray[np.float64]:
+    def _size(self, name: str) -> Floats:
         """Sizes in meters, ages in years; 0 for unknown."""
         read = [(title, what, *cells(self.table.columns[title])) for title, what in self.found.get(name, ())]
         if not read:
@@ -343,7 +324,7 @@ class _Reading:
         )
         return np.where(self.good, values, 0.0)
 
-    def _guess(self, title: str, name: str, known: NDArray[np.float64]) -> float:
+    def _guess(self, title: str, name: str, known: Floats) -> float:
         """Meters of the unit of a column that names none."""
         if self.units == IMPERIAL:
             unit, text = (0.0254, "inches") if name in _TRUNKS else (0.3048, "feet")
@@ -357,7 +338,7 @@ class _Reading:
         self.notes.append(f'"{title}" read as {text}')
         return unit
 
-    def _since_planting(self) -> NDArray[np.float64]:
+    def _since_planting(self) -> Floats:
         """Ages from years of planting, 0 for unknown."""
         if "planted" not in self.found:
             return np.zeros(len(self.good))
@@ -367,7 +348,7 @@ class _Reading:
         self.notes.append(f'ages from "{title}" to {now}')
         return np.where(years > 0, np.maximum(now - years, 1), 0).astype(np.float64)
 
-    def _dead(self) -> NDArray[np.float64]:
+    def _dead(self) -> Floats:
         """Years since death, 0 for those alive."""
         years = np.zeros(len(self.good))
         for name in ("dead", "status", "name", "common"):
@@ -380,7 +361,7 @@ class _Reading:
                 years = np.maximum(years, values)
         return years
 
-    def _points(self, epsg: int) -> tuple[NDArray[np.float64], System]:
+    def _points(self, epsg: int) -> tuple[Floats, System]:
         """Coordinates and their system."""
         name, points, system, pair = self.table.name, self.table.points, self.table.system, ("coordinates",)
         if points is None:
@@ -419,7 +400,7 @@ class _Reading:
         self._refuse_far(points, system, pair[0])
         return points, system
 
-    def _refuse_far(self, points: NDArray[np.float64], system: System, column: str) -> None:
+    def _refuse_far(self, points: Floats, system: System, column: str) -> None:
         """Refuse rows that lie far from most others, as those do whose coordinates are 0 or wrong."""
         good = np.flatnonzero(self.good)
         if not len(good):
@@ -434,7 +415,7 @@ class _Reading:
                 far, column, lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} is {_away(away[i])} most other trees"
             )
 
-    def _places(self) -> tuple[NDArray[np.float64], int]:
+    def _places(self) -> tuple[Floats, int]:
         """Coordinates that stand in one column, and the EPSG code that stands there too, or 0."""
         title = self.found["place"][0][0]
         texts = self._texts(title)
@@ -449,7 +430,7 @@ class _Reading:
             self.notes.append(f'"{title}" read as latitude, longitude')
         return points, int(found[:, 2].max(initial=0.0))
 
-    def _coordinate(self, column: str) -> NDArray[np.float64]:
+    def _coordinate(self, column: str) -> Floats:
         """Numbers (n,) of a column of coordinates, in meters or degrees."""
         title, what = self.found[column][0]
         texts = self._texts(title)
@@ -459,7 +440,7 @@ class _Reading:
         self._refuse(bad, column, lambda i: f"{quoted(str(texts[i]))} is not a coordinate")
         return np.where(self.good, values, 0.0) * (what.unit or 1.0)
 
-    def _names(self) -> tuple[tuple[tuple[str, ...], ...], NDArray[np.int64]]:
+    def _names(self) -> tuple[tuple[tuple[str, ...], ...], Integers]:
         """Names of the trees: each combination once, and the index of each tree."""
         titles = [title for kind in NAMES for title, _ in self.found.get(kind, ())]
         genera, names = (len(self.found.get(kind, ())) for kind in NAMES[:2])
@@ -482,7 +463,7 @@ def _ordered(genera: tuple[str, ...], names: tuple[str, ...], others: tuple[str,
     return tuple(name for name in (*joined[:1], *names, *others, genus) if is_name(name))
 
 
-def _are_degrees(points: NDArray[np.float64]) -> bool:
+def _are_degrees(points: Floats) -> bool:
     """Whether coordinates that are called x and y are degrees: nobody lists trees of a plot so small."""
     if not len(points) or (np.abs(points) > (180.0, 90.0)).any():
         return False

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import SceneError, quoted
 from ..files import is_regular, parse_json, read_whole
 from .prj import system_in
@@ -217,7 +217,7 @@ def _shape(record: bytes) -> _Feature | None:
     rings = [points[a:b] for a, b in pairwise(starts)]
     if kind == 3:
         return {"type": "MultiLineString", "coordinates": [ring.tolist() for ring in rings]}
-    areas: list[list[NDArray[np.float64]]] = [[ring] for ring in rings if _turn(ring) <= 0.0]
+    areas: list[list[Floats]] = [[ring] for ring in rings if _turn(ring) <= 0.0]
     for hole in (ring for ring in rings if _turn(ring) > 0.0):
         outer = next((area for area in areas if _inside(hole[0], area[0])), None)
         if outer is None:
@@ -227,18 +227,18 @@ def _shape(record: bytes) -> _Feature | None:
     return {"type": "MultiPolygon", "coordinates": [[ring.tolist() for ring in area] for area in areas]}
 
 
-def _points(data: bytes, at: int, number: int) -> NDArray[np.float64]:
+def _points(data: bytes, at: int, number: int) -> Floats:
     """Points (n, 2) that begin at some byte."""
     return np.frombuffer(data, "<f8", 2 * number, at).reshape(-1, 2)
 
 
-def _turn(ring: NDArray[np.float64]) -> float:
+def _turn(ring: Floats) -> float:
     """Twice the area of a ring, positive counter-clockwise."""
     x, y = (ring - ring[:1]).T
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
 
 
-def _inside(point: NDArray[np.float64], ring: NDArray[np.float64]) -> bool:
+def _inside(point: Floats, ring: Floats) -> bool:
     """Whether a point lies within a ring (n, 2)."""
     (x, y), (x1, y1), (x2, y2) = point, ring.T, np.roll(ring, -1, axis=0).T
     crossed = (y1 > y) != (y2 > y)

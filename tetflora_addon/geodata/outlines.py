@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import NAME, SceneError, readable
 from . import table
 from .layers import LAYER, list_of, parts_of, read_features
@@ -48,25 +48,15 @@ _FEET = re.compile(r"(ft|feet)$")
 
 @dataclass(frozen=True)
 class MapFeature:
-    """One feature of a map.
+    """One feature of a map."""
 
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    name : str
-    rings : tuple of (k, 2) float64
-        Coordinates. Of an area its border and the holes in it, without the last point, which is the first; or a line.
-    closed : bool
-        Whether it is an area.
-    width, height : float
-        Of a line and a building, meters.
-    """
-
-    kind: str
+    kind: str  # one of `KINDS`
     name: str
-    rings: tuple[NDArray[np.float64], ...]
-    closed: bool
+    #: tuple of (k, 2): coordinates. Of an area its border and the holes in it, without the last point, which is the
+    #: first; or a line.
+    rings: tuple[Floats, ...]
+    closed: bool  # whether it is an area
+    #: width and height: of a line and a building, meters.
     width: float = 0.0
     height: float = 0.0
 
@@ -121,7 +111,7 @@ def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFe
     return found, system, notes
 
 
-def _rings(geometry: dict[str, Any] | None, where: str) -> Iterator[tuple[tuple[NDArray[np.float64], ...], bool]]:
+def _rings(geometry: dict[str, Any] | None, where: str) -> Iterator[tuple[tuple[Floats, ...], bool]]:
     """Areas and lines of a geometry, an area as border and holes without their last points, which are the first."""
     for kind, values in parts_of(geometry, where):
         if kind == "LineString":
@@ -132,7 +122,7 @@ def _rings(geometry: dict[str, Any] | None, where: str) -> Iterator[tuple[tuple[
 
 
 def _outline(
-    tags: dict[str, Any], names: tuple[str, ...], rings: tuple[NDArray[np.float64], ...], closed: bool, chosen: str
+    tags: dict[str, Any], names: tuple[str, ...], rings: tuple[Floats, ...], closed: bool, chosen: str
 ) -> MapFeature:
     """A feature of its kind, with width and height."""
     kind, value = _kind(tags, names, closed)
@@ -199,7 +189,7 @@ def _measure(value: Any) -> float:
     return float(found[1].replace(",", ".")[:20]) * (0.3048 if found[2] in ("ft", "'") else 1.0)
 
 
-def one_ring(rings: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
+def one_ring(rings: tuple[Floats, ...]) -> Floats:
     """Border and holes of an area as one ring, (k, 2): a bridge without width leads to each hole and back."""
     outer = rings[0]
     for hole in rings[1:]:
@@ -211,7 +201,7 @@ def one_ring(rings: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
     return outer
 
 
-def denser(line: NDArray[np.float64], step: float, closed: bool = False) -> NDArray[np.float64]:
+def denser(line: Floats, step: float, closed: bool = False) -> Floats:
     """A line (k, 2) with more points, none farther than so many meters from the next."""
     ends = np.concatenate([line, line[:1]]) if closed else line
     pieces = np.linalg.norm(np.diff(ends, axis=0), axis=1)

@@ -24,13 +24,14 @@ from math import asin, atan2, cos, exp, inf, log, sin, sqrt, tan, tanh
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats
 from ..errors import SceneError, readable
 from . import table
 
 #: EPSG code of longitude and latitude, and what stands for a plane in meters in place of a code.
 LONGITUDE_LATITUDE, PLAIN = 4326, -1
 _HEIGHTS = {4937: 4258}  # systems with heights, by those without
-_Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
+_Pair = tuple[Floats, Floats]
 _Way = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
 _STEPS = 5  # of Newton's method for latitudes, which doubles the digits each time
 _ROUNDS = 7  # each of which leaves a 150th of the error
@@ -57,11 +58,11 @@ class Ellipsoid:
         """Eccentricity."""
         return sqrt(self.e2)
 
-    def isometric(self, latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+    def isometric(self, latitude: Floats) -> Floats:
         """Isometric latitude."""
         return np.arcsinh(np.tan(latitude)) - self.e * np.arctanh(self.e * np.sin(latitude))
 
-    def of_isometric(self, psi: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of_isometric(self, psi: Floats) -> Floats:
         """Latitude from `isometric`."""
         phi = np.zeros_like(psi)
         for _ in range(_ROUNDS):
@@ -72,12 +73,12 @@ class Ellipsoid:
         """Radius of a parallel, over the longer half-axis."""
         return cos(latitude) / sqrt(1.0 - self.e2 * sin(latitude) ** 2)
 
-    def authalic(self, latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+    def authalic(self, latitude: Floats) -> Floats:
         """Twice the area between equator and parallel, over what a radian has of it on a sphere."""
         s = np.sin(latitude)
         return (1.0 - self.e2) * (s / (1.0 - self.e2 * s * s) + np.arctanh(self.e * s) / self.e)
 
-    def of_authalic(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of_authalic(self, q: Floats) -> Floats:
         """Latitude from `authalic`."""
         phi = np.arcsin(np.clip(q / self.authalic(np.array(_HALF_PI)), -1.0, 1.0))
         for _ in range(_STEPS):
@@ -85,7 +86,7 @@ class Ellipsoid:
             phi = phi + (q - self.authalic(phi)) / np.maximum(slope, 1e-9)
         return phi
 
-    def at(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, longitude: Floats, latitude: Floats) -> Floats:
         """Places (n, 3) on the ellipsoid, meters from the middle of the Earth."""
         nu = self.a / np.sqrt(1.0 - self.e2 * np.sin(latitude) ** 2)
         flat = nu * np.cos(latitude)
@@ -93,7 +94,7 @@ class Ellipsoid:
             [flat * np.cos(longitude), flat * np.sin(longitude), nu * (1.0 - self.e2) * np.sin(latitude)], axis=1
         )
 
-    def of(self, places: NDArray[np.float64]) -> _Pair:
+    def of(self, places: Floats) -> _Pair:
         """Longitude and latitude of places (n, 3) near the ellipsoid."""
         x, y, z = places.T
         flat = np.hypot(x, y)
@@ -109,29 +110,15 @@ WGS84 = Ellipsoid()
 
 @dataclass(frozen=True)
 class Definition:
-    """A coordinate system.
+    """A coordinate system."""
 
-    Attributes
-    ----------
-    method : str
-        A key of `METHODS`, or ``geo`` for longitude and latitude.
-    ellipsoid : Ellipsoid
-    shift : tuple of 7 floats
-        To WGS 84: meters, seconds of arc, and parts in a million, as of a position vector.
-    meridian : float
-        Of longitude 0, degrees east of Greenwich.
-    unit : float
-        Meters.
-    parameters : tuple of floats
-        Degrees and meters, in the order that the method has them.
-    """
-
-    method: str
+    method: str  # a key of `METHODS`, or ``geo`` for longitude and latitude
     ellipsoid: Ellipsoid = WGS84
+    #: tuple of 7 floats: to WGS 84: meters, seconds of arc, and parts in a million, as of a position vector.
     shift: tuple[float, ...] = (0.0,) * 7
-    meridian: float = 0.0
-    unit: float = 1.0
-    parameters: tuple[float, ...] = ()
+    meridian: float = 0.0  # of longitude 0, degrees east of Greenwich
+    unit: float = 1.0  # meters
+    parameters: tuple[float, ...] = ()  # degrees and meters, in the order that the method has them
 
     @cached_property
     def ways(self) -> tuple[Callable[..., _Pair], Callable[..., _Pair], float]:
@@ -147,29 +134,29 @@ class Definition:
         equal = self.method in ("aea", "laea")
         latitudes = (ell.authalic, ell.of_authalic) if equal else (ell.isometric, ell.of_isometric)
 
-        def there(longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+        def there(longitude: Floats, latitude: Floats) -> _Pair:
             place = forward(latitudes[0](latitude) + 1j * longitude)
             return (place.imag + east) / self.unit, (place.real + north) / self.unit
 
-        def back(x: NDArray[np.float64], y: NDArray[np.float64]) -> _Pair:
+        def back(x: Floats, y: Floats) -> _Pair:
             place = backward(y * self.unit - north + 1j * (x * self.unit - east))
             return place.imag, latitudes[1](place.real)
 
         return there, back, self.parameters[1] + self.meridian
 
     @property
-    def _turned(self) -> NDArray[np.float64]:
+    def _turned(self) -> Floats:
         """Matrix (3, 3) of the turn and the scale of the shift."""
         x, y, z = np.radians(np.array(self.shift[3:6]) / 3600.0)
         return (1.0 + 1e-6 * self.shift[6]) * np.array([[1.0, -z, y], [z, 1.0, -x], [-y, x, 1.0]])
 
-    def to_wgs84(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+    def to_wgs84(self, longitude: Floats, latitude: Floats) -> _Pair:
         """Longitude and latitude on WGS 84 of those on the own datum."""
         if not any(self.shift):
             return longitude, latitude
         return WGS84.of(self.ellipsoid.at(longitude, latitude) @ self._turned.T + self.shift[:3])
 
-    def from_wgs84(self, longitude: NDArray[np.float64], latitude: NDArray[np.float64]) -> _Pair:
+    def from_wgs84(self, longitude: Floats, latitude: Floats) -> _Pair:
         """Longitude and latitude on the own datum of those on WGS 84."""
         if not any(self.shift):
             return longitude, latitude
@@ -340,26 +327,16 @@ TRUE = {"tm", "lcc1", "lcc2", "sterea", "omercA", "omercB"}
 
 @dataclass(frozen=True)
 class System:
-    """A coordinate system.
+    """A coordinate system."""
 
-    Attributes
-    ----------
-    epsg : int
-        EPSG; 0 for a plane in meters of which nobody knows where on Earth it lies, -1 for one about a place, -2 for one
-        that a file defines by itself.
-    longitude, latitude : float
-        The place, degrees.
-    own : Definition, optional
-        Of the file.
-    unit : float
-        Meters of plain coordinates, or of those that are taken for meters of the system.
-    """
-
+    #: EPSG; 0 for a plane in meters of which nobody knows where on Earth it lies, -1 for one about a place, -2 for one
+    #: that a file defines by itself.
     epsg: int = 0
+    #: longitude and latitude: the place, degrees.
     longitude: float = 0.0
     latitude: float = 0.0
-    own: Definition | None = field(default=None, repr=False)
-    unit: float = 1.0
+    own: Definition | None = field(default=None, repr=False)  # of the file
+    unit: float = 1.0  # meters of plain coordinates, or of those that are taken for meters of the system
 
     @property
     def definition(self) -> Definition:
@@ -449,7 +426,7 @@ def code_in(text: str) -> int | None:
     return int(next(filter(None, found.groups()))) if found else None
 
 
-def to_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_degrees(system: System, points: Floats) -> Floats:
     """Longitude and latitude on WGS 84 in degrees, (n, 2), of points (n, 2) in a system that lies on Earth."""
     points, own = system.unit * np.asarray(points, np.float64), system.definition
     if own.method == "geo" and not any(own.shift):
@@ -459,7 +436,7 @@ def to_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float6
     return np.degrees(np.stack(own.to_wgs84(longitude + np.radians(meridian), latitude), axis=1))
 
 
-def from_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def from_degrees(system: System, points: Floats) -> Floats:
     """Points (n, 2) of a system that lies on Earth, from longitude and latitude in degrees on WGS 84, (n, 2).
 
     What is too far from the system's meridian is nan.
@@ -474,7 +451,7 @@ def from_degrees(system: System, points: NDArray[np.float64]) -> NDArray[np.floa
     return np.stack(there(off, latitude), axis=1) / system.unit
 
 
-def between(points: NDArray[np.float64], source: System, target: System) -> NDArray[np.float64]:
+def between(points: Floats, source: System, target: System) -> Floats:
     """Points (n, 2) of one system in another; both lie on Earth, or both are plain."""
     if source == target or source.epsg == target.epsg == 0:
         return points * (source.unit / target.unit)
@@ -483,20 +460,14 @@ def between(points: NDArray[np.float64], source: System, target: System) -> NDAr
 
 @dataclass(frozen=True)
 class MapOrigin:
-    """Where on a map the world's origin is.
-
-    Attributes
-    ----------
-    system : System
-    east, north : float
-        Coordinates of the origin in the system.
-    """
+    """Where on a map the world's origin is."""
 
     system: System
+    #: east and north: coordinates of the origin in the system.
     east: float
     north: float
 
-    def local(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
+    def local(self, points: Floats, system: System, what: str) -> Floats:
         """Meters from the origin, (n, 2), of points (n, 2) of a system.
 
         Raises
@@ -514,7 +485,7 @@ class MapOrigin:
             )
         return local
 
-    def offsets(self, points: NDArray[np.float64], system: System, what: str) -> NDArray[np.float64]:
+    def offsets(self, points: Floats, system: System, what: str) -> Floats:
         """Meters from the origin, (n, 2), of points (n, 2) of a system, however far.
 
         Raises
@@ -535,7 +506,7 @@ class MapOrigin:
 MOST_AWAY = 250_000.0
 
 
-def place_about(system: System, low: NDArray[np.float64], high: NDArray[np.float64], what: str = "") -> MapOrigin:
+def place_about(system: System, low: Floats, high: Floats, what: str = "") -> MapOrigin:
     """The place for a scene whose first data lie between two corners, (2,) each; in whole meters.
 
     Raises

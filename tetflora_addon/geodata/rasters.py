@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Floats32
 from ..errors import SceneError, quoted
 from ..files import is_regular, read_whole
 from ..jobs import Progress
@@ -34,37 +35,27 @@ _SMALL = 4096  # bytes of world files and files with the name of a coordinate sy
 
 @dataclass(frozen=True)
 class Raster:
-    """Cells with one value each.
+    """Cells with one value each."""
 
-    Attributes
-    ----------
-    values : (h, w) float32
-        Meters, the first row is the first of the file (the northernmost, if ``down`` is); nan where nothing is known.
-    corner : (2,) float64
-        Coordinates of the middle of the first cell of the first row.
-    along, down : (2,) float64
-        Steps from a cell to the next of its row, and to the next row.
-    system : System
-    notes : tuple of str
-        What was taken from the file beside its values.
-    """
-
-    values: NDArray[np.float32]
-    corner: NDArray[np.float64]
-    along: NDArray[np.float64]
-    down: NDArray[np.float64]
+    #: (h, w): meters, the first row is the first of the file (the northernmost, if ``down`` is); nan where nothing is
+    #: known.
+    values: Floats32
+    corner: Floats  # (2,): coordinates of the middle of the first cell of the first row
+    #: along and down, (2,): steps from a cell to the next of its row, and to the next row.
+    along: Floats
+    down: Floats
     system: System
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what was taken from the file beside its values
 
-    def places(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> NDArray[np.float64]:
+    def places(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> Floats:
         """Coordinates (n, 2) of places given in cells; 0, 0 is the middle of the first cell."""
         return self.corner + np.outer(column, self.along) + np.outer(row, self.down)
 
-    def cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def cells(self, points: Floats) -> Floats:
         """Column and row, (n, 2), of places given by their coordinates."""
         return np.linalg.solve(np.stack([self.along, self.down]).T, (points - self.corner).T).T
 
-    def part(self, cells: NDArray[np.float64]) -> Raster:
+    def part(self, cells: Floats) -> Raster:
         """The part that holds some cells (n, 2), by column and row, as far as they are there."""
         most = self.values.shape[::-1]
         low = np.clip(np.floor(cells.min(axis=0)), 0, most).astype(np.int64)
@@ -73,12 +64,12 @@ class Raster:
         return replace(self, values=values, corner=self.places(low[:1], low[1:])[0])
 
     @property
-    def outline(self) -> NDArray[np.float64]:
+    def outline(self) -> Floats:
         """Coordinates of the four corners, (4, 2)."""
         h, w = self.values.shape
         return self.places(np.array([-0.5, w - 0.5, w - 0.5, -0.5]), np.array([-0.5, -0.5, h - 0.5, h - 0.5]))
 
-    def at(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> NDArray[np.float64]:
+    def at(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> Floats:
         """Values between cells, (n,), linear; those of the border beyond it, nan where a cell that counts is."""
         h, w = self.values.shape
         column, row = np.clip(column, 0.0, w - 1.0), np.clip(row, 0.0, h - 1.0)
@@ -99,7 +90,7 @@ class Raster:
             return self
         rows, columns = np.arange(0, h, step), np.arange(0, w, step)
 
-        def sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        def sums(values: Floats) -> Floats:
             return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
 
         known = np.isfinite(self.values)
@@ -112,7 +103,7 @@ class Raster:
         return replace(self, values=values, corner=corner, along=step * self.along, down=step * self.down)
 
 
-def upright(dx: float, dy: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def upright(dx: float, dy: float) -> tuple[Floats, Floats]:
     """Steps along rows to the east, and down to the south."""
     return np.array([dx, 0.0]), np.array([0.0, -dy])
 
@@ -243,7 +234,7 @@ def _ascii_head(header: dict[str, float], name: str) -> tuple[int, int, tuple[fl
     return int(width), int(height), corner, dx, dy
 
 
-def numbers_in(piece: bytes, name: str, line: int) -> NDArray[np.float64]:
+def numbers_in(piece: bytes, name: str, line: int) -> Floats:
     """All numbers of some lines; a broken one is told by its line."""
     found = _split(piece)
     if found is not None:
@@ -256,7 +247,7 @@ def numbers_in(piece: bytes, name: str, line: int) -> NDArray[np.float64]:
     raise SceneError(f"{name}: line {line}: not a list of numbers; correct it")
 
 
-def _split(text: bytes) -> NDArray[np.float64] | None:
+def _split(text: bytes) -> Floats | None:
     """Numbers (n,) of a text; None if one of them is none."""
     if not text.strip():  # of which NumPy makes -1
         return np.empty(0)
@@ -279,7 +270,7 @@ def _number(text: str, what: str) -> float:
     return value
 
 
-def without_nodata(values: NDArray[np.floating], nothing: float | None) -> NDArray[np.float32]:
+def without_nodata(values: NDArray[np.floating], nothing: float | None) -> Floats32:
     """Values with nan where nothing is known, or what stands there is no height."""
     values = np.asarray(values, np.float32)
     bad = ~(np.abs(values) < _LIMIT)
@@ -300,7 +291,7 @@ def system_beside(path: Path) -> System:
     return system_in(read_whole(found, 16 * _SMALL).decode("latin-1")) if found else System()
 
 
-def world_file(path: Path) -> list[NDArray[np.float64]]:
+def world_file(path: Path) -> list[Floats]:
     """Middle of the first cell, and steps along and down, of the world file of an image.
 
     Raises

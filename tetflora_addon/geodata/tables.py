@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from ..errors import NAME, SceneError, quoted, readable
 from ..files import parse_json, read_whole
 from . import table
@@ -36,39 +37,17 @@ MAX_POINTS = 5_000_000
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts under names.
+    """Rows of texts under names."""
 
-    Attributes
-    ----------
-    name : str
-        Of the file.
-    row : str
-        What a row is called, such as "line".
-    numbers : (n,) int64
-        Number of each row in the file.
-    columns : dict
-        Texts (n,) of each column by its name.
-    points : (n, 2) float64, optional
-        Coordinates from geometry.
-    system : System, optional
-        That goes with them.
-    broken : int
-        Rows that were left out because they are not like the others.
-    first : str
-        What is wrong with the first of them.
-    notes : list of str
-        What else was left out.
-    """
-
-    name: str
-    row: str
-    numbers: NDArray[np.int64]
-    columns: dict[str, NDArray[np.str_]]
-    points: NDArray[np.float64] | None = None
-    system: System | None = None
-    broken: int = 0
-    first: str = ""
-    notes: list[str] = field(default_factory=list)
+    name: str  # of the file
+    row: str  # what a row is called, such as "line"
+    numbers: Integers  # (n,): number of each row in the file
+    columns: dict[str, NDArray[np.str_]]  # texts (n,) of each column by its name
+    points: Floats | None = None  # (n, 2): coordinates from geometry
+    system: System | None = None  # that goes with them
+    broken: int = 0  # rows that were left out because they are not like the others
+    first: str = ""  # what is wrong with the first of them
+    notes: list[str] = field(default_factory=list)  # what else was left out
 
     def where(self, index: int, column: str = "") -> str:
         """A place in the file, for messages."""
@@ -172,7 +151,7 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
     return Table(name, "feature", np.array(numbers, np.int64), columns, np.concatenate(points), system, notes=notes)
 
 
-def _points_of(geometry: dict[str, Any] | None, where: str) -> NDArray[np.float64]:
+def _points_of(geometry: dict[str, Any] | None, where: str) -> Floats:
     """Places (n, 2) of a geometry: its points, or the middle of its first area."""
     parts = list(parts_of(geometry, where))
     points = [values for kind, values in parts if kind == "Point"]
@@ -199,7 +178,7 @@ def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
     return out
 
 
-def coordinates(values: Any, where: str, texts: bool = False) -> NDArray[np.float64]:
+def coordinates(values: Any, where: str, texts: bool = False) -> Floats:
     """Positions of GeoJSON as (n, 2); heights do not count, and numbers may be texts if asked for.
 
     Raises
@@ -308,7 +287,7 @@ def _unit(text: str | None) -> float:
     return next((meters for meters, forms in _METERS.items() if text and re.fullmatch(forms, text)), 0.0)
 
 
-def cells(texts: NDArray[np.str_]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def cells(texts: NDArray[np.str_]) -> tuple[Floats, Floats, Integers]:
     """Numbers (n,), 0 for nothing and nan for what is wrong; meters of their units, 0 if they name none; kinds."""
     distinct, index = np.unique(texts, return_inverse=True)
     points = any("." in text for text in distinct.tolist())

@@ -30,24 +30,13 @@ NEVER = 9
 
 
 class Title(NamedTuple):
-    """What a title says.
+    """What a title says."""
 
-    Attributes
-    ----------
-    field : str
-        One of `FIELDS`, or ``z``.
-    unit : float
-        Meters; 0 if it names none.
-    doubt : int
-        0 for what is plain, more for what only values can confirm; `NEVER` for what is known to be something else.
-    classes : bool
-        Whether it speaks of classes, so that whole numbers may be theirs.
-    """
-
-    field: str
-    unit: float
+    field: str  # one of `FIELDS`, or ``z``
+    unit: float  # meters; 0 if it names none
+    #: 0 for what is plain, more for what only values can confirm; `NEVER` for what is known to be something else.
     doubt: int
-    classes: bool = False
+    classes: bool = False  # whether it speaks of classes, so that whole numbers may be theirs
 
 
 @cache

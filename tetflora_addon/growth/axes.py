@@ -24,27 +24,13 @@ from .wind import axis_and_angle, is_windy, leaned, moment, sway, turned_by, tur
 
 @dataclass(frozen=True)
 class Axes(Arrays):
-    """Center lines of branches: straight segments.
+    """Center lines of branches: straight segments."""
 
-    Attributes
-    ----------
-    knots : (n, S + 1, 3) float64
-        Ends of the segments; a branch with fewer than S segments repeats its last knot.
-    frames : (n, S, 3, 3) float64
-        Local axes along each segment.
-    segments : (n,) int64
-        Number of segments.
-    skies : (n, S, 3) float64 or None
-        In the wind: `branches.Branches.sky` along each segment.
-    later : Axes or None
-        The same lines a moment later, where it is asked how plants move.
-    """
-
-    knots: Floats
-    frames: Floats
-    segments: Integers
-    skies: Floats | None = None
-    later: Axes | None = None
+    knots: Floats  # (n, S + 1, 3): ends of the segments; a branch with fewer than S segments repeats its last knot
+    frames: Floats  # (n, S, 3, 3): local axes along each segment
+    segments: Integers  # (n,): number of segments
+    skies: Floats | None = None  # (n, S, 3): in the wind: `branches.Branches.sky` along each segment
+    later: Axes | None = None  # the same lines a moment later, where it is asked how plants move
 
     @staticmethod
     def _rows(own: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:

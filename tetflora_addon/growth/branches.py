@@ -4,82 +4,54 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Keys, column
+from ..arrays import Arrays, Floats, Floats32, Integers32, Keys, column
 
 
 @dataclass(frozen=True)
 class Pose(Arrays):
-    """Where branches are.
+    """Where branches are."""
 
-    Attributes
-    ----------
-    position : (n, 3) float64
-    frame : (n, 3, 3) float64
-    sky : (n, 3) float64
-    """
-
-    position: Floats
-    frame: Floats
-    sky: Floats
+    position: Floats  # (n, 3)
+    frame: Floats  # (n, 3, 3)
+    sky: Floats  # (n, 3)
 
 
 @dataclass(frozen=True)
 class Branches(Arrays):
-    """Branches (or sub-plants) as a structure of arrays.
+    """Branches (or sub-plants) as a structure of arrays."""
 
-    Attributes
-    ----------
-    row : (n,) int32
-        Row of the parameter table: which kind of branch of which species.
-    plant : (n,) int32
-        Index of the plant that it belongs to.
-    key : (n,) uint64
-        Hash of the plant's seed and the path of child indices.
-    position : (n, 3) float64
-        Base, meters, world space.
-    frame : (n, 3, 3) float64
-        Columns are the local axes at the base; the branch sets out along the third, the first points away from the
-        parent.
-    length, radius : (n,) float64
-        Length of the axis and radius at its base, meters.
-    scale : (n,) float64
-        Scale of the plant, which leaves take as well.
-    vigor : (n,) float64
-        Length as the crown's shape has it here, relative to the longest; numbers of branches and leaves may follow it.
-    outward : (n,) float64
-        Where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
-        themselves, along which it grows.
-    sky : (n, 3) float64 or None
-        In the wind: where the direction that was up without it has turned to. Plants grow toward that, so that wind
-        moves them and does not change how they grow.
-    later : Pose or None
-        Position and frame a moment later, where it is asked how plants move.
-    year : (n, 2) float64 or None
-        On a day of the year: the day that it is for the plant, and its place among the autumn colors of its species.
-    crown : (n, 5) float32 or None
-        Where plants have crown shapes: what trunks and their stems know of these, see `crown_effects`; of all others
-        the factor on their length in the first column, and 0.
-    """
-
-    row: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    plant: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    key: Keys = field(metadata=column(dtype=np.uint64))
-    position: Floats = field(metadata=column(3))
-    frame: Floats = field(metadata=column(3, 3))
+    row: Integers32 = column(dtype=np.int32)  # (n,): row of the parameter table: which kind of branch of which species
+    plant: Integers32 = column(dtype=np.int32)  # (n,): index of the plant that it belongs to
+    key: Keys = column(dtype=np.uint64)  # (n,): hash of the plant's seed and the path of child indices
+    position: Floats = column(3)  # (n, 3): base, meters, world space
+    #: (n, 3, 3): columns are the local axes at the base; the branch sets out along the third, the first points away
+    #: from the parent.
+    frame: Floats = column(3, 3)
+    #: length and radius, (n,): length of the axis and radius at its base, meters.
     length: Floats
     radius: Floats
-    scale: Floats
+    scale: Floats  # (n,): scale of the plant, which leaves take as well
+    #: (n,): length as the crown's shape has it here, relative to the longest; numbers of branches and leaves may follow
+    #: it.
     vigor: Floats
+    #: (n,): where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
+    #: themselves, along which it grows.
     outward: Floats
+    #: (n, 3): in the wind: where the direction that was up without it has turned to. Plants grow toward that, so that
+    #: wind moves them and does not change how they grow.
     sky: Floats | None = None
-    later: Pose | None = None
+    later: Pose | None = None  # position and frame a moment later, where it is asked how plants move
+    #: (n, 2): on a day of the year: the day that it is for the plant, and its place among the autumn colors of its
+    #: species.
     year: Floats | None = None
-    crown: NDArray[np.float32] | None = None
+    #: (n, 5): where plants have crown shapes: what trunks and their stems know of these, see `crown_effects`; of all
+    #: others the factor on their length in the first column, and 0.
+    crown: Floats32 | None = None
 
     @classmethod
     def apart(cls, row: int, key: NDArray, frame: NDArray, length: float, scale: float) -> Branches:

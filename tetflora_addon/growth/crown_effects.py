@@ -12,9 +12,9 @@ that fill a solid, have no crown shapes.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Integers, Mask, Table, by_component
+from ..arrays import Floats, Floats32, Integers, Mask, Table, by_component
 from .branches import Branches
 from .crown_shapes import BASE, EAST, NORTH, PLAIN, THICKNESS, WIDTH
 from .rows import DEAD, FORK, LATERAL, SPUR
@@ -30,7 +30,7 @@ MOST_LEANING = 1.5
 _STEMS = 2.0
 
 
-def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> tuple[NDArray[np.float32], Floats]:
+def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> tuple[Floats32, Floats]:
     """The column ``crown`` (n, 5) of trunks, and factors (n,) on their radii.
 
     Parameters
@@ -74,7 +74,7 @@ def trunk_length_factors(base: ArrayLike, fork: ArrayLike) -> tuple[Floats, Floa
     return np.where(fork < 1, place / np.maximum(fork, 1e-9), 1.0), above
 
 
-def length_factors(rows: Table, row: Integers, crown: NDArray[np.float32]) -> Floats:
+def length_factors(rows: Table, row: Integers, crown: Floats32) -> Floats:
     """How many times as long as described branches of rows (n,) are, which are parts of trunks; 1 for all others."""
     below, above = trunk_length_factors(crown[:, BASE], first_forks(rows, row))
     return np.where(rows["order"][row] > 0, 1.0, np.where(rows["continues"][row], above, below))
@@ -140,7 +140,7 @@ def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> 
     return np.where(stool, np.minimum(reach, MOST_LEANING), one), np.where(trunk & ~stool, reach, one)
 
 
-def handed_on(parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, angle: Floats) -> NDArray[np.float32]:
+def handed_on(parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, angle: Floats) -> Floats32:
     """The column ``crown`` (m, 5) of children of a sort.
 
     Parameters

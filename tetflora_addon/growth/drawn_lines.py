@@ -21,26 +21,17 @@ MAX_DRAWN = 1000
 
 @dataclass(frozen=True)
 class DrawnLines:
-    """Drawn branches as arrays of one width, meters in the plant's space; parents come before children.
+    """Drawn branches as arrays of one width, meters in the plant's space; parents come before children."""
 
-    Attributes
-    ----------
-    order : (b,) int64
-    segments : (b,) int64
-    knots : (b, MAX_SEGMENTS + 1, 3) float64
-        Evenly spaced along the branch; beyond its segments the last one again.
-    radii : (b, MAX_SEGMENTS + 1) float64
-    frames : (b, MAX_SEGMENTS, 3, 3) float64
-        Columns are local axes; the third leads along the segment, the others are carried along without twist.
-    length, radius, outward : (b,) float64
-        Of the whole line; at its base; and where between inside and outside of the crown it leaves its limb.
-    """
-
-    order: Integers
-    segments: Integers
-    knots: Floats
-    radii: Floats
+    order: Integers  # (b,)
+    segments: Integers  # (b,)
+    knots: Floats  # (b, MAX_SEGMENTS + 1, 3): evenly spaced along the branch; beyond its segments the last one again
+    radii: Floats  # (b, MAX_SEGMENTS + 1)
+    #: (b, MAX_SEGMENTS, 3, 3): columns are local axes; the third leads along the segment, the others are carried along
+    #: without twist.
     frames: Floats
+    #: length, radius and outward, (b,): of the whole line; at its base; and where between inside and outside of the
+    #: crown it leaves its limb.
     length: Floats
     radius: Floats
     outward: Floats

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Keys, Mask, Table
+from ..arrays import Floats, Floats32, Integers, Keys, Mask, Table
 from ..species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 from .axes import Axes
 from .branches import Branches
@@ -114,7 +114,7 @@ def inclinations(kind: Integers, number: Floats) -> Floats:
     return out
 
 
-def inclined(frame: NDArray[np.float32], kind: Integers, key: Keys) -> NDArray[np.float32]:
+def inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
     """Frames (m, 3, 3) of leaves that stand by a distribution, all around their branch and turned in their own plane.
 
     Parameters

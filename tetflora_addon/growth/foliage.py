@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Keys, Table, cross, dot, gathered
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, Table, cross, dot, gathered
 from .axes import Axes
 from .branches import Branches
 from .envelopes import EVEN_JITTER, inclined, leaf_sites, leaf_start
@@ -28,36 +28,18 @@ _PLACE_JITTER = 0.4  # below a half, so that leaves keep their order along the b
 
 @dataclass(frozen=True)
 class Leaves(Arrays):
-    """Leaves as a structure of arrays.
+    """Leaves as a structure of arrays."""
 
-    Attributes
-    ----------
-    branch : (n,) int64
-        Index of the branch that bears the leaf.
-    key : (n,) uint64
-    position : (n, 3) float64
-        Base of the leaf, meters.
-    frame : (n, 3, 3) float32
-        Columns: across, along the midrib, upper side; before it turns to the light. Single precision is off by some
-        nanometers at the tip of a leaf, and its cosines are ten times as fast.
-    size : (n,) float64
-        Meters by which the leaf model is scaled.
-    light : (n,) float64
-        How far it turns to the sky; (1,) where that is the same for all.
-    sky : (3,) float64 or (n, 3) float32
-        Where that is; with the branch in the wind.
-    stages : Stages or None
-        On a day of the year; None where all are as in summer.
-    """
-
-    branch: Integers
-    key: Keys
-    position: Floats
-    frame: NDArray[np.float32]
-    size: Floats
-    light: Floats
-    sky: NDArray[np.floating]
-    stages: Stages | None = None
+    branch: Integers  # (n,): index of the branch that bears the leaf
+    key: Keys  # (n,)
+    position: Floats  # (n, 3): base of the leaf, meters
+    #: (n, 3, 3): columns: across, along the midrib, upper side; before it turns to the light. Single precision is off
+    #: by some nanometers at the tip of a leaf, and its cosines are ten times as fast.
+    frame: Floats32
+    size: Floats  # (n,): meters by which the leaf model is scaled
+    light: Floats  # (n,): how far it turns to the sky; (1,) where that is the same for all
+    sky: NDArray[np.floating]  # (3,) or (n, 3) float32: where that is; with the branch in the wind
+    stages: Stages | None = None  # on a day of the year; None where all are as in summer
 
 
 def leaf_keys(branches: Branches, owner: Integers, index: Integers) -> Keys:
@@ -127,7 +109,7 @@ def stages_of(rows: Table, branches: Branches, owner: Integers, key: Keys) -> St
     return leaf_stages(rows, _rows_of(branches, owner), key, np.take(branches.year[:, 0], owner))
 
 
-def _rows_of(branches: Branches, owner: Integers) -> NDArray[np.int32]:
+def _rows_of(branches: Branches, owner: Integers) -> Integers32:
     """Row (m,) of each branch's parameters, or the only one (1,), which is as good and need not be gathered."""
     row = branches.row
     return row[:1] if len(row) and (row == row[0]).all() else np.take(row, owner)
@@ -172,12 +154,12 @@ def place_leaves(
 def leaf_frames(
     rows: Table,
     row: Integers,
-    frame: NDArray[np.float32],
+    frame: Floats32,
     roll: Floats,
     index: Integers,
     key: Keys,
     sky: NDArray[np.floating] | None = None,
-) -> NDArray[np.float32]:
+) -> Floats32:
     """Frames (m, 3, 3) of leaves before they turn to the light.
 
     Parameters
@@ -212,9 +194,7 @@ def leaf_frames(
     return np.where(kind[:, None, None] > 0, inclined(frame, kind, key), out) if kind.any() else out
 
 
-def _leaf_frames(
-    frame: NDArray[np.float32], azimuth: NDArray[np.float32], angle: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def _leaf_frames(frame: Floats32, azimuth: Floats32, angle: Floats32) -> Floats32:
     """As `growth.turned`, with columns in the order of a leaf.
 
     The upper side of a leaf faces the tip of its branch: against the tilt, whose first column leads away from it.
@@ -251,28 +231,18 @@ def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArr
     (n, 3, 3), type of frame
         Right-handed frames; the upper side is turned, the midrib follows by the least turn.
     """
-    kind = frame.dtype
-    light, sky = light.astype(kind), sky.astype(kind).T
-    along, up = frame[:, :, 1].T, frame[:, :, 2].T
-    out = np.zeros((3, 3, len(frame)), kind)
-    across_out, along_out, normal = out.swapaxes(0, 1)
-    np.multiply(1 - light, up, out=normal)
-    normal += light * sky if sky.ndim == 2 else light * sky[:, None]
-    normal += kind.type(1e-9) * up  # a leaf that hangs upside down half way has no direction left; it keeps its own
-    normal /= _length(normal)
-    np.multiply(_inner(along, normal), normal, out=along_out)
-    np.subtract(along, along_out, out=along_out)
+    along, up, light, sky = _by_component(frame, light, sky)
+    normal = _toward(up, light, sky, 1e-9)
+    along_out = along - _inner(along, normal) * normal
     length = _length(along_out)
     # The midrib points straight up or down: turn about the blade. What is left of it must stand above rounding.
-    lost = np.flatnonzero(length <= (1e-6 if kind == np.float64 else 1e-3))
+    lost = np.flatnonzero(length <= (1e-6 if frame.dtype == np.float64 else 1e-3))
     if len(lost):
         across, facing = gathered(frame[:, :, 0], lost), normal[:, lost].T
         along_out[:, lost] = cross(facing, across - dot(across, facing) * facing).T
         length = _length(along_out)
     along_out /= length
-    np.multiply(along_out[[1, 2, 0]], normal[[2, 0, 1]], out=across_out)
-    across_out -= along_out[[2, 0, 1]] * normal[[1, 2, 0]]
-    return out.transpose(2, 0, 1)
+    return _frames(along_out, normal)
 
 
 def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
@@ -290,9 +260,7 @@ def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floa
     return hanging(frame, droop, sky) if droop.any() else frame
 
 
-def in_wind(
-    rows: Table, branches: Branches, leaves: Leaves, frame: NDArray[np.float32], ahead: float = 0.0
-) -> NDArray[np.float32]:
+def in_wind(rows: Table, branches: Branches, leaves: Leaves, frame: Floats32, ahead: float = 0.0) -> Floats32:
     """`settled` frames (m, 3, 3) of leaves (m) of branches as the wind turns them; as they are where there is none.
 
     So many seconds after the moment of the rows; the branches are where they are then.
@@ -305,23 +273,38 @@ def in_wind(
 
 def hanging(frame: NDArray[np.floating], droop: Floats, sky: Floats) -> NDArray:
     """Let leaves hang: the midrib turns down as far as ``droop`` (n,) or (1,), the blade follows it."""
-    kind = frame.dtype
-    droop, sky = droop.astype(kind), sky.astype(kind).T
-    along, up = frame[:, :, 1].T, frame[:, :, 2].T
-    out = np.zeros((3, 3, len(frame)), kind)
-    across_out, along_out, normal = out.swapaxes(0, 1)
-    np.multiply(1 - droop, along, out=along_out)
-    along_out -= droop * sky if sky.ndim == 2 else droop * sky[:, None]
-    along_out += kind.type(1e-6) * along  # a leaf that stands upright half way has no direction left; it keeps its own
-    along_out /= _length(along_out)
+    along, up, droop, sky = _by_component(frame, droop, sky)
+    along_out = _toward(along, droop, -sky, 1e-6)
     # The upper side leads away from the old midrib, so that it never lies along the new one: a leaf may hang over.
-    np.subtract(up, _inner(up, along_out) * along_out, out=normal)
+    normal = up - _inner(up, along_out) * along_out
     lost = np.flatnonzero(_length(normal) < 1e-3)
     if len(lost):
         normal[:, lost] = -along[:, lost]
     normal /= _length(normal)
-    np.multiply(along_out[[1, 2, 0]], normal[[2, 0, 1]], out=across_out)
-    across_out -= along_out[[2, 0, 1]] * normal[[1, 2, 0]]
+    return _frames(along_out, normal)
+
+
+def _by_component(frame: NDArray[np.floating], share: Floats, sky: Floats) -> tuple[NDArray, ...]:
+    """Midribs and upper sides (3, n) of leaf frames, shares (n,) or (1,), and skies (3, n) or (3, 1), of one type."""
+    sky = sky.astype(frame.dtype).T
+    return frame[:, :, 1].T, frame[:, :, 2].T, share.astype(frame.dtype), sky if sky.ndim == 2 else sky[:, None]
+
+
+def _toward(vector: NDArray, share: NDArray, target: NDArray, least: float) -> NDArray:
+    """Unit vectors (3, n) a share of the way to targets; what is half way to the opposite keeps its own direction."""
+    out = (1 - share) * vector
+    out += share * target
+    out += out.dtype.type(least) * vector
+    out /= _length(out)
+    return out
+
+
+def _frames(along: NDArray, normal: NDArray) -> NDArray:
+    """Leaf frames (n, 3, 3) of midribs and upper sides (3, n)."""
+    out = np.empty((3, 3, along.shape[1]), along.dtype)
+    out[:, 1], out[:, 2] = along, normal
+    np.multiply(along[[1, 2, 0]], normal[[2, 0, 1]], out=out[:, 0])
+    out[:, 0] -= along[[2, 0, 1]] * normal[[1, 2, 0]]
     return out.transpose(2, 0, 1)
 
 

@@ -180,33 +180,18 @@ def _within(key: Keys) -> Floats:
 
 @dataclass(frozen=True)
 class Grown:
-    """Living nodes of branches (n,).
+    """Living nodes of branches (n,)."""
 
-    Attributes
-    ----------
-    on : (n,) bool
-        Whether they are still growing; if not, the rest has no meaning.
-    first, number : (2, n) int64
-        Number of the lowest node, and how many there are: of those that stay, and those that live for a while.
-    now : (n,) float64
-        Length over that when full-grown.
-    law : NodeLaw of (n,) float64
-    ends : (3, n) float64
-        Where nodes begin, where those begin that live for a while, and where all end, in nodes.
-    density : (2, n) float64
-        Nodes above the begin, and nodes that live for a while, over those of the law.
-    described : (n,) float64
-        Where nodes would begin without the crown shapes of plants.
-    """
-
-    on: Mask
+    on: Mask  # (n,): whether they are still growing; if not, the rest has no meaning
+    #: first and number, (2, n): number of the lowest node, and how many there are: of those that stay, and those that
+    #: live for a while.
     first: Integers
     number: Integers
-    now: Floats
-    law: NodeLaw
-    ends: Floats
-    density: Floats
-    described: Floats
+    now: Floats  # (n,): length over that when full-grown
+    law: NodeLaw  # of (n,) float64
+    ends: Floats  # (3, n): where nodes begin, where those begin that live for a while, and where all end, in nodes
+    density: Floats  # (2, n): nodes above the begin, and nodes that live for a while, over those of the law
+    described: Floats  # (n,): where nodes would begin without the crown shapes of plants
 
     def chosen(self, owner: Integers, index: Integers, whorl: Integers) -> tuple[Integers, Integers, Mask]:
         """Index that is theirs for life, where child numbers begin, and which live for a while (m,), of children (m,).

@@ -293,16 +293,11 @@ def chosen_children(
     )
 
 
-def sorts_of(rows: Table, parents: Branches) -> list[int]:
-    """Sorts of children that any of the branches has."""
-    return [sort for sort in (LATERAL, FORK, SPUR, DEAD) if (rows["next"][parents.row, sort] >= 0).any()]
-
-
 def children(rows: Table, parents: Branches, lines: Axes | None = None) -> tuple[Branches, Integers]:
     """All children (m,) of branches (n,), and the parent (m,) of each; ``lines`` are the branches' axes if known."""
     lines = axes(rows, parents) if lines is None else lines
     grown, owners = [Branches.empty()], [np.zeros(0, np.int64)]
-    for sort in sorts_of(rows, parents):
+    for sort in np.flatnonzero((rows["next"][parents.row] >= 0).any(axis=0)).tolist():
         counts = branch_counts(rows, parents, sort)
         owner, index = spread(counts)
         grown.append(chosen_children(rows, parents, lines, owner, index, counts, sort))
@@ -312,16 +307,10 @@ def children(rows: Table, parents: Branches, lines: Axes | None = None) -> tuple
 
 @dataclass(frozen=True)
 class WholeBranches(Arrays):
-    """Whole branches and their axes.
+    """Whole branches and their axes."""
 
-    Attributes
-    ----------
-    branches : Branches of n
-    lines : Axes of the same n
-    """
-
-    branches: Branches
-    lines: Axes
+    branches: Branches  # of n
+    lines: Axes  # of the same n
 
     def knots(self, rows: Table) -> tuple[Integers, Floats, Floats]:
         """Where segments begin and end; a flared base has some more.

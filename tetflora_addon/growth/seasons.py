@@ -21,7 +21,7 @@ import numpy as np
 
 from ..arrays import Arrays, Floats, Integers, Keys, Mask, Table, smoothstep
 from ..errors import TetFloraError
-from ..setting import setting
+from ..setting import FACTOR, setting
 from ..species.species import LEAF_KINDS, Species
 from ..species.year import DAYS, MAX_AUTUMN, LeafYear
 from .hashing import Draw, mix_draw, uniform
@@ -85,12 +85,7 @@ class Season:
         max=2.0,
     )
     snow: float = setting(
-        0.0,
-        "Snow",
-        "Snow on leaves, branches and ground: 0 none, 1 on all that faces the sky",
-        subtype='FACTOR',
-        min=0.0,
-        max=1.0,
+        0.0, "Snow", "Snow on leaves, branches and ground: 0 none, 1 on all that faces the sky", **FACTOR
     )
 
     def __post_init__(self) -> None:
@@ -195,26 +190,16 @@ def may_change(rows: Table, row: Integers, year: Floats) -> bool:
 
 @dataclass(frozen=True)
 class Stages(Arrays):
-    """Stages of leaves (n,).
+    """Stages of leaves (n,)."""
 
-    Attributes
-    ----------
-    there : (n,) bool
-        Not yet to come and not fallen.
-    size : (n,) float64
-        Over that in summer.
-    fresh, turned, dead : (n,) float64
-        How far each has the fresh color, then its color of autumn, and that of dead leaves.
-    tint : (n,) float64
-        Its place among the autumn colors but for what is the plant's, 0 to 1.
-    """
-
-    there: Mask
-    size: Floats
+    there: Mask  # (n,): not yet to come and not fallen
+    size: Floats  # (n,): over that in summer
+    #: fresh, turned and dead, (n,): how far each has the fresh color, then its color of autumn, and that of dead
+    #: leaves.
     fresh: Floats
     turned: Floats
     dead: Floats
-    tint: Floats
+    tint: Floats  # (n,): its place among the autumn colors but for what is the plant's, 0 to 1
 
 
 def leaf_stages(rows: Table, row: Integers, key: Keys, day: Floats) -> Stages:

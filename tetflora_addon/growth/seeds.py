@@ -7,43 +7,25 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers
+from ..arrays import Arrays, Floats, Integers, Integers32
 
 
 @dataclass(frozen=True)
 class Seeds(Arrays):
-    """Plants at places: those of a scene, of a field, or of single objects.
+    """Plants at places: those of a scene, of a field, or of single objects."""
 
-    Attributes
-    ----------
-    identifiers : tuple of str
-        Species that ``species`` counts through, as in the catalog; in a scene, kinds of plants.
-    species : (n,) int32
-        Index into ``identifiers``.
-    seed : (n,) int64
-        Random seed of each plant; any value.
-    position : (n, 3) float64
-        Where the trunk leaves the ground, meters.
-    frame : (n, 3, 3) float64
-        Rotation of each plant; its columns are the plant's axes in world space, +z along the upright trunk.
-    scale : (n,) float64
-        Uniform scale, greater than zero.
-    crown : (n, 5) float64 or None
-        Crown shapes, see `crown_shapes`; None where all plants are as described.
-    motion : (n, 6) float64 or None
-        How plants move as a whole: meters a second, then the rotation vector about their foot, radians a second. None
-        where all stand still.
-    """
-
+    #: Species that ``species`` counts through, as in the catalog; in a scene, kinds of plants.
     identifiers: tuple[str, ...]
-    species: NDArray[np.int32]
-    seed: Integers
-    position: Floats
+    species: Integers32  # (n,): index into ``identifiers``
+    seed: Integers  # (n,): random seed of each plant; any value
+    position: Floats  # (n, 3): where the trunk leaves the ground, meters
+    #: (n, 3, 3): rotation of each plant; its columns are the plant's axes in world space, +z along the upright trunk.
     frame: Floats
-    scale: Floats
-    crown: Floats | None = None
+    scale: Floats  # (n,): uniform scale, greater than zero
+    crown: Floats | None = None  # (n, 5): crown shapes, see `crown_shapes`; None where all plants are as described
+    #: (n, 6): how plants move as a whole: meters a second, then the rotation vector about their foot, radians a second.
+    #: None where all stand still.
     motion: Floats | None = None
 
     @classmethod

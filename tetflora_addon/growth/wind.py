@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Keys, Table, cross, dot
+from ..arrays import Floats, Floats32, Integers, Keys, Table, cross, dot
 from ..errors import TetFloraError
-from ..setting import setting
+from ..setting import FACTOR, setting, within
 from .branches import Branches
 from .hashing import Draw, uniform
 from .rows import SPUR_ORDER, with_columns
@@ -74,19 +74,6 @@ sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency,
 class Wind:
     """A wind at a moment. Fields with a label are properties of a scene, and documented by their tooltips.
 
-    Attributes
-    ----------
-    direction : float
-        Radians from +x toward +y.
-    time : float
-        Seconds.
-    loop : float
-        Seconds after which all movement repeats; 0 for never.
-    moving : bool
-        Whether vertices shall have velocities.
-    origin : tuple of float
-        Where in the world positions are counted from, meters.
-
     Raises
     ------
     TetFloraError
@@ -98,10 +85,9 @@ class Wind:
         "Speed",
         "Mean speed in meters per second: 2 stirs leaves, 4 is a gentle breeze, 10 sways trees, 20 is a gale. Animate "
         "it slowly: plants react at once",
-        min=0.0,
-        soft_max=25.0,
-        max=100.0,
+        **within(0.0, 25.0, 100.0),
     )
+    #: Radians from +x toward +y.
     direction: float = setting(
         0.0,
         "Direction",
@@ -115,14 +101,12 @@ class Wind:
         "Gusts",
         "Strength of gusts and lulls relative to the mean speed: 0 is an even wind, 1 makes gusts twice as strong. "
         "They travel with the wind",
-        subtype='FACTOR',
-        min=0.0,
-        max=1.0,
+        **FACTOR,
     )
-    time: float = 0.0
-    loop: float = 0.0
-    moving: bool = False
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    time: float = 0.0  # seconds
+    loop: float = 0.0  # seconds after which all movement repeats; 0 for never
+    moving: bool = False  # whether vertices shall have velocities
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where in the world positions are counted from, meters
 
     def __post_init__(self) -> None:
         if not np.isfinite([self.speed, self.direction, self.gusts, self.time, self.loop]).all():
@@ -304,9 +288,7 @@ def leaned(points: Floats, up: Floats, turn: Floats) -> Floats:
     return along[..., None] * up[:, None] + beside[..., None] * aside[:, None] + level
 
 
-def fluttered(
-    rows: Table, row: Integers, frame: NDArray[np.float32], key: Keys, gust: Floats, ahead: float = 0.0
-) -> NDArray[np.float32]:
+def fluttered(rows: Table, row: Integers, frame: Floats32, key: Keys, gust: Floats, ahead: float = 0.0) -> Floats32:
     """Frames of leaves (n, 3, 3) turned about their bases: up and down, and about their midribs.
 
     Parameters

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_ANGLE, Floats, Integers, connected, cross, perpendicular
+from ..arrays import GOLDEN_ANGLE, Floats, Floats32, Integers, connected, cross, perpendicular
 from .models import LeafModel, Spines
 
 #: Angle of all faces around a vertex below which it is a point, and stays: a full turn on flat ground, 4/3 π on an
@@ -163,7 +163,7 @@ _CUSHION, _SIDES, _EDGES = (0.07, 0.11), 5, 3
 _BARE = 0.08
 
 
-def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel, NDArray[np.float32]]:
+def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel, Floats32]:
     """A model with spines on it.
 
     Parameters

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers
+from ..arrays import Floats, Floats32, Integers, Integers32
 from .models import LeafModel, fans, leaf_model
 
 #: The topology of all of them.
@@ -36,23 +36,13 @@ _SKEWNESS /= 5.0 * (1.0 - _WIDEST * (1.0 - _WIDEST)) ** 1.5
 
 @dataclass(frozen=True)
 class LeafKites:
-    """Kites (k) that stand for a leaf model.
+    """Kites (k) that stand for a leaf model."""
 
-    Attributes
-    ----------
-    positions : (k, 4, 3) float64
-        Their vertices, in units of the leaf's size; each kite has the area that the model shows.
-    uv : (k, 4, 2) float32
-    share : (k,) float64
-        Up to which random number, from 0 to 1, each is taken; the last is 1.
-    material_index : (k,) int32, optional
-        As of the model.
-    """
-
+    #: (k, 4, 3): their vertices, in units of the leaf's size; each kite has the area that the model shows.
     positions: Floats
-    uv: NDArray[np.float32]
-    share: Floats
-    material_index: NDArray[np.int32] | None = None
+    uv: Floats32  # (k, 4, 2)
+    share: Floats  # (k,): up to which random number, from 0 to 1, each is taken; the last is 1
+    material_index: Integers32 | None = None  # (k,): as of the model
 
     def chosen(self, number: Floats) -> Integers:
         """Which kite (n,) copies with random numbers (n,) take."""
@@ -180,7 +170,7 @@ def _within(corners: Floats, reach: float) -> Floats:
     return corners
 
 
-def _texture(model: LeafModel, positions: Floats) -> NDArray[np.float32]:
+def _texture(model: LeafModel, positions: Floats) -> Floats32:
     """Texture coordinates (k, 4, 2): those of the model, as far as a linear function follows them."""
     corners = model.positions[model.corner_verts]
     fitted = np.linalg.lstsq(np.column_stack([corners, np.ones(len(corners))]), model.uv, rcond=None)[0]

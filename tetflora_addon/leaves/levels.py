@@ -14,9 +14,8 @@ from functools import lru_cache
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers
+from ..arrays import Floats, Floats32, Integers
 from ..optics import needle_color
 from .blades import blade_surface
 from .bodies import closed_parts, rounded, spined
@@ -51,32 +50,17 @@ Shape = Blade | Needles | Compound
 
 @dataclass(frozen=True, eq=False)
 class LeafLevel:
-    """A leaf within an error.
+    """A leaf within an error."""
 
-    Attributes
-    ----------
-    model : LeafModel
-        Faces and texture; the vertices of the first variant.
-    shapes : (k, v, 3) float32
-        Vertices of each variant, in units of the leaf's size.
-    error : float
-        Largest distance of the margin from that of the shape, in lengths of the leaf.
-    tint : (f, 3) float32
-        What the color of a leaf is times that of each face: shoots are brown, petioles pale.
-    again : (f,) float32
-        Probability that light which a face scatters meets another: needles on a shoot hide each other.
-    solid : bool
-        Whether light that enters a face comes out of another, as of prisms: all others are sheets.
-    """
+    model: LeafModel  # faces and texture; the vertices of the first variant
+    shapes: Floats32  # (k, v, 3): vertices of each variant, in units of the leaf's size
+    error: float  # largest distance of the margin from that of the shape, in lengths of the leaf
+    tint: Floats32  # (f, 3): what the color of a leaf is times that of each face: shoots are brown, petioles pale
+    #: (f,): probability that light which a face scatters meets another: needles on a shoot hide each other.
+    again: Floats32
+    solid: bool = False  # whether light that enters a face comes out of another, as of prisms: all others are sheets
 
-    model: LeafModel
-    shapes: NDArray[np.float32]
-    error: float
-    tint: NDArray[np.float32]
-    again: NDArray[np.float32]
-    solid: bool = False
-
-    def colors(self, whole: NDArray[np.float32]) -> NDArray[np.float32]:
+    def colors(self, whole: Floats32) -> Floats32:
         """Colors (n, f, 3) of faces, from those of leaves: that of a species with needles is that of its shoots."""
         whole = np.minimum(whole * self.tint, 1.0)
         return needle_color(whole, self.again[:, None]) if self.again.any() else whole

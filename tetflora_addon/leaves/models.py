@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import GOLDEN_ANGLE, Floats, Integers, perpendicular, spiral, spread
+from ..arrays import GOLDEN_ANGLE, Floats, Floats32, Integers, Integers32, perpendicular, spiral, spread
 from ..errors import SpeciesError
+from ..files import beside
 from ..parameters import limited
 from .compounds import Compound
 from .needles import Needles
@@ -46,36 +48,17 @@ class Spines:
 
 @dataclass(frozen=True, eq=False)
 class LeafModel:
-    """Polygons of one leaf.
+    """Polygons of one leaf."""
 
-    Attributes
-    ----------
-    positions : (v, 3) float64
-        Vertices in units of the leaf's size.
-    corner_verts : (c,) int32
-        Vertex of each corner, face after face.
-    face_offsets : (f + 1,) int32
-        First corner of each face.
-    uv : (c, 2) float32
-        Texture coordinates by corner.
-    material_index : (f,) int32, optional
-        Material of each face, of models that have several.
-    textured : bool
-        Drawn as it is at any size: a texture may cut it out.
-    shape : Blade, Needles or Compound, optional
-        What it stands for, which leaves are drawn as that are near; see `levels`.
-    spines : Spines, optional
-        What grows on its closed parts up close.
-    """
-
-    positions: Floats
-    corner_verts: NDArray[np.int32]
-    face_offsets: NDArray[np.int32]
-    uv: NDArray[np.float32]
-    material_index: NDArray[np.int32] | None = None
-    textured: bool = False
+    positions: Floats  # (v, 3): vertices in units of the leaf's size
+    corner_verts: Integers32  # (c,): vertex of each corner, face after face
+    face_offsets: Integers32  # (f + 1,): first corner of each face
+    uv: Floats32  # (c, 2): texture coordinates by corner
+    material_index: Integers32 | None = None  # (f,): material of each face, of models that have several
+    textured: bool = False  # drawn as it is at any size: a texture may cut it out
+    #: What it stands for, which leaves are drawn as that are near; see `levels`.
     shape: Blade | Needles | Compound | None = None
-    spines: Spines | None = None
+    spines: Spines | None = None  # what grows on its closed parts up close
 
     @property
     def polygons(self) -> int:
@@ -104,12 +87,12 @@ class LeafModel:
         return self.content, self.shape, self.spines
 
     @cached_property
-    def next_corner(self) -> NDArray[np.int32]:
+    def next_corner(self) -> Integers32:
         """(c,) int32: the corner that follows each corner in its face."""
         return next_corners(self.face_offsets)
 
     @cached_property
-    def edges(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def edges(self) -> tuple[Integers32, Integers32]:
         """Edges (e, 2) int32 and the edge of each corner (c,) int32."""
         pairs = np.sort(np.stack([self.corner_verts, self.corner_verts[self.next_corner]], axis=1), axis=1)
         edges, corner_edges = np.unique(pairs, axis=0, return_inverse=True)
@@ -257,120 +240,20 @@ def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | Non
     return model
 
 
-def _folded(half_width: float, fold: float, droop: float) -> LeafModel:
-    """Two quads that meet at the midrib and rise from it: a broad leaf with a hexagonal outline."""
-    base, tip = (0.0, 0.0, 0.0), (0.0, 1.0, -droop)
-    low, high = (half_width, 0.28, fold), (0.8 * half_width, 0.66, 0.7 * fold - 0.5 * droop)
-    mirrored = [(-x, y, z) for x, y, z in (low, high)]
-    return leaf_model([base, tip, low, high, *mirrored], [[0, 2, 3, 1], [0, 1, 5, 4]])
+#: Kinds of outlines by their name in species files; the first is meant where none is given.
+OUTLINES: dict[str, type] = {"blade": Blade, "needles": Needles, "compound": Compound}
 
 
-def _spray() -> LeafModel:
-    """Four narrow quads fanned out in a plane, tilted out of it, and turned by turns: a bundle of needles."""
-    positions = []
-    for i in range(4):
-        turn = np.radians(-55 + 110 * (i + 0.5) / 4)
-        along = np.array([np.sin(turn), np.cos(turn), 0.25 * (1 if i % 2 else -1)])
-        along /= np.linalg.norm(along)
-        across = np.array([np.cos(turn), -np.sin(turn), 0.0])
-        across = 0.025 / np.sqrt(2.0) * (across + (1 if i // 2 % 2 else -1) * np.cross(across, along))
-        positions += [0 * along - across, 0 * along + across, along + across, along - across]
-    faces = np.arange(16).reshape(4, 4).tolist()
-    return leaf_model(np.array(positions), faces, np.tile([[0, 0], [1, 0], [1, 1], [0, 1]], (4, 1)))
+def _outline(page: dict[str, Any]) -> Blade | Needles | Compound:
+    own = {key: _outline(value) if key == "leaflet" else value for key, value in page.items() if key != "kind"}
+    return OUTLINES[page["kind"]](**own)
 
 
-def _outlined(half: list[tuple[float, float]], fold: float, droop: float) -> LeafModel:
-    """Two polygons that meet at the midrib and rise from it, of a leaf whose right half has the outline given.
-
-    The outline leads from behind the base to before the tip; ``fold`` is the rise and ``droop`` the fall over one unit.
-    """
-    right = [(x, y, fold * x - droop * y * y) for x, y in half]
-    left = [(-x, y, z) for x, y, z in reversed(right)]
-    ends = [(0.0, 0.0, 0.0), (0.0, 1.0, -droop)]
-    n = len(half)
-    faces = [[0, *range(2, n + 2), 1], [0, 1, *range(n + 2, 2 * n + 2)]]
-    return leaf_model([*ends, *right, *left], faces)
+def _built_in(page: dict[str, Any]) -> LeafModel:
+    """A leaf as species files have leaves: polygons, and the outline that they stand for."""
+    return replace(leaf_model(page["vertices"], page["faces"], page.get("uv")), shape=_outline(page["outline"]))
 
 
-def _flower() -> LeafModel:
-    """Quads around a point half a unit along: an open flower that looks up, its petals raised at their tips."""
-    petals, half_width, cup, center = 5, 0.24, 0.12, np.array([0.0, 0.5, 0.0])
-    turn = 2 * np.pi * (np.arange(petals) + 0.5) / petals - np.pi / 2
-    along = np.stack([np.cos(turn), np.sin(turn), np.zeros(petals)], axis=1)
-    across = np.stack([-along[:, 1], along[:, 0], along[:, 2]], axis=1)
-    rise = np.array([0.0, 0.0, cup])
-    right, left = (center + 0.36 * along + side * across + 0.9 * rise for side in (-half_width, half_width))
-    corners = np.stack([right, center + 0.52 * along + 0.7 * rise, left], axis=1)
-    faces = [[0, 3 * i + 1, 3 * i + 2, 3 * i + 3] for i in range(petals)]
-    return leaf_model(np.concatenate([center[None], corners.reshape(-1, 3)]), faces)
-
-
-_LOBED = [(0.17, 0.2), (0.1, 0.34), (0.28, 0.5), (0.16, 0.62), (0.28, 0.8), (0.14, 0.96)]
-_MAPLE = [(0.2, -0.05), (0.4, 0.12), (0.29, 0.22), (0.56, 0.56), (0.24, 0.5), (0.2, 0.74)]
-_DELTOID = [(0.3, 0.1), (0.37, 0.3), (0.19, 0.66)]
-
-#: What the built-in models stand for: the leaves that they are when they are near.
-LEAF_SHAPES: dict[str, Blade | Needles | Compound] = {
-    # A silver birch: rhombic, drawn out to a tip, doubly serrate.
-    "kite": Blade(
-        width=0.68, widest=0.34, base="cuneate", apex="acuminate", teeth=13, tooth="doubly serrate", tooth_size=0.035,
-        fold=0.16, curl=0.06, wave=0.012, waves=3.5, petiole=0.1,
-    ),
-    # A beech: entire, with a shallow wave for each vein.
-    "ovate": Blade(
-        width=0.62, widest=0.42, base="rounded", apex="acute", teeth=8, tooth="sinuate", tooth_size=0.012,
-        fold=0.24, curl=0.1, wave=0.014, waves=8.0, petiole=0.06,
-    ),
-    # An aspen: as broad as it is long, on a long stalk, with blunt teeth.
-    "round": Blade(
-        width=0.88, widest=0.38, base="truncate", apex="acute", teeth=15, tooth="crenate", tooth_size=0.022,
-        fold=0.11, curl=0.06, wave=0.018, waves=2.5, petiole=0.12,
-    ),
-    # A willow: narrow, finely serrate.
-    "lanceolate": Blade(
-        width=0.27, widest=0.38, base="cuneate", apex="acuminate", teeth=34, tooth="serrate", tooth_size=0.006,
-        fold=0.22, curl=0.12, wave=0.006, waves=5.0, petiole=0.03,
-    ),
-    # Four shoots of a conifer.
-    "needles": Needles(
-        needles=200, length=0.11, thickness=0.011, angle=48.0, angle_tip=24.0, flat=0.45, bend=0.1,
-        shoot=0.95, shoots=4, spread=82.5, lift=0.25, stem=0.016,
-    ),
-    # An oak: rounded lobes, the largest beyond the middle.
-    "lobed": Blade(
-        width=0.58, widest=0.62, base="cuneate", apex="rounded", lobes=4, lobe_depth=0.5, lobe_round=1.0,
-        fold=0.16, curl=0.08, wave=0.018, waves=3.5, petiole=0.04,
-    ),
-    # A Norway maple: five pointed lobes with few large teeth.
-    "maple": Blade(
-        width=1.12, widest=0.4, base="truncate", apex="acute", lobing="palmate", lobes=5, lobe_depth=0.44,
-        lobe_round=0.1, teeth=10, tooth="serrate", tooth_size=0.075, fold=0.14, curl=0.1, wave=0.015, waves=2.0,
-    ),
-    # A poplar or downy birch: triangular, doubly serrate.
-    "deltoid": Blade(
-        width=0.76, widest=0.24, base="truncate", apex="acuminate", teeth=14, tooth="doubly serrate", tooth_size=0.03,
-        fold=0.16, curl=0.08, wave=0.012, waves=3.0, petiole=0.08,
-    ),
-    # A cherry blossom: five petals around a cup.
-    "blossom": Compound(
-        leaflet=Blade(
-            width=0.85, widest=0.6, base="cuneate", apex="rounded", fold=0.1, curl=-0.12, wave=0.03, waves=2.0,
-        ),
-        pairs=0, around=5, first=0.5, terminal=0, length=0.5, cup=0.22, curl=0.0, stem=0.02,
-    ),
-}  # fmt: skip
-
-_COARSE: dict[str, LeafModel] = {
-    # One quad, bent along the midrib: the least that still looks like a leaf.
-    "kite": leaf_model([(0.0, 0.0, 0.0), (0.32, 0.4, 0.05), (0.0, 1.0, -0.05), (-0.32, 0.4, 0.05)], [[0, 1, 2, 3]]),
-    "ovate": _folded(0.30, 0.08, 0.10),
-    "round": _folded(0.42, 0.05, 0.06),
-    "lanceolate": _folded(0.13, 0.03, 0.12),
-    "needles": _spray(),
-    "lobed": _outlined(_LOBED, 0.16, 0.08),
-    "maple": _outlined(_MAPLE, 0.14, 0.1),
-    "deltoid": _outlined(_DELTOID, 0.14, 0.08),
-    "blossom": _flower(),
-}
-LEAF_MODELS: dict[str, LeafModel] = {n: replace(model, shape=LEAF_SHAPES.get(n)) for n, model in _COARSE.items()}
-"""The built-in polygon lists by name, with what they stand for."""
+_PAGES: dict[str, dict[str, Any]] = beside(__file__, "models.json")
+LEAF_MODELS = {name: _built_in(page) for name, page in _PAGES.items()}
+"""The built-in leaves by name."""

@@ -15,15 +15,13 @@ from .blades import check_outline
 from .bodies import closed_parts
 from .compounds import Compound
 from .levels import TOLERANCES, fitted, shown_area, surface_of
-from .models import LEAF_MODELS, LeafModel, Spines, leaf_model
+from .models import LEAF_MODELS, OUTLINES, LeafModel, Spines, leaf_model
 from .needles import Needles
 from .outlines import Blade
 
 #: Most forms of a leaf.
 MAX_FORMS = 8
 LEAF_KEYS = ("model", "object", "vertices", "faces", "uv", "outline", "spines")
-#: Kinds of outlines by their name in species files; the first is meant where none is given.
-OUTLINES: dict[str, type] = {"blade": Blade, "needles": Needles, "compound": Compound}
 
 
 def read_forms(reader: FileReader, data: Any, key: str) -> tuple[LeafModel | str, ...]:

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Mask
+from ..arrays import Floats, Integers, Integers32, Mask
 
 #: Leaves of a form that are bent, folded and grown in different ways.
 VARIANTS = 6
@@ -25,7 +24,7 @@ def variant_offsets(number: int) -> Floats:
     return 2.0 * ((np.arange(VARIANTS) * (_GOLDEN + 0.4 * step) + step) % 1.0) - 1.0
 
 
-def next_corners(offsets: NDArray[np.int32]) -> NDArray[np.int32]:
+def next_corners(offsets: Integers32) -> Integers32:
     """The corner (c,) that follows each corner in its face, by where faces start (f + 1,)."""
     following = np.arange(1, offsets[-1] + 1, dtype=np.int32)
     following[offsets[1:] - 1] = offsets[:-1]
@@ -34,27 +33,14 @@ def next_corners(offsets: NDArray[np.int32]) -> NDArray[np.int32]:
 
 @dataclass(frozen=True)
 class LeafSurface:
-    """Faces of a leaf.
+    """Faces of a leaf."""
 
-    Attributes
-    ----------
-    positions : (k, v, 3) float64
-        Vertices of each variant, in units of the leaf's size.
-    corner_verts : (c,) int32
-    face_offsets : (f + 1,) int32
-    uv : (c, 2) float64
-    solid : (f,) bool
-        Faces of closed bodies, as needles: half of their surface counts as one-sided area.
-    error : float
-        Largest distance from the shape that it stands for.
-    """
-
-    positions: Floats
-    corner_verts: NDArray[np.int32]
-    face_offsets: NDArray[np.int32]
-    uv: Floats
-    solid: Mask
-    error: float = 0.0
+    positions: Floats  # (k, v, 3): vertices of each variant, in units of the leaf's size
+    corner_verts: Integers32  # (c,)
+    face_offsets: Integers32  # (f + 1,)
+    uv: Floats  # (c, 2)
+    solid: Mask  # (f,): faces of closed bodies, as needles: half of their surface counts as one-sided area
+    error: float = 0.0  # largest distance from the shape that it stands for
 
     @property
     def polygons(self) -> int:

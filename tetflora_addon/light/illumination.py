@@ -13,9 +13,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers
+from ..arrays import Floats, Floats32, Integers
 from ..camera.camera import Camera, to_eye
 from ..refinement.lights import Light
 from ..tetrahedra.geometry import volume
@@ -134,7 +133,7 @@ class Illumination:
         camera: Camera | None = None,
         sheets: Integers | None = None,
         dull: Floats | None = None,
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    ) -> tuple[Floats32, Floats32]:
         """Outgoing radiance of facets or leaves.
 
         Parameters
@@ -183,7 +182,7 @@ class Illumination:
         normal: Floats | None = None,
         plane: Floats | None = None,
         sheets: Integers | None = None,
-    ) -> NDArray[np.float32]:
+    ) -> Floats32:
         """Radiance (m, 3) of microspheres or, the same, of thick clouds around points, as the camera sees them.
 
         Parameters
@@ -220,7 +219,7 @@ class Illumination:
             result[part] = (1.0 - weight) * particles + weight * planes
         return result
 
-    def cell_sources(self, camera: Camera) -> NDArray[np.float32]:
+    def cell_sources(self, camera: Camera) -> Floats32:
         """Radiance J (n, 4, 3) of each tetrahedron at its vertices, were it thick, as the camera sees it.
 
         The paper's blend of p cos φ and p cos α + s cos^spear β with the light of all lamps; linear between vertices.

@@ -36,29 +36,14 @@ _ROOMY = 1.5
 
 @dataclass(frozen=True)
 class MediumCells(Arrays):
-    """Tetrahedra in the light, explicit ones included: n of them, without overlap.
+    """Tetrahedra in the light, explicit ones included: n of them, without overlap."""
 
-    Attributes
-    ----------
-    vertices : (n, 4, 3) float64
-        Positively oriented, meters.
-    matrices : (n, 6) float64
-        S of κ(ω) = √(ωᵀSω), as `summaries.extinction_matrices` gives it, 1/m².
-    color : (n, 3) float64
-    transmission : (n,) float64
-        Means of their contents.
-    normal : (n, 3) float64
-        Axis in which most normals lie.
-    plane : (n,) float64
-        Weight of the plane term, 0 to 1.
-    """
-
-    vertices: Floats
-    matrices: Floats
-    color: Floats
-    transmission: Floats
-    normal: Floats
-    plane: Floats
+    vertices: Floats  # (n, 4, 3): positively oriented, meters
+    matrices: Floats  # (n, 6): S of κ(ω) = √(ωᵀSω), as `summaries.extinction_matrices` gives it, 1/m²
+    color: Floats  # (n, 3)
+    transmission: Floats  # (n,): means of their contents
+    normal: Floats  # (n, 3): axis in which most normals lie
+    plane: Floats  # (n,): weight of the plane term, 0 to 1
 
     @classmethod
     def of(cls, flora: Flora, refinement: Refinement, even: Mask | None = None) -> MediumCells:
@@ -138,21 +123,12 @@ def cell_of_node(refinement: Refinement) -> Integers:
 
 @dataclass(frozen=True)
 class SurfaceElements:
-    """Facets, leaves or other small opaque quadrilaterals: m of them, in n tetrahedra.
+    """Facets, leaves or other small opaque quadrilaterals: m of them, in n tetrahedra."""
 
-    Attributes
-    ----------
-    corners : (m, 4, 3) float64
-        Meters; a triangle repeats a corner.
-    cell : (m,) int64
-        Tetrahedron (index into the clouds) of each, none negative; the nearest where it lies in none.
-    replaced : (n,) bool
-        Tetrahedra that cast no shadow themselves, since their sheets do.
-    """
-
-    corners: Floats
+    corners: Floats  # (m, 4, 3): meters; a triangle repeats a corner
+    #: (m,): tetrahedron (index into the clouds) of each, none negative; the nearest where it lies in none.
     cell: Integers
-    replaced: Mask
+    replaced: Mask  # (n,): tetrahedra that cast no shadow themselves, since their sheets do
 
     def __len__(self) -> int:
         return len(self.cell)

@@ -93,14 +93,9 @@ def arriving(light: Light, points: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class World:
-    """The sky, cut into what is nearest to each of `DIRECTIONS`.
+    """The sky, cut into what is nearest to each of `DIRECTIONS`."""
 
-    Attributes
-    ----------
-    parts : (24, 9, 3) float64
-        Radiance of each part by harmonic and color; the sum over the visible parts is that of the sky.
-    """
-
+    #: (24, 9, 3): radiance of each part by harmonic and color; the sum over the visible parts is that of the sky.
     parts: Floats
 
     @classmethod

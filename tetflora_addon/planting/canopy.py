@@ -13,9 +13,8 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, bilinear, spread
+from ..arrays import Arrays, Floats, Integers, Integers32, bilinear, spread
 
 #: Directions of the sky that light comes from: degrees from the vertical, how many, and the weight of all of them.
 DIRECTIONS = ((0.0, 1, 0.2), (32.0, 5, 0.5), (55.0, 5, 0.3))
@@ -30,27 +29,15 @@ _PAIRS = 1_500_000  # of plants and cells, worked out together
 
 @dataclass(frozen=True)
 class Canopy(Arrays):
-    """Plants that stand, as far as the ground under them is concerned.
+    """Plants that stand, as far as the ground under them is concerned."""
 
-    Attributes
-    ----------
-    position : (n, 3) float64
-        Feet, meters.
-    radius : (n,) float64
-        Of the crown, meters.
-    base, top : (n,) float64
-        Heights above the foot between which the crown is, meters.
-    area : (n,) float64
-        One-sided area of the leaves, m².
-    species : (n,) int32
-    """
-
-    position: Floats
-    radius: Floats
+    position: Floats  # (n, 3): feet, meters
+    radius: Floats  # (n,): of the crown, meters
+    #: base and top, (n,): heights above the foot between which the crown is, meters.
     base: Floats
     top: Floats
-    area: Floats
-    species: NDArray[np.int32]
+    area: Floats  # (n,): one-sided area of the leaves, m²
+    species: Integers32  # (n,)
 
     def ordered(self) -> Canopy:
         """The same plants by place, so that sums do not depend on the order in which they were given."""
@@ -60,19 +47,10 @@ class Canopy(Arrays):
 
 @dataclass(frozen=True)
 class Sheet:
-    """A rectangle of the map in square cells.
+    """A rectangle of the map in square cells."""
 
-    Attributes
-    ----------
-    low : (2,) float64
-        Corner with the smallest coordinates, meters.
-    cell : float
-        Meters.
-    columns, rows : int
-    """
-
-    low: Floats
-    cell: float
+    low: Floats  # (2,): corner with the smallest coordinates, meters
+    cell: float  # meters
     columns: int
     rows: int
 

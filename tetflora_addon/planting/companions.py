@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Keys, Mask
+from ..arrays import Floats, Integers32, Keys, Mask
 from ..growth.hashing import uniform
 from .plane import NO_DISTANCE, Neighbors, Spacing
 from .rules import Companion, Rules
@@ -23,7 +22,7 @@ class Company:
     Where plants shun others, it does not matter who came first: an oak that shuns birches keeps new birches away too.
     """
 
-    def __init__(self, rules: Rules, position: Floats, species: NDArray[np.int32]) -> None:
+    def __init__(self, rules: Rules, position: Floats, species: Integers32) -> None:
         """Begin with older plants: places on the map (m, 2), and indices into the weights or -1 (m,)."""
         self.rules = [(n, r) for n, r in enumerate(rules.companions) if r.strength and r.distance >= NO_DISTANCE]
         self.place = {s: [position[species == s]] for s in range(len(rules.weights))}
@@ -31,8 +30,9 @@ class Company:
     def order(self, wanted: list[int]) -> list[int]:
         """Species in the order in which they are placed: those that are sought before those that seek them."""
         order, rest = [], list(wanted)
+        seeks = {(rule.species, rule.other) for _, rule in self.rules if rule.strength > 0.0}
         while rest:
-            free = [s for s in rest if not any(self._seeks(s, other) for other in rest if other != s)]
+            free = [s for s in rest if not any((s, other) in seeks for other in rest if other != s)]
             # In a circle of species that seek each other, the first of the list begins.
             order.append(free[0] if free else rest[0])
             rest.remove(order[-1])
@@ -67,7 +67,7 @@ class Company:
         """Plants of a species stand now at places (n, 2)."""
         self.place.setdefault(species, []).append(points)
 
-    def lonely(self, points: Floats, species: NDArray[np.int32], keys: Keys, older: Company) -> Mask:
+    def lonely(self, points: Floats, species: Integers32, keys: Keys, older: Company) -> Mask:
         """Plants that have not what they seek near, (n,), when those that these need in turn are gone as well."""
         gone = np.zeros(len(points), bool)
         seeking = [(n, r) for n, r in self.rules if r.strength > 0.0]
@@ -87,9 +87,6 @@ class Company:
 
     def _standing(self, species: int) -> Floats:
         return np.concatenate(self.place[species])
-
-    def _seeks(self, species: int, other: int) -> bool:
-        return any(r.species == species and r.other == other and r.strength > 0.0 for _, r in self.rules)
 
     def _reaches(self, start: int, goal: int, seen: set[int]) -> bool:
         if start == goal:

@@ -51,20 +51,11 @@ class Habitat(Enum):
 
 @dataclass(frozen=True)
 class Floor:
-    """Maps of the ground under plants.
-
-    Attributes
-    ----------
-    sheet : Sheet
-    light : (cells,) float64
-        Fraction of the light of the sky.
-    fallen : (species, cells) float64
-        Leaves that fall, m² on a square meter.
-    """
+    """Maps of the ground under plants."""
 
     sheet: Sheet
-    light: Floats
-    fallen: Floats
+    light: Floats  # (cells,): fraction of the light of the sky
+    fallen: Floats  # (species, cells): leaves that fall, m² on a square meter
 
     def suits(self, habitat: Habitat, species: int | None, seed: int) -> Suits:
         """How suitable places are for a habitat.
@@ -123,23 +114,12 @@ def mapping(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, 
 
 @dataclass(frozen=True)
 class Stratum:
-    """One kind of plants of a ground cover, for the color of the ground.
+    """One kind of plants of a ground cover, for the color of the ground."""
 
-    Attributes
-    ----------
-    suits : (cells,) float64
-    number : float
-        Plants on a square meter that suits.
-    area : float
-        Of one plant seen from above, m².
-    color : (3,) float64
-        Linear RGB.
-    """
-
-    suits: Floats
-    number: float
-    area: float
-    color: Floats
+    suits: Floats  # (cells,)
+    number: float  # plants on a square meter that suits
+    area: float  # of one plant seen from above, m²
+    color: Floats  # (3,): linear RGB
 
 
 def covered(strata: Sequence[Stratum], cells: int) -> Floats:

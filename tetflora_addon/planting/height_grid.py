@@ -21,20 +21,13 @@ class HeightGrid:
     """Heights at the middles of square cells.
 
     Cells lie on a lattice through the world's origin, so that they do not move when ground is added beside.
-
-    Attributes
-    ----------
-    west, south : float
-        Corner of the first cell, meters in world space.
-    cell : float
-        Side of a cell, meters.
-    height : (h, w) float64
-        Of the highest surface, meters; the first row is the southernmost. NaN where there is no ground.
     """
 
+    #: west and south: corner of the first cell, meters in world space.
     west: float
     south: float
-    cell: float
+    cell: float  # side of a cell, meters
+    #: (h, w): of the highest surface, meters; the first row is the southernmost. NaN where there is no ground.
     height: Floats
 
     def at(self, values: Floats, points: Floats) -> Floats:

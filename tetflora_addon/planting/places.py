@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Arrays, Floats, Integers, Keys
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys
 from ..errors import SceneError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .companions import Company
@@ -37,38 +37,17 @@ _SPECIES = 2**32  # keys of species that are placed one after the other, away fr
 
 @dataclass(frozen=True)
 class Placement(Arrays):
-    """Plants to make.
+    """Plants to make."""
 
-    Attributes
-    ----------
-    position : (n, 3) float64
-        Meters, world space.
-    azimuth : (n,) float64
-        Rotation about the vertical, radians; comes before the tilt.
-    scale : (n,) float64
-    species : (n,) int32
-        Index into the weights of the rules.
-    seed : (n,) int32
-        Zero or positive.
-    wanted : int
-        How many were asked for, by number or by density.
-    reason : str
-        Why there are fewer, and what to do; empty if there are not.
-    up : (n, 3) float64, optional
-        Unit vectors along the trunks; upright if not given.
-    erased : int
-        How many were left out by `without`.
-    """
-
-    position: Floats
-    azimuth: Floats
-    scale: Floats
-    species: NDArray[np.int32]
-    seed: NDArray[np.int32]
-    wanted: int
-    reason: str = ""
-    up: Floats | None = None
-    erased: int = 0
+    position: Floats  # (n, 3): meters, world space
+    azimuth: Floats  # (n,): rotation about the vertical, radians; comes before the tilt
+    scale: Floats  # (n,)
+    species: Integers32  # (n,): index into the weights of the rules
+    seed: Integers32  # (n,): zero or positive
+    wanted: int  # how many were asked for, by number or by density
+    reason: str = ""  # why there are fewer, and what to do; empty if there are not
+    up: Floats | None = None  # (n, 3): unit vectors along the trunks; upright if not given
+    erased: int = 0  # how many were left out by `without`
 
     def __post_init__(self) -> None:
         """Plants that nobody tilted are upright."""
@@ -90,7 +69,7 @@ def place(
     ground: Terrain,
     rules: Rules,
     older: Floats | None = None,
-    older_species: NDArray[np.int32] | None = None,
+    older_species: Integers32 | None = None,
     suits: Mapping[int, Suits] | None = None,
     zones: Sequence[Zone] = (),
 ) -> Placement:
@@ -168,7 +147,7 @@ def without(placement: Placement, bare: Sequence[Path]) -> Placement:
     return replace(placement.take(stay), erased=placement.erased + int((~stay).sum()))
 
 
-def new_seeds(seeds: Integers, roll: int = 0) -> NDArray[np.int32]:
+def new_seeds(seeds: Integers, roll: int = 0) -> Integers32:
     """Other seeds for plants with the given ones, (n,), zero or positive; another ``roll`` gives yet others."""
     return _positive(child_key(key_of_seed(seeds), roll & 0xFFFFFFFF))
 
@@ -245,7 +224,7 @@ class _Sowing:
             self.company.add(species, position[chosen, :2])
         return len(keys), len(chosen)
 
-    def result(self) -> tuple[NDArray, NDArray, Keys, NDArray[np.int32]]:
+    def result(self) -> tuple[NDArray, NDArray, Keys, Integers32]:
         """Places, normals, keys and species of all plants."""
         none = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.uint64), np.zeros(0, np.int32)
         return tuple(np.concatenate(column) for column in zip(none, *self._parts, strict=True))
@@ -318,14 +297,14 @@ def _tilted(normal: Floats, tilt: float) -> Floats | None:
     return up / np.linalg.norm(up, axis=1, keepdims=True)
 
 
-def _positive(keys: Keys) -> NDArray[np.int32]:
+def _positive(keys: Keys) -> Integers32:
     return (uniform(keys, SiteDraw.SEED) * 2**31).astype(np.int32)
 
 
 _DRAWS = range(1 << 20, (1 << 20) + 12)  # beyond those of branches and leaves
 
 
-def plant_ages(seed: ArrayLike, age: float, spread: float) -> NDArray[np.float32]:
+def plant_ages(seed: ArrayLike, age: float, spread: float) -> Floats32:
     """Ages (n,) of plants with seeds (n,), years, in single precision as Blender stores them.
 
     They are log-normal, as sizes in uneven-aged stands are: the median is ``age``, and a standard deviation is a factor

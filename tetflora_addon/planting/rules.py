@@ -8,41 +8,31 @@ Rules that nothing can follow are refused, with the setting's name and what to d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import degrees, floor, inf, isfinite, log10, pi, radians, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Integers32
 from ..errors import SceneError
-from ..setting import LENGTH, setting
+from ..setting import FACTOR, LENGTH, meters, setting, within
 
 #: Most plants that are placed at once.
 MOST_PLANTS = 10_000_000
 _ANGLE = {"subtype": 'ANGLE'}
 _SLOPE = {"min": 0.0, "max": pi / 2, **_ANGLE}
 _ALTITUDE = {"soft_min": -1000.0, "soft_max": 5000.0, **LENGTH}
-_FACTOR = {"subtype": 'FACTOR', "min": 0.0, "max": 1.0}
 _SCALE = {"min": 0.01, "soft_max": 4.0}
 
 
 @dataclass(frozen=True)
 class Companion:
-    """How plants of one species stand to those of another.
+    """How plants of one species stand to those of another."""
 
-    Attributes
-    ----------
-    species, other : int
-        Indices into the weights. Plants of ``other`` may also be older than the population.
-    strength : float
-        -1: none grows within the distance of any of the others; 0: indifferent; 1: they grow only there.
-    distance : float
-        Meters on the map.
-    """
-
+    #: species and other: indices into the weights. Plants of ``other`` may also be older than the population.
     species: int
     other: int
+    #: -1: none grows within the distance of any of the others; 0: indifferent; 1: they grow only there.
     strength: float = setting(
         -1.0,
         "Attraction",
@@ -52,13 +42,9 @@ class Companion:
         min=-1.0,
         max=1.0,
     )
+    #: Meters on the map.
     distance: float = setting(
-        5.0,
-        "Reach",
-        "How far the companion's influence extends, measured on the map",
-        min=0.0,
-        soft_max=100.0,
-        **LENGTH,
+        5.0, "Reach", "How far the companion's influence extends, measured on the map", **meters(0.0, 100.0)
     )
 
 
@@ -80,17 +66,17 @@ class GroundLimits:
         "Min Wetness",
         "Drier ground is left out. 0 is the driest, as on ridges, and 1 the wettest, as at brooks and in hollows: it "
         "follows from where water runs on the ground",
-        **_FACTOR,
+        **FACTOR,
     )
     wetness_max: float = setting(
-        1.0, "Max Wetness", "Wetter ground is left out; 1 is the wettest, as at brooks and in hollows", **_FACTOR
+        1.0, "Max Wetness", "Wetter ground is left out; 1 is the wettest, as at brooks and in hollows", **FACTOR
     )
     wetness_softness: float = setting(
         0.0,
         "Wetness Softness",
         "Range around both limits over which plants become sparser; half of them grow at a limit. 0 for a sharp line",
         default=0.2,
-        **_FACTOR,
+        **FACTOR,
     )
 
 
@@ -100,27 +86,16 @@ class Rules(GroundLimits):
 
     Fields with a label are properties of a population, and documented by their tooltips. Lengths are in meters,
     altitudes z in the world, angles in radians.
-
-    Attributes
-    ----------
-    density : float
-        Plants for each square meter of the map that is wholly suitable; fewer where it is suitable in part.
-    aspect : float
-        Clockwise from +Y (north) on the map.
-    weights : tuple of float
-        Relative frequency of each species.
-    companions : tuple of Companion
     """
 
     count: int = setting(
         100,
         "Plants",
         "Number of plants to place. Fewer are placed if no more fit, which the report mentions",
-        min=1,
-        soft_max=10_000,
-        max=MOST_PLANTS,
+        **within(1, 10_000, MOST_PLANTS),
     )
     by_density: bool = setting(False, "By Density", "Set the number of plants per hectare instead of in total")
+    #: Plants for each square meter of the map that is wholly suitable; fewer where it is suitable in part.
     density: float = 0.01
     seed: int = setting(0, "Seed", "A different seed gives a different arrangement and different plants")
     min_distance: float = setting(
@@ -128,19 +103,16 @@ class Rules(GroundLimits):
         "Min Distance",
         "Minimum distance between two trunks, measured on the map; existing plants count",
         default=2.0,
-        min=0.0,
-        soft_max=50.0,
-        **LENGTH,
+        **meters(0.0, 50.0),
     )
     slope_max: float = setting(pi / 2, "Max Slope", "Steeper ground is left out", default=radians(40.0), **_SLOPE)
     altitude_falloff: float = setting(
         0.0,
         "Altitude Falloff",
         "Distance inside both altitudes over which plants become sparser; 0 for a sharp line",
-        min=0.0,
-        soft_max=500.0,
-        **LENGTH,
+        **meters(0.0, 500.0),
     )
+    #: Clockwise from +Y (north) on the map.
     aspect: float = setting(
         0.0,
         "Facing",
@@ -159,19 +131,17 @@ class Rules(GroundLimits):
         0.0,
         "Edge Falloff",
         "Distance from the ground's border over which plants become sparser; 0 for none",
-        min=0.0,
-        soft_max=100.0,
-        **LENGTH,
+        **meters(0.0, 100.0),
     )
     clumping: float = setting(
         0.0,
         "Clumping",
         "0: evenly spread; 1: in clumps with bare ground between them. The number of plants stays the same while "
         "there is room",
-        **_FACTOR,
+        **FACTOR,
     )
     clump_size: float = setting(
-        20.0, "Clump Size", "Approximate distance from one clump to the next", min=0.1, soft_max=500.0, **LENGTH
+        20.0, "Clump Size", "Approximate distance from one clump to the next", **meters(0.1, 500.0)
     )
     scale_min: float = setting(
         1.0, "Min Scale", "Scale of the smallest plants; 1 is the size in the species file", default=0.8, **_SCALE
@@ -186,18 +156,25 @@ class Rules(GroundLimits):
         0.0,
         "Follow Ground",
         "0: upright, as trees grow; 1: perpendicular to the ground, as moss and grass grow",
-        **_FACTOR,
+        **FACTOR,
     )
-    weights: tuple[float, ...] = (1.0,)
+    weights: tuple[float, ...] = (1.0,)  # relative frequency of each species
     companions: tuple[Companion, ...] = ()
 
 
-def species_by_weight(weights: tuple[float, ...], draws: Floats) -> NDArray[np.int32]:
+def species_by_weight(weights: tuple[float, ...], draws: Floats) -> Integers32:
     """Species as indices into the weights, which are their relative frequencies, by draws from [0, 1), (n,) each."""
     weights = np.maximum(np.asarray(weights, dtype=np.float64), 0.0)
     limits = np.cumsum(weights) / weights.sum()
     # Rounding may leave the last limit below a draw that is just under 1.
     return np.minimum(np.searchsorted(limits, draws, side="right"), len(weights) - 1).astype(np.int32)
+
+
+#: Fields that have to be 0 or greater, in the order in which they are looked at.
+_NOT_NEGATIVE = (
+    "density", "min_distance", "altitude_falloff", "wetness_softness", "edge_falloff", "clumping", "scale_at_top",
+    "aspect_spread",
+)  # fmt: skip
 
 
 def check_rules(rules: Rules) -> None:
@@ -243,19 +220,11 @@ def check_rules(rules: Rules) -> None:
 
 
 def _check_numbers(rules: Rules) -> None:
-    numbers = {
-        "Density": rules.density,
-        "Min Distance": rules.min_distance,
-        "Altitude Falloff": rules.altitude_falloff,
-        "Wetness Softness": rules.wetness_softness,
-        "Edge Falloff": rules.edge_falloff,
-        "Clumping": rules.clumping,
-        "Scale at Top": rules.scale_at_top,
-        "Facing Spread": rules.aspect_spread,
-    }
-    for name, value in numbers.items():
+    labels = {one.name: one.metadata.get("name", "Density") for one in fields(rules)}
+    for name in _NOT_NEGATIVE:
+        value = getattr(rules, name)
         if not isfinite(value) or value < 0.0:
-            raise SceneError(f"{name} must be 0 or greater, not {value:g}")
+            raise SceneError(f"{labels[name]} must be 0 or greater, not {value:g}")
 
 
 def _check_companion(rule: Companion, species: int) -> None:

@@ -60,25 +60,13 @@ REMEDIES = {
 
 @dataclass(frozen=True)
 class Sample:
-    """Suitable places among those that were drawn.
+    """Suitable places among those that were drawn."""
 
-    Attributes
-    ----------
-    position : (n, 3) float64
-    up : (n, 3) float64
-        Normals of the ground, upwards.
-    key : (n,) uint64
-    drawn : int
-        Places looked at.
-    lost : dict
-        How many of them each of `REMEDIES` refused.
-    """
-
-    position: Floats
-    up: Floats
-    key: Keys
-    drawn: int
-    lost: dict[str, int]
+    position: Floats  # (n, 3)
+    up: Floats  # (n, 3): normals of the ground, upwards
+    key: Keys  # (n,)
+    drawn: int  # places looked at
+    lost: dict[str, int]  # how many of them each of `REMEDIES` refused
 
 
 class Site:

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Keys, Mask
 from ..growth.hashing import child_key, key_of_seed, uniform
-from ..setting import LENGTH, setting
-from .plane import NO_DISTANCE, cells_of, packed
+from ..setting import meters, setting
+from .plane import NO_DISTANCE, Spacing, cells_of, packed
 from .rules import species_by_weight
 
 #: Cells that one dab looks at; a wider circle, or a higher density, is refused by `paint`.
@@ -43,27 +43,15 @@ class _Draw(IntEnum):
 
 @dataclass(frozen=True)
 class Brush:
-    """What the brush is like. Fields with a label are properties of a scene, and documented by their tooltips.
-
-    Attributes
-    ----------
-    density : float
-        Plants for each square meter of the map.
-    scale_min, scale_max : float
-    weights : tuple of float
-        Relative frequency of each species.
-    """
+    """What the brush is like. Fields with a label are properties of a scene, and documented by their tooltips."""
 
     radius: float = setting(
         5.0,
         "Radius",
         "Radius of the brush on the map. While painting, use F, [ and ], or Ctrl and the mouse wheel",
-        min=0.05,
-        soft_max=50.0,
-        max=10_000.0,
-        **LENGTH,
+        **meters(0.05, 50.0, 10_000.0),
     )
-    density: float = 0.04
+    density: float = 0.04  # plants for each square meter of the map
     strength: float = setting(
         1.0,
         "Strength",
@@ -78,13 +66,11 @@ class Brush:
         "Minimum distance between two trunks, measured on the map; existing plants count, including those of fields. "
         "Large values limit the density",
         default=1.0,
-        min=0.0,
-        soft_max=50.0,
-        **LENGTH,
+        **meters(0.0, 50.0),
     )
     scale_min: float = 1.0
     scale_max: float = 1.0
-    weights: tuple[float, ...] = (1.0,)
+    weights: tuple[float, ...] = (1.0,)  # relative frequency of each species
 
 
 def stroke_key(seed: int, stroke: int) -> Keys:
@@ -162,7 +148,8 @@ def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, da
             cells, cell_keys, tried, places = cells[inside], cell_keys[inside], tried[inside], places[inside]
             inside = inside[inside]
         chosen = np.flatnonzero(inside)
-        chosen = chosen[admitted(places[chosen], np.concatenate([standing, *found]), brush.min_distance)]
+        spacing = Spacing(brush.min_distance, np.concatenate([standing, *found]))
+        chosen = chosen[spacing.admit(places[chosen], len(chosen))]
         found.append(places[chosen])
         keys.append(tried[chosen])
         left = np.ones(len(cells), bool)
@@ -189,7 +176,7 @@ def thin(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, dab
     near = near[np.argsort(_ranks(standing[near, :2]), kind="stable")]
     _, first = np.unique(cells_of(standing[near, :2], cell_size(brush.density)), return_index=True)
     winners = near[np.sort(first)]
-    winners = winners[admitted(standing[winners, :2], np.zeros((0, 2)), brush.min_distance)]
+    winners = winners[Spacing(brush.min_distance, np.zeros((0, 2))).admit(standing[winners, :2], len(winners))]
     gone = np.sort(near[~np.isin(near, winners)])
     gone = gone[within(standing[gone], center, brush.radius)]
     return gone[_drawn(brush, gone, key, dab)]
@@ -220,50 +207,6 @@ def dabs_along(last: Sequence[float], to: Sequence[float], spacing: float) -> Fl
     a, b = np.asarray(last, float), np.asarray(to, float)
     number = int(np.clip(np.ceil(np.linalg.norm(b - a) / max(spacing, _TINY)), 1, _MOST_DABS))
     return a + (b - a) * (np.arange(1, number + 1) / number)[:, None]
-
-
-def admitted(places: Floats, standing: Floats, distance: float) -> Integers:
-    """Numbers of places, (n, 2), that keep a distance to those that stand, (m, 2), and among each other.
-
-    The earlier of two places goes first, as if they were set one after the other.
-    """
-    free = np.ones(len(places), bool)
-    if distance <= NO_DISTANCE or not len(places):
-        return np.flatnonzero(free)
-    free[_close(places, standing, distance)[0]] = False
-    undecided = np.flatnonzero(free)
-    first, second = _close(places[undecided], places[undecided], distance)
-    early = first < second
-    first, second = first[early], second[early]
-    state = np.zeros(len(undecided), np.int8)  # 0 undecided, 1 in, -1 out
-    while (open_ := state == 0).any():
-        # Whoever has no earlier neighbor that may yet come in is in; its later neighbors are out.
-        waits = np.zeros(len(state), bool)
-        waits[second[state[first] == 0]] = True
-        state[open_ & ~waits] = 1
-        state[second[state[first] == 1]] = -1
-    return undecided[state == 1]
-
-
-def _close(a: Floats, b: Floats, distance: float) -> tuple[Integers, Integers]:
-    """Pairs of numbers of places, (n, 2) and (m, 2), that are closer than a distance."""
-    if not len(a) or not len(b):
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    cells_b = packed(np.floor(b / distance).astype(np.int64))
-    order = np.argsort(cells_b, kind="stable")
-    sorted_b, home = cells_b[order], np.floor(a / distance).astype(np.int64)
-    firsts, seconds = [], []
-    for step in np.ndindex(3, 3):
-        wanted = packed(home + (np.array(step) - 1))
-        begin, end = np.searchsorted(sorted_b, wanted), np.searchsorted(sorted_b, wanted, side="right")
-        counts = end - begin
-        i = np.repeat(np.arange(len(a)), counts)
-        j = order[np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts - begin, counts)]
-        gap = a[i] - b[j]
-        near = np.einsum("ij,ij->i", gap, gap) < distance * distance
-        firsts.append(i[near])
-        seconds.append(j[near])
-    return np.concatenate(firsts), np.concatenate(seconds)
 
 
 def _drawn(brush: Brush, numbers: Integers, key: Keys, dab: int) -> Mask:

@@ -7,55 +7,32 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, bilinear
+from ..arrays import Floats, Floats32, bilinear
 from ..errors import SceneError
 
 
 @dataclass(frozen=True)
 class Path:
-    """A line on the map to keep free.
+    """A line on the map to keep free."""
 
-    Attributes
-    ----------
-    points : (k, 2) float64
-        Meters, k at least 1; a cyclic line repeats its first point.
-    half_width : float
-        Meters to either side in which nothing grows; 0 keeps nothing free.
-    """
-
-    points: Floats
-    half_width: float
+    points: Floats  # (k, 2): meters, k at least 1; a cyclic line repeats its first point
+    half_width: float  # meters to either side in which nothing grows; 0 keeps nothing free
 
 
 @dataclass(frozen=True)
 class Terrain:
-    """A terrain with everything that is drawn on it. Only the triangles are needed.
+    """A terrain with everything that is drawn on it. Only the triangles are needed."""
 
-    Attributes
-    ----------
-    triangles : (t, 3, 3) float64
-        Corners, meters in world space; either side may be up.
-    weight : (t, 3) float, optional
-        How suitable the corners are, 0 to 1 (vertex groups); linear between.
-    uv : (t, 3, 2) float, optional
-        Where the corners are in the image; it repeats beyond 0 and 1.
-    image : (h, w) float, optional
-        How suitable texels are, 0 to 1; the first row is at the bottom. Read between texels (bilinear).
-    areas : tuple of (k, 2) float64
-        Closed polygons on the map. If there are any, plants grow in at least one of them.
-    paths : tuple of Path
-    border : (e, 2, 3) float64, optional
-        Edges where the ground ends; found from the triangles if they are asked for and not given.
-    """
-
-    triangles: Floats
-    weight: Floats | None = None
-    uv: Floats | None = None
-    image: NDArray[np.float32] | None = None
+    triangles: Floats  # (t, 3, 3): corners, meters in world space; either side may be up
+    weight: Floats | None = None  # (t, 3): how suitable the corners are, 0 to 1 (vertex groups); linear between
+    uv: Floats | None = None  # (t, 3, 2): where the corners are in the image; it repeats beyond 0 and 1
+    #: (h, w): how suitable texels are, 0 to 1; the first row is at the bottom. Read between texels (bilinear).
+    image: Floats32 | None = None
+    #: tuple of (k, 2): closed polygons on the map. If there are any, plants grow in at least one of them.
     areas: tuple[Floats, ...] = ()
     paths: tuple[Path, ...] = ()
+    #: (e, 2, 3): edges where the ground ends; found from the triangles if they are asked for and not given.
     border: Floats | None = None
 
     def __post_init__(self) -> None:
@@ -110,7 +87,7 @@ def border_of(triangles: Floats) -> Floats:
     return places[first[(count == 1)]]
 
 
-def sampled(image: NDArray[np.float32], uv: Floats) -> Floats:
+def sampled(image: Floats32, uv: Floats) -> Floats:
     """Values of an image (h, w) at places (n, 2), linear between the middles of texels, (n,).
 
     It repeats, but opposite borders do not mix: a mask that is black on one side would let plants stray to the other.

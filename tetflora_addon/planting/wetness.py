@@ -143,17 +143,10 @@ def wetness(height: Floats, cell: float) -> Floats:
 
 @dataclass(frozen=True)
 class WetGround:
-    """How wet a ground is.
-
-    Attributes
-    ----------
-    grid : HeightGrid
-    wetness : (h, w) float64
-        From 0 to 1, of each cell of the grid.
-    """
+    """How wet a ground is."""
 
     grid: HeightGrid
-    wetness: Floats
+    wetness: Floats  # (h, w): from 0 to 1, of each cell of the grid
 
     def at(self, points: Floats) -> Floats:
         """Wetness at places on the map (n, 2 or more), (n,); beyond all cells it is that of level ground."""

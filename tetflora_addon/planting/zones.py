@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from math import inf, pi, radians
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers
-from ..setting import LENGTH, setting
+from ..arrays import Floats, Floats32, Integers
+from ..setting import meters, setting
 from .plane import Lines, lines_along
 from .rules import GroundLimits
 from .terrain import sampled
@@ -33,22 +32,12 @@ class Limits(GroundLimits):
     """
 
     slope_softness: float = setting(0.0, "Slope Softness", _WIDTH, default=radians(10.0), **_ANGLE)
-    altitude_softness: float = setting(
-        0.0, "Altitude Softness", _WIDTH, default=10.0, min=0.0, soft_max=500.0, **LENGTH
-    )
-    path_min: float = setting(
-        0.0, "From", "Ground nearer to the paths is not part of the biome", min=0.0, soft_max=100.0, **LENGTH
-    )
+    altitude_softness: float = setting(0.0, "Altitude Softness", _WIDTH, default=10.0, **meters(0.0, 500.0))
+    path_min: float = setting(0.0, "From", "Ground nearer to the paths is not part of the biome", **meters(0.0, 100.0))
     path_max: float = setting(
-        inf,
-        "To",
-        "Ground farther from the paths is not part of the biome",
-        default=10.0,
-        min=0.0,
-        soft_max=500.0,
-        **LENGTH,
+        inf, "To", "Ground farther from the paths is not part of the biome", default=10.0, **meters(0.0, 500.0)
     )
-    path_softness: float = setting(0.0, "Path Softness", _WIDTH, default=2.0, min=0.0, soft_max=100.0, **LENGTH)
+    path_softness: float = setting(0.0, "Path Softness", _WIDTH, default=2.0, **meters(0.0, 100.0))
 
     @property
     def open(self) -> bool:
@@ -61,49 +50,24 @@ class Limits(GroundLimits):
 
 @dataclass(frozen=True)
 class Spots:
-    """Places on the ground, as zones ask for them.
+    """Places on the ground, as zones ask for them."""
 
-    Attributes
-    ----------
-    triangle : (n,) int64
-        Of the ground.
-    barycentric : (n, 3) float64
-    position : (n, 3) float64
-        Meters.
-    normal : (n, 3) float64
-        Of the ground, upwards.
-    """
-
-    triangle: Integers
-    barycentric: Floats
-    position: Floats
-    normal: Floats
+    triangle: Integers  # (n,): of the ground
+    barycentric: Floats  # (n, 3)
+    position: Floats  # (n, 3): meters
+    normal: Floats  # (n, 3): of the ground, upwards
 
 
 @dataclass(frozen=True)
 class Zone:
-    """One zone of a ground of t triangles.
-
-    Attributes
-    ----------
-    weight : (t, 3) float, optional
-        Mask at the corners, 0 to 1; linear between.
-    uv : (t, 3, 2) float, optional
-        Where the corners are in the image.
-    image : (h, w) float, optional
-        Mask in texels, 0 to 1; the first row is at the bottom.
-    lines : Lines, optional
-        What distances are measured from: see `distance_lines`.
-    inverse : bool
-        All but the zone, as what gives way to it has.
-    """
+    """One zone of a ground of t triangles."""
 
     limits: Limits
-    weight: Floats | None = None
-    uv: Floats | None = None
-    image: NDArray[np.float32] | None = None
-    lines: Lines | None = None
-    inverse: bool = False
+    weight: Floats | None = None  # (t, 3): mask at the corners, 0 to 1; linear between
+    uv: Floats | None = None  # (t, 3, 2): where the corners are in the image
+    image: Floats32 | None = None  # (h, w): mask in texels, 0 to 1; the first row is at the bottom
+    lines: Lines | None = None  # what distances are measured from: see `distance_lines`
+    inverse: bool = False  # all but the zone, as what gives way to it has
 
     @property
     def asks_for_water(self) -> bool:

@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, srgb_of
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, srgb_of
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..refinement.contents import Contents
@@ -44,39 +44,17 @@ _LEAST, _MOST = 0.25, 1_024.0
 
 @dataclass(frozen=True)
 class Level(Arrays):
-    """The tetrahedra that hold something after one pass.
+    """The tetrahedra that hold something after one pass."""
 
-    Attributes
-    ----------
-    nodes : (t,) int32
-        Their nodes in the tree.
-    depth : (t,) int16
-        Planes between the root and each.
-    decision : (t,) int8
-        `Decision`; in all levels but the last some are still to be divided.
-    visibility : (t,) float32
-        Fraction of each one's light that nothing in front blocks; 0 out of view.
-    contribution : (t,) float32
-        Pixels of the image that its contents change.
-    extinction : (t,) float32
-        κ of its contents spread evenly, 1/m; optical depth is κ times the way through it.
-    color : (t, 3) float32
-        Mean color of its contents, linear RGB.
-    figures : Step
-        Counts for the overlay.
-    number : int
-        Pass of the loop, from 0.
-    """
-
-    nodes: NDArray[np.int32]
-    depth: NDArray[np.int16]
-    decision: NDArray[np.int8]
-    visibility: NDArray[np.float32]
-    contribution: NDArray[np.float32]
-    extinction: NDArray[np.float32]
-    color: NDArray[np.float32]
-    figures: Step
-    number: int
+    nodes: Integers32  # (t,): their nodes in the tree
+    depth: NDArray[np.int16]  # (t,): planes between the root and each
+    decision: NDArray[np.int8]  # (t,): `Decision`; in all levels but the last some are still to be divided
+    visibility: Floats32  # (t,): fraction of each one's light that nothing in front blocks; 0 out of view
+    contribution: Floats32  # (t,): pixels of the image that its contents change
+    extinction: Floats32  # (t,): κ of its contents spread evenly, 1/m; optical depth is κ times the way through it
+    color: Floats32  # (t, 3): mean color of its contents, linear RGB
+    figures: Step  # counts for the overlay
+    number: int  # pass of the loop, from 0
 
 
 class Levels:
@@ -112,7 +90,7 @@ class Levels:
         """A level, 0 for the root; beyond the last one, the last."""
         return self.levels[min(max(number, 0), len(self.levels) - 1)]
 
-    def vertices(self, level: Level, chosen: NDArray | slice = slice(None)) -> NDArray[np.float32]:
+    def vertices(self, level: Level, chosen: NDArray | slice = slice(None)) -> Floats32:
         """Corners (t, 4, 3) float32 of a level's tetrahedra, or of some, meters from the camera's `origin`."""
         return self.tree.vertices(level.nodes[chosen]).astype(np.float32)
 
@@ -188,14 +166,14 @@ def mean_colors(flora: Flora, contents: Contents, nodes: Integers, size: int) ->
     return sums[nodes] / np.where(area > 0.0, area, 1.0)[nodes, None]
 
 
-def ramp(fraction: NDArray[np.floating]) -> NDArray[np.float32]:
+def ramp(fraction: NDArray[np.floating]) -> Floats32:
     """Colors (n, 3) for fractions (n,): dark violet at 0, through green, to bright yellow at 1."""
     at = np.clip(fraction, 0.0, 1.0) * (len(_RAMP) - 1)
     low = np.minimum(at.astype(np.intp), len(_RAMP) - 2)
     return (_RAMP[low] + (_RAMP[low + 1] - _RAMP[low]) * (at - low)[:, None]).astype(np.float32)
 
 
-def colors_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
+def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
     """Colors (t, 3) of a level's tetrahedra.
 
     Parameters
@@ -227,6 +205,6 @@ def colors_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
     raise ValueError(f'unknown color mode "{mode}"; use LEVEL, VISIBILITY, FORM or CONTRIBUTION')
 
 
-def as_shown(linear: NDArray[np.floating]) -> NDArray[np.float32]:
+def as_shown(linear: NDArray[np.floating]) -> Floats32:
     """Linear colors (..., 3) as a screen shows them (IEC 61966-2-1)."""
     return srgb_of(np.clip(linear, 0.0, 1.0)).astype(np.float32)

@@ -14,9 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers
+from ..arrays import Floats, Floats32, Integers, Integers32
 from ..camera.camera import origin_near
 from ..compiled.flora import Flora
 from ..compiled.placed import extents, outlines
@@ -41,29 +40,14 @@ _SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
 
 @dataclass(frozen=True)
 class Shapes:
-    """Many plants in one mesh.
+    """Many plants in one mesh."""
 
-    Attributes
-    ----------
-    positions : (v, 3) float32
-        Meters from ``origin``.
-    colors : (v, 3) float32
-        As a screen shows them, shaded by a fixed light.
-    indices : (m, 3) int32 for faces, or (m, 2) int32 for edges
-    plants : int
-        Plants that are shown.
-    of : int
-        Plants that there are.
-    origin : (3,) float64
-        Near most plants, meters, world space.
-    """
-
-    positions: NDArray[np.float32]
-    colors: NDArray[np.float32]
-    indices: NDArray[np.int32]
-    plants: int
-    of: int
-    origin: Floats
+    positions: Floats32  # (v, 3): meters from ``origin``
+    colors: Floats32  # (v, 3): as a screen shows them, shaded by a fixed light
+    indices: Integers32  # (m, 3) for faces, or (m, 2) int32 for edges
+    plants: int  # plants that are shown
+    of: int  # plants that there are
+    origin: Floats  # (3,): near most plants, meters, world space
 
 
 def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
@@ -186,7 +170,7 @@ def _faces() -> Integers:
     return np.concatenate([np.stack(part, axis=1) for part in parts])
 
 
-def _repeated(indices: Integers, corners: int, times: int) -> NDArray[np.int32]:
+def _repeated(indices: Integers, corners: int, times: int) -> Integers32:
     """The same faces or edges for each of many plants of so many corners."""
     every = indices[None] + corners * np.arange(times)[:, None, None]
     return every.reshape(-1, indices.shape[1]).astype(np.int32)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Mask
+from ..arrays import Floats, Integers32, Mask
 from ..camera.camera import Camera
 from ..tetrahedra.geometry import barycentric_gradients
 
@@ -48,26 +48,16 @@ _CASES = _cases()
 
 @dataclass(frozen=True)
 class Projected:
-    """Tetrahedra as triangles, in the order of the tetrahedra.
+    """Tetrahedra as triangles, in the order of the tetrahedra."""
 
-    Attributes
-    ----------
-    corners : (n, 5, 3) float64
-        The four vertices, on which opacity is 0, and the nearest point of the ray on which each tetrahedron is
-        thickest; world space, meters.
-    opacity : (n,) float64
-        Of the thick point: 1 − e^(−κ · thickness).
-    thickness : (n,) float64
-        Along that ray, meters.
-    triangles : (m, 3) int32
-        Corners of triangles, counted through all tetrahedra (five each); those of one follow one another. They face
-        either way.
-    """
-
+    #: (n, 5, 3): the four vertices, on which opacity is 0, and the nearest point of the ray on which each tetrahedron
+    #: is thickest; world space, meters.
     corners: Floats
-    opacity: Floats
-    thickness: Floats
-    triangles: NDArray[np.int32]
+    opacity: Floats  # (n,): of the thick point: 1 − e^(−κ · thickness)
+    thickness: Floats  # (n,): along that ray, meters
+    #: (m, 3): corners of triangles, counted through all tetrahedra (five each); those of one follow one another. They
+    #: face either way.
+    triangles: Integers32
 
 
 def drawable(vertices: NDArray[np.floating], camera: Camera) -> Mask:

@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, nested, spread
+from ..arrays import Arrays, Floats, Integers, Integers32, Mask, column, nested, spread
 from ..assets.asset import AssetTable, Instances
 from ..camera.camera import Camera
 from ..growth.hashing import child_key, uniform
@@ -29,32 +29,20 @@ _EVEN = 1e-4
 
 @dataclass(frozen=True)
 class AssetParts(Arrays):
-    """Clusters of instances (n).
+    """Clusters of instances (n)."""
 
-    Attributes
-    ----------
-    instance : (n,) int32
-    cluster : (n,) int32
-        Of `AssetTable.clusters`.
-    center : (n, 3) float64
-        Middle of its bound, meters.
-    totals : Totals of n
-    extent : (n,) float64
-        Longest side of its bound, meters.
-    """
-
-    instance: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    cluster: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    center: NDArray[np.float64] = field(metadata=column(3))
-    totals: Totals = field(metadata=nested(Totals))
-    extent: NDArray[np.float64]
+    instance: Integers32 = column(dtype=np.int32)  # (n,)
+    cluster: Integers32 = column(dtype=np.int32)  # (n,): of `AssetTable.clusters`
+    center: Floats = column(3)  # (n, 3): middle of its bound, meters
+    totals: Totals = nested(Totals)  # of n
+    extent: Floats  # (n,): longest side of its bound, meters
 
     @property
-    def reach(self) -> NDArray[np.float64]:
+    def reach(self) -> Floats:
         """Distance (n,) from the middle within which all of each is, meters."""
         return 0.5 * np.sqrt(3.0) * self.extent
 
-    def bounding_box(self) -> NDArray[np.float64]:
+    def bounding_box(self) -> Floats:
         """Axis-aligned box (2, 3) around all of them, at least one, meters."""
         reach = self.reach[:, None]
         return np.stack([(self.center - reach).min(axis=0), (self.center + reach).max(axis=0)])
@@ -92,7 +80,7 @@ class PlacedAssets:
         """All instances as they are."""
         return self.parts(np.arange(len(self)), self.assets.root[self.instances.asset])
 
-    def parts(self, instance: NDArray[np.integer], cluster: NDArray[np.integer]) -> AssetParts:
+    def parts(self, instance: Integers, cluster: Integers) -> AssetParts:
         """Clusters (n,) of instances (n,)."""
         clusters = self.assets.clusters
         low, high = clusters.low[cluster], clusters.high[cluster]
@@ -103,13 +91,13 @@ class PlacedAssets:
         center = self.to_world((low + high) / 2, instance)
         return AssetParts(instance.astype(np.int32), cluster.astype(np.int32), center, totals, side)
 
-    def children(self, parts: AssetParts) -> tuple[AssetParts, NDArray[np.int64]]:
+    def children(self, parts: AssetParts) -> tuple[AssetParts, Integers]:
         """Children of clusters (n,), and whose each is (m,)."""
         clusters = self.assets.clusters
         owner, index = spread(clusters.children[parts.cluster].astype(np.int64))
         return self.parts(parts.instance[owner], clusters.child[parts.cluster][owner] + index), owner
 
-    def kites(self, parts: AssetParts) -> NDArray[np.float64]:
+    def kites(self, parts: AssetParts) -> Floats:
         """Corners (k, 4, 3) of kites for all leaves of clusters (n,), meters."""
         leaves, clusters, asset = self.assets.leaves, self.assets.clusters, self.instances.asset[parts.instance]
         owner, index = spread(clusters.leaves[parts.cluster].astype(np.int64))
@@ -117,7 +105,7 @@ class PlacedAssets:
         corners = (own.center - own.along, own.center - own.across, own.center + own.along, own.center + own.across)
         return np.stack([self.to_world(corner, parts.instance[owner]) for corner in corners], axis=1)
 
-    def to_world(self, points: NDArray[np.floating], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+    def to_world(self, points: NDArray[np.floating], instance: Integers) -> Floats:
         """Points (n, 3) of assets' spaces in the world, by instances (n,)."""
         linear, out = self.instances.linear, self.instances.position[instance]
         for i in range(3):
@@ -125,12 +113,12 @@ class PlacedAssets:
                 out[:, i] += linear[instance, i, k] * points[:, k]
         return out
 
-    def cofactors(self, instance: NDArray[np.integer]) -> NDArray[np.float64]:
+    def cofactors(self, instance: Integers) -> Floats:
         """Matrices (n, 3, 3) that take area vectors of assets' spaces to the world."""
         a, b, c = np.moveaxis(self.instances.linear[instance], 2, 0)
         return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
 
-    def _areas(self, instance: NDArray, cluster: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _areas(self, instance: NDArray, cluster: NDArray) -> tuple[Floats, Floats]:
         """Areas (n,) of sheets and of solids, m²; where an instance is stretched, as its samples say."""
         clusters, scale = self.assets.clusters, self.scale[instance] ** 2
         leaf, wood = clusters.leaf_area[cluster] * scale, clusters.wood_area[cluster] * scale
@@ -147,7 +135,7 @@ class PlacedAssets:
             wood[some] *= longer / scale[some]
         return leaf, wood
 
-    def closed_leaves(self, parts: AssetParts) -> NDArray[np.float64]:
+    def closed_leaves(self, parts: AssetParts) -> Floats:
         """Area (n,) of solids that facets stand for as for leaves, m²."""
         clusters = self.assets.clusters
         part = clusters.closed_leaf_area[parts.cluster] / np.maximum(clusters.wood_area[parts.cluster], 1e-300)
@@ -159,8 +147,8 @@ class PlacedAssets:
         return child_key(self.instances.key[parts.instance], local)
 
     def picked(
-        self, parts: AssetParts, key: NDArray[np.uint64], leafy: bool, owner: NDArray[np.int64], index: NDArray
-    ) -> NDArray[np.int64]:
+        self, parts: AssetParts, key: NDArray[np.uint64], leafy: bool, owner: Integers, index: NDArray
+    ) -> Integers:
         """Samples (m,) of parts (n,) with keys (n,): a run on leaves, or on wood, that begins anywhere."""
         clusters = self.assets.clusters
         first = (clusters.leaf_sample if leafy else clusters.wood_sample)[parts.cluster].astype(np.int64)
@@ -186,15 +174,15 @@ class SharedAssets(SharedParts[AssetParts]):
         parts = placed.wholes()
         self.hold(parts, self.points_on(parts, None))
 
-    def can_open(self, parts: AssetParts) -> NDArray[np.bool_]:
+    def can_open(self, parts: AssetParts) -> Mask:
         """As `SharedParts.can_open`."""
         return self.placed.assets.clusters.children[parts.cluster] > 0
 
-    def branch_only(self, parts: AssetParts) -> NDArray[np.bool_]:
+    def branch_only(self, parts: AssetParts) -> Mask:
         """None of them counts apart."""
         return np.zeros(len(parts), bool)
 
-    def opened(self, parts: AssetParts) -> Iterator[tuple[AssetParts, NDArray[np.int64], None]]:
+    def opened(self, parts: AssetParts) -> Iterator[tuple[AssetParts, Integers, None]]:
         """Children of clusters, as `SharedParts.opened`."""
         yield *self.placed.children(parts), None
 

@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Mask, column, nested
+from ..arrays import Arrays, Chunks, Floats, Integers, Integers32, Mask, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds, extents
@@ -42,25 +42,14 @@ Kind = TypeVar("Kind", Branches, Pieces, Polygons)
 
 @dataclass(frozen=True)
 class Totals(Arrays):
-    """What each thing (sub-plant, piece, polygon) or each tetrahedron holds in total.
+    """What each thing (sub-plant, piece, polygon) or each tetrahedron holds in total."""
 
-    Attributes
-    ----------
-    leaf_area : (n,) float64
-        One-sided area of leaves, m².
-    wood_area : (n,) float64
-        Surface of branches, m².
-    polygons : (n,) float64
-        Expected faces if made explicit.
-    width : (n,) float64
-        Width of the features, meters: that of the leaves, or of the branch where there are none. By tetrahedron: the
-        mean, weighted by area. Infinite where polygons are drawn as they are whatever is decided; these count for a
-        tetrahedron that holds nothing else.
-    """
-
-    leaf_area: Floats
-    wood_area: Floats
-    polygons: Floats
+    leaf_area: Floats  # (n,): one-sided area of leaves, m²
+    wood_area: Floats  # (n,): surface of branches, m²
+    polygons: Floats  # (n,): expected faces if made explicit
+    #: (n,): width of the features, meters: that of the leaves, or of the branch where there are none. By tetrahedron:
+    #: the mean, weighted by area. Infinite where polygons are drawn as they are whatever is decided; these count for a
+    #: tetrahedron that holds nothing else.
     width: Floats
 
     @property
@@ -147,22 +136,12 @@ def sums(totals: Totals, cells: Integers, number: int) -> Totals:
 
 @dataclass(frozen=True)
 class PlantParts(Arrays):
-    """Parts of plants (n): sub-plants, and branches without what grows on them.
+    """Parts of plants (n): sub-plants, and branches without what grows on them."""
 
-    Attributes
-    ----------
-    branches : Branches of n
-    branch_only : (n,) bool
-        Only the branch itself, with the leaves that it bears.
-    totals : Totals of n
-    extent : (n,) float64
-        Longest side, meters.
-    """
-
-    branches: Branches = field(metadata=nested(Branches))
-    branch_only: Mask = field(metadata=column(dtype=bool))
-    totals: Totals = field(metadata=nested(Totals))
-    extent: Floats
+    branches: Branches = nested(Branches)  # of n
+    branch_only: Mask = column(dtype=bool)  # (n,): only the branch itself, with the leaves that it bears
+    totals: Totals = nested(Totals)  # of n
+    extent: Floats  # (n,): longest side, meters
 
     @classmethod
     def of_subplants(cls, flora: Flora, branches: Branches) -> PlantParts:
@@ -194,19 +173,11 @@ def as_pieces(branches: Branches) -> Pieces:
 
 @dataclass(frozen=True)
 class InCells(Arrays, Generic[Kind]):
-    """Things of one kind (n), each in one node of the tree.
+    """Things of one kind (n), each in one node of the tree."""
 
-    Attributes
-    ----------
-    items : Branches, Pieces or Polygons of n
-    cell : (n,) int32
-        Node that holds each.
-    totals : Totals of n
-    """
-
-    items: Kind
-    cell: NDArray[np.int32]
-    totals: Totals
+    items: Kind  # of n
+    cell: Integers32  # (n,): node that holds each
+    totals: Totals  # of n
 
     @classmethod
     def none(cls, kind: type[Kind]) -> InCells[Kind]:
@@ -234,64 +205,29 @@ def in_the_root(polygons: Polygons, large: Mask | None = None) -> InCells[Polygo
     return InCells(polygons, np.zeros(len(polygons), np.int32), totals)
 
 
-class PolygonsByCell:
+class PolygonsByCell(Chunks[InCells[Polygons]]):
     """Polygons in terminal nodes while a tree is divided: only what lies in divided nodes is taken out and copied."""
 
-    def __init__(self, polygons: InCells[Polygons]) -> None:
-        self._parts = [polygons]
-
     def __len__(self) -> int:
-        return int(sum((part.cell >= 0).sum() for part in self._parts))
+        return super().__len__() - self.marked
 
     @property
     def polygons(self) -> InCells[Polygons]:
         """All together; copies them into one, which is then kept until something changes."""
-        self._parts = [_joined([_living(part) for part in self._parts])]
-        return self._parts[0]
+        return self.joined()
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays, including what was taken out but is not yet dropped."""
-        return sum(part.nbytes for part in self._parts)
-
-    def totals(self, chosen: Mask) -> list[tuple[Totals, NDArray[np.int32]]]:
-        """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each part."""
-        some = [part.take(_within(part, chosen)) for part in self._parts]
+    def totals(self, chosen: Mask) -> list[tuple[Totals, Integers32]]:
+        """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each chunk."""
+        some = [chunk.take(chosen[chunk.cell] & there) for chunk, there in self.chunks()]
         return [(part.totals, part.cell) for part in some]
 
-    def put(self, polygons: InCells[Polygons]) -> None:
-        """Add polygons."""
-        self._parts.append(polygons)
-
-    def take_out(self, chosen: Mask) -> InCells[Polygons]:
+    def take_within(self, chosen: Mask) -> InCells[Polygons]:
         """Remove and return what lies in chosen nodes; ``chosen`` is (nodes,) bool."""
-        out, kept = [], []
-        for part in self._parts:
-            taken = _within(part, chosen)
-            if taken.any():
-                out.append(part.take(taken))
-                # What is taken is only marked; copying what stays would cost more than all else that moves.
-                part = replace(part, cell=np.where(taken, np.int32(-1), part.cell))
-                if 2 * (part.cell < 0).sum() > len(part):
-                    part = _living(part)
-            kept.append(part)
-        self._parts = kept
-        return _joined(out)
-
-
-def _within(part: InCells[Polygons], chosen: Mask) -> Mask:
-    return chosen[np.maximum(part.cell, 0)] & (part.cell >= 0)
-
-
-def _living(part: InCells[Polygons]) -> InCells[Polygons]:
-    """Without what has been taken out."""
-    return part.take(part.cell >= 0)
-
-
-def _joined(parts: list[InCells[Polygons]]) -> InCells[Polygons]:
-    if len(parts) < 2:
-        return parts[0] if parts else InCells.none(Polygons)
-    return InCells.concatenate(parts)
+        within = [chosen[chunk.cell] & there for chunk, there in self.chunks()]
+        out = self.take_out(np.flatnonzero(np.concatenate(within)))
+        if self.marked > len(self):  # copying what stays each time would cost more than all else that moves
+            self.joined()
+        return out
 
 
 def large_polygons(polygons: Polygons, camera: Camera) -> Mask:
@@ -413,9 +349,7 @@ def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Sl
     return InCells.concatenate(placed)
 
 
-def _lowered(
-    tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack | None
-) -> tuple[NDArray[np.int32], Mask]:
+def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack | None) -> tuple[Integers32, Mask]:
     """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""
     cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
     center, reach, touching = polygons.center, polygons.reach, polygons.touching()

@@ -50,32 +50,17 @@ class Decision(IntEnum):
 
 @dataclass(frozen=True)
 class Terminals(Arrays):
-    """Terminal tetrahedra that hold something, and what is known of each until it is divided.
+    """Terminal tetrahedra that hold something, and what is known of each until it is divided."""
 
-    Attributes
-    ----------
-    nodes : (n,) int
-        Their nodes in the tree.
-    totals : Totals of n
-    pixels, opacity : (n,) float64
-        As in `visibility.Outline`.
-    feature_px : (n,) float64
-        Width in pixels of what they hold, where it is nearest to the eye.
-    min_feature_px : (n,) float64
-        The same where it is farthest away.
-    longest_edge_px : (n,) float64
-        Longest edge in pixels at their distance.
-    fully_inside : (n,) bool
-        Whether all of each is in view. What crosses the border has the pixels of its visible part only.
-    """
-
-    nodes: Integers
-    totals: Totals
+    nodes: Integers  # (n,): their nodes in the tree
+    totals: Totals  # of n
+    #: pixels and opacity, (n,): as in `visibility.Outline`.
     pixels: Floats
     opacity: Floats
-    feature_px: Floats
-    min_feature_px: Floats
-    longest_edge_px: Floats
+    feature_px: Floats  # (n,): width in pixels of what they hold, where it is nearest to the eye
+    min_feature_px: Floats  # (n,): the same where it is farthest away
+    longest_edge_px: Floats  # (n,): longest edge in pixels at their distance
+    #: (n,): whether all of each is in view. What crosses the border has the pixels of its visible part only.
     fully_inside: Mask
 
     @classmethod

@@ -43,43 +43,23 @@ _NEAR = 1e-2
 
 @dataclass(frozen=True)
 class Light:
-    """Where light comes from.
+    """Where light comes from."""
 
-    Attributes
-    ----------
-    kind : {'SUN', 'SPOT', 'POINT', 'AREA'}
-        Parallel rays, a cone, all around, or a flat surface that shines to one side.
-    position : (3,) float64
-        Meters, world space; of no meaning for the sun.
-    direction : (3,) float64
-        Unit vector in which it shines; of no meaning for a point.
-    width : float
-        Angle in radians under which the sun is seen, or diameter in meters of the others: shadows are blurred by it.
-    angle : float
-        Half of the spot's cone, radians.
-    color : (3,) float64
-        Linear RGB times energy: for the sun W/m² on a surface that faces it, for the others the W/sr that they send
-        ahead, so that a surface at distance r that faces them gets color / r² W/m².
-    blend : float
-        Fraction of a spot's cone over which it fades, 0 to 1.
-    span : (2, 3) float64
-        Half edges of an area, or half axes of an ellipse, meters.
-    ellipse : bool
-        Whether an area is a disk or an ellipse instead of a square or a rectangle.
-    shadow : bool
-        Whether it casts shadows; without, everything is lit.
-    """
-
+    #: Parallel rays, a cone, all around, or a flat surface that shines to one side.
     kind: Literal["SUN", "SPOT", "POINT", "AREA"]
-    position: Floats
-    direction: Floats
+    position: Floats  # (3,): meters, world space; of no meaning for the sun
+    direction: Floats  # (3,): unit vector in which it shines; of no meaning for a point
+    #: Angle in radians under which the sun is seen, or diameter in meters of the others: shadows are blurred by it.
     width: float = 0.0
-    angle: float = np.pi
+    angle: float = np.pi  # half of the spot's cone, radians
+    #: (3,): linear RGB times energy: for the sun W/m² on a surface that faces it, for the others the W/sr that they
+    #: send ahead, so that a surface at distance r that faces them gets color / r² W/m².
     color: Floats = field(default_factory=lambda: np.ones(3))
-    blend: float = 0.0
+    blend: float = 0.0  # fraction of a spot's cone over which it fades, 0 to 1
+    #: (2, 3): half edges of an area, or half axes of an ellipse, meters.
     span: Floats = field(default_factory=lambda: np.zeros((2, 3)))
-    ellipse: bool = False
-    shadow: bool = True
+    ellipse: bool = False  # whether an area is a disk or an ellipse instead of a square or a rectangle
+    shadow: bool = True  # whether it casts shadows; without, everything is lit
 
     def counted_from(self, origin: Floats) -> Light:
         """The same in coordinates that begin at a place (3,) of the present ones."""
@@ -165,17 +145,11 @@ def lamp_views(position: Floats, points: Floats, resolution: int) -> list[Camera
 
 @dataclass(frozen=True)
 class Shadows:
-    """Shadows of tetrahedra (n,) in the image, all lights together.
+    """Shadows of tetrahedra (n,) in the image, all lights together."""
 
-    Attributes
-    ----------
-    pixels : (n,) float64
-        Pixels of the final image that are darkened if all of it is opaque and nothing else is in the light.
-    feature_px : (n,) float64
-        Width in pixels of the shadows of what they hold, 0 where it is lost in the light's penumbra.
-    """
-
+    #: (n,): pixels of the final image that are darkened if all of it is opaque and nothing else is in the light.
     pixels: Floats
+    #: (n,): width in pixels of the shadows of what they hold, 0 where it is lost in the light's penumbra.
     feature_px: Floats
 
 

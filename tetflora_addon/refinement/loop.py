@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers32, Mask
 from ..camera.camera import Camera
 from ..camera.silhouette import expected_pixels
 from ..compiled.flora import Flora
@@ -63,52 +64,22 @@ class Refinement:
     """State of the loop after a pass; the last one is the result.
 
     The tree and its contents grow with the loop: those of an intermediate state are valid until the next one is made.
-
-    Attributes
-    ----------
-    tree : TetrahedralTree
-    plants : SharedPlants
-        All plants, shared among terminal nodes.
-    assets : SharedAssets
-        All instances of assets, likewise.
-    cell_polygons : PolygonsByCell
-        All polygons, in terminal nodes.
-    cells : Terminals of t
-        Terminal nodes that hold something.
-    transmittance : (t,) float64
-        Fraction of each one's light that nothing in front of it blocks.
-    decision : (t,) int8
-        `Decision` for each of them.
-    rank : (t,) int32
-        Front-to-back order of them.
-    passes : int
-        Passes so far.
-    complete : bool
-        False where a limit of the settings stopped the loop.
-    seconds : dict of str to float
-        Wall clock by step.
-    outliers : Outliers
-        What is left out.
-    lights : sequence of Light
-        Those that throw shadows.
-    polygons : Polygons
-        All of them, whole.
     """
 
     tree: TetrahedralTree
-    plants: SharedPlants
-    assets: SharedAssets
-    cell_polygons: PolygonsByCell
-    cells: Terminals
-    transmittance: NDArray[np.float64]
-    decision: NDArray[np.int8]
-    rank: NDArray[np.int32]
-    passes: int
-    complete: bool
-    seconds: dict[str, float]
-    outliers: Outliers = field(default_factory=Outliers)
-    lights: Sequence[Light] = ()
-    polygons: Polygons = field(default_factory=Polygons.empty)
+    plants: SharedPlants  # all plants, shared among terminal nodes
+    assets: SharedAssets  # all instances of assets, likewise
+    cell_polygons: PolygonsByCell  # all polygons, in terminal nodes
+    cells: Terminals  # of t: terminal nodes that hold something
+    transmittance: Floats  # (t,): fraction of each one's light that nothing in front of it blocks
+    decision: NDArray[np.int8]  # (t,): `Decision` for each of them
+    rank: Integers32  # (t,): front-to-back order of them
+    passes: int  # passes so far
+    complete: bool  # false where a limit of the settings stopped the loop
+    seconds: dict[str, float]  # wall clock by step
+    outliers: Outliers = field(default_factory=Outliers)  # what is left out
+    lights: Sequence[Light] = ()  # those that throw shadows
+    polygons: Polygons = field(default_factory=Polygons.empty)  # all of them, whole
 
     @property
     def nodes(self) -> NDArray[np.intp]:
@@ -127,7 +98,7 @@ class Refinement:
         return Contents(subplants, branches, self.cell_polygons.polygons)
 
     @property
-    def in_view(self) -> NDArray[np.bool_]:
+    def in_view(self) -> Mask:
         """Mask over all nodes of the tree (nodes,): those that hold something and are within the view, if in part."""
         # The pieces of a view's own root know whether they are part of it; others are in view where they have pixels.
         if self.tree.inside.any():
@@ -136,7 +107,7 @@ class Refinement:
         mask[self.nodes[self.cells.pixels > 0.0]] = True
         return mask
 
-    def chosen(self, *decisions: Decision) -> NDArray[np.bool_]:
+    def chosen(self, *decisions: Decision) -> Mask:
         """Mask over all nodes of the tree (nodes,) of those with one of the decisions."""
         mask = np.zeros(len(self.tree), dtype=bool)
         mask[self.nodes[np.isin(self.decision, decisions)]] = True
@@ -148,7 +119,7 @@ def refine(
     seeds: Seeds,
     camera: Camera,
     settings: RefinementSettings,
-    occluders: NDArray[np.float64] | None = None,
+    occluders: Floats | None = None,
     polygons: Polygons | None = None,
     lights: Sequence[Light] = (),
     placed: PlacedAssets | None = None,
@@ -245,9 +216,9 @@ def refine(
         edge[parents] = np.sqrt(squared_edges(tree.vertices(parents)).max(axis=1))
         may_cut = len(cell_polygons) <= most
         new = sort_into_children(
-            tree, cell_polygons.take_out(dividing), slack if may_cut else lambda at: np.full(len(at), np.inf)
+            tree, cell_polygons.take_within(dividing), slack if may_cut else lambda at: np.full(len(at), np.inf)
         )
-        cell_polygons.put(new)
+        cell_polygons.append(new)
         changed = plants.update(tree, dividing, edge) | assets.update(tree, dividing, edge)
         changed[new.cell] = True
         clock.lap("update")
@@ -264,7 +235,7 @@ def _height(seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets) -> fl
     return float(np.median(np.concatenate(heights)))
 
 
-def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons | None) -> NDArray[np.float64]:
+def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons | None) -> Floats:
     """Axis-aligned box (2, 3) of all that is there, meters."""
     boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
     boxes += [assets.parts.bounding_box()] if len(assets.parts) else []
@@ -273,7 +244,7 @@ def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: 
 
 
 def _filled(
-    tree: TetrahedralTree, shared: Sequence[SharedParts], cell_polygons: PolygonsByCell, changed: NDArray[np.bool_]
+    tree: TetrahedralTree, shared: Sequence[SharedParts], cell_polygons: PolygonsByCell, changed: Mask
 ) -> tuple[NDArray[np.intp], Totals]:
     """Nodes (n,) whose contents have changed and that hold something, and their totals."""
     found = [*(kind.totals(changed) for kind in shared), *cell_polygons.totals(changed)]
@@ -304,7 +275,7 @@ def _slack(camera: Camera, resolution: int) -> Slack:
     """A pixel of the alpha buffer, in meters: nothing smaller changes decisions."""
     pixels = max(pixels_of_buffer(camera, resolution), SLACK)
 
-    def slack(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slack(points: Floats) -> Floats:
         return pixels * camera.extent_around(points)
 
     return slack

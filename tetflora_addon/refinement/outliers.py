@@ -32,20 +32,14 @@ _NONE = np.zeros(0, np.int64)
 
 @dataclass(frozen=True)
 class Outliers:
-    """What is left out of a scene.
+    """What is left out of a scene."""
 
-    Attributes
-    ----------
-    plants, assets, instances : (k,), (l,) and (m,) int64
-        Rows of the seeds, of instances of assets, and instances of other meshes.
-    away : (k + l + m,) float64
-        How far they are from the camera, meters.
-    """
-
+    #: plants, assets and instances, (k,), (l,) and (m,): rows of the seeds, of instances of assets, and instances of
+    #: other meshes.
     plants: Integers = field(default_factory=lambda: _NONE)
     assets: Integers = field(default_factory=lambda: _NONE)
     instances: Integers = field(default_factory=lambda: _NONE)
-    away: Floats = field(default_factory=lambda: np.zeros(0))
+    away: Floats = field(default_factory=lambda: np.zeros(0))  # (k + l + m,): how far they are from the camera, meters
 
     def others(
         self, seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Mask, spread
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, spread
 from ..subplants.pieces import chunks
 
 #: Triangles that are measured at a time; bounds what that takes to some hundred megabytes.
@@ -31,55 +31,29 @@ _TOUCHING = 1e-9
 
 @dataclass(frozen=True)
 class Surface:
-    """One mesh in its own space, shared by all of its instances.
+    """One mesh in its own space, shared by all of its instances."""
 
-    Attributes
-    ----------
-    name : str
-        Of the object, for messages and results.
-    positions : (v, 3) float64
-        Vertices in the mesh's own space.
-    corner_verts : (c,) int32
-        Vertex of each face corner.
-    face_offsets : (f + 1,) int32
-        Where each face's corners start.
-    triangles : (t, 3) int32
-        Corners of the triangles that faces consist of: n − 2 for a face of n corners, face after face.
-    material : (f,) int32
-        Slot of each face.
-    colors : (s, 3) float64
-        Mean color of each slot's material, linear RGB.
-    transmission, coverage : (s,) float64
-        Fraction of scattered light that passes through, and of the surface that is opaque.
-    solid : (f,) bool
-        The face belongs to a nearly closed surface, of which half is never seen; see `mesh_features`.
-    leaf : (f,) bool
-        The face is a good part of one of many similar things, such as leaves; several may be drawn as one.
-    width : (f,) float64
-        Width of the feature that the face belongs to, in the mesh's own units.
-    attributes : mapping of str to (c, k) float32
-        Interpolated across faces: texture coordinates (k = 2), colors and vectors (k = 3), numbers (k = 1).
-    normals : (c, 3) float32 or None
-        Of corners where any face is smooth, in the mesh's own space.
-    look : str
-        What stands for surfaces with different ones is kept apart.
-    """
-
-    name: str
-    positions: Floats
-    corner_verts: NDArray[np.int32]
-    face_offsets: NDArray[np.int32]
-    triangles: NDArray[np.int32]
-    material: NDArray[np.int32]
-    colors: Floats
+    name: str  # of the object, for messages and results
+    positions: Floats  # (v, 3): vertices in the mesh's own space
+    corner_verts: Integers32  # (c,): vertex of each face corner
+    face_offsets: Integers32  # (f + 1,): where each face's corners start
+    #: (t, 3): corners of the triangles that faces consist of: n − 2 for a face of n corners, face after face.
+    triangles: Integers32
+    material: Integers32  # (f,): slot of each face
+    colors: Floats  # (s, 3): mean color of each slot's material, linear RGB
+    #: transmission and coverage, (s,): fraction of scattered light that passes through, and of the surface that is
+    #: opaque.
     transmission: Floats
     coverage: Floats
-    solid: Mask
+    solid: Mask  # (f,): the face belongs to a nearly closed surface, of which half is never seen; see `mesh_features`
+    #: (f,): the face is a good part of one of many similar things, such as leaves; several may be drawn as one.
     leaf: Mask
-    width: Floats
-    attributes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
-    normals: NDArray[np.float32] | None = None
-    look: str = ""
+    width: Floats  # (f,): width of the feature that the face belongs to, in the mesh's own units
+    #: mapping of str to (c, k): interpolated across faces: texture coordinates (k = 2), colors and vectors (k = 3),
+    #: numbers (k = 1).
+    attributes: Mapping[str, Floats32] = field(default_factory=dict)
+    normals: Floats32 | None = None  # (c, 3): of corners where any face is smooth, in the mesh's own space
+    look: str = ""  # what stands for surfaces with different ones is kept apart
 
 
 class Meshes:
@@ -209,32 +183,16 @@ class Meshes:
 
 @dataclass(frozen=True)
 class Polygons(Arrays):
-    """Whole faces and fragments of faces, n in all, m of them fragments.
+    """Whole faces and fragments of faces, n in all, m of them fragments."""
 
-    Attributes
-    ----------
-    meshes : Meshes
-        What the numbers below count through.
-    face, instance : (n,) int32
-    part : (n,) int32
-        Row of the two arrays below, −1 for whole faces.
-    triangle : (m,) int32
-    weights : (m, 3, 3) float64
-        Barycentric coordinates in the triangle, for each corner of the fragment a row.
-    center : (n, 3) float64
-        Somewhere within, meters, world space.
-    reach : (n,) float64
-        Distance from there within which all of it lies, meters.
-    """
-
-    meshes: Meshes
-    face: NDArray[np.int32]
-    instance: NDArray[np.int32]
-    part: NDArray[np.int32]
-    triangle: NDArray[np.int32]
-    weights: Floats
-    center: Floats
-    reach: Floats
+    meshes: Meshes  # what the numbers below count through
+    face: Integers32  # (n,)
+    instance: Integers32  # (n,)
+    part: Integers32  # (n,): row of the two arrays below, −1 for whole faces
+    triangle: Integers32  # (m,)
+    weights: Floats  # (m, 3, 3): barycentric coordinates in the triangle, for each corner of the fragment a row
+    center: Floats  # (n, 3): somewhere within, meters, world space
+    reach: Floats  # (n,): distance from there within which all of it lies, meters
 
     @classmethod
     def everything(cls, meshes: Meshes) -> Polygons:

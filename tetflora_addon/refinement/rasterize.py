@@ -10,12 +10,11 @@ along it. Nothing nearer than the near plane or beyond the far plane is seen.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, column, spread
+from ..arrays import Arrays, Floats, Integers, Integers32, column, spread
 from ..camera.camera import Camera
 from ..camera.silhouette import silhouette_area, window_bounds
 from ..parallel import blocks
@@ -39,26 +38,13 @@ _PARALLEL = 1e-150
 
 @dataclass(frozen=True)
 class Fragments(Arrays):
-    """Tetrahedra as seen from pixels, in no particular order.
+    """Tetrahedra as seen from pixels, in no particular order."""
 
-    Attributes
-    ----------
-    cell : (f,) int32
-        Which tetrahedron.
-    pixel : (f,) int32
-        Which pixel.
-    entry : (f,) float64
-        Where the ray enters, meters along the ray.
-    thickness : (f,) float64
-        Meters of the ray inside.
-    coverage : (f,) float64
-        Pixels that the fragment stands for: 1, or for small tetrahedra their area divided among their fragments.
-    """
-
-    cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    pixel: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    entry: Floats
-    thickness: Floats
+    cell: Integers32 = column(dtype=np.int32)  # (f,): which tetrahedron
+    pixel: Integers32 = column(dtype=np.int32)  # (f,): which pixel
+    entry: Floats  # (f,): where the ray enters, meters along the ray
+    thickness: Floats  # (f,): meters of the ray inside
+    #: (f,): pixels that the fragment stands for: 1, or for small tetrahedra their area divided among their fragments.
     coverage: Floats
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ..setting import script_setting, setting
+from ..setting import script_setting, setting, within
 
 
 @dataclass(frozen=True)
@@ -16,43 +16,6 @@ class RefinementSettings:
 
     Fields with a label are properties of a scene, and documented by their tooltips. Sizes are in pixels of the final
     image.
-
-    Attributes
-    ----------
-    leaf_limit : float
-        Leaves narrower than so many pixels become facets; up to 2.5 times this width, a growing fraction stays real.
-        About half of ``facet``: below that, leaves cost more polygons than facets.
-    block : float
-        Visible tetrahedra larger than so many pixels are always split, even where all their contents become polygons,
-        to find hidden parts.
-    few_polygons : int
-        Tetrahedra holding fewer polygons are not split further.
-    hidden : float
-        Visibility below which a tetrahedron counts as hidden. Larger values save polygons in thickets.
-    visibility_resolution : int
-        Longer side, in pixels, of the buffer that determines what hides what; time grows with the square.
-    max_tetrahedra : int
-        Refinement stops before exceeding so many, which bounds time and memory.
-    max_levels : int
-        How often space can be halved.
-    max_passes : int
-        Stop after so many passes, to inspect an intermediate state; 0 for no limit.
-    facet : float
-        Size in pixels of the facets that stand for leaves, at most: where there are few, they are finer.
-    max_memory : float
-        Gigabytes of Blender, for refinement, its result and rendering together; 0 is half of the machine's memory.
-        Plants that would not fit become coarser.
-    anchored : bool
-        Divide space the same way in every frame of an animation, whatever the camera does: tetrahedra begin with
-        `tetrahedra.world_root` instead of the view. Always so for panoramas.
-    hidden_block : float
-        Longest edge, in pixels at its depth, down to which hidden tetrahedra are divided. Facets take their places from
-        the plants, so that they need no such limit; a shell fills its whole tetrahedron and does.
-    proxy_block : float
-        The same for proxies that are seen; infinite for facets, which need no finer tetrahedra than their visibility.
-    margin : float
-        Fraction of the image's width and height by which the view is widened on each side: leaves that grow outside
-        but reach in are real leaves.
     """
 
     cutoff: float = setting(
@@ -66,28 +29,45 @@ class RefinementSettings:
         soft_max=16.0,
         max=1000.0,
     )
+    #: Leaves narrower than so many pixels become facets; up to 2.5 times this width, a growing fraction stays real.
+    #: About half of ``facet``: below that, leaves cost more polygons than facets.
     leaf_limit: float = script_setting(0.6, min=0.05, max=1000.0)
+    #: Visible tetrahedra larger than so many pixels are always split, even where all their contents become polygons, to
+    #: find hidden parts.
     block: float = script_setting(32.0, min=1.0, max=10_000.0)
-    few_polygons: int = script_setting(200, min=0)
+    few_polygons: int = script_setting(200, min=0)  # tetrahedra holding fewer polygons are not split further
+    #: Visibility below which a tetrahedron counts as hidden. Larger values save polygons in thickets.
     hidden: float = script_setting(0.02, min=0.0, max=1.0)
+    #: Longest edge, in pixels at its depth, down to which hidden tetrahedra are divided. Facets take their places from
+    #: the plants, so that they need no such limit; a shell fills its whole tetrahedron and does.
     hidden_block: float = math.inf
+    #: The same for proxies that are seen; infinite for facets, which need no finer tetrahedra than their visibility.
     proxy_block: float = math.inf
+    #: Fraction of the image's width and height by which the view is widened on each side: leaves that grow outside but
+    #: reach in are real leaves.
     margin: float = 0.04
+    #: Longer side, in pixels, of the buffer that determines what hides what; time grows with the square.
     visibility_resolution: int = script_setting(256, min=16, max=4096)
+    #: Refinement stops before exceeding so many, which bounds time and memory.
     max_tetrahedra: int = script_setting(400_000, min=100)
-    max_levels: int = script_setting(60, min=1, max=200)
+    max_levels: int = script_setting(60, min=1, max=200)  # how often space can be halved
+    #: Stop after so many passes, to inspect an intermediate state; 0 for no limit.
     max_passes: int = script_setting(0, min=0)
+    #: Size in pixels of the facets that stand for leaves, at most: where there are few, they are finer.
     facet: float = script_setting(1.2, min=0.1, max=100.0)
     max_polygons: int = setting(
         0,
         "Max Polygons",
         "Maximum number of polygons in the result, proxies included; 0 for no limit. The most visible plants get "
         "polygons first, and the rest becomes coarser proxies",
-        min=0,
-        soft_max=100_000_000,
+        **within(0, 100_000_000),
         step=100_000,
     )
+    #: Gigabytes of Blender, for refinement, its result and rendering together; 0 is half of the machine's memory.
+    #: Plants that would not fit become coarser.
     max_memory: float = script_setting(0.0, min=0.0)
+    #: Divide space the same way in every frame of an animation, whatever the camera does: tetrahedra begin with
+    #: `tetrahedra.world_root` instead of the view. Always so for panoramas.
     anchored: bool = script_setting(False)
     shadow_cutoff: float = setting(
         0.0,
@@ -95,9 +75,7 @@ class RefinementSettings:
         "Size in pixels below which shadows of hidden plants are refined no further; 0 refines those that fall into "
         "the picture with few polygons. About 4 pixels sharpens them for roughly a quarter more",
         subtype='PIXEL',
-        min=0.0,
-        soft_max=16.0,
-        max=1000.0,
+        **within(0.0, 16.0, 1000.0),
     )
 
     def first_look(self) -> RefinementSettings:

@@ -10,13 +10,25 @@ larger than a part is the part opened, see `shares` and `asset_parts`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Chunks, Floats, Growing, Integers, Mask, column, renumber, rows_within
+from ..arrays import (
+    Arrays,
+    Chunks,
+    Floats,
+    Floats32,
+    Growing,
+    Integers,
+    Integers32,
+    Mask,
+    column,
+    renumber,
+    rows_within,
+)
 from ..camera.camera import Camera
 from ..parallel import blocks, each_on_all_cores
 from ..tetrahedra.tree import TetrahedralTree
@@ -34,32 +46,22 @@ Parts = TypeVar("Parts", bound=Arrays)
 
 @dataclass(frozen=True)
 class SharePoints(Arrays):
-    """Points (m) on parts of plants; each stands for a fraction of its part's area.
+    """Points (m) on parts of plants; each stands for a fraction of its part's area."""
 
-    Attributes
-    ----------
-    part : (m,) int32
-    cell : (m,) int32
-        Node of the tree that the point is in.
-    position : (m, 3) float32
-        Meters, world space.
-    leaf, wood : (m,) float32
-        Area that it stands for, m²; one of the two is 0.
-    """
-
-    part: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    leaf: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    wood: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
+    part: Integers32 = column(dtype=np.int32)  # (m,)
+    cell: Integers32 = column(dtype=np.int32)  # (m,): node of the tree that the point is in
+    position: Floats32 = column(3, dtype=np.float32)  # (m, 3): meters, world space
+    #: leaf and wood, (m,): area that it stands for, m²; one of the two is 0.
+    leaf: Floats32 = column(dtype=np.float32)
+    wood: Floats32 = column(dtype=np.float32)
 
     @property
-    def optical_area(self) -> NDArray[np.float32]:
+    def optical_area(self) -> Floats32:
         """Area (m,) that can block light, m²."""
         return self.leaf + self.wood / 2
 
 
-def descend(tree: TetrahedralTree, points: SharePoints, some: Integers | None = None) -> NDArray[np.int32]:
+def descend(tree: TetrahedralTree, points: SharePoints, some: Integers | None = None) -> Integers32:
     """Terminal nodes (m,) that points are in, below those that they are known to be in.
 
     some: indices (k,) of points, by default all, of which alone they are wanted (k,).
@@ -188,7 +190,7 @@ class SharedParts(Generic[Parts]):
             changed[self.open(opening, tree)] = True
         return changed
 
-    def open(self, opening: Mask, tree: TetrahedralTree | None) -> NDArray[np.int32]:
+    def open(self, opening: Mask, tree: TetrahedralTree | None) -> Integers32:
         """Open parts (n,); returns nodes (k,) of points that leave or come. Without a tree these stay in the root."""
         gone = rows_within(opening, self._points.rows.part)
         count, parts, points = len(self._parts), [], []
@@ -224,7 +226,7 @@ class SharedParts(Generic[Parts]):
         totals, _ = self.totals(np.ones(nodes, bool))
         return InCells(parts.take(pair // nodes), (pair % nodes).astype(np.int32), sums(totals, row, len(pair)))
 
-    def totals(self, chosen: Mask) -> tuple[Totals, NDArray[np.int32]]:
+    def totals(self, chosen: Mask) -> tuple[Totals, Integers32]:
         """Totals (k,) of points in chosen nodes, a mask (nodes,), and their nodes (k,)."""
         points, figures = self._points.rows, self._figures.rows
         cell, part, leaf, wood = points.cell, points.part, points.leaf, points.wood

@@ -16,94 +16,57 @@ COARSER = 1.5
 
 @dataclass(frozen=True)
 class Step:
-    """The state after one pass through the loop.
+    """The state after one pass through the loop."""
 
-    Attributes
-    ----------
-    tetrahedra_made, levels : int
-        All tetrahedra ever made, and how deep their tree is.
-    split, proxy, hidden, explicit : int
-        Tetrahedra that hold something, by what was decided on them.
-    subplants, pieces, foreign : int
-        Their contents: sub-plants, pieces of branches, polygons of other meshes.
-    polygons : int
-        Expected polygons of what is to be explicit.
-    seconds : float
-        Wall clock since the loop began.
-    memory_mb : float
-        Megabytes of the tree and of what it holds.
-    """
-
+    #: tetrahedra_made and levels: all tetrahedra ever made, and how deep their tree is.
     tetrahedra_made: int
     levels: int
+    #: split, proxy, hidden and explicit: tetrahedra that hold something, by what was decided on them.
     split: int
     proxy: int
     hidden: int
     explicit: int
+    #: subplants, pieces and foreign: their contents: sub-plants, pieces of branches, polygons of other meshes.
     subplants: int
     pieces: int
     foreign: int
-    polygons: int
-    seconds: float
-    memory_mb: float
+    polygons: int  # expected polygons of what is to be explicit
+    seconds: float  # wall clock since the loop began
+    memory_mb: float  # megabytes of the tree and of what it holds
 
 
 @dataclass
 class Statistics:
-    """Counts and seconds of one refinement; ``as_dict`` is what JSON output holds.
+    """Counts and seconds of one refinement; ``as_dict`` is what JSON output holds."""
 
-    Attributes
-    ----------
-    plants : int
-        Plants that took part.
-    polygons_full : int
-        Polygons of all plants expanded (compiled estimate).
-    polygons_meshed, polygons_proxy : int
-        Polygons of the plants' meshes, and faces of proxies.
-    instances, instances_whole, instances_clusters : int
-        Instances of assets that took part; those that are drawn as the originals, and clusters as meshes of their own.
-    tetrahedra_made, tetrahedra_terminal, tetrahedra_proxy : int
-        All tetrahedra ever made; those that are not divided; those of them that are drawn as proxies.
-    passes : int
-        Passes through the loop; ``levels`` in `as_dict`, as in saved files and the output of the command line.
-    facet_pixels : float
-        Side of the facets of proxies, pixels, which a budget may have increased; 0 for shells.
-    facet_asked : float
-        That which the settings ask for.
-    complete : bool
-        False where a limit of the settings stopped the loop.
-    seconds : dict of str to float
-        Wall clock by stage: ``read``, ``compile``, ``refine``, ``emit``.
-    memory_mb : float
-        Estimated megabytes of the meshes in Blender.
-    steps : list of Step
-        One for each pass through the loop.
-    outliers : dict of str to float
-        Objects that were left out at least in part, because they are far beyond all others, and how far from the camera
-        that is, meters.
-    unknown : str
-        Tells of plants that were left out because nobody has their species.
-    """
-
-    plants: int = 0
-    polygons_full: int = 0
+    plants: int = 0  # plants that took part
+    polygons_full: int = 0  # polygons of all plants expanded (compiled estimate)
+    #: polygons_meshed and polygons_proxy: polygons of the plants' meshes, and faces of proxies.
     polygons_meshed: int = 0
     polygons_proxy: int = 0
+    #: instances, instances_whole and instances_clusters: instances of assets that took part; those that are drawn as
+    #: the originals, and clusters as meshes of their own.
     instances: int = 0
     instances_whole: int = 0
     instances_clusters: int = 0
+    #: tetrahedra_made, tetrahedra_terminal and tetrahedra_proxy: all tetrahedra ever made; those that are not divided;
+    #: those of them that are drawn as proxies.
     tetrahedra_made: int = 0
     tetrahedra_terminal: int = 0
     tetrahedra_proxy: int = 0
+    #: Passes through the loop; ``levels`` in `as_dict`, as in saved files and the output of the command line.
     passes: int = 0
-    facet_pixels: float = 0.0
-    facet_asked: float = 0.0
-    complete: bool = True
+    facet_pixels: float = 0.0  # side of the facets of proxies, pixels, which a budget may have increased; 0 for shells
+    facet_asked: float = 0.0  # that which the settings ask for
+    complete: bool = True  # false where a limit of the settings stopped the loop
+    #: Wall clock by stage: ``read``, ``compile``, ``refine``, ``emit``.
     seconds: dict[str, float] = field(default_factory=dict)
-    memory_mb: float = 0.0
-    steps: list[Step] = field(default_factory=list)
+    memory_mb: float = 0.0  # estimated megabytes of the meshes in Blender
+    steps: list[Step] = field(default_factory=list)  # one for each pass through the loop
+    #: Objects that were left out at least in part, because they are far beyond all others, and how far from the camera
+    #: that is, meters.
     outliers: dict[str, float] = field(default_factory=dict)
-    unknown: str = ""
+    unknown: str = ""  # tells of plants that were left out because nobody has their species
 
     @property
     def left_out(self) -> str:

@@ -43,21 +43,11 @@ def depth_in_front(pixel: Integers, depth: Floats) -> tuple[Integers, NDArray]:
 
 @dataclass(frozen=True)
 class Outline:
-    """What is known of each tetrahedron (n,) without the others.
+    """What is known of each tetrahedron (n,) without the others."""
 
-    Attributes
-    ----------
-    pixels : (n,) float64
-        Area in pixels of the final image that the tetrahedron affects, hidden or not; 0 out of view.
-    opacity : (n,) float64
-        Mean of 1 − e^−τ over its own silhouette, 0 to 1; 0 out of view.
-    fully_inside : (n,) bool
-        Whether all of it is in view.
-    """
-
-    pixels: Floats
-    opacity: Floats
-    fully_inside: Mask
+    pixels: Floats  # (n,): area in pixels of the final image that the tetrahedron affects, hidden or not; 0 out of view
+    opacity: Floats  # (n,): mean of 1 − e^−τ over its own silhouette, 0 to 1; 0 out of view
+    fully_inside: Mask  # (n,): whether all of it is in view
 
 
 class AlphaBuffer:

@@ -22,21 +22,11 @@ _JOINED_WITHIN = 0.01  # of the size: a start that is drawn by eye, not snapped
 
 @dataclass(frozen=True)
 class Chains:
-    """Points of several splines, one after the other.
+    """Points of several splines, one after the other."""
 
-    Attributes
-    ----------
-    points : (p, 4) float64
-        x, y, z and radius.
-    first : (s + 1,) int64
-        First point of each spline, and the number of points.
-    cyclic : (s,) bool
-        Whether the last point leads back to the first.
-    """
-
-    points: Floats
-    first: Integers
-    cyclic: Mask
+    points: Floats  # (p, 4): x, y, z and radius
+    first: Integers  # (s + 1,): first point of each spline, and the number of points
+    cyclic: Mask  # (s,): whether the last point leads back to the first
 
     @classmethod
     def concatenate(cls, parts: list[Chains]) -> Chains:

@@ -64,21 +64,14 @@ def rounded_least(a: float, b: float, full: float) -> float:
 
 
 class NodeLaw(NamedTuple):
-    """Numbers of nodes along full-grown axes (...), from where the crown begins; negative below that.
+    """Numbers of nodes along full-grown axes (...), from where the crown begins; negative below that."""
 
-    Attributes
-    ----------
-    begin, end : (...) float64
-        Fractions of the full-grown length.
-    power : (...) float64
-        The number of nodes below grows as this power of the length.
-    whole, below : (...) float64
-        Number of nodes from ``begin`` to ``end`` (and on, as densely), and from the foot to ``begin``.
-    """
-
+    #: begin and end, (...): fractions of the full-grown length.
     begin: ArrayLike
     end: ArrayLike
-    power: ArrayLike
+    power: ArrayLike  # (...): the number of nodes below grows as this power of the length
+    #: whole and below, (...): number of nodes from ``begin`` to ``end`` (and on, as densely), and from the foot to
+    #: ``begin``.
     whole: ArrayLike
     below: ArrayLike
 
@@ -98,32 +91,19 @@ class NodeLaw(NamedTuple):
 
 
 class Nodes(NamedTuple):
-    """Where children of one sort are on axes that are not full-grown, see `law`.
+    """Where children of one sort are on axes that are not full-grown, see `law`."""
 
-    Attributes
-    ----------
-    whole, below : float
-        Nodes between the begin and the end of the full-grown axis, and from its foot to there, over those that are
-        alive now.
-    begin, end : float
-        Where the first and the last are on the full-grown axis, as fractions of its length.
-    power : float
-        The number of nodes below grows as this power of the length.
-    until : float
-        Where the topmost are now, as a fraction of the present length;
-    kept : float
-        and of those, from the lowest up, the fraction that is left.
-    extra, fresh : float
-        For each node so many more that live only for a while: on the topmost fraction of the others.
-    """
-
+    #: whole and below: nodes between the begin and the end of the full-grown axis, and from its foot to there, over
+    #: those that are alive now.
     whole: float
     below: float
+    #: begin and end: where the first and the last are on the full-grown axis, as fractions of its length.
     begin: float
     end: float = 1.0
-    power: float = 1.0
-    until: float = 1.0
-    kept: float = 1.0
+    power: float = 1.0  # the number of nodes below grows as this power of the length
+    until: float = 1.0  # where the topmost are now, as a fraction of the present length
+    kept: float = 1.0  # of those, from the lowest up, the fraction that is left
+    #: extra and fresh: for each node so many more that live only for a while: on the topmost fraction of the others.
     extra: float = 0.0
     fresh: float = 0.0
 
@@ -134,28 +114,17 @@ class Nodes(NamedTuple):
 
 @dataclass(frozen=True)
 class PartGrown:
-    """How far the branches of an order have grown.
+    """How far the branches of an order have grown."""
 
-    Attributes
-    ----------
-    now : float
-        Their length over that when they are full-grown.
-    settled : float
-        1 where the number of nodes on a full-grown branch is known as a whole number, 0 where it changes with time.
-    laterals, spurs, dead : Nodes
-        Their children.
-    conical : float
-        By how much the topmost children are shorter than the crown's shape would have them.
-    ramps : tuple of float
-        Fractions of the children, from the lowest up and from the topmost down, that are about to die or just grow.
-    """
-
-    now: float
+    now: float  # their length over that when they are full-grown
+    #: 1 where the number of nodes on a full-grown branch is known as a whole number, 0 where it changes with time.
     settled: float
+    #: laterals, spurs and dead: their children.
     laterals: Nodes
     spurs: Nodes
     dead: Nodes
-    conical: float = 0.0
+    conical: float = 0.0  # by how much the topmost children are shorter than the crown's shape would have them
+    #: Fractions of the children, from the lowest up and from the topmost down, that are about to die or just grow.
     ramps: tuple[float, float] = (0.0, 0.0)
 
 

@@ -12,14 +12,14 @@ patch appear as those of the tree fall.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from functools import partial
 from itertools import pairwise
 from math import cos, hypot, pi, sin, sqrt
-from pathlib import Path
 from typing import Any
 
+from ..files import beside
 from ..formats import FORMATS
 from ..leaves.models import LeafModel
 from ..leaves.needles import Needles
@@ -33,12 +33,6 @@ NEEDLES = 0.2
 #: Leaves of a patch, and what fraction of its circle they cover, counted singly.
 _LEAVES, _COVERED = (16, 44), 0.62
 _RADIUS = (0.12, 0.45)  # meters, of a patch
-#: How blades bend as they dry.
-_BENT = (
-    {"fold": 0.12, "curl": 0.12, "wave": 0.02},
-    {"fold": 0.38, "curl": -0.2, "wave": 0.03},
-    {"fold": -0.25, "curl": 0.25, "wave": 0.03},
-)
 #: Linear RGB of dead leaves and needles, mean and variation, and of wood without bark.
 _BROWN = ((0.16, 0.1, 0.05), (0.1, 0.062, 0.031))
 _NEEDLE_BROWN = ((0.135, 0.068, 0.031), (0.06, 0.032, 0.014))
@@ -55,9 +49,8 @@ _BURIED = 0.12  # meters, of the lower end of a log
 _CONES = 0.45  # of a patch, on average
 
 
-def _parts() -> dict[str, dict[str, Any]]:
-    """What is the same below all species: parts of orders, a cone on its side, and the round end of a log."""
-    return json.loads(Path(__file__).with_name("litter.json").read_text(encoding="utf-8"))
+#: What is the same below all species: parts of orders, how blades bend as they dry, a cone, the round end of a log.
+_parts = partial(beside, __file__, "litter.json")
 
 
 def bears_needles(species: Species) -> bool:
@@ -181,7 +174,7 @@ def _dried(form: LeafModel | str, own: dict[str, Any]) -> list[dict[str, Any]]:
     if not isinstance(form, LeafModel) or not isinstance(form.shape, Blade):
         return [own]
     blade = {f.name: getattr(form.shape, f.name) for f in fields(Blade) if getattr(form.shape, f.name) != f.default}
-    return [{"outline": {"kind": "blade", **blade, **bent}} for bent in _BENT]
+    return [{"outline": {"kind": "blade", **blade, **bent}} for bent in _parts()["bent"]]
 
 
 def _page(species: Species, kind: str, description: str, orders: list[dict[str, Any]]) -> dict[str, Any]:

@@ -20,30 +20,16 @@ from .species import CROWN_PROFILES, LEAF_KINDS, Dead, Order, Range, Species, cr
 
 @dataclass(frozen=True)
 class Members:
-    """Expected numbers on one plant, by order.
+    """Expected numbers on one plant, by order."""
 
-    Attributes
-    ----------
-    branches : list of float
-        A branch that divides counts once.
-    stems : list of float
-        The same with every part between forks as one.
-    segments : list of float
-        Straight pieces of all branches of the order.
-    leaves : list of float
-    spurs, spur_leaves : float
-        Short shoots of all orders, and their leaves.
-    dead : tuple of float
-        Dead branches by their order.
-    """
-
-    branches: list[float]
-    stems: list[float]
-    segments: list[float]
+    branches: list[float]  # a branch that divides counts once
+    stems: list[float]  # the same with every part between forks as one
+    segments: list[float]  # straight pieces of all branches of the order
     leaves: list[float]
+    #: spurs and spur_leaves: short shoots of all orders, and their leaves.
     spurs: float
     spur_leaves: float
-    dead: tuple[float, float] = (0.0, 0.0)
+    dead: tuple[float, float] = (0.0, 0.0)  # dead branches by their order
 
 
 def expected_members(species: Species) -> Members:

@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import formats
 from ..errors import SpeciesError, quoted
-from ..files import parse_json, read_whole
+from ..files import beside, parse_json, read_whole
 from ..leaves.schema import read_forms
 from ..parameters import FileReader, Rgb, keys_of
 from .ecology import Ecology
@@ -34,24 +34,9 @@ SPECIES_KEYS = (
     "leaf_transmission", "blossom", "blossom_transmission", "spur", "bud", "dead", "year", "age",
     "ecology",
 )  # fmt: skip
+_DEFAULTS = beside(__file__, "defaults.json")
 #: The short shoot of a species that asks for some and describes none.
-DEFAULT_SPUR = {"length": [0.05, 0.02], "thickness": [0.03, 0.005], "angle": [50, 15], "leaves": [4, 1]}
-
-
-#: Of the wood that has lost its bark, and of bark without life.
-_GRAY = [[0.14, 0.122, 0.102], [0.03, 0.027, 0.023]]
-#: Dead branches of a species that only says how many: broken off or bare, with bare twigs.
-DEFAULT_DEAD = (
-    {
-        "length": [0.06, 0.045], "thickness": [0.085, 0.025], "taper": [0.45, 0.2], "segments": 4, "sides": 4,
-        "curvature": [0, 60], "angle": [88, 14], "angle_tip": 70, "azimuth": [137.5, 60], "branches": [6, 3],
-        "branch_start": 0.2, "branch_color": _GRAY,
-    },
-    {
-        "length": [0.4, 0.26], "thickness": [0.32, 0.08], "taper": 0.4, "segments": 3, "sides": 3,
-        "curvature": [0, 80], "angle": [58, 18], "azimuth": [137.5, 40], "branch_color": _GRAY,
-    },
-)  # fmt: skip
+DEFAULT_SPUR: dict[str, Any] = _DEFAULTS["spur"]
 
 
 def _read_order(reader: FileReader, data: Any, where: str, first: bool, last: bool) -> Order:
@@ -68,7 +53,7 @@ def _read_order(reader: FileReader, data: Any, where: str, first: bool, last: bo
 
 
 def _read_dead(reader: FileReader, data: Any, name: str) -> Dead:
-    """The key ``dead`` of a species."""
+    """The key ``dead`` of a species; one that only says how many has them broken off or bare, with bare twigs."""
 
     def read_orders(value: Any, name: str) -> tuple[Order, ...]:
         if not isinstance(value, list) or not 1 <= len(value) <= 2:
@@ -76,7 +61,7 @@ def _read_dead(reader: FileReader, data: Any, name: str) -> Dead:
         last = len(value) - 1
         return tuple(_read_order(reader, one, f"{name}[{i}]", False, i == last) for i, one in enumerate(value))
 
-    whole = {"orders": list(DEFAULT_DEAD), **data} if isinstance(data, dict) else data
+    whole = {"orders": _DEFAULTS["dead"], **data} if isinstance(data, dict) else data
     dead = reader.read(Dead, whole, name, {"orders": read_orders})
     for i, order in enumerate(dead.orders):
         for key in ("leaves", "spurs", "forks", "flare", "pipe"):

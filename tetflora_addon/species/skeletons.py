@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Integers, connected, top
+from ..arrays import Floats, Integers, Integers32, connected, top
 from ..errors import SpeciesError
 from .curves import breadth_first, coinciding, levels, longest_way, summed_from_root
 
@@ -33,27 +33,17 @@ _SAME = 1e-6  # of the largest; radii and lengths that differ by less are equal
 class Skeleton:
     """Points of a plant's drawn branches; equal where the numbers are.
 
-    Attributes
-    ----------
-    points : (p, 3) float64
-        Meters in the plant's space: z up, the origin at its foot.
-    radius : (p,) float64
-        Meters.
-    parent : (p,) int32
-        The point before, toward the root; -1 for roots. Parents stand before their children.
-    line : (p,) int32, optional
-        Which stroke of the artist's led to the point from the one before; all 0 where nobody knows.
-
     Raises
     ------
     ValueError
         Arrays that do not fit each other, or a parent that does not stand before its child.
     """
 
-    points: Floats
-    radius: Floats
-    parent: NDArray[np.int32]
-    line: NDArray[np.int32] | None = None
+    points: Floats  # (p, 3): meters in the plant's space: z up, the origin at its foot
+    radius: Floats  # (p,): meters
+    parent: Integers32  # (p,): the point before, toward the root; -1 for roots. Parents stand before their children.
+    #: (p,): which stroke of the artist's led to the point from the one before; all 0 where nobody knows.
+    line: Integers32 | None = None
 
     def __post_init__(self) -> None:
         if self.line is None:
@@ -82,36 +72,18 @@ class Skeleton:
 
 @dataclass(frozen=True)
 class DrawnBranches:
-    """Branches of a skeleton, sorted by order; parents come before their children, the largest trunk first.
+    """Branches of a skeleton, sorted by order; parents come before their children, the largest trunk first."""
 
-    Attributes
-    ----------
-    first : (b + 1,) int64
-        First knot of each branch, and the number of knots.
-    knots : (k, 3) float64
-        Meters, branch after branch from base to tip. A branch starts at the point of its parent where it leaves.
-    radius : (k,) float64
-        Meters.
-    order : (b,) int32
-        0 for trunks; at most ``MAX_ORDERS - 1``.
-    parent : (b,) int32
-        Branch that it grows on; -1 for trunks.
-    at : (b,) float64
-        Where on the parent it leaves, fraction of the parent's length; 0 for trunks.
-    length : (b,) float64
-        Along the knots, meters.
-    outward : (b,) float64
-        From order 2 on, the fraction of the limb's length (its ancestor of order 1) at which that line of branches
-        leaves it; 0 for trunks and limbs.
-    """
-
-    first: Integers
+    first: Integers  # (b + 1,): first knot of each branch, and the number of knots
+    #: (k, 3): meters, branch after branch from base to tip. A branch starts at the point of its parent where it leaves.
     knots: Floats
-    radius: Floats
-    order: NDArray[np.int32]
-    parent: NDArray[np.int32]
-    at: Floats
-    length: Floats
+    radius: Floats  # (k,): meters
+    order: Integers32  # (b,): 0 for trunks; at most ``MAX_ORDERS - 1``
+    parent: Integers32  # (b,): branch that it grows on; -1 for trunks
+    at: Floats  # (b,): where on the parent it leaves, fraction of the parent's length; 0 for trunks
+    length: Floats  # (b,): along the knots, meters
+    #: (b,): from order 2 on, the fraction of the limb's length (its ancestor of order 1) at which that line of branches
+    #: leaves it; 0 for trunks and limbs.
     outward: Floats
 
     def __len__(self) -> int:

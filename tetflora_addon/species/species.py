@@ -152,8 +152,7 @@ class Order:
         "linear RGB",
         follows="leaf_color",
     )
-    #: How far it has grown; None where it is as long as it will be.
-    growing: PartGrown | None = None
+    growing: PartGrown | None = None  # How far it has grown; None where it is as long as it will be
 
 
 @dataclass(frozen=True)
@@ -186,41 +185,20 @@ class Dead:
 
 @dataclass(frozen=True, kw_only=True)
 class Species:
-    """A species as read from its file.
+    """A species as read from its file."""
 
-    Attributes
-    ----------
-    identifier, name, description : str
-        Identifier is the file's name without its ending.
-    orders : tuple of Order
-        From the trunk up; at most `skeletons.MAX_ORDERS`.
-    leaf, blossom : tuple of LeafModel or str
-        Forms of the sample leaf, and of blossoms or fruit, where there are any; each leaf has one of them by chance. A
-        string is the name of a Blender mesh object, which the bridge to Blender replaces by a model.
-    spur : Order or None
-        A short shoot; its length is in meters and its thickness a fraction of that, as for a trunk.
-    bud : Bud or None
-    dead : Dead or None
-    skeleton : Skeleton or None
-        Trunk and lower orders modeled by hand; only the orders above are grown.
-    aged : (Species, float) or None
-        Of what, and at how many years, this is another age; see `ages.with_age`.
-    year : Year or None
-        When leaves appear, turn and fall.
-    ages : Ages or None
-        How it grows.
-    ecology : Ecology or None
-        What it needs among others.
-    """
-
+    #: identifier, name and description: identifier is the file's name without its ending.
     identifier: str
     name: str = limited(..., 1, 1000, "name")
     description: str = described("", "description")
-    orders: tuple[Order, ...]
+    orders: tuple[Order, ...]  # from the trunk up; at most `skeletons.MAX_ORDERS`
+    #: leaf and blossom: forms of the sample leaf, and of blossoms or fruit, where there are any; each leaf has one of
+    #: them by chance. A string is the name of a Blender mesh object, which the bridge to Blender replaces by a model.
     leaf: tuple[LeafModel | str, ...]
     leaf_transmission: float = limited(0.4, 0, 1, "fraction of the light scattered by a leaf that goes through it")
     blossom: tuple[LeafModel | str, ...] = ()
     blossom_transmission: float = limited(0.4, 0, 1, "the same of blossoms or fruit")
+    #: A short shoot; its length is in meters and its thickness a fraction of that, as for a trunk.
     spur: Order | None = None
     bud: Bud | None = None
     dead: Dead | None = None
@@ -229,11 +207,12 @@ class Species:
     habit: float = limited(0.0, 0, 1, "how far trees are those of a dense stand, not free ones as described")
     stand_leaves: float = limited(1.0, 0.05, 1, "fraction of the leaves on a twig that are left in a dense stand")
     exact: bool = described(False, "whether all plants are the same: ranges have their means, and seeds do not matter")
-    skeleton: Skeleton | None = None
+    skeleton: Skeleton | None = None  # trunk and lower orders modeled by hand; only the orders above are grown
+    #: (Species, float): of what, and at how many years, this is another age; see `ages.with_age`.
     aged: tuple[Species, float] | None = None
-    year: Year | None = None
-    ages: Ages | None = None
-    ecology: Ecology | None = None
+    year: Year | None = None  # when leaves appear, turn and fall
+    ages: Ages | None = None  # how it grows
+    ecology: Ecology | None = None  # what it needs among others
 
     def forms(self, kind: int) -> tuple[LeafModel | str, ...]:
         """Forms of leaves of a kind, by its index in `LEAF_KINDS`; leaves where there are no blossoms."""

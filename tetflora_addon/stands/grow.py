@@ -17,7 +17,7 @@ from ..arrays import Mask
 from ..errors import TetFloraError
 from ..jobs import Progress
 from ..parallel import blocks, on_all_cores
-from ..setting import script_setting, setting
+from ..setting import script_setting, setting, within
 from .change import MOST_PLANTS, SeedDispersal, dying, fallen, grown, planted
 from .light import LightGrid
 from .plants import DeadPlants, Plants, Records, in_order
@@ -36,47 +36,33 @@ _LEVEL = 0.5
 
 @dataclass(frozen=True)
 class StandSettings:
-    """How a stand grows. Fields with a label are properties of the scene, and documented by their tooltips.
-
-    Attributes
-    ----------
-    interval : int
-        Years between two records of the stand; 0 keeps the last year only.
-    min_height : float
-        Meters; lower plants are not part of the result.
-    cell : float
-        Width, meters, of the columns in which light is computed.
-    open_edges : bool
-        Light comes in from all sides, as at the edge of a wood. Otherwise the stand goes on beyond the ground, and what
-        grows at one side shades what grows at the opposite one.
-    """
+    """How a stand grows. Fields with a label are properties of the scene, and documented by their tooltips."""
 
     years: int = setting(80, "Years", "How long the stand grows", min=1, soft_max=300, max=2000)
-    interval: int = script_setting(5, min=0)
+    interval: int = script_setting(5, min=0)  # years between two records of the stand; 0 keeps the last year only
     seed: int = setting(0, "Seed", "A different seed gives a different stand")
     density: float = setting(
         2500.0,
         "Planted",
         "Young plants per hectare at the beginning; 0 leaves the ground bare",
-        min=0.0,
-        soft_max=20_000.0,
+        **within(0.0, 20_000.0),
     )
     recruits: float = setting(
         300.0,
         "Seedlings",
         "Most plants that come up from seed per hectare and year; light and soil allow fewer. 0 for none",
-        min=0.0,
-        soft_max=2000.0,
+        **within(0.0, 2000.0),
     )
     outside: float = setting(
         1.0,
         "Incoming Seeds",
         "Factor on the seeds that arrive from beyond the ground; at 0, only the stand itself bears seeds",
-        min=0.0,
-        soft_max=10.0,
+        **within(0.0, 10.0),
     )
-    min_height: float = script_setting(1.0, min=0.0)
-    cell: float = script_setting(1.0, min=0.1)
+    min_height: float = script_setting(1.0, min=0.0)  # meters; lower plants are not part of the result
+    cell: float = script_setting(1.0, min=0.1)  # width, meters, of the columns in which light is computed
+    #: Light comes in from all sides, as at the edge of a wood. Otherwise the stand goes on beyond the ground, and what
+    #: grows at one side shades what grows at the opposite one.
     open_edges: bool = script_setting(False)
 
 

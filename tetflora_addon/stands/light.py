@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, spread
+from ..arrays import Floats, Floats32, Integers, Integers32, spread
 from ..errors import TetFloraError
 from ..parallel import blocks, each_on_all_cores, on_all_cores
 
@@ -36,26 +36,16 @@ _FINE = 12
 
 
 class Discs(NamedTuple):
-    """Tables of discs up to a radius.
+    """Tables of discs up to a radius."""
 
-    Attributes
-    ----------
-    first, number : (d,) int64
-        Run of each disc, by ``radius × _PLACES² + row of the middle × _PLACES + column``.
-    row, column : (m,) int64
-        Of the cell, from that of the middle.
-    part : (m,) float64
-        Fraction of the disc in the cell.
-    far : (m,) float64
-        Square of the distance from the middle over the radius, mean of what is covered.
-    """
-
+    #: first and number, (d,): run of each disc, by ``radius × _PLACES² + row of the middle × _PLACES + column``.
     first: Integers
     number: Integers
+    #: row and column, (m,): of the cell, from that of the middle.
     row: Integers
     column: Integers
-    part: Floats
-    far: Floats
+    part: Floats  # (m,): fraction of the disc in the cell
+    far: Floats  # (m,): square of the distance from the middle over the radius, mean of what is covered
 
 
 @cache
@@ -88,20 +78,13 @@ def _discs(radii: int) -> Discs:
 
 
 class CrownCells(NamedTuple):
-    """Cells that crowns cover: one row for each crown and cell, those of a crown together.
+    """Cells that crowns cover: one row for each crown and cell, those of a crown together."""
 
-    Attributes
-    ----------
-    crown : (m,) int64
-    row, column : (m,) int64
-        Beyond the grid where a crown is.
-    part, far : (m,) float64
-        As of `Discs`.
-    """
-
-    crown: Integers
+    crown: Integers  # (m,)
+    #: row and column, (m,): beyond the grid where a crown is.
     row: Integers
     column: Integers
+    #: part and far, (m,): as of `Discs`.
     part: Floats
     far: Floats
 
@@ -161,63 +144,41 @@ def layer_of(height: Floats) -> tuple[Integers, Floats]:
 
 @dataclass
 class Crowns:
-    """What of plants takes light; arrays (n,) of meters from the corner of the grid, and m².
+    """What of plants takes light; arrays (n,) of meters from the corner of the grid, and m²."""
 
-    Attributes
-    ----------
-    x, y, radius : (n,) float64
-        Of the crown, not of the trunk.
-    base, height : (n,) float64
-    leaves : (n,) float64
-        Leaf area × extinction, m².
-    top : (n,) float64
-        0 a dome, 1 a cone.
-    """
-
+    #: x, y and radius, (n,): of the crown, not of the trunk.
     x: Floats
     y: Floats
     radius: Floats
-    base: Floats
-    height: Floats
-    leaves: Floats
-    top: Floats
+    base: Floats  # (n,)
+    height: Floats  # (n,)
+    leaves: Floats  # (n,): leaf area × extinction, m²
+    top: Floats  # (n,): 0 a dome, 1 a cone
 
 
 class _Columns(NamedTuple):
     """Columns (m,) of the crowns of a strip: of which, places of foot and top in the grid of light, and leaves."""
 
     number: int
-    crown: NDArray[np.int32]
-    foot: NDArray[np.int32]
-    head: NDArray[np.int32]
-    under: NDArray[np.float32]
-    over: NDArray[np.float32]
-    density: NDArray[np.float32]
+    crown: Integers32
+    foot: Integers32
+    head: Integers32
+    under: Floats32
+    over: Floats32
+    density: Floats32
 
 
 @dataclass
 class LightGrid:
-    """Columns of a ground; light that leaves it on one side enters on the other.
-
-    Attributes
-    ----------
-    rows, columns : int
-    cell : float
-        Meters.
-    margin : float
-        Meters of open ground around that of the plants.
-    ground : (rows × columns,) float64, optional
-        Altitudes; level where it is None.
-    light : (layers + 1, rows × columns) float32
-        Light summed from above down to where each layer begins, meters of full light.
-    """
+    """Columns of a ground; light that leaves it on one side enters on the other."""
 
     rows: int
     columns: int
-    cell: float
-    margin: float = 0.0
-    ground: Floats | None = None
-    light: NDArray[np.float32] = field(init=False)
+    cell: float  # meters
+    margin: float = 0.0  # meters of open ground around that of the plants
+    ground: Floats | None = None  # (rows × columns,): altitudes; level where it is None
+    #: (layers + 1, rows × columns): light summed from above down to where each layer begins, meters of full light.
+    light: Floats32 = field(init=False)
 
     def __post_init__(self) -> None:
         self.strip = max(_STRIP_ROWS, _STRIP_CELLS // self.columns)
@@ -253,7 +214,7 @@ class LightGrid:
 
     def _leaves(
         self, crowns: Crowns, strip: slice, index: NDArray, layers: int
-    ) -> tuple[_Columns, NDArray, NDArray[np.int32]]:
+    ) -> tuple[_Columns, NDArray, Integers32]:
         """Columns of some crowns, and differences of their leaves along these: rows (r,), (layers, r, columns)."""
         size = self.cell
         x, y = ((values[index] + self.margin) / size for values in (crowns.x, crowns.y))
@@ -295,7 +256,7 @@ class LightGrid:
         rows = np.arange(low, high) % self.rows
         return columns, rows, total.astype(np.int32).reshape(layers, high - low, self.columns)
 
-    def _shine(self, leaves: NDArray[np.int32]) -> None:
+    def _shine(self, leaves: Integers32) -> None:
         layers, rows, columns = leaves.shape
         if getattr(self, "light", np.zeros((0, 0))).shape != (layers + 1, rows * columns):
             self.light = np.zeros((layers + 1, rows * columns), np.float32)
@@ -351,7 +312,7 @@ class LightGrid:
     def _cell(self, row: NDArray, column: NDArray) -> Integers:
         return (row % self.rows) * self.columns + column % self.columns
 
-    def _summed(self, place: NDArray[np.int32], part: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _summed(self, place: Integers32, part: Floats32) -> Floats32:
         flat = self.light.ravel()
         low, high = np.take(flat, place), np.take(flat, place + np.int32(self.rows * self.columns))
         high -= low

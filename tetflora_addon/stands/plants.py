@@ -7,13 +7,13 @@ What a simulation says: plants at several years, and what lies between these.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Keys, Mask, column, nested
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, Mask, column, nested
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .light import Crowns
 from .site import StandSite
@@ -25,43 +25,24 @@ LYING = 20.0
 
 @dataclass(frozen=True)
 class Records(Arrays):
-    """Plants at a year, one row each; all rows of a plant are neighbors, years ascending.
+    """Plants at a year, one row each; all rows of a plant are neighbors, years ascending."""
 
-    Attributes
-    ----------
-    plant : (n,) int32
-        Number of the plant, ascending.
-    year : (n,) float32
-        Of the simulation.
-    species : (n,) int32
-        Index into the species.
-    seed : (n,) int32
-        From which it is drawn.
-    position : (n, 3) float32
-        Foot of the trunk in the world, meters.
-    height, diameter, crown_width, crown_base : (n,) float32
-        Meters; the diameter is that at 1.3 m, 0 for what is smaller, the width the mean of all directions, and the base
-        the height of the lowest limb.
-    offset : (n, 2) float32
-        By which fraction limbs to the east and to the north are longer, and those opposite shorter.
-    lean : (n, 2) float32
-        Tangents of the trunk's tilt to the east and to the north; `LYING` or more long where it lies.
-    dead : (n,) float32
-        Years since death, 0 of what is alive.
-    """
-
-    plant: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    year: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    species: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    seed: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    height: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    diameter: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    crown_width: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    crown_base: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    offset: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))
-    lean: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))
-    dead: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
+    plant: Integers32 = column(dtype=np.int32)  # (n,): number of the plant, ascending
+    year: Floats32 = column(dtype=np.float32)  # (n,): of the simulation
+    species: Integers32 = column(dtype=np.int32)  # (n,): index into the species
+    seed: Integers32 = column(dtype=np.int32)  # (n,): from which it is drawn
+    position: Floats32 = column(3, dtype=np.float32)  # (n, 3): foot of the trunk in the world, meters
+    #: height, diameter, crown_width and crown_base, (n,): meters; the diameter is that at 1.3 m, 0 for what is smaller,
+    #: the width the mean of all directions, and the base the height of the lowest limb.
+    height: Floats32 = column(dtype=np.float32)
+    diameter: Floats32 = column(dtype=np.float32)
+    crown_width: Floats32 = column(dtype=np.float32)
+    crown_base: Floats32 = column(dtype=np.float32)
+    #: (n, 2): by which fraction limbs to the east and to the north are longer, and those opposite shorter.
+    offset: Floats32 = column(2, dtype=np.float32)
+    #: (n, 2): tangents of the trunk's tilt to the east and to the north; `LYING` or more long where it lies.
+    lean: Floats32 = column(2, dtype=np.float32)
+    dead: Floats32 = column(dtype=np.float32)  # (n,): years since death, 0 of what is alive
 
     @property
     def lying(self) -> Mask:
@@ -91,7 +72,7 @@ class Records(Arrays):
         for name, value in mixed.items():
             value[exact] = getattr(second, name)[exact]
         years = np.full(len(after), year, np.float32)
-        return Records(first.plant, years, first.species, first.seed, **mixed)
+        return replace(first, year=years, **mixed)
 
 
 def in_order(rows: Records) -> Records:
@@ -122,49 +103,27 @@ class StandDraw(IntEnum):
 
 @dataclass(frozen=True)
 class Plants(Arrays):
-    """Living plants.
+    """Living plants."""
 
-    Attributes
-    ----------
-    number : (n,) int64
-        In the order in which they came.
-    key : (n,) uint64
-        Of their random numbers.
-    species : (n,) int64
-    x, y : (n,) float64
-        Meters from the corner of the site.
-    basal, height, base, radius : (n,) float64
-        Meters; basal diameter as `traits` has it.
-    east, north : (n,) float64
-        Offset of the crown, as of `Records`.
-    vigor : (n,) float64
-        Growth of the last years over that of a free plant of the same basal diameter.
-    quality : (n,) float64
-        How well it grows where it is, 0 to 1.
-    strength : (n,) float64
-        How well it grows by nature, about 1.
-    age : (n,) float64
-        Years.
-    known : (n,) bool
-        Whether it has a record.
-    """
-
-    number: Integers = field(metadata=column(dtype=np.int64))
-    key: Keys = field(metadata=column(dtype=np.uint64))
-    species: Integers = field(metadata=column(dtype=np.int64))
+    number: Integers = column(dtype=np.int64)  # (n,): in the order in which they came
+    key: Keys = column(dtype=np.uint64)  # (n,): of their random numbers
+    species: Integers = column(dtype=np.int64)  # (n,)
+    #: x and y, (n,): meters from the corner of the site.
     x: Floats
     y: Floats
+    #: basal, height, base and radius, (n,): meters; basal diameter as `traits` has it.
     basal: Floats
     height: Floats
     base: Floats
     radius: Floats
+    #: east and north, (n,): offset of the crown, as of `Records`.
     east: Floats
     north: Floats
-    vigor: Floats
-    quality: Floats
-    strength: Floats
-    age: Floats
-    known: Mask = field(metadata=column(dtype=bool))
+    vigor: Floats  # (n,): growth of the last years over that of a free plant of the same basal diameter
+    quality: Floats  # (n,): how well it grows where it is, 0 to 1
+    strength: Floats  # (n,): how well it grows by nature, about 1
+    age: Floats  # (n,): years
+    known: Mask = column(dtype=bool)  # (n,): whether it has a record
 
     def crowns(self, traits: StandTraits) -> Crowns:
         """What takes light."""
@@ -181,55 +140,33 @@ class Plants(Arrays):
 
     def records(self, year: float, traits: StandTraits, site: StandSite) -> Records:
         """What they are now; ``plant`` is their number still."""
-        number = len(self)
-        return Records(
-            self.number.astype(np.int32),
-            np.full(number, year, np.float32),
-            self.species.astype(np.int32),
-            (uniform(self.key, StandDraw.SEED) * 2.0**31).astype(np.int32),
-            _positions(self.x, self.y, site),
-            self.height.astype(np.float32),
-            traits.diameters(self.species, self.basal).astype(np.float32),
-            (2.0 * self.radius).astype(np.float32),
-            self.base.astype(np.float32),
-            np.stack([self.east, self.north], axis=1).astype(np.float32),
-            np.zeros((number, 2), np.float32),
-            np.zeros(number, np.float32),
-        )
+        diameter, offset = traits.diameters(self.species, self.basal), np.stack([self.east, self.north], axis=1)
+        identity = self.number, np.full(len(self), year), self.species, uniform(self.key, StandDraw.SEED) * 2.0**31
+        crown = diameter, 2.0 * self.radius, self.base, offset
+        upright = np.zeros((len(self), 2)), np.zeros(len(self))
+        return Records.typed(*identity, _positions(self.x, self.y, site), self.height, *crown, *upright)
 
 
 @dataclass(frozen=True)
 class DeadPlants(Arrays):
-    """Trees that stand dead or lie.
+    """Trees that stand dead or lie."""
 
-    Attributes
-    ----------
-    last : Records
-        What they were at their death.
-    died, falls, gone : (n,) float64
-        Years.
-    lean : (n, 2) float32
-        Of their trunks when they lie.
-    """
-
-    last: Records = field(metadata=nested(Records))
+    last: Records = nested(Records)  # what they were at their death
+    #: died, falls and gone, (n,): years.
     died: Floats
     falls: Floats
     gone: Floats
-    lean: NDArray[np.float32] = field(metadata=column(2, dtype=np.float32))
+    lean: Floats32 = column(2, dtype=np.float32)  # (n, 2): of their trunks when they lie
 
     def records(self, year: float) -> Records:
         """What they are in a year."""
         last = self.last
         lean = np.where((year > self.falls)[:, None], self.lean, np.float32(0.0))
         dead = (year - self.died).astype(np.float32)
-        return Records(
-            last.plant, np.full(len(last), year, np.float32), last.species, last.seed, last.position, last.height,
-            last.diameter, last.crown_width, last.crown_base, last.offset, lean, dead,
-        )  # fmt: skip
+        return replace(last, year=np.full(len(last), year, np.float32), lean=lean, dead=dead)
 
 
-def _positions(x: NDArray, y: NDArray, site: StandSite) -> NDArray[np.float32]:
+def _positions(x: NDArray, y: NDArray, site: StandSite) -> Floats32:
     return np.stack([site.west + x, site.south + y, site.ground(x, y)], axis=1).astype(np.float32)
 
 

@@ -27,39 +27,21 @@ _DIGITS = 4
 
 @dataclass(frozen=True)
 class StandSite:
-    """Ground on a grid of square cells; rows from the south, columns from the west.
+    """Ground on a grid of square cells; rows from the south, columns from the west."""
 
-    Attributes
-    ----------
-    west, south : float
-        Corner of the grid in the world, meters.
-    cell : float
-        Side of a cell, meters.
-    height : (h, w) float
-        Altitude, meters.
-    plantable : (h, w) float, optional
-        Fraction of the ground where plants can be, 0 to 1; everywhere where it is None.
-    moisture : (h, w) float, optional
-        0 dry to 1 wet; 0.5, fresh, where it is None.
-    fertility : (h, w) float, optional
-        0 poor to 1 rich; 0.7 where it is None.
-    degree_days : float
-        Sum of daily mean temperatures over 5 °C in a year (growing degree days), at the altitude ``altitude``.
-    coldest_month : float
-        Mean temperature of the coldest month there, °C.
-    altitude : float
-        Meters at which degree days and the coldest month are known; colder above by 0.6 K for 100 m.
-    """
-
+    #: west and south: corner of the grid in the world, meters.
     west: float
     south: float
-    cell: float
-    height: NDArray
+    cell: float  # side of a cell, meters
+    height: NDArray  # (h, w): altitude, meters
+    #: (h, w): fraction of the ground where plants can be, 0 to 1; everywhere where it is None.
     plantable: NDArray | None = None
-    moisture: NDArray | None = None
-    fertility: NDArray | None = None
+    moisture: NDArray | None = None  # (h, w): 0 dry to 1 wet; 0.5, fresh, where it is None
+    fertility: NDArray | None = None  # (h, w): 0 poor to 1 rich; 0.7 where it is None
+    #: Sum of daily mean temperatures over 5 °C in a year (growing degree days), at the altitude ``altitude``.
     degree_days: float = 1700.0
-    coldest_month: float = -1.0
+    coldest_month: float = -1.0  # mean temperature of the coldest month there, °C
+    #: Meters at which degree days and the coldest month are known; colder above by 0.6 K for 100 m.
     altitude: float = 0.0
 
     def __post_init__(self) -> None:

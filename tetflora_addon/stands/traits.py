@@ -74,23 +74,13 @@ def ecology_of(species: Species) -> Ecology:
 
 @dataclass(frozen=True)
 class StandSpecies:
-    """One species in a stand.
-
-    Attributes
-    ----------
-    species : Species
-    planted : float
-        Share of what is planted, over those of the others.
-    incoming_seeds : float
-        Seeds that come from outside, over those where a tenth of the ground beyond is below its crowns.
-    ecology : Ecology, optional
-        In place of that of the species.
-    """
+    """One species in a stand."""
 
     species: Species
-    planted: float = 1.0
+    planted: float = 1.0  # share of what is planted, over those of the others
+    #: Seeds that come from outside, over those where a tenth of the ground beyond is below its crowns.
     incoming_seeds: float = 1.0
-    ecology: Ecology | None = None
+    ecology: Ecology | None = None  # in place of that of the species
 
     @property
     def needs(self) -> Ecology:
@@ -169,7 +159,3 @@ class StandTraits:
     def diameters(self, species: NDArray, basal: NDArray) -> Floats:
         """Diameters (n,) of trunks at breast height, meters."""
         return np.maximum(basal - np.take(self.first, species), 0.0)
-
-    def masses(self, species: NDArray, basal: NDArray, height: NDArray) -> Floats:
-        """Dry mass (n,) of the wood above ground, kg."""
-        return np.take(self.mass_factor, species) * basal**2 * height

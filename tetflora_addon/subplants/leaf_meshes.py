@@ -12,12 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Keys, spread
+from ..arrays import Floats, Floats32, Integers, Integers32, Keys, spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
@@ -73,10 +72,10 @@ class LeafCopies:
         self,
         key: Keys,
         position: Floats,
-        frame: NDArray[np.float32],
+        frame: Floats32,
         size: Floats,
         color: Floats,
-        motion: tuple[Floats, NDArray[np.float32]] | None = None,
+        motion: tuple[Floats, Floats32] | None = None,
     ) -> None:
         """Place the next n copies.
 
@@ -103,7 +102,7 @@ class LeafCopies:
             self.velocity[new] = _placed(shape, *motion, size)
         self.color[new] = color[:, None]
 
-    def _shapes(self, key: Keys, new: slice) -> NDArray[np.float32]:
+    def _shapes(self, key: Keys, new: slice) -> Floats32:
         """Vertices (v, 3, n or 1) of copies with keys (n,) before they are placed."""
         return self.model.positions.astype(np.float32)[:, :, None]
 
@@ -135,11 +134,11 @@ class LeafCopies:
             smooth=model.closed and not model.textured,  # fruit and fleshy leaves are round
         )
 
-    def _texture(self) -> NDArray[np.float32]:
+    def _texture(self) -> Floats32:
         """Texture coordinates (corners, 2)."""
         return _stepped(self.model.uv.reshape(-1), 0, self.done).reshape(-1, 2)
 
-    def _materials(self) -> NDArray[np.int32] | None:
+    def _materials(self) -> Integers32 | None:
         """Material (faces,) of each face, where there are several."""
         model = self.model
         return None if model.material_index is None else _stepped(model.material_index, 0, self.done)
@@ -162,14 +161,14 @@ class KiteCopies(LeafCopies):
         self.kites = kites
         self.plane = np.zeros(number, np.int8)
 
-    def _shapes(self, key: Keys, new: slice) -> NDArray[np.float32]:
+    def _shapes(self, key: Keys, new: slice) -> Floats32:
         self.plane[new] = self.kites.chosen(uniform(key, Draw.LEAF_PLANE))
         return self.kites.positions.astype(np.float32).transpose(1, 2, 0)[:, :, self.plane[new]]
 
-    def _texture(self) -> NDArray[np.float32]:
+    def _texture(self) -> Floats32:
         return self.kites.uv[self.plane[: self.done]].reshape(-1, 2)
 
-    def _materials(self) -> NDArray[np.int32] | None:
+    def _materials(self) -> Integers32 | None:
         index = self.kites.material_index
         return None if index is None else index[self.plane[: self.done]]
 
@@ -188,7 +187,7 @@ class LevelCopies(LeafCopies):
         super().__init__(level.model, number, transmission, moving)
         self.level, self.shapes = level, level.shapes.transpose(1, 2, 0)
 
-    def _shapes(self, key: Keys, new: slice) -> NDArray[np.float32]:
+    def _shapes(self, key: Keys, new: slice) -> Floats32:
         variants = self.shapes.shape[2]
         return self.shapes[:, :, (uniform(key, Draw.LEAF_VARIANT) * variants).astype(np.int64)]
 
@@ -215,9 +214,7 @@ class LevelCopies(LeafCopies):
         return through
 
 
-def _placed(
-    shape: NDArray[np.float32], position: Floats, frame: NDArray[np.float32], size: Floats
-) -> NDArray[np.float32]:
+def _placed(shape: Floats32, position: Floats, frame: Floats32, size: Floats) -> Floats32:
     """Vertices (n, 3 v) of copies of shapes (v, 3, n or 1); linear in position and frame, and so serves velocities."""
     scaled = frame.transpose(1, 2, 0) * size.astype(np.float32)  # (3, 3, n)
     points = np.zeros((len(shape), 3, len(size)), np.float32)
@@ -255,21 +252,11 @@ _EARLIEST = 0.7
 
 @dataclass(frozen=True)
 class LeafMesh:
-    """Copies of one form of leaf.
+    """Copies of one form of leaf."""
 
-    Attributes
-    ----------
-    kind : int
-        Index into `species.LEAF_KINDS`.
-    form : int
-        Which of the species' forms of that kind.
-    buffers : MeshBuffers
-        Faces with ``UVMap``, ``tf_color`` and ``tf_transmission``.
-    """
-
-    kind: int
-    form: int
-    buffers: MeshBuffers
+    kind: int  # index into `species.LEAF_KINDS`
+    form: int  # which of the species' forms of that kind
+    buffers: MeshBuffers  # faces with ``UVMap``, ``tf_color`` and ``tf_transmission``
 
 
 def leaf_meshes(
@@ -324,18 +311,9 @@ def _copies(model: LeafModel, step: int, number: int, transmission: float, movin
 
 def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_LeafBearers]:
     """Those of branches that bear leaves, row by row."""
-    order = np.argsort(whole.branches.row, kind="stable")
-    order = order[flora.rows["leaves"][whole.branches.row[order]].sum(axis=1) > 0]
-    for row, own in _by_row(whole.branches.row[order]):
-        yield _LeafBearers(flora, row, whole.take(order[own]))
-
-
-def _by_row(rows: Integers) -> Iterator[tuple[int, slice]]:
-    """Runs of equal numbers in a sorted array."""
-    cuts = [0, *(np.flatnonzero(np.diff(rows)) + 1), len(rows)]
-    for start, stop in pairwise(cuts):
-        if stop > start:
-            yield int(rows[start]), slice(int(start), int(stop))
+    row = whole.branches.row
+    for one in np.unique(row[flora.rows["leaves"][row].sum(axis=1) > 0]).tolist():
+        yield _LeafBearers(flora, one, whole.take(np.flatnonzero(row == one)))
 
 
 class _LeafBearers:

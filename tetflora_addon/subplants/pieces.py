@@ -8,7 +8,7 @@ Pieces are straight parts of an axis with the leaves on them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,23 +28,16 @@ Thin = Callable[[Keys, Floats, Floats, Floats], tuple[Integers, Floats]]
 
 @dataclass(frozen=True)
 class Pieces(Arrays):
-    """Parts of branches, each within one straight segment.
+    """Parts of branches, each within one straight segment."""
 
-    Attributes
-    ----------
-    branches : Branches of n
-        The whole branch that each piece is part of; enough to make its wood and leaves.
-    t0, t1 : (n,) float64
-        The part's ends as fractions of the branch's axis.
-    start, end : (n, 3) float64
-        The same ends in space, meters.
-    """
-
-    branches: Branches = field(metadata=nested(Branches))
+    #: of n: the whole branch that each piece is part of; enough to make its wood and leaves.
+    branches: Branches = nested(Branches)
+    #: t0 and t1, (n,): the part's ends as fractions of the branch's axis.
     t0: Floats
     t1: Floats
-    start: Floats = field(metadata=column(3))
-    end: Floats = field(metadata=column(3))
+    #: start and end, (n, 3): the same ends in space, meters.
+    start: Floats = column(3)
+    end: Floats = column(3)
 
 
 def whole_pieces(rows: Table, whole: WholeBranches) -> tuple[Pieces, Integers]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Keys, Mask, Table, spread, unit
+from ..arrays import Floats, Floats32, Integers, Keys, Mask, Table, spread, unit
 from ..compiled.averages import tube_perimeter
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds
@@ -31,37 +31,18 @@ _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
 
 @dataclass(frozen=True)
 class Rings:
-    """Places on branches (k) around which there are rings of vertices.
+    """Places on branches (k) around which there are rings of vertices."""
 
-    Attributes
-    ----------
-    branches : Branches of k
-    branch : (r,) int64
-        Rings of a branch follow one another.
-    t : (r,) float64
-        Fractions of the axes, for textures; below the base negative.
-    center : (r, 3) float64
-    reach : (2, 3, r) float32
-        From the center to the ring, along both axes across the branch.
-    goes_on : (r,) bool
-        Whether a tube leads from a ring to the next.
-    later : tuple of (r, 3) float64 and (2, 3, r) float32, or None
-        Center and reach a moment later, where it is asked how plants move.
-    swelling : (sides, r) float32 or None
-        What multiplies the reach at each vertex.
-    color : (k, 3) float64 or None
-        Of what has not that of its branch.
-    """
-
-    branches: Branches
-    branch: Integers
-    t: Floats
-    center: Floats
-    reach: NDArray[np.float32]
-    goes_on: Mask
+    branches: Branches  # of k
+    branch: Integers  # (r,): rings of a branch follow one another
+    t: Floats  # (r,): fractions of the axes, for textures; below the base negative
+    center: Floats  # (r, 3)
+    reach: Floats32  # (2, 3, r): from the center to the ring, along both axes across the branch
+    goes_on: Mask  # (r,): whether a tube leads from a ring to the next
+    #: tuple of (r, 3) and (2, 3, r): center and reach a moment later, where it is asked how plants move.
     later: tuple[NDArray, NDArray] | None = None
-    swelling: NDArray[np.float32] | None = None
-    color: Floats | None = None
+    swelling: Floats32 | None = None  # (sides, r): what multiplies the reach at each vertex
+    color: Floats | None = None  # (k, 3): of what has not that of its branch
 
 
 def rings_of(flora: Flora, whole: WholeBranches) -> Rings:
@@ -357,7 +338,7 @@ def root_sides(sides: int) -> int:
     return max(sides // 4, 6)
 
 
-def keep_inside(flora: Flora, branches: Branches, owner: Integers, points: NDArray[np.float32]) -> None:
+def keep_inside(flora: Flora, branches: Branches, owner: Integers, points: Floats32) -> None:
     """Move points (m, 3), in place, that lie outside the bounds of their branches (n,) to the border of these.
 
     Hardly any: bounds are those of whole sub-plants, and wider than what a foot or a collar adds to wood.
@@ -381,7 +362,7 @@ def keep_inside(flora: Flora, branches: Branches, owner: Integers, points: NDArr
 
 def swelling(
     rows: Table, branches: Branches, weight: Floats, owner: Integers, t: Floats, radius: Floats, sides: int
-) -> NDArray[np.float32] | None:
+) -> Floats32 | None:
     """Factors (sides, r) of the radius (r,) of rings at fractions t (r,) of branches (n,); None where all are 1."""
     footed = has_foot(rows, branches)
     if not footed.any():

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers
+from ..arrays import Floats, Floats32, Integers, Integers32
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
@@ -201,12 +201,7 @@ class _Tubes:
         self.faces += len(lower) * sides
 
     def _add_shape(
-        self,
-        out: NDArray[np.float32],
-        center: NDArray[np.float32],
-        reach: NDArray[np.float32],
-        sides: int,
-        swelling: NDArray[np.float32] | None,
+        self, out: Floats32, center: Floats32, reach: Floats32, sides: int, swelling: Floats32 | None
     ) -> None:
         """Vertices around centers (3, rings), along both axes (2, 3, rings) of each ring; or, as well, velocities."""
         rings = center.shape[1]
@@ -221,7 +216,7 @@ class _Tubes:
         new = out[self.vertices : self.vertices + rings * sides]
         new.reshape(rings, -1)[...] = points.reshape(-1, rings).T
 
-    def _add_topology(self, base: NDArray[np.int32], rings: int, sides: int) -> None:
+    def _add_topology(self, base: Integers32, rings: int, sides: int) -> None:
         """Edges around all rings, then edges from those where pieces start (p,) to the next; faces between."""
         here = np.arange(sides, dtype=np.int32)
         there = np.roll(here, -1)
@@ -240,7 +235,7 @@ class _Tubes:
         np.add(ring_edge[:, None], _interleaved(here, here + sides), out=new[:, ::2])
         np.add(long_edge[:, None], _interleaved(there, here), out=new[:, 1::2])
 
-    def _add_looks(self, low: NDArray, high: NDArray, color: NDArray[np.float32], sides: int) -> None:
+    def _add_looks(self, low: NDArray, high: NDArray, color: Floats32, sides: int) -> None:
         """Texture coordinates between the v (p,) at both ends of pieces, their colors (p, 3)."""
         number = len(low) * sides
         new = self.uv[self.faces : self.faces + number].reshape(len(low), -1)
@@ -255,7 +250,7 @@ class _Tubes:
 
 
 def wood_attributes(
-    uv: NDArray[np.float32], color: NDArray[np.float32], girth: NDArray[np.float32], velocity: NDArray | None
+    uv: Floats32, color: Floats32, girth: Floats32, velocity: NDArray | None
 ) -> dict[str, tuple[str, NDArray]]:
     """Attributes of a mesh of wood: of its corners, of its faces, and of its vertices where these move."""
     motion = {} if velocity is None else {"velocity": ("POINT", velocity)}

@@ -39,36 +39,20 @@ _PLACES = np.array([0.25, 0.5, 0.75])
 
 @dataclass(frozen=True)
 class Pixels:
-    """How large pixels are.
+    """How large pixels are."""
 
-    Attributes
-    ----------
-    extent : callable
-        Meters (n,) that a pixel spans at points (n, 3).
-    slope : float
-        By how much that falls at most with each meter that one comes nearer.
-    """
-
-    extent: Callable[[Floats], Floats]
-    slope: float = 0.0
+    extent: Callable[[Floats], Floats]  # meters (n,) that a pixel spans at points (n, 3)
+    slope: float = 0.0  # by how much that falls at most with each meter that one comes nearer
 
 
 @dataclass(frozen=True)
 class Fineness(Arrays):
-    """How finely branches (n,) are drawn.
+    """How finely branches (n,) are drawn."""
 
-    Attributes
-    ----------
-    sides : (n,) int64
-    weight : (n,) float64
-        From 0 to 1: how much there is of what near wood has besides; 0 for the coarse tube, unchanged.
-    pixels : (n,) float64
-        Radius in the image where that is largest.
-    """
-
-    sides: Integers
+    sides: Integers  # (n,)
+    #: (n,): from 0 to 1: how much there is of what near wood has besides; 0 for the coarse tube, unchanged.
     weight: Floats
-    pixels: Floats
+    pixels: Floats  # (n,): radius in the image where that is largest
 
 
 def round_up_to(sides: Integers) -> Floats:
@@ -117,24 +101,14 @@ def finer(sides: Integers, pixels: Floats) -> tuple[Integers, Floats]:
 
 @dataclass(frozen=True)
 class Curve:
-    """The curves through the joints of branches (n,) of up to S segments: cubic, with given tangents at joints.
+    """The curves through the joints of branches (n,) of up to S segments: cubic, with given tangents at joints."""
 
-    Attributes
-    ----------
-    lines : Axes of n
-    chord : (n, S, 3) float64
-        Of each segment.
-    start, end : (n, S, 3) float64
-        What the tangents at both ends of a segment add to its chord.
-    across : (n, S + 1, 3) float64
-        First axis of the frames at joints.
-    """
-
-    lines: Axes
-    chord: Floats
+    lines: Axes  # of n
+    chord: Floats  # (n, S, 3): of each segment
+    #: start and end, (n, S, 3): what the tangents at both ends of a segment add to its chord.
     start: Floats
     end: Floats
-    across: Floats
+    across: Floats  # (n, S + 1, 3): first axis of the frames at joints
 
     def deviation(self) -> Floats:
         """How far the curve may be off each segment (n, S), meters."""

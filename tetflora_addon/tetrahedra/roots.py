@@ -155,7 +155,7 @@ def _around_pyramid(
         triangle = np.array([eye, far_corners[first], far_corners[second]])
         on_wall = triangle.copy()
         on_wall[:, 1] = wall
-        return _prism(np.concatenate([on_wall, triangle]))
+        return _best_prism(np.concatenate([on_wall, triangle]))[1]
 
     one = np.array([eye, far_corners[0], far_corners[1], far_corners[2]])
     two = np.array([eye, far_corners[0], far_corners[2], far_corners[3]])
@@ -201,10 +201,6 @@ def _hexahedron(corners: NDArray[np.float64]) -> _Piece:
     ]
     turn, ((_, one), (_, two)) = max(halves, key=lambda half: min(half[1][0][0], half[1][1][0]))
     return _Cut(corners[[turn, turn + 2, turn + 4]], one, two)
-
-
-def _prism(corners: NDArray[np.float64]) -> _Piece:
-    return _best_prism(corners)[1]
 
 
 def _best_prism(corners: NDArray[np.float64]) -> tuple[float, _Piece]:

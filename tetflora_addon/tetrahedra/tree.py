@@ -165,7 +165,8 @@ class TetrahedralTree:
             If a node is not terminal or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
-        self._check_terminal(nodes)
+        if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
+            raise ValueError("only terminal nodes can be split, and each only once")
         first = self._size
         self._append(
             np.repeat(nodes.astype(np.int32), 2),
@@ -269,10 +270,6 @@ class TetrahedralTree:
         if np.isnan(vertices[:, 0, 0]).any():
             raise ValueError("only nodes with a tetrahedron can be bisected; split regions by a plane instead")
         return vertices
-
-    def _check_terminal(self, nodes: NDArray[np.intp]) -> None:
-        if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
-            raise ValueError("only terminal nodes can be split, and each only once")
 
     def _descend(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
         node = np.zeros(len(points), np.int32)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from tests.engine.assets import trees
 from tetflora_addon.assets.asset import MESH_FACES, Asset, AssetSource
-from tetflora_addon.assets.compiled import compile_asset
 from tetflora_addon.assets.measures import through_both_sides
 from tetflora_addon.errors import TetFloraError
 
@@ -101,7 +100,7 @@ def test_any_mesh_compiles_or_is_named(seed: int, vertices: int, faces: int) -> 
     looks = rng.uniform(0, 1, (faces, 3)), rng.choice([0.0, 0.4, np.nan], faces), rng.choice([0.0, 0.3, 1.0], faces)
     source = trees.source_of(trees.surface(positions, own, *looks))
     try:
-        asset = compile_asset(source)
+        asset = trees.compile_asset(source)
     except TetFloraError as error:
         assert '"tree"' in str(error)
         corners, *_, coverage = trees.triangles_of(source)
@@ -156,7 +155,7 @@ def test_means_over_samples_are_those_of_the_cluster(kind: str) -> None:
 
 def test_moments_and_colors_are_those_of_faces() -> None:
     flat = trees.surface(trees.QUAD * [1, 1, 0], [(0, 1, 2, 3)], (0.2, 0.4, 0.6), 0.25)
-    one = compile_asset(trees.source_of(flat)).clusters
+    one = trees.compile_asset(trees.source_of(flat)).clusters
     assert one.moment[0] == pytest.approx([0, 0, 1, 0, 0, 0], abs=1e-7)
     assert one.color[0] == pytest.approx([0.2, 0.4, 0.6], abs=1e-3)
     assert one.transmission[0] == pytest.approx(0.25, abs=1e-3)
@@ -173,7 +172,7 @@ def test_moments_and_colors_are_those_of_faces() -> None:
 def test_what_nobody_knows_lets_some_light_through_sheets_and_none_through_solids() -> None:
     tree = trees.joined(trees.trunk(), trees.leaves(1, 400))
     tree = replace(tree, transmission=np.full(tree.faces, np.nan, np.float16))
-    own = compile_asset(trees.source_of(tree)).clusters
+    own = trees.compile_asset(trees.source_of(tree)).clusters
     kinds = own.take(own.parent == 0)
     assert kinds.transmission[kinds.leaf_area > 0] == pytest.approx(0.3, abs=1e-6)
     assert (kinds.transmission[kinds.leaf_area == 0] == 0).all()
@@ -234,13 +233,13 @@ def test_parts_that_are_turned_stretched_and_mirrored(seed: int) -> None:
     matrices[:, :3] = rng.normal(size=(40, 3, 4))
     own = trees.leaves(seed % 100, 12), trees.trunk()
     source = trees.source_of(*own, shown=rng.integers(0, 2, 40), matrices=matrices)
-    asset = compile_asset(source)
+    asset = trees.compile_asset(source)
     check(source, asset)
     check_samples(asset)
 
 
 def test_the_same_source_is_the_same_asset() -> None:
-    again = compile_asset(trees.source("varied"))
+    again = trees.compile_asset(trees.source("varied"))
     for name in ("clusters", "samples", "leaves"):
         for key, value in vars(getattr(trees.compiled("varied"), name)).items():
             assert np.array_equal(value, getattr(getattr(again, name), key)), (name, key)
@@ -248,7 +247,7 @@ def test_the_same_source_is_the_same_asset() -> None:
 
 def test_clusters_with_meshes_of_their_own_are_all_of_the_asset_once() -> None:
     big = trees.source_of(trees.tree(4, 9000, size=0.05))
-    asset = compile_asset(big)
+    asset = trees.compile_asset(big)
     own = asset.clusters.meshes
     assert own.sum() > 2
     assert asset.clusters.faces[own].sum() == asset.faces
@@ -277,10 +276,10 @@ def test_what_cannot_be_refined_is_named(what: str) -> None:
         "no area": lambda: trees.source_of(trees.surface(np.ones((3, 3)), [(0, 1, 2)])),
     }[what]()
     with pytest.raises(TetFloraError, match='"tree"'):
-        compile_asset(one)
+        trees.compile_asset(one)
 
 
 def test_a_surface_without_faces_beside_others_is_nothing() -> None:
     empty = trees.surface(np.zeros((2, 3)), [], name="empty")
     with_it = trees.source_of(empty, trees.leaves(), shown=[0, 1])
-    assert compile_asset(with_it).faces == 400
+    assert trees.compile_asset(with_it).faces == 400

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tetflora_addon.assets.asset import Asset, AssetSource, AssetSurface
-from tetflora_addon.assets.compiled import compile_asset
+from tetflora_addon.assets.compiled import compile_steps
+from tetflora_addon.jobs import run_to_end
 
 GREEN, BROWN = (0.1, 0.3, 0.05), (0.2, 0.12, 0.08)
 
@@ -163,6 +164,11 @@ SOURCES = {
 def source(kind: str) -> AssetSource:
     """One of `SOURCES`."""
     return SOURCES[kind]()
+
+
+def compile_asset(one: AssetSource) -> Asset:
+    """An asset, compiled at once."""
+    return run_to_end(compile_steps(one))
 
 
 @cache

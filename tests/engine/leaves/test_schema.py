@@ -12,7 +12,7 @@ from tests.engine import support
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.leaves.compounds import Compound
 from tetflora_addon.leaves.levels import leaf_levels
-from tetflora_addon.leaves.models import _COARSE, LEAF_MODELS, LeafModel
+from tetflora_addon.leaves.models import _PAGES, LEAF_MODELS, LeafModel
 from tetflora_addon.leaves.needles import Needles
 from tetflora_addon.leaves.outlines import Blade
 from tetflora_addon.species.schema import species_from_dict
@@ -23,11 +23,16 @@ def leaf(data: Any) -> LeafModel:
     return species_from_dict({**support.SMALL, "leaf": data}, "s", "s.json").leaf[0]
 
 
+@pytest.mark.parametrize("name", LEAF_MODELS)
+def test_built_in_leaves_are_those_of_species_files(name: str) -> None:
+    assert leaf({key: value for key, value in _PAGES[name].items() if key != "about"}) == LEAF_MODELS[name]
+
+
 def test_outlines_are_read() -> None:
     """Beside a model or vertices, which stay what they are, or alone."""
     own = {"width": 0.3, "lobes": 3, "base": "cordate"}
     with_model = leaf({"model": "lobed", "outline": own})
-    assert with_model.content == _COARSE["lobed"].content
+    assert with_model.content == LEAF_MODELS["lobed"].content
     assert with_model.shape == Blade(width=0.3, lobes=3, base="cordate") != LEAF_MODELS["lobed"].shape
     square = {"vertices": [[-0.2, 0, 0], [0.2, 0, 0], [0.2, 1, 0], [-0.2, 1, 0]], "faces": [[0, 1, 2, 3]]}
     polygons = leaf({**square, "outline": {"kind": "needles", "needles": 40, "bundle": 2}})

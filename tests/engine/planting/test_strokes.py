@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.planting import strokes
+from tetflora_addon.planting.plane import Spacing
 from tetflora_addon.planting.strokes import Brush
 
 NONE = np.zeros((0, 2))
@@ -169,7 +170,7 @@ def test_admitted_is_what_one_after_the_other_would_be(seed, n, m, distance):
         if all(((place - t) ** 2).sum() >= distance * distance for t in taken):
             taken.append(place)
             expected.append(i)
-    assert strokes.admitted(places, standing, distance).tolist() == expected
+    assert Spacing(distance, standing).admit(places, n).tolist() == expected
 
 
 def test_dabs_follow_the_mouse():

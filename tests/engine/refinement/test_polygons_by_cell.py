@@ -21,14 +21,14 @@ def test_holdings_give_and_take(seed: int) -> None:
     cell_polygons = PolygonsByCell(held)
     for _ in range(5):
         chosen = rng.random(len(tree)) < rng.choice([0.05, 0.5, 0.95])
-        out = cell_polygons.take_out(chosen)
+        out = cell_polygons.take_within(chosen)
         assert len(out) + len(cell_polygons) == len(held)
         assert chosen[out.cell].all()
         for totals, cell in cell_polygons.totals(np.ones(len(tree), bool)):
             assert len(totals) == len(cell)
             assert not chosen[cell].any()
         assert not chosen[cell_polygons.polygons.cell].any()
-        cell_polygons.put(out)
+        cell_polygons.append(out)
 
     def rows(some: InCells) -> np.ndarray:
         columns = (some.items.instance, some.items.face, some.cell, some.totals.area, some.totals.width)
@@ -41,5 +41,5 @@ def test_holdings_give_and_take(seed: int) -> None:
 def test_holdings_of_nothing() -> None:
     cell_polygons = PolygonsByCell(InCells.none(Polygons))
     assert len(cell_polygons) == 0
-    assert len(cell_polygons.take_out(np.ones(3, bool))) == 0
+    assert len(cell_polygons.take_within(np.ones(3, bool))) == 0
     assert len(cell_polygons.polygons) == 0

@@ -175,7 +175,7 @@ def test_dense_stands_thin_themselves() -> None:
     for year in range(70):
         stand.step(year)
         plants = stand.plants
-        thinned.append((len(plants), traits.masses(plants.species, plants.basal, plants.height).mean()))
+        thinned.append((len(plants), (traits.mass_factor[plants.species] * plants.basal**2 * plants.height).mean()))
     number, mass = np.log(np.array(thinned)[25:]).T
     assert -1.8 < np.polyfit(number, mass, 1)[0] < -1.2
     leaves = plants.leaf_area(traits).sum() / 3600.0

@@ -73,7 +73,7 @@ def outline_steps(order: Import, kind: str = "") -> Steps:
     try:
         for number, (outline, own) in enumerate(zip(outlines, rings, strict=True)):
             if number % _BATCH == 0:
-                yield Progress(0.5 + 0.5 * number / len(outlines), "Drawing outlines", partial=True)
+                yield Progress(0.5 + 0.5 * number / len(outlines), "Drawing outlines")
             curve = _curve(outline, own, heights)
             made[KINDS.index(outline.kind)].objects.link(curve)
     except BaseException:  # an error, or Esc

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...planting.places import Placement
-from ...planting.strokes import admitted
+from ...planting.plane import Spacing
 from ..attributes import write
 from ..compat import shader_tree
 from ..materials.nodes import Graph, find_socket
@@ -212,7 +212,7 @@ def places(seed: int) -> list[NDArray[np.float64]]:
         x = x + path(y) * np.clip(1.0 - y / 60.0, 0.0, 1.0)
         fits = (np.abs(x - path(y)) > _PATH + layer.verge) & (x > _WEST + 2.0) & (x < _EAST - 2.0)
         candidates = np.stack([x, y], axis=1)[fits]
-        chosen = candidates[admitted(candidates, standing, layer.spacing)[: layer.number]]
+        chosen = candidates[Spacing(layer.spacing, standing).admit(candidates, layer.number)]
         standing = np.concatenate([standing, chosen])
         out.append(chosen)
     return out
