@@ -24,10 +24,11 @@ _TALLEST = 0.98  # of the leaves are lower than the plant is tall
 _LEAF_LEANS = 0.25  # of the length of leaves, which makes the crown of grass: its axes are next to nothing
 LEVEL = 0.7  # of the area of leaves is seen from above, between those that stand in all directions and those that lie
 _LOWEST = 0.03  # of the leaves are lower than the crown's base
-_PLANTS = 16  # over which the length of trunks is averaged
+_PLANTS = 16  # whose trunks' lengths stand for all
 _MOST = 256  # crowns that are kept
 _REACH = 0.25  # of a line's length is how far its nearer end is to one side of any point of it, on average
-_PARTS = 512  # leaves, and branches, of a crown that stand for all
+_PARTS = 4096  # leaves, and branches, of a crown that stand for all: few of a tree's are at the height of eyes
+_FINER = 8  # times as many samples, of which these are
 
 _known: dict[Species, Crown] = {}
 
@@ -91,7 +92,7 @@ def known_crown(species: Species) -> Crown | None:
 
 
 def crown_of(species: Species) -> Crown:
-    """The mean crown of a species; its samples are drawn at the first time, which takes some hundredths of a second.
+    """The mean crown of a species; its samples are drawn at the first time, which takes some tenths of a second.
 
     Raises
     ------
@@ -136,7 +137,9 @@ def _crown_of(species: Species) -> Crown:
     color = tuple((areas @ colors / areas.sum()).tolist())
     polygons = expected_polygons(flora.species[0])
     forms = tuple(next(iter(own), None) for own in flora.forms[0])
-    parts = CrownParts.concatenate([_leaf_parts(flora, row, length), _branch_parts(flora, row, length)])
+    samples = flora.samples_of((row,), _FINER)
+    own = _leaf_parts(flora, samples.leaves, row, trunk.length), _branch_parts(flora, samples.wood, row, trunk.length)
+    parts = CrownParts.concatenate(own)
     return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), color, forms, parts)
 
 
@@ -152,9 +155,9 @@ def _even_parts(crown: Crown) -> CrownParts:
     return CrownParts(place, number, area, size, size, np.zeros(_PARTS), none, none, np.zeros(_PARTS), none)
 
 
-def _some(points: Points, row: int, length: float) -> tuple[Floats, Integers, Floats, Floats]:
-    """Places (n, 3) of samples of upright trunks, their rows (n,), of how many of its row (n,) each is one, and where
-    leaves point (n, 3).
+def _some(points: Points, row: int, lengths: Floats) -> tuple[Floats, Integers, Floats, Floats]:
+    """Places (n, 3) of samples of upright trunks of lengths (k,), their rows (n,), of how many of its row (n,) each is
+    one, and where leaves point (n, 3).
 
     Few of large branches, which have most of the samples, so that there are as many of small ones.
     """
@@ -164,13 +167,13 @@ def _some(points: Points, row: int, length: float) -> tuple[Floats, Integers, Fl
     chosen = np.concatenate([np.flatnonzero(rows == one)[:most] for one in np.unique(rows)])
     rows, chosen = rows[chosen], first + chosen
     place, along = (of[chosen].astype(np.float64) for of in (points.position, points.frame[:, :, 1]))
-    return length * place, rows, np.bincount(rows)[rows].astype(np.float64), along
+    return np.resize(lengths, (len(chosen), 1)) * place, rows, np.bincount(rows)[rows].astype(np.float64), along
 
 
-def _leaf_parts(flora: Flora, row: int, length: float) -> CrownParts:
+def _leaf_parts(flora: Flora, points: Points, row: int, lengths: Floats) -> CrownParts:
     if not flora.leaf_count[row] > 0:
         return CrownParts.empty()
-    place, rows, like, along = _some(flora.samples.leaves, row, length)
+    place, rows, like, along = _some(points, row, lengths)
     totals, leaf = flora.averages, flora.leaf
     number, area = totals.leaves[row][rows], totals.leaf_area[row, 1][rows]
     area = area / np.maximum(number, 1e-300)
@@ -185,8 +188,9 @@ def _leaf_parts(flora: Flora, row: int, length: float) -> CrownParts:
     return CrownParts(place, number / like, area, width, size, reach, none, none, none.astype(float), form)
 
 
-def _branch_parts(flora: Flora, row: int, length: float) -> CrownParts:
-    place, rows, like, _ = _some(flora.samples.wood, row, length)
+def _branch_parts(flora: Flora, points: Points, row: int, lengths: Floats) -> CrownParts:
+    place, rows, like, _ = _some(points, row, lengths)
+    length = float(lengths.mean())
     trunk_radius = float(flora.averages.radius[row]) * length / float(flora.averages.length[row])
     totals, bud = flora.averages, flora.species[0].bud
     sides, segments = flora.rows["sides"][rows].astype(np.int64), flora.rows["segments"][rows].astype(np.int64)

@@ -8,7 +8,7 @@ sub-plant are kept as a few hundred sample points, drawn by following random pat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -121,8 +121,12 @@ class Flora:
     @_in_summer
     def samples(self) -> Samples:
         """Points on the leaves and wood of sub-plants."""
+        return self.samples_of(range(len(self.rows)))
+
+    def samples_of(self, some: Container[int], times: int = 1) -> Samples:
+        """Samples of some rows alone, and so many times as many, of plants in summer."""
         totals = self.averages
-        return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length)
+        return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length, some, times)
 
     @_in_summer
     def sampled_bound(self) -> Floats:

@@ -12,7 +12,7 @@ Those of trunks know which limbs they are on, so that they can be moved as the c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,8 +74,10 @@ class Samples:
     wood: Points
 
 
-def draw_samples(rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats) -> Samples:
-    """Sample every row.
+def draw_samples(
+    rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats, some: Container[int], times: int
+) -> Samples:
+    """Sample rows.
 
     Parameters
     ----------
@@ -84,12 +86,16 @@ def draw_samples(rows: Table, leaf_area: Floats, wood_area: Floats, length: Floa
         Expected area in a sub-plant by the row that contributes it.
     length : (r,) float64
         Typical length of a branch, meters.
+    some : container of int
+        Which rows.
+    times : int
+        So many times as many as proxies need.
     """
     leaves, wood = [], []
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
     for first, end in zip(trunk, [*trunk[1:], len(rows)], strict=True):
-        walk = _Walk(rows, int(first), int(end), leaf_area, length)
-        for row in range(first, end):
+        walk = _Walk(rows, int(first), int(end), leaf_area, length, times)
+        for row in filter(some.__contains__, range(first, end)):
             for points, area, out in ((walk.leaves, leaf_area, leaves), (walk.wood, wood_area, wood)):
                 if area[row].sum() > 0:
                     out.append((row, *walk.sampled(points, row, area[row])))
@@ -164,8 +170,8 @@ class _Walk:
     those of each row that paths have followed, ``leaves`` and ``wood`` what they have met.
     """
 
-    def __init__(self, rows: Table, first: int, end: int, leaf_area: Floats, length: Floats) -> None:
-        self.rows, self.first = rows, first
+    def __init__(self, rows: Table, first: int, end: int, leaf_area: Floats, length: Floats, times: int) -> None:
+        self.rows, self.first, self.times = rows, first, times
         self.length = np.where(length[first:end] > 0, length[first:end], 1.0) / max(length[first], 1e-9)
         self.scale = 1 / max(length[first], 1e-9)
         drawn = rows["drawn"][first:end]
@@ -250,11 +256,11 @@ class _Walk:
         area = points.area[own] * (expected / np.where(met > 0, met, 1))[points.row[own]]
         base, under = self.branches[i], points.line[own, self.slot[i]] - self.start[i]
         place = _in_bands(points, own, base, under)
-        group, numbers = np.zeros(len(own), np.int64), np.full(_CLASSES, int(SAMPLES * self.fraction[i]))
+        group, numbers = np.zeros(len(own), np.int64), np.full(_CLASSES, int(self.times * SAMPLES * self.fraction[i]))
         first = np.zeros(_CLASSES, np.int64)
         if self.rows["tropic"][row]:
             group = _GROUPS[_stand_classes(base.frame[:, 2, :])][under]
-            numbers = (np.where(_UPRIGHT, _OF_UPRIGHT, _OF_CLASS) * self.fraction[i]).astype(np.int64)
+            numbers = (self.times * np.where(_UPRIGHT, _OF_UPRIGHT, _OF_CLASS) * self.fraction[i]).astype(np.int64)
             distinct = np.where(np.arange(_CLASSES) == _GROUPS, numbers, 0)
             first = (np.cumsum(distinct) - distinct)[_GROUPS]
             pick = systematic(area, group, place, distinct)

@@ -298,21 +298,36 @@ class _Tile:
         self._leave_out(self.number - most)
 
     def _leave_out(self, number: float) -> None:
-        """Leave out so many of the facets that nobody sees, should there be more than allowed; all alike by a hash."""
-        unseen = {what: joined(some) for what, some in self._facets.items() if not what[1]}
-        there = sum(map(len, unseen.values()))
-        if number <= 0 or not there:
-            return
-        keys = np.concatenate([uniform(_keys_of(_places(some)), _LEFT) for some in unseen.values()])
-        left = max(there - int(np.ceil(number)), 0)
-        kept = np.zeros(there, bool)
-        kept[np.argsort(keys, kind="stable")[:left]] = True
-        start = 0
-        for what, some in unseen.items():
-            self._facets[what] = [some.take(np.flatnonzero(kept[start : start + len(some)]))]
-            start += len(some)
-        self._facets = {what: some for what, some in self._facets.items() if sum(map(len, some))}
-        self.number -= there - left
+        """Leave out so many things, should there be more than allowed.
+
+        First go facets that nobody sees, then the smallest faces in the image, at last facets that are seen; of facets
+        all alike by a hash.
+        """
+        extent_around = self.given.camera.extent_around
+
+        def size(mesh: MeshBuffers) -> NDArray[np.float64]:
+            faces = _facets_of_faces(*_corners_of_faces(mesh), mesh, np.arange(mesh.polygons))
+            return faces.side / extent_around(faces.center)
+
+        for seen in (False, None, True):
+            there: dict[Any, Any] = {what: joined(own) for what, own in self._facets.items() if what[1] == seen}
+            if seen is None:
+                there = {what: concatenate_buffers(own) for what, own in self._meshes.items()}
+            ranks = [size(one) if seen is None else uniform(_keys_of(_places(one)), _LEFT) for one in there.values()]
+            first = np.cumsum([0, *map(len, ranks)])
+            gone = int(min(np.ceil(max(number, 0.0)), first[-1]))
+            if not gone:
+                continue
+            kept = np.ones(first[-1], bool)
+            kept[np.argsort(np.concatenate(ranks), kind="stable")[:gone]] = False
+            for (what, one), own in zip(there.items(), np.split(kept, first[1:-1]), strict=True):
+                if seen is None:
+                    self._meshes[what] = [kept_faces(one, own)]
+                elif own.any():
+                    self._facets[what] = [one.take(np.flatnonzero(own))]
+                else:
+                    del self._facets[what]
+            self.number, number = self.number - gone, number - gone
 
     def draw_outside(self, parts: Sequence[Arrays], share: float) -> None:
         """Parts out of view, a share of all of them."""
@@ -349,9 +364,7 @@ class _Tile:
         """As of `Canvas`."""
         if buffers is None or not buffers.polygons:
             return
-        size, first = np.diff(buffers.face_offsets), buffers.face_offsets[:-1]
-        every = first[:, None] + np.minimum(np.arange(int(size.max())), size[:, None] - 1)
-        corners = buffers.positions[buffers.corner_verts[every]]
+        corners, _ = _corners_of_faces(buffers)
         if culled:
             self._waiting.append((what, buffers, corners))
             return
@@ -557,6 +570,13 @@ def quarters(facets: Facets) -> Facets:
     half = replace(facets, side=0.5 * facets.side)
     parts = [replace(half, center=0.5 * (facets.center + corners[:, k])) for k in range(3)]
     return Facets.concatenate([*parts, replace(half, across=-facets.across, along=-facets.along)])
+
+
+def _corners_of_faces(mesh: MeshBuffers) -> tuple[NDArray[np.float32], NDArray[np.integer]]:
+    """Corners (f, k, 3) of one or more faces, the last of which repeats beyond their size (f,), and that."""
+    size, first = np.diff(mesh.face_offsets), mesh.face_offsets[:-1]
+    every = first[:, None] + np.minimum(np.arange(int(size.max())), size[:, None] - 1)
+    return mesh.positions[mesh.corner_verts[every]], size
 
 
 def _facets_of_faces(

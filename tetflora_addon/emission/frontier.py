@@ -28,6 +28,8 @@ DETAIL, FEW = 3.0, 3.0
 #: Facets for each pixel of a cell that are made at a time, about, and how many are made at least in all cells: what
 #: these hide of each other is not known when they are made.
 SLAB, LEAST = 0.8, 40_000.0
+#: So many times as many before anything is known of what parts hide of each other.
+FIRST = 2.0
 
 #: One-sided layers of leaves that are enough where nothing is seen, and how much of its box a crown fills.
 LAYERS, FILLED = 6.0, 0.6
@@ -188,7 +190,9 @@ class Frontier:
 
         In each cell of the image these are the nearest ones, which have no more than about so many facets in all.
         """
-        pools, dense = list(map(self.pool, self.kinds, parts)), SLAB * CELL**2
+        pools = list(map(self.pool, self.kinds, parts))
+        cells = len(np.unique(np.concatenate([pool.cell for pool in pools])))
+        dense = min(SLAB * CELL**2, FIRST * most / max(cells, 1))
         for pool, *left in zip(pools, self.hidden, self.outside, strict=True):
             for one in left:
                 one.append(pool.take(slice(0)))

@@ -9,6 +9,7 @@ them before anything is compiled.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -81,7 +82,14 @@ def _laterals(order: Order) -> tuple[Floats, Floats, Floats | float]:
     return at, shorter * _ratios(order, fraction), weight
 
 
+@lru_cache
+def _even_ratios(profile: int) -> Floats:
+    return crown_ratio(np.full(EVEN.shape, profile), 1 - EVEN)
+
+
 def _ratios(order: Order, fraction: Floats) -> Floats:
+    if fraction is EVEN:  # of all that are full-grown, again and again
+        return _even_ratios(CROWN_PROFILES.index(order.crown))
     return crown_ratio(np.full(fraction.shape, CROWN_PROFILES.index(order.crown)), 1 - fraction)
 
 
@@ -93,6 +101,7 @@ def least_length(order: Order) -> float:
     return float((_ratios(order, fraction) * (1 - order.growing.conical * fraction)).min())
 
 
+@lru_cache(maxsize=256)
 def expected_forks(forks: Range, power: float = 1.0) -> float:
     """Mean of n^power, for the n stems into which a branch divides (`growth.branch_counts`)."""
     wanted = forks.mean + forks.variation * (2 * EVEN - 1)

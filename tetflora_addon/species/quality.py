@@ -83,11 +83,14 @@ def with_quality(species: Species, quality: float) -> Species:
         dead = species.dead
         few = {"number": dead.number.scaled(quality), "on_limbs": dead.on_limbs.scaled(quality)}
         species = replace(species, dead=replace(dead, **few))
+    members = expected_members(species)  # in which sides and segments have no part
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
-    detail = _bisected(lambda d: expected_polygons(_thinned(_shaped(species, _shapes(species, d)), d)), target)
-    shaped = _shaped(species, [(round(k), round(s)) for k, s in _shapes(species, detail)])
-    detail = _bisected(lambda d: expected_polygons(_thinned(shaped, d)), target)
-    return _kept(species, _thinned(shaped, detail))
+    detail = _bisected(
+        lambda d: expected_polygons(_thinned(_shaped(species, _shapes(species, members, d)), members, d)), target
+    )
+    shaped = _shaped(species, [(round(k), round(s)) for k, s in _shapes(species, members, detail)])
+    detail = _bisected(lambda d: expected_polygons(_thinned(shaped, members, d)), target)
+    return _kept(species, _thinned(shaped, members, detail))
 
 
 def _tiers(species: Species) -> list[Order]:
@@ -116,10 +119,10 @@ def _bisected(polygons: Callable[[float], float], target: float) -> float:
     return (low + high) / 2
 
 
-def _shapes(species: Species, detail: float) -> list[tuple[float, float]]:
+def _shapes(species: Species, members: Members, detail: float) -> list[tuple[float, float]]:
     """Sides and segments of each order, not yet whole numbers."""
     shapes = []
-    for order, number in zip(_tiers(species), _numbers(expected_members(species), species)[0], strict=True):
+    for order, number in zip(_tiers(species), _numbers(members, species)[0], strict=True):
         if detail >= 1:
             more = detail - 1
             rounder = _ROUNDER ** (min(more, _ROUND) + _SLOWER * max(more - _ROUND, 0.0))
@@ -152,9 +155,8 @@ def _left(number: float, detail: float, pace: float = 1.0) -> float:
     return base ** (detail - 1 if detail < 1 else pace * (detail - 1))
 
 
-def _thinned(species: Species, detail: float) -> Species:
+def _thinned(species: Species, members: Members, detail: float) -> Species:
     """The species with other numbers of branches and leaves, and leaves of such a size that their area is kept."""
-    members = expected_members(species)
     branches, tiers = members.branches, _tiers(species)
     foliage = _left(max(sum(_numbers(members, species)[1]), 2 * _FEW), detail)
     spurs = _left(members.spurs, detail, _crowd(members.spurs))

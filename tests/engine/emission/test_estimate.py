@@ -124,6 +124,20 @@ def test_as_many_are_made(name, monkeypatch):
     assert 1 / 1.5 < _estimate(stand, camera).primitives / made < 1.5
 
 
+def test_as_many_leaves_hang_at_the_height_of_eyes():
+    """Next to none of a birch's are there, but these are all that somebody sees who stands before it."""
+    species = load_species("birch")
+    flora, parts, height = compile_species([species]), crown_of(species).parts, 3.5
+    leaf = parts.form >= 0
+    low = np.array([0, 0])
+    for seed in range(1, 4):
+        whole = support.whole_of(flora, support.grown(flora, support.plants(seed))[1])
+        place = support.leaves_of(flora, whole.branches)[1]
+        low += (place[:, 2] < height).sum(), len(place)
+    share = parts.number[leaf & (parts.position[:, 2] < height)].sum() / parts.number[leaf].sum()
+    assert 1 / 1.5 < share / (low[0] / low[1]) < 1.5
+
+
 @pytest.mark.parametrize("name", ["birch at 3 m", "bushes", "near birches", "mixed"])
 def test_as_many_are_expanded(name):
     """Polygons of all plants, those at hand as finely as the camera sees them, and the memory for these."""
