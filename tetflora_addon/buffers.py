@@ -16,38 +16,20 @@ BLOCK_POLYGONS = 250_000
 
 @dataclass(frozen=True)
 class MeshBuffers:
-    """One mesh, ready to be copied into a Blender mesh without any further computation.
+    """One mesh, ready to be copied into a Blender mesh without any further computation."""
 
-    Attributes
-    ----------
-    positions : (v, 3) float32
-        Vertices, meters, world space.
-    edge_verts : (e, 2) int32
-        The two vertices of each edge.
-    corner_verts, corner_edges : (c,) int32
-        Vertex of each face corner, and the edge that leads from it to the next corner.
-    face_offsets : (f + 1,) int32
-        Where each face's corners start; the last entry is ``c``.
-    attributes : mapping of str to (str, ndarray)
-        Name to domain (``'POINT'``, ``'FACE'`` or ``'CORNER'``) and values: ``(n,)``, ``(n, 2)`` or ``(n, 3)`` float32,
-        or ``(n,)`` int32.
-    smooth : bool
-        Whether faces are shaded smooth.
-    species : int or None
-        The species all of it is of, if that is known; −1 for assets.
-    look : str
-        Of the surfaces or assets that it stands for, where it is of no species.
-    """
-
-    positions: NDArray[np.float32]
-    edge_verts: NDArray[np.int32]
+    positions: NDArray[np.float32]  # (v, 3): vertices, meters, world space
+    edge_verts: NDArray[np.int32]  # (e, 2): the two vertices of each edge
+    #: corner_verts, corner_edges: (c,): Vertex of each face corner, and the edge that leads from it to the next corner
     corner_verts: NDArray[np.int32]
     corner_edges: NDArray[np.int32]
-    face_offsets: NDArray[np.int32]
+    face_offsets: NDArray[np.int32]  # (f + 1,): where each face's corners start; the last entry is ``c``
+    #: Name to domain (``'POINT'``, ``'FACE'`` or ``'CORNER'``) and values: ``(n,)``, ``(n, 2)`` or ``(n, 3)`` float32,
+    #: or ``(n,)`` int32
     attributes: Mapping[str, tuple[str, NDArray]] = field(default_factory=dict)
-    smooth: bool = False
-    species: int | None = None
-    look: str = ""
+    smooth: bool = False  # whether faces are shaded smooth
+    species: int | None = None  # the species all of it is of, if that is known; −1 for assets
+    look: str = ""  # of the surfaces or assets that it stands for, where it is of no species
 
     @property
     def polygons(self) -> int:
@@ -63,23 +45,13 @@ class MeshBuffers:
 
 @dataclass(frozen=True)
 class PointBuffers:
-    """One cloud of points that are drawn as spheres.
+    """One cloud of points that are drawn as spheres."""
 
-    Attributes
-    ----------
-    positions : (n, 3) float32
-        Centers, meters, world space.
-    radius : (n,) float32
-        Meters.
-    attributes : mapping of str to ndarray
-        Name to values of the points: ``(n,)`` or ``(n, 3)`` float32.
-    species, look : int or None, str
-        As of meshes.
-    """
-
-    positions: NDArray[np.float32]
-    radius: NDArray[np.float32]
+    positions: NDArray[np.float32]  # (n, 3): centers, meters, world space
+    radius: NDArray[np.float32]  # (n,): meters
+    #: Name to values of the points: ``(n,)`` or ``(n, 3)`` float32
     attributes: Mapping[str, NDArray] = field(default_factory=dict)
+    #: species, look: As of meshes
     species: int | None = None
     look: str = ""
 

@@ -18,24 +18,12 @@ _MOMENT = 0.005  # seconds of sleep while a thread computes
 
 @dataclass(frozen=True)
 class Progress:
-    """One step of a job.
+    """One step of a job."""
 
-    Attributes
-    ----------
-    fraction : float
-        0 to 1, an estimate.
-    message : str
-        For the status bar.
-    waiting : bool
-        Whether nothing is new: the next step waits as well.
-    partial : bool
-        Whether something small is half done: whoever looks after the job may do that later.
-    """
-
-    fraction: float
-    message: str
-    waiting: bool = False
-    partial: bool = False
+    fraction: float  # 0 to 1, an estimate
+    message: str  # for the status bar
+    waiting: bool = False  # whether nothing is new: the next step waits as well
+    partial: bool = False  # whether something small is half done: whoever looks after the job may do that later
 
     @property
     def repeated(self) -> Progress:

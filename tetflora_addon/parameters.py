@@ -64,34 +64,21 @@ class Color(NamedTuple):
 
 @dataclass(frozen=True)
 class Key:
-    """What files may have for a field, and what it means.
+    """What files may have for a field, and what it means."""
 
-    Attributes
-    ----------
-    low, high : float, or tuple of float
-        Limits, inclusive; of a pair they may be two as well, of a text they count characters. A range is written
-        ``[mean, variation]``, or as a number where it has no variation; mean − variation and mean + variation both have
-        to lie in the limits.
-    meaning, unit : str
-        For the documentation and for tooltips.
-    choices : tuple of str
-        Names of which it is one.
-    follows : str
-        Key of the same object whose mean is the default.
-    written : str
-        The key in files where it is not the field's name.
-    kind, default, field, needed
-        From the field: one of `KINDS` or ``choice``, what stands for a key that is left out, the field's name, and
-        whether the key must be there.
-    """
-
+    #: low, high: Limits, inclusive; of a pair they may be two as well, of a text they count characters. A range is
+    #: written ``[mean, variation]``, or as a number where it has no variation; mean − variation and mean + variation
+    #: both have to lie in the limits.
     low: Any
     high: Any
+    #: meaning, unit: For the documentation and for tooltips
     meaning: str
     unit: str = ""
-    choices: tuple[str, ...] = ()
-    follows: str = ""
-    written: str = ""
+    choices: tuple[str, ...] = ()  # names of which it is one
+    follows: str = ""  # key of the same object whose mean is the default
+    written: str = ""  # the key in files where it is not the field's name
+    #: kind, default, field, needed: From the field: one of `KINDS` or ``choice``, what stands for a key that is left
+    #: out, the field's name, and whether the key must be there
     kind: str = ""
     default: Any = None
     field: str = ""

@@ -41,23 +41,12 @@ _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
 
 @dataclass(frozen=True)
 class BiomeResult:
-    """What adding or planting a biome made.
-
-    Attributes
-    ----------
-    name : str
-    layers : list of (str, int)
-        Names of the layers, and how many plants each has.
-    bare : list of str
-        Why layers have no plants.
-    kept : list of str
-        Grounds that keep a material of the artist's.
-    """
+    """What adding or planting a biome made."""
 
     name: str
-    layers: list[tuple[str, int]]
-    bare: list[str]
-    kept: list[str]
+    layers: list[tuple[str, int]]  # names of the layers, and how many plants each has
+    bare: list[str]  # why layers have no plants
+    kept: list[str]  # grounds that keep a material of the artist's
 
 
 @job("Adding the biome")

@@ -63,21 +63,14 @@ STAND_ENTRY = ("species", "planted", "incoming_seeds")
 
 @dataclass(frozen=True)
 class Biome:
-    """A biome as its file has it, checked.
-
-    Attributes
-    ----------
-    layers : list of dict
-        Each with ``kind`` and the keys of that.
-    species : dict
-        Species of its own by identifier: whole pages, or what differs from one ``of`` the catalog, and what differs
-        in ``every_order`` of that.
-    """
+    """A biome as its file has it, checked."""
 
     identifier: str
     name: str
-    layers: list[dict[str, Any]]
+    layers: list[dict[str, Any]]  # each with ``kind`` and the keys of that
     description: str = ""
+    #: Species of its own by identifier: whole pages, or what differs from one ``of`` the catalog, and what differs in
+    #: ``every_order`` of that
     species: dict[str, dict[str, Any]] = field(default_factory=dict)
     limits: dict[str, float] = field(default_factory=dict)
     gives_way: bool = True

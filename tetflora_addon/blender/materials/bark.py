@@ -73,106 +73,55 @@ _WILLOW: Tones = (
 
 @dataclass(frozen=True)
 class Bark:
-    """One character of bark.
+    """One character of bark."""
 
-    Attributes
-    ----------
-    pattern : callable
-        (graph, place) → (factors of the color, height in widths of a feature): terms.
-    scale : float
-        Features to a radius, on a branch of .25 m radius; 2π times as many around it.
-    stretch : float
-        How much longer along the branch than around it features are.
-    mean : (3,) float
-        Mean of the pattern's factors over the surface, measured.
-    contrast : float
-        1: factors as the pattern has them.
-    depth : float
-        Of the relief, in widths of a feature.
-    smooth, full : float
-        Perimeters under which there is no pattern, and over which it is complete, meters.
-    moss, lichen : float
-        How much of it there is.
-    power : float
-        Features to a radius go by this power of the radius: at 1 they are as wide on all branches.
-    """
-
+    #: (graph, place) → (factors of the color, height in widths of a feature): terms
     pattern: Callable[[Graph, Place], tuple[Term, Term]]
-    scale: float
-    stretch: float
-    mean: tuple[float, float, float]
-    contrast: float
-    depth: float
+    scale: float  # features to a radius, on a branch of .25 m radius; 2π times as many around it
+    stretch: float  # how much longer along the branch than around it features are
+    mean: tuple[float, float, float]  # (3,): mean of the pattern's factors over the surface, measured
+    contrast: float  # 1: factors as the pattern has them
+    depth: float  # of the relief, in widths of a feature
+    #: smooth, full: Perimeters under which there is no pattern, and over which it is complete, meters
     smooth: float
     full: float
+    #: moss, lichen: How much of it there is
     moss: float = 0.0
     lichen: float = 0.0
-    power: float = 0.5
+    power: float = 0.5  # features to a radius go by this power of the radius: at 1 they are as wide on all branches
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where on a branch a point lies, as terms.
+    """Where on a branch a point lies, as terms."""
 
-    Attributes
-    ----------
-    round : vector
-        On the cylinder of radius 1, moved by the branch's color.
-    cells : vector
-        The same in features: their widths around the branch, their lengths along it.
-    turn, along : number
-        Turns around the branch, and radii along it from its base.
-    scale, stretch : number
-        Features to a radius, and their length over their width.
-    girth : number
-        Length around the branch at its base, meters.
-    """
-
-    round: Term
-    cells: Term
+    round: Term  # on the cylinder of radius 1, moved by the branch's color
+    cells: Term  # the same in features: their widths around the branch, their lengths along it
+    #: turn, along: Turns around the branch, and radii along it from its base
     turn: Term
     along: Term
+    #: scale, stretch: Features to a radius, and their length over their width
     scale: Term
     stretch: Term
-    girth: Term
+    girth: Term  # length around the branch at its base, meters
 
 
 @dataclass(frozen=True)
 class Cell:
-    """The cell of a scatter of points in which a place lies, as terms.
+    """The cell of a scatter of points in which a place lies, as terms."""
 
-    Attributes
-    ----------
-    border : number
-        Distance to the plane halfway to the next point.
-    across : number
-        How steeply that border crosses the branch: 0 where it runs along, 1 where around.
-    random : three numbers
-        Of this cell.
-    off : vector
-        Place, from the middle of the cell.
-    """
-
-    border: Term
-    across: Term
-    random: tuple[Term, Term, Term]
-    off: Term
+    border: Term  # distance to the plane halfway to the next point
+    across: Term  # how steeply that border crosses the branch: 0 where it runs along, 1 where around
+    random: tuple[Term, Term, Term]  # of this cell
+    off: Term  # place, from the middle of the cell
 
 
 @dataclass(frozen=True)
 class Knot:
-    """The nearest scar of a shed branch, as terms.
+    """The nearest scar of a shed branch, as terms."""
 
-    Attributes
-    ----------
-    off : vector
-        Place from its middle, in sizes of its eye.
-    far : number
-        Length of that; large where there is none.
-    """
-
-    off: Term
-    far: Term
+    off: Term  # place from its middle, in sizes of its eye
+    far: Term  # length of that; large where there is none
 
 
 def place_group() -> bpy.types.NodeTree:

@@ -33,23 +33,15 @@ _MOST_BYTES = 512 << 20
 
 @dataclass(frozen=True)
 class Pyramid:
-    """Copies of an image, each half as wide as the one before.
+    """Copies of an image, each half as wide as the one before."""
 
-    Attributes
-    ----------
-    texels : (n,) uint64
-        Of all copies; each is four float16: linear RGB times alpha, and alpha.
-    start, columns, rows : (l,) int32
-        First texel, and size, of each copy.
-    width, height : (l,) float32
-        Texels that the whole image would be wide and high in each copy; of sizes that are no power of two, the last
-        texels stick out.
-    """
-
-    texels: NDArray[np.uint64]
+    texels: NDArray[np.uint64]  # (n,): of all copies; each is four float16: linear RGB times alpha, and alpha
+    #: start, columns, rows: (l,): First texel, and size, of each copy
     start: NDArray[np.int32]
     columns: NDArray[np.int32]
     rows: NDArray[np.int32]
+    #: width, height: (l,): Texels that the whole image would be wide and high in each copy; of sizes that are no power
+    #: of two, the last texels stick out
     width: NDArray[np.float32]
     height: NDArray[np.float32]
 
@@ -225,43 +217,23 @@ class MeshLayers:
 
 @dataclass
 class Plan:
-    """How one material is evaluated on one mesh; a point where everything has its mean, which notes what is asked for.
+    """How a material is evaluated on a mesh; a point where everything has its mean, which notes what is asked for."""
 
-    Attributes
-    ----------
-    name : str
-        Of the material, for messages.
-    problems : list of str
-        For the artist.
-    viewport : (3,) float32
-        The material's color in viewports, for images that are missing.
-    constant : (5,) float32
-        Cover, color times cover, and the lightness of what goes through; of where all has its mean, if it varies.
-    surface : bpy.types.NodeSocket, optional
-        What its shaders lead to; None if it has none.
-    is_known : bool
-        Whether its transmission is.
-    maps, colors : list of str
-        UV maps and other attributes that it depends on.
-    texels : float
-        Of the finest image, along a unit of texture coordinates.
-    uneven : bool
-        Whether it is not the mean that comes out for the mean.
-    """
-
-    name: str
+    name: str  # of the material, for messages
     layers: MeshLayers
     reader: FaceReader
-    viewport: NDArray[np.float32]
+    viewport: NDArray[np.float32]  # (3,): the material's color in viewports, for images that are missing
+    #: (5,): Cover, color times cover, and the lightness of what goes through; of where all has its mean, if it varies
     constant: NDArray[np.float32]
-    problems: list[str] = field(default_factory=list)
-    surface: bpy.types.NodeSocket | None = None
-    is_known: bool = False
+    problems: list[str] = field(default_factory=list)  # for the artist
+    surface: bpy.types.NodeSocket | None = None  # what its shaders lead to; None if it has none
+    is_known: bool = False  # whether its transmission is
+    #: maps, colors: UV maps and other attributes that it depends on
     maps: list[str] = field(default_factory=list)
     colors: list[str] = field(default_factory=list)
     images: set[bpy.types.Image] = field(default_factory=set)
-    texels: float = 1.0
-    uneven: bool = False
+    texels: float = 1.0  # of the finest image, along a unit of texture coordinates
+    uneven: bool = False  # whether it is not the mean that comes out for the mean
 
     def tell(self, problem: str) -> None:
         """Add a problem; those that are told already are left out."""

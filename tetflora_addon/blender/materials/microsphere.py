@@ -349,26 +349,17 @@ def _builder(group: Any) -> Any:
 
 @dataclass(frozen=True)
 class _Path:
-    """The ray's way through the cell, from the face that was hit.
+    """The ray's way through the cell, from the face that was hit."""
 
-    Attributes
-    ----------
-    length : Term
-        Meters inside the cell that count at this face.
-    transmittance, depth : Term
-        e^{−κℓ}, and κℓ.
-    levels, slopes : list of Term
-        The four barycentric coordinates at the hit, in the order of the vertices, and what they lose a meter.
-    leaving : Term
-        1 on the faces where the ray leaves.
-    """
-
-    length: Term
+    length: Term  # meters inside the cell that count at this face
+    #: transmittance, depth: e^{−κℓ}, and κℓ
     transmittance: Term
     depth: Term
+    #: levels, slopes: The four barycentric coordinates at the hit, in the order of the vertices, and what they lose a
+    #: meter
     levels: list[Term]
     slopes: list[Term]
-    leaving: Term
+    leaving: Term  # 1 on the faces where the ray leaves
 
 
 def _paths(graph: Graph, geometry: dict[str, Term]) -> dict[str, _Path]:

@@ -210,21 +210,11 @@ _SIMPLE = {
 
 
 class Scattered(NamedTuple):
-    """What points of a surface do with light.
+    """What points of a surface do with light."""
 
-    Attributes
-    ----------
-    cover : (p, k)
-        Fraction that is not transparent.
-    color : (3, p, k)
-        Fraction of light that is scattered to either side; none where transparent.
-    through : (p, k)
-        Lightness of the part that leaves on the other side.
-    """
-
-    cover: Values
-    color: Values
-    through: Values
+    cover: Values  # (p, k): fraction that is not transparent
+    color: Values  # (3, p, k): fraction of light that is scattered to either side; none where transparent
+    through: Values  # (p, k): lightness of the part that leaves on the other side
 
 
 _ONE, _NONE = np.ones((1, 1), np.float32), np.zeros((1, 1), np.float32)

@@ -77,17 +77,10 @@ class Ingredient:
 
 @dataclass(frozen=True)
 class CoverResult:
-    """What covering made.
-
-    Attributes
-    ----------
-    made : Made
-    bare : list of str
-        Grounds that keep a material of the artist's.
-    """
+    """What covering made."""
 
     made: PlacedPlants
-    bare: list[str]
+    bare: list[str]  # grounds that keep a material of the artist's
 
 
 def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:

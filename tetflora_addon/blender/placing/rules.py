@@ -232,20 +232,14 @@ def set_grounds(population: bpy.types.PropertyGroup, grounds: Iterable[bpy.types
 
 @dataclass(frozen=True)
 class Search:
-    """All that the places of a population's plants depend on, as it was read from Blender.
-
-    Attributes
-    ----------
-    species : tuple of str
-        Identifiers that placements count through.
-    """
+    """All that the places of a population's plants depend on, as it was read from Blender."""
 
     ground: Terrain
     rules: Rules
     present: tuple[NDArray[np.float64], NDArray[np.int32]]
     suits: Callable[[], Mapping[int, Suits]]
     erased: tuple[Path, ...]
-    species: tuple[str, ...]
+    species: tuple[str, ...]  # identifiers that placements count through
     zones: tuple[Zone, ...] = ()
 
     def placement(self) -> Placement:

@@ -38,21 +38,11 @@ def grid_mesh(name: str, points: NDArray[np.float64]) -> bpy.types.Mesh:
 
 @dataclass(frozen=True)
 class Line:
-    """One curve.
+    """One curve."""
 
-    Attributes
-    ----------
-    points : (k, 2) float64
-        On the map, meters.
-    cyclic : bool
-        The last point is joined to the first, which is not repeated.
-    half_width : float
-        Width that its bevel adds to each side, meters.
-    """
-
-    points: NDArray[np.float64]
-    cyclic: bool
-    half_width: float
+    points: NDArray[np.float64]  # (k, 2): on the map, meters
+    cyclic: bool  # the last point is joined to the first, which is not repeated
+    half_width: float  # width that its bevel adds to each side, meters
 
 
 def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line]:

@@ -261,53 +261,28 @@ _OWN = {"position", "material_index", "sharp_face", "sharp_edge", "custom_normal
 
 @dataclass(frozen=True)
 class AttributeArray:
-    """An attribute of a mesh.
+    """An attribute of a mesh."""
 
-    Attributes
-    ----------
-    domain : {'POINT', 'FACE', 'CORNER'}
-    data_type : str
-        One of `attributes.KINDS`.
-    values : (n,) or (n, width)
-    """
-
-    domain: str
-    data_type: str
-    values: NDArray
+    domain: str  # {'POINT', 'FACE', 'CORNER'}
+    data_type: str  # one of `attributes.KINDS`
+    values: NDArray  # (n,) or (n, width)
 
 
 @dataclass(frozen=True)
 class SurfaceArrays:
-    """All of one mesh that renderers read.
+    """All of one mesh that renderers read."""
 
-    Attributes
-    ----------
-    positions : (v, 3) float32
-    corner_verts : (c,) int32
-    face_offsets : (f + 1,) int32
-    slots : (f,) int32
-        Material of each face.
-    materials : list of bpy.types.Material or None
-        At least one.
-    rendered : (str, str)
-        Names of the UV map and the color attribute that materials read if they name none; empty without any.
-    normals : (c, 3) float32 or None
-        Of corners; None where all faces are flat.
-    flat : (f,) bool
-    texture_space : (2, 3) float64
-        Location and size of the box that generated coordinates fill.
-    """
-
-    positions: NDArray[np.float32]
-    corner_verts: NDArray[np.int32]
-    face_offsets: NDArray[np.int32]
-    slots: NDArray[np.int32]
-    materials: list[bpy.types.Material | None]
+    positions: NDArray[np.float32]  # (v, 3)
+    corner_verts: NDArray[np.int32]  # (c,)
+    face_offsets: NDArray[np.int32]  # (f + 1,)
+    slots: NDArray[np.int32]  # (f,): material of each face
+    materials: list[bpy.types.Material | None]  # at least one
     layers: Mapping[str, AttributeArray]
+    #: (str, str): Names of the UV map and the color attribute that materials read if they name none; empty without any
     rendered: tuple[str, str]
-    normals: NDArray[np.float32] | None
-    flat: NDArray[np.bool_]
-    texture_space: NDArray[np.float64]
+    normals: NDArray[np.float32] | None  # (c, 3): of corners; None where all faces are flat
+    flat: NDArray[np.bool_]  # (f,)
+    texture_space: NDArray[np.float64]  # (2, 3): location and size of the box that generated coordinates fill
 
 
 def read_mesh(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> SurfaceArrays:

@@ -106,19 +106,11 @@ def _emission(data: bpy.types.Light) -> bpy.types.Node | None:
 
 @dataclass(frozen=True)
 class WorldLight:
-    """Light of the world.
-
-    Attributes
-    ----------
-    suns : tuple of Light
-        The sun's disc of a sky.
-    note : str
-        What is not supported and how it counts instead; empty if nothing.
-    """
+    """Light of the world."""
 
     world: World
-    suns: tuple[Light, ...] = ()
-    note: str = ""
+    suns: tuple[Light, ...] = ()  # the sun's disc of a sky
+    note: str = ""  # what is not supported and how it counts instead; empty if nothing
 
 
 def read_world(scene: bpy.types.Scene) -> WorldLight:

@@ -37,25 +37,14 @@ _SOON, _PATIENCE = 0.3, 30.0  # seconds to the next look, and times that one too
 
 @dataclass(frozen=True)
 class Warned:
-    """Something that is wrong.
+    """Something that is wrong."""
 
-    Attributes
-    ----------
-    key : str
-        Names it for `mend`.
-    short, text : str
-        In a few letters beside a button, and at length.
-    button : str
-        What a click does, empty where none can; where ``mend`` is missing, an operator does it.
-    mend : callable, optional
-        Does that to a scene.
-    """
-
-    key: str
+    key: str  # names it for `mend`
+    #: short, text: In a few letters beside a button, and at length
     short: str
     text: str
-    button: str = ""
-    mend: Callable[[bpy.types.Scene], object] | None = None
+    button: str = ""  # what a click does, empty where none can; where ``mend`` is missing, an operator does it
+    mend: Callable[[bpy.types.Scene], object] | None = None  # does that to a scene
 
 
 _found: dict[int, list[Warned]] = {}
