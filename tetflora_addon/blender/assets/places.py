@@ -209,19 +209,12 @@ def _target(datablock: bpy.types.Object | bpy.types.Collection) -> Target:
 
 
 class Scatter:
-    """What one object scatters: what it instances is followed to its assets, with all places at once.
-
-    Attributes
-    ----------
-    places : list of Places
-        Each target once, when all has been followed.
-    left : dict of str to int
-        Instances that are no assets, by name and number: empties, lights, cameras and volumes.
-    """
+    """What one object scatters: what it instances is followed to its assets, with all places at once."""
 
     def __init__(self, owner: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         self.owner, self.depsgraph = owner, depsgraph
-        self.places: list[Places] = []
+        self.places: list[Places] = []  # each target once, when all has been followed
+        #: Instances that are no assets, by name and number: empties, lights, cameras and volumes
         self.left: dict[str, int] = {}
         self._parts: dict[Target, list[tuple[NDArray, NDArray]]] = {}
         self._faces: dict[Target, bool] = {}

@@ -443,18 +443,11 @@ class FaceReader:
     ----------
     most : int
         See `pyramid_of`.
-
-    Attributes
-    ----------
-    warnings : list of str
-        What the artist should know, each once.
-    curves : dict of int to ndarray
-        Tables of ramps, see `NodeValues`.
     """
 
     def __init__(self, most: int = MOST_TEXELS) -> None:
-        self.warnings: list[str] = []
-        self.curves: dict[int, NDArray[np.float32]] = {}
+        self.warnings: list[str] = []  # what the artist should know, each once
+        self.curves: dict[int, NDArray[np.float32]] = {}  # tables of ramps, see `NodeValues`
         self._most = most
         self._pyramids: dict[tuple[bpy.types.Image, bool], Pyramid | None] = {}
 
@@ -479,13 +472,7 @@ class FaceReader:
 
 
 class MeshLooks:
-    """The looks of one mesh, evaluated piece by piece.
-
-    Attributes
-    ----------
-    plans : list of Plan
-        One for each material.
-    """
+    """The looks of one mesh, evaluated piece by piece."""
 
     def __init__(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], reader: FaceReader) -> None:
         maps = mesh.uv_layers
@@ -493,7 +480,7 @@ class MeshLooks:
         types = {a.name: a.data_type for a in mesh.attributes if a.domain in _DOMAINS and a.data_type in _TYPES}
         self.materials = materials
         layers = MeshLayers(first, types)
-        self.plans = [_plan_of(material, layers, reader) for material in materials]
+        self.plans = [_plan_of(material, layers, reader) for material in materials]  # one for each material
         self._values: dict[str, tuple[str, NDArray]] = {}
         for name in {name for plan in self.plans for name in plan.names}:
             attribute = mesh.attributes[name]

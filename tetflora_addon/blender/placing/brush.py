@@ -71,18 +71,7 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
 
 
 class Standing:
-    """Plants of a scene that stand by themselves or in fields, as arrays.
-
-    Attributes
-    ----------
-    places : (n, 3) float64
-        World space.
-    source : (n,) int32
-        Index into ``fields``, or -1 for ``objects``.
-    number : (n,) int64
-        Index into ``objects``, or point of the field.
-    removable : (n,) bool
-    """
+    """Plants of a scene that stand by themselves or in fields, as arrays."""
 
     def __init__(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, covers: bool) -> None:
         """Read a scene, with or without what covers the ground."""
@@ -104,9 +93,11 @@ class Standing:
             source.append(np.full(len(found), index))
             number.append(np.arange(len(found)))
             removable.append(np.full(len(found), own and field.visible_get()))
-        self.places = np.concatenate(places)
+        self.places = np.concatenate(places)  # (n, 3): world space
+        #: number: (n,): Index into ``objects``, or point of the field
+        #: source: (n,): Index into ``fields``, or -1 for ``objects``
         self.source, self.number = np.concatenate(source).astype(np.int32), np.concatenate(number).astype(np.int64)
-        self.removable = np.concatenate(removable)
+        self.removable = np.concatenate(removable)  # (n,)
 
     def add(self, places: NDArray[np.float64], source: int, first: int) -> None:
         """Note new plants: at the end of the list of objects or of a field, from number ``first`` on."""

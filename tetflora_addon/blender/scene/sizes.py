@@ -209,16 +209,10 @@ def _classes(species: Species, every: int) -> NDArray[np.float64]:
 
 
 class Measure:
-    """Sizes of a compiled species at one age, for trunks that are not bent to some length by chance.
-
-    Attributes
-    ----------
-    flora : Flora
-        Of this species alone.
-    """
+    """Sizes of a compiled species at one age, for trunks that are not bent to some length by chance."""
 
     def __init__(self, species: Species, ratios: tuple[float, float] | None = None) -> None:
-        self.flora, self._ratios = compile_species([species]), ratios
+        self.flora, self._ratios = compile_species([species]), ratios  # flora: of this species alone
         number = np.arange(_PLANTS)
         place, upright, one = np.zeros((_PLANTS, 3)), np.tile(np.eye(3), (_PLANTS, 1, 1)), np.ones(_PLANTS)
         self._some = Seeds((species.name,), np.zeros(_PLANTS, np.int32), number, place, upright, one)
