@@ -42,7 +42,6 @@ def drop_steps(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph
         What is visible in its view layer is ground.
     plants : sequence of bpy.types.Object

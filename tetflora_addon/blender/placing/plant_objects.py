@@ -87,7 +87,6 @@ def add_plants(
 
     Parameters
     ----------
-    placement : Placement
     species : sequence of str
         Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional
@@ -208,7 +207,6 @@ def add_field(
 
     Parameters
     ----------
-    placement : Placement
     species : sequence of str
         Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional

@@ -46,10 +46,7 @@ def level_steps(
 ) -> Generator[Progress, None, Levels]:
     """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
 
-    Raises
-    ------
-    TetFloraError
-        As `job.refine_steps`.
+    Errors as of `job.refine_steps`.
     """
     layer = view_layer or depsgraph.view_layer
     data = JobData("Compute Levels", scene, layer)
