@@ -44,7 +44,6 @@ _IDLE |= {"bl_idname", "bl_label", "bl_description", "bl_icon", "bl_static_type"
 _IDLE |= {"bl_width_default", "bl_width_min", "bl_width_max", "bl_height_default", "bl_height_min", "bl_height_max"}
 _IDLE |= {"internal_links", "inputs", "outputs", "color_tag", "hide", "use_custom_color", "show_options"}
 _IDLE |= {"show_preview", "show_texture", "image_user", "texture_mapping", "color_mapping"}
-_VALUES = {'BOOLEAN', 'INT', 'FLOAT', 'STRING', 'ENUM'}
 # Content of packed images by identity and length: they are read once.
 _packed: dict[tuple[int, int], str] = {}
 

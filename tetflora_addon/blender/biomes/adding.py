@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from math import pi
@@ -25,16 +25,16 @@ from ...species.litter import FALLEN
 from ...species.litter import KIND as FALLEN_LEAVES
 from ..placing.cover import fallen_from
 from ..placing.population_data import fill_population, set_setting
-from ..placing.populations import add_population, free_name, make_plants_steps
+from ..placing.populations import add_population, free_name, make_plants_steps, remove_layer, restored
 from ..placing.rules import set_grounds
 from ..runtime import GoneError, JobData, is_there, job
 from ..scene.field_sizes import has_history
 from ..settings import BIOME, SCATTER, with_identity
-from ..species.edits import catalog, new_identifier, revert_species, species_data, store_species, unknown_text
+from ..species.edits import catalog, new_identifier, species_data, store_species, unknown_text
 from ..stands.growing import GrownStand, again_steps, new_stand_steps
 from .files import Biome, find_biome, layers_of, pages_of, stand_settings, stands_of
 from .ground import lay_biome_soil, make_line
-from .layers import index_of, remove_layer
+from .layers import index_of
 
 _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
 
@@ -68,7 +68,7 @@ def add_biome_steps(
     """
     data.add_objects(grounds)
     yield Progress(0.0, "Reading the biome")
-    with _restored(scene):
+    with restored(scene):
         renamed = _own_species(scene, biome)
         group, uid = scene.tetflora, uuid.uuid4().hex
         made = group.layers.add()
@@ -214,28 +214,6 @@ def _make_litter(scene: bpy.types.Scene, entry: bpy.types.PropertyGroup) -> None
         kind = next((k for k in (*FALLEN, FALLEN_LEAVES) if entry.species.endswith(f"_{k}")), "")
         made = fallen_from(scene, entry.shed_by, kind) if kind else ""
         entry.species = made or entry.species
-
-
-@contextmanager
-def _restored(scene: bpy.types.Scene) -> Iterator[None]:
-    """Where what is done ends early, forget the biome that was begun, its populations and its species."""
-    group = scene.tetflora
-    before = {layer.uid for layer in group.layers}
-    species = {edit.identifier for edit in group.species_edits}
-    active = group.layers_index
-    try:
-        yield
-    except BaseException:  # an error, or Esc
-        if is_there(scene):
-            for index in [i for i, layer in enumerate(group.layers) if layer.uid not in before][::-1]:
-                layer = group.layers[index]
-                if layer.kind == BIOME and layer.paths is not None:
-                    bpy.data.batch_remove([*layer.paths.objects, layer.paths])
-                remove_layer(scene, index)
-            group.layers_index = active
-            for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
-                revert_species(identifier)
-        raise
 
 
 def growing_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:

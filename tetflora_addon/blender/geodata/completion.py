@@ -46,8 +46,7 @@ def curves_of(species: Species) -> Curves:
     diameter = height if ages.scaled else np.array([ages.diameters(year) for year in years])
     width = height if ages.scaled else np.clip(diameter**ages.spread, 0.45 * height, 1.4 * height**0.8)
     rows = compile_species([species]).rows
-    place, upright, one = np.zeros((_PLANTS, 3)), np.tile(np.eye(3), (_PLANTS, 1, 1)), np.ones(_PLANTS)
-    trunk = trunks(rows, Seeds((species.name,), np.zeros(_PLANTS, np.int32), np.arange(_PLANTS), place, upright, one))
+    trunk = trunks(rows, Seeds.upright(_PLANTS))
     at = np.minimum(_BREAST / trunk.length, 0.5)
     full = float(2.0 * (trunk.radius * profile(rows, trunk.row, trunk.key, at)).mean())
     return Curves(crown.height * height, full * diameter, 2.0 * crown.radius * width)
