@@ -250,10 +250,6 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
 _MIDDLES, _HALF = (20.0, 125.0, 196.0, 293.0), 182.0
 
 
-def _season_number(year: bpy.types.PropertyGroup) -> int:
-    return SEASONS.index(season_name(Season(year.day % DAYS, year.latitude)))
-
-
 def _go_to_season(year: bpy.types.PropertyGroup, number: int) -> None:
     day = _MIDDLES[number] + (0.0 if year.latitude >= 0.0 else _HALF)
     year.enabled, year.day = True, (day - 1.0) % 365.0 + 1.0
@@ -280,7 +276,7 @@ class TetFloraYear(bpy.types.PropertyGroup):
             ('SUMMER', "Summer", "Full leaves of July"),
             ('AUTUMN', "Autumn", "Leaves of late October, most of them turned"),
         ),
-        get=_season_number,
+        get=lambda year: SEASONS.index(season_name(Season(year.day % DAYS, year.latitude))),
         set=_go_to_season,
         options={'SKIP_SAVE'},
     )

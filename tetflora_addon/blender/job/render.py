@@ -67,11 +67,6 @@ def render_errors() -> list[str]:
     return list(failed_frames)
 
 
-def forget_render_errors() -> None:
-    """Clear the messages, after Refine has made the plants."""
-    failed_frames.clear()
-
-
 def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """When a render starts: clear earlier errors, unless it is part of another render."""
     if _rendering.outer not in {0, scene.session_uid}:

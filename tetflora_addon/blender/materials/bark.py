@@ -402,11 +402,6 @@ def netted(graph: Graph, place: Place) -> tuple[Term, Term]:
     return graph.mixed(hollow, tones(graph, tone, _ASH), _BLACK), height
 
 
-def plated(graph: Graph, place: Place) -> tuple[Term, Term]:
-    """Long plates of flakes that lie in layers, each its own red-brown or gray, with dark fissures between."""
-    return _plates(graph, place)[:2]
-
-
 def papery(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Plates low on the trunk; on limbs and high up thin orange skin that curls off in flakes."""
     color, height, part, fine = _plates(graph, place)
@@ -419,7 +414,10 @@ def papery(graph: Graph, place: Place) -> tuple[Term, Term]:
 
 
 def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
-    """Color, height, part of a flake from its rim, and a fine noise."""
+    """Long plates of flakes that lie in layers, each its own red-brown or gray, with dark fissures between.
+
+    Color, height, part of a flake from its rim, and a fine noise.
+    """
     noise, wave = graph.noise(times(place.cells, 0.9, 1.5), 3.0, 0.62)
     where = bent(place.cells, wave, 1.0, 0.6)
     plate = cell(graph, where)
@@ -531,13 +529,6 @@ def foot(graph: Graph, place: Place, noise: Term, uneven: float, start: float) -
     return graph.step(noise * uneven + -place.along, start, start + 1.0)
 
 
-def _dashes(graph: Graph, place: Place, noise: Term, wave: Term) -> Term:
-    """1 in thin dark lines across, some long and many short."""
-    spots = points(graph, bent(times(place.round, 1.3, 8.0), wave, 0.4))
-    size = graph.parts(spots["Color"])[0] ** 2.0 * 0.36 + 0.1
-    return graph.step(noise * 0.4 + (spots["Distance"] - 0.2), size, size * 0.75)
-
-
 def banded(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Satin skin with lenticels in rings, like a cherry's, and curls of skin between."""
     noise, wave = graph.noise(times(place.cells, 0.4, 0.35), 4.0, 0.6)
@@ -556,7 +547,10 @@ def peeling(graph: Graph, place: Place) -> tuple[Term, Term]:
     torn = graph.step(sheet, 0.585, 0.6)
     edge = torn * graph.step(sheet, 0.625, 0.6)
     dots = graph.step(points(graph, bent(place.cells, wave, 0.3))["Distance"], 0.3, 0.2)
-    dashes = _dashes(graph, place, noise, wave)
+    # Thin dark lines across, some long and many short.
+    spots = points(graph, bent(times(place.round, 1.3, 8.0), wave, 0.4))
+    size = graph.parts(spots["Color"])[0] ** 2.0 * 0.36 + 0.1
+    dashes = graph.step(noise * 0.4 + (spots["Distance"] - 0.2), size, size * 0.75)
     eye = knot(graph, place, _SCAR, wave, apart=0.85)
     # A scar is a black diamond, wider than high, and its brows hang from it.
     flat = graph.vector('DOT_PRODUCT', abs(eye.off), (0.45, 0.45, 1.5))
@@ -593,7 +587,7 @@ def jointed(graph: Graph, place: Place) -> tuple[Term, Term]:
 
 _CHARACTERS: dict[str, Bark] = {
     "ridged": Bark(ridged, 11.0, 6.0, (0.427, 0.394, 0.335), 0.95, 0.3, 0.22, 0.8, 1.0, 0.6),
-    "plated": Bark(plated, 6.0, 2.8, (0.33, 0.245, 0.203), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
+    "plated": Bark(lambda *at: _plates(*at)[:2], 6.0, 2.8, (0.33, 0.245, 0.203), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
     "smooth": Bark(smooth, 6.0, 0.3, (0.445, 0.449, 0.422), 1.0, 0.02, 0.12, 0.4, 0.8, 0.9),
     "banded": Bark(banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
     "ringed": Bark(ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),

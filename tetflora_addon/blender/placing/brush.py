@@ -254,7 +254,8 @@ class Stroke:
         made = strokes.individuals(brush, keys)
         placement = Placement(position=places, wanted=len(keys), **made)
         standing = self.standing
-        if not self._in_field(len(keys)):
+        store, number = self.scene.tetflora.brush.store, len(standing.objects) + len(keys)
+        if not (store == 'FIELD' or (store == 'AUTOMATIC' and number > MOST_PAINTED_EMPTIES)):
             first = len(standing.objects)
             standing.objects += add_plants(self.scene, placement, species)
             standing.add(places, _OBJECTS, first)
@@ -275,10 +276,6 @@ class Stroke:
         frame = np.stack([np.stack(row, axis=1) for row in rows], axis=1)
         add_points(field, places, frame, placement.scale, placement.species, placement.seed, species)
         standing.add(places, number, first)
-
-    def _in_field(self, more: int) -> bool:
-        store = self.scene.tetflora.brush.store
-        return store == 'FIELD' or (store == 'AUTOMATIC' and len(self.standing.objects) + more > MOST_PAINTED_EMPTIES)
 
 
 def draped_circle(

@@ -205,7 +205,9 @@ def point_object(
     ValueError
         Arrays of wrong shape or type; no datablock is left behind.
     """
-    vertices = _as_vertices(buffers)
+    none, values = np.zeros(0, np.int32), {"radius": buffers.radius, **buffers.attributes}
+    attributes = {name: ("POINT", array) for name, array in values.items()}
+    vertices = MeshBuffers(buffers.positions, none.reshape(0, 2), none, none, np.zeros(1, np.int32), attributes)
     by_nodes = not can_resize_point_clouds()
     if by_nodes:
         data = write_mesh(name, vertices, [material])
@@ -216,14 +218,6 @@ def point_object(
     if by_nodes:
         made.modifiers.new("Spheres", 'NODES').node_group = spheres_group(material)
     return made
-
-
-def _as_vertices(buffers: PointBuffers) -> MeshBuffers:
-    """Points as a mesh without edges and faces, its attributes on the vertices."""
-    none = np.zeros(0, np.int32)
-    values = {"radius": buffers.radius, **buffers.attributes}
-    attributes = {name: ("POINT", array) for name, array in values.items()}
-    return MeshBuffers(buffers.positions, none.reshape(0, 2), none, none, np.zeros(1, np.int32), attributes)
 
 
 def _write_cloud(name: str, vertices: MeshBuffers) -> bpy.types.PointCloud:

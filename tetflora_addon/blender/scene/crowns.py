@@ -53,7 +53,7 @@ def crown_to_draw(scene: bpy.types.Scene, kind: str) -> Crown | None:
         species = _grown(scene, kind)
     except SpeciesError:
         return _guess(species_of(kind))
-    if _in_background():
+    if bpy.app.background:
         return crown_for(scene, kind)
     if species in _without:
         return _guess(species_of(kind))
@@ -76,10 +76,6 @@ def crown_steps(progress: Progress, scene: bpy.types.Scene, kinds: Iterable[str]
 
 def _grown(scene: bpy.types.Scene, kind: str) -> Species:
     return kind_species(species_for(scene, species_of(kind)), kind)
-
-
-def _in_background() -> bool:
-    return bpy.app.background
 
 
 def _find() -> float | None:

@@ -88,18 +88,13 @@ def _color(data: bpy.types.Light) -> NDArray[np.float64]:
     color = np.array(data.color[:]) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if getattr(data, "use_temperature", False):
         color = color * np.array(data.temperature_color[:])
-    if (emission := _emission(data)) is not None:
+    output = active_output(tree_in_use(data), 'OUTPUT_LIGHT')
+    emission = next(upstream(output.inputs["Surface"]), None) if output is not None else None
+    if emission is not None and emission.type == 'EMISSION':
         tint, strength = emission.inputs["Color"], emission.inputs["Strength"]
         color = color * (1.0 if tint.is_linked else np.array(tint.default_value[:3]))
         color = color * (1.0 if strength.is_linked else strength.default_value)
     return np.maximum(color.astype(np.float64), 0.0)
-
-
-def _emission(data: bpy.types.Light) -> bpy.types.Node | None:
-    """The emission that a light's own nodes link to its output."""
-    output = active_output(tree_in_use(data), 'OUTPUT_LIGHT')
-    node = next(upstream(output.inputs["Surface"]), None) if output is not None else None
-    return node if node is not None and node.type == 'EMISSION' else None
 
 
 @dataclass(frozen=True)

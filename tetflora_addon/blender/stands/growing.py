@@ -186,7 +186,9 @@ def _again_steps(
     ground = zoned(scene, depsgraph, stand, grounds, ground)
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
     try:
-        records = yield from _growing(site, members, settings)
+        growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))
+        with closing(growing) as steps:
+            records = yield from part_of(steps, _GROWING[0], sum(_GROWING))
     except TetFloraError as error:
         raise SceneError(f'"{field.name}": {error}') from None
     if not len(records):
@@ -210,14 +212,6 @@ def _again_steps(
     group.stand_year = min(group.stand_year, last)
     group.stand.grown_by = stand_settings_now(scene, field)
     return GrownStand(field, len(records.at(last)), len(records), last)
-
-
-def _growing(
-    site: StandSite, members: list[StandSpecies], settings: StandSettings
-) -> Generator[Progress, object, Records]:
-    (begin, part) = _GROWING
-    with closing(steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))) as steps:
-        return (yield from part_of(steps, begin, begin + part))
 
 
 def _measuring(species: list[Species], records: Records) -> Generator[Progress, object, None]:

@@ -51,7 +51,10 @@ def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, NDArray[np.float
             "mesh"
         )
     height = _whole(grid.height)
-    plantable = there & (_slope(height, grid.cell) <= np.tan(min(soil.slope_max, 1.57)))
+    rise = [
+        np.gradient(height, grid.cell, axis=a) if n > 1 else np.zeros_like(height) for a, n in enumerate(height.shape)
+    ]
+    plantable = there & (np.hypot(*rise) <= np.tan(min(soil.slope_max, 1.57)))
     if not plantable.any():
         raise SceneError(
             f"All of the ground is steeper than Max Slope ({np.degrees(soil.slope_max):.0f}°); raise Max Slope or use "
@@ -120,9 +123,3 @@ def _whole(height: NDArray[np.float64]) -> NDArray[np.float64]:
         mean = np.where(known, beside, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
         out = np.where(gaps & known.any(axis=0), mean, out)
     return np.where(np.isnan(out), np.nanmean(height), out)
-
-
-def _slope(height: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
-    """Tangents of slopes (h, w)."""
-    parts = [np.gradient(height, cell, axis=a) if height.shape[a] > 1 else np.zeros_like(height) for a in (0, 1)]
-    return np.hypot(*parts)

@@ -258,10 +258,11 @@ def lines_of(scene: bpy.types.Scene, preview: Preview) -> list[tuple[str, tuple[
     return lines
 
 
-def _draw_figures(scene: bpy.types.Scene, preview: Preview, area: bpy.types.Area) -> None:
-    lines = lines_of(scene, preview)
-    scale = bpy.context.preferences.system.ui_scale
-    left = next((r.width for r in area.regions if r.type == 'TOOLS' and r.alignment == 'LEFT'), 0)
+def _draw_figures(context: bpy.types.Context, preview: Preview) -> None:
+    if not context.scene.tetflora.preview.statistics:
+        return
+    lines, scale = lines_of(context.scene, preview), context.preferences.system.ui_scale
+    left = next((r.width for r in context.area.regions if r.type == 'TOOLS' and r.alignment == 'LEFT'), 0)
     step = 18.0 * scale
     blf.size(0, 12.0 * scale)
     blf.enable(0, blf.SHADOW)
@@ -303,16 +304,11 @@ def _in_space(context: bpy.types.Context, preview: Preview) -> None:
         _draw_frozen(preview)
 
 
-def _on_screen(context: bpy.types.Context, preview: Preview) -> None:
-    if context.scene.tetflora.preview.statistics:
-        _draw_figures(context.scene, preview, context.area)
-
-
 def register() -> None:
     """Draw over all 3D viewports from now on; in the background there are none."""
     if bpy.app.background:
         return
-    for draw, kind in ((_in_space, 'POST_VIEW'), (_on_screen, 'POST_PIXEL')):
+    for draw, kind in ((_in_space, 'POST_VIEW'), (_draw_figures, 'POST_PIXEL')):
         _handles.append(bpy.types.SpaceView3D.draw_handler_add(_guarded, (draw,), 'WINDOW', kind))
 
 

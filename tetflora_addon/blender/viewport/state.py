@@ -52,27 +52,18 @@ class Preview:
     cache: dict = field(default_factory=dict)  # what the overlay keeps
 
 
-_previews: dict[int, Preview] = {}
+previews: dict[int, Preview] = {}
+"""By the scene's `session_uid`."""
 
 
 def find(scene: bpy.types.Scene) -> Preview | None:
     """What is previewed of a scene, if anything."""
-    return _previews.get(scene.session_uid)
+    return previews.get(scene.session_uid)
 
 
 def of(scene: bpy.types.Scene) -> Preview:
     """The same, made if there is none."""
-    return _previews.setdefault(scene.session_uid, Preview())
-
-
-def forget_all() -> None:
-    """Forget everything: another file is opened, or TetFlora is switched off."""
-    _previews.clear()
-
-
-def longest_reading() -> float:
-    """Seconds that reading the plants of any scene took last."""
-    return max((preview.seconds for preview in _previews.values()), default=0.0)
+    return previews.setdefault(scene.session_uid, Preview())
 
 
 def forget(scene: bpy.types.Scene) -> None:
@@ -118,7 +109,7 @@ def freeze(scene: bpy.types.Scene, on: bool, depsgraph: Callable[[], bpy.types.D
     redraw()
 
 
-def bring_in_step(scene: bpy.types.Scene) -> None:
+def bring_in_step(scene: bpy.types.Scene, *_: object) -> None:
     """After undo, which changes settings without a word: what is frozen, and shown of plants, follows them."""
     preview, settings = find(scene), scene.tetflora.preview
     if preview is not None:
@@ -139,14 +130,6 @@ def plants_wanted(scene: bpy.types.Scene) -> None:
         redraw()
     else:
         listeners.notify()
-
-
-def _plants_changed(group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    plants_wanted(group.id_data)
-
-
-def _freeze_changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get)
 
 
 _SHOWN = {"options": set(), "update": lambda _group, _context: redraw()}
@@ -225,7 +208,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         ),
         default='NONE',
         options=set(),
-        update=_plants_changed,
+        update=lambda group, _context: plants_wanted(group.id_data),
     )
     statistics: BoolProperty(
         name="Statistics",
@@ -240,7 +223,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             "camera or navigate. Its view is drawn as a pyramid. Not saved in the file"
         ),
         options=set(),
-        update=_freeze_changed,
+        update=lambda group, context: freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get),
     )
 
 
