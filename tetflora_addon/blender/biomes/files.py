@@ -44,7 +44,7 @@ from ..species.edits import find_edit, new_identifier, species_data
 from ..stands.growing import is_stand
 from ..stands.properties import TetFloraStand, TetFloraStandEntry
 from . import library
-from .properties import GROUND, data_of
+from .library import GROUND, data_of
 
 FORMAT = "TetFlora biome"
 #: What a layer is: plants that keep their distance from others and shade the ground; what grows and lies under them,
