@@ -163,8 +163,10 @@ def _plant(
         population = with_identity(scene.tetflora.layers, name)
         if population is None:
             continue
-        for entry in population.mix:
-            _make_litter(scene, entry)
+        for entry in population.mix:  # litter is made where an entry needs it and nobody has it
+            if entry.shed_by and entry.species not in catalog():
+                kind = next((k for k in (*FALLEN, FALLEN_LEAVES) if entry.species.endswith(f"_{k}")), "")
+                entry.species = (kind and fallen_from(scene, entry.shed_by, kind)) or entry.species
         title = population.name
         begin, end = (first + n / len(names) * (1.0 - _SOIL - first) for n in (number, number + 1))
         try:
@@ -206,14 +208,6 @@ def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
             if needed not in known:
                 raise SceneError(f'"{biome.name}", layer "{layer["name"]}": {unknown_text(needed)}')
     return renamed
-
-
-def _make_litter(scene: bpy.types.Scene, entry: bpy.types.PropertyGroup) -> None:
-    """Make a species of what another sheds, where an entry needs it and nobody has it."""
-    if entry.shed_by and entry.species not in catalog():
-        kind = next((k for k in (*FALLEN, FALLEN_LEAVES) if entry.species.endswith(f"_{k}")), "")
-        made = fallen_from(scene, entry.shed_by, kind) if kind else ""
-        entry.species = made or entry.species
 
 
 def growing_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:

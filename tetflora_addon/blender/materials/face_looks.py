@@ -534,7 +534,11 @@ class MeshLooks:
             slot = self.slots(low, high)
             values = self._triangles(chosen, verts, face[start:end], slot[of_face], most)
             if high - low < end - start:
-                values = _by_face(values, of_face, _areas(positions, verts), high - low)
+                # Means over faces of those over their triangles.
+                areas, number = _areas(positions, verts), high - low
+                total = np.maximum(np.bincount(of_face, areas, number), _TINY)
+                values = np.stack([np.bincount(of_face, column * areas, number) for column in values.T], axis=1)
+                values = values / total[:, None]
             self._write(made, slice(low, high), values, slot)
             yield end / len(face)
         return made
@@ -639,11 +643,3 @@ def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, reader: Fa
 def _areas(positions: NDArray[np.float32], verts: NDArray[np.int32]) -> NDArray[np.float64]:
     a, b, c = (np.take(positions, column, axis=0).astype(np.float64) for column in verts.T)
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) + _TINY
-
-
-def _by_face(
-    values: NDArray[np.float32], face: NDArray[np.int32], areas: NDArray[np.float64], faces: int
-) -> NDArray[np.float64]:
-    """Means (n, 5) over faces of those over their triangles."""
-    total = np.maximum(np.bincount(face, areas, faces), _TINY)
-    return np.stack([np.bincount(face, column * areas, faces) for column in values.T], axis=1) / total[:, None]

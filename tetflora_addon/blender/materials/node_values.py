@@ -33,18 +33,8 @@ def _ratio(a: Values, b: Values) -> Values:
     return np.divide(a, b, out=np.zeros(np.broadcast_shapes(a.shape, b.shape), np.float32), where=b != 0)
 
 
-def _mod(a: Values, b: Values) -> Values:
-    return a - np.trunc(_ratio(a, b)) * b
-
-
-def _wrap(a: Values, high: Values, low: Values) -> Values:
-    span = high - low
-    return np.where(span != 0, a - span * np.floor(_ratio(a - low, span)), low)
-
-
-def _ping_pong(a: Values, b: Values) -> Values:
-    turns = _ratio(a - b, 2 * b)
-    return np.where(b != 0, np.abs((turns - np.floor(turns)) * b * 2 - b), 0)
+def _fraction(a: Values) -> Values:
+    return a - np.floor(a)
 
 
 #: Operations of nodes *Math* and, for each component, *Vector Math*; with as many operands as they need.
@@ -70,13 +60,13 @@ MATHS: dict[str, Callable[..., Values]] = {
     'FLOOR': np.floor,
     'CEIL': np.ceil,
     'TRUNC': np.trunc,
-    'FRACT': lambda a: a - np.floor(a),
-    'FRACTION': lambda a: a - np.floor(a),
-    'MODULO': _mod,
+    'FRACT': _fraction,
+    'FRACTION': _fraction,
+    'MODULO': lambda a, b: a - np.trunc(_ratio(a, b)) * b,
     'FLOORED_MODULO': lambda a, b: a - np.floor(_ratio(a, b)) * b,
-    'WRAP': _wrap,
+    'WRAP': lambda a, high, low: np.where(high != low, a - (high - low) * np.floor(_ratio(a - low, high - low)), low),
     'SNAP': lambda a, b: np.floor(_ratio(a, b)) * b,
-    'PINGPONG': _ping_pong,
+    'PINGPONG': lambda a, b: np.where(b != 0, np.abs(_fraction(_ratio(a - b, 2 * b)) * b * 2 - b), 0),
     'SINE': np.sin,
     'COSINE': np.cos,
     'RADIANS': np.deg2rad,

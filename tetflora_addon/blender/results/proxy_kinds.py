@@ -169,12 +169,6 @@ def raise_settings(scene: bpy.types.Scene) -> dict[tuple[str, str], int]:
     return before
 
 
-def restore_settings(scene: bpy.types.Scene, before: Mapping[tuple[str, str], int]) -> None:
-    """Undo `raise_settings`."""
-    for (engine, name), value in before.items():
-        setattr(getattr(scene, engine), name, value)
-
-
 def few_bounces(scene: bpy.types.Scene) -> str:
     """A warning if the scene's own bounces are too few for its proxies, else an empty text."""
     cycles, form = getattr(scene, "cycles", None), proxy_kind_of(scene)
