@@ -23,7 +23,7 @@ QUALITY_ITEMS = (
 )
 
 
-def _use_cache(*_: object) -> None:
+def _use_cache(_preferences: object = None, _context: object = None) -> None:
     """Use the cache folder of the environment or the preferences, or none."""
     chosen, own = os.environ.get(CACHE_VARIABLE, ""), preferences()
     if chosen:

@@ -279,13 +279,13 @@ class Stroke:
 
 
 def draped_circle(
-    ground: Ground, center: Sequence[float], normal: Sequence[float], radius: float, sides: int = 48
+    ground: Ground, center: Sequence[float], normal: Sequence[float], radius: float
 ) -> NDArray[np.float64]:
-    """The brush's circle on the map laid on the ground, (sides + 1, 3) with the first corner twice.
+    """The brush's circle on the map laid on the ground, (49, 3) with the first corner twice.
 
     Where there is no ground, it goes on in the plane through the center.
     """
-    angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
+    angle = np.linspace(0.0, 2.0 * np.pi, 49)
     x, y = center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)
     reach = max(_REACH * radius, _LEAST_REACH)
     z = ground.heights(np.stack([x[:-1], y[:-1]], axis=1), center[2] + reach, center[2] - reach)

@@ -84,17 +84,14 @@ def recount(scene: bpy.types.Scene) -> None:
 def add_population(
     scene: bpy.types.Scene,
     grounds: Iterable[bpy.types.Object] = (),
-    settings: TetFloraLayer | None = None,
     name: str = NAME,
 ) -> TetFloraLayer:
-    """Add a population without plants and make it the active one.
+    """Add a population without plants, with the scene's settings for new ones, and make it the active one.
 
     Parameters
     ----------
     grounds : iterable of bpy.types.Object
         Meshes to grow on.
-    settings : TetFloraLayer, optional
-        What to begin with; the scene's settings for new populations if not given.
     name : str
         A number is added if another population has it.
     """
@@ -103,7 +100,7 @@ def add_population(
     group.layers_index = len(group.layers) - 1
     population.uid = uuid.uuid4().hex
     population.name = free_name(group.layers, name)
-    copy_settings(settings or group.populate, population)
+    copy_settings(group.populate, population)
     set_grounds(population, grounds)
     return population
 
