@@ -68,12 +68,7 @@ def is_regular(path: Path) -> bool:
 
 
 def read_whole(path: Path, most: int) -> bytes:
-    """The content of a regular file.
-
-    Parameters
-    ----------
-    most : int
-        Bytes; a larger file is not read.
+    """The content of a regular file of at most so many bytes.
 
     Raises
     ------

@@ -74,10 +74,7 @@ def read_places(
 ) -> list[Places]:
     """Places of all assets of a view layer that render: first of plants, then of objects that scatter, by name.
 
-    Parameters
-    ----------
-    depsgraph : bpy.types.Depsgraph
-        In which originals are shown, as `results.hiding.originals_shown` does.
+    The dependency graph shows originals, as of `results.hiding.originals_shown`.
 
     Raises
     ------

@@ -155,12 +155,7 @@ def place_group() -> bpy.types.NodeTree:
 
 
 def bark_group(character: str) -> bpy.types.NodeTree:
-    """The group "TetFlora <Character> Bark".
-
-    Parameters
-    ----------
-    character : str
-        One of `BARKS`.
+    """The group "TetFlora <Character> Bark" of one of `BARKS`.
 
     Returns
     -------
