@@ -245,6 +245,10 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
 _MIDDLES, _HALF = (20.0, 125.0, 196.0, 293.0), 182.0
 
 
+def _season_number(year: bpy.types.PropertyGroup) -> int:
+    return SEASONS.index(season_name(Season(year.day % DAYS, year.latitude)))
+
+
 def _go_to_season(year: bpy.types.PropertyGroup, number: int) -> None:
     day = _MIDDLES[number] + (0.0 if year.latitude >= 0.0 else _HALF)
     year.enabled, year.day = True, (day - 1.0) % 365.0 + 1.0
@@ -271,7 +275,7 @@ class TetFloraYear(bpy.types.PropertyGroup):
             ('SUMMER', "Summer", "Full leaves of July"),
             ('AUTUMN', "Autumn", "Leaves of late October, most of them turned"),
         ),
-        get=lambda year: SEASONS.index(season_name(Season(year.day % DAYS, year.latitude))),
+        get=_season_number,
         set=_go_to_season,
         options={'SKIP_SAVE'},
     )

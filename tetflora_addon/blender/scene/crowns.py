@@ -45,7 +45,7 @@ def crown_for(scene: bpy.types.Scene, kind: str) -> Crown:
 def crown_to_draw(scene: bpy.types.Scene, kind: str) -> Crown | None:
     """The same for a panel, without waiting: None where it is only being looked for; the window is then drawn again."""
     species = _found(scene, kind)
-    if bpy.app.background or isinstance(species, Crown):
+    if _in_background() or isinstance(species, Crown):
         return crown_for(scene, kind)
     if species in _without:
         return _guess(species_of(kind))
@@ -68,6 +68,10 @@ def crown_steps(progress: Progress, scene: bpy.types.Scene, kinds: Iterable[str]
 
 def _grown(scene: bpy.types.Scene, kind: str) -> Species:
     return kind_species(species_for(scene, species_of(kind)), kind)
+
+
+def _in_background() -> bool:
+    return bpy.app.background
 
 
 def _find() -> float | None:

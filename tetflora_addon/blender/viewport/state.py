@@ -132,6 +132,14 @@ def plants_wanted(scene: bpy.types.Scene) -> None:
         listeners.notify()
 
 
+def _plants_changed(group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    plants_wanted(group.id_data)
+
+
+def _freeze_changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get)
+
+
 _SHOWN = {"options": set(), "update": lambda _group, _context: redraw()}
 
 
@@ -208,7 +216,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         ),
         default='NONE',
         options=set(),
-        update=lambda group, _context: plants_wanted(group.id_data),
+        update=_plants_changed,
     )
     statistics: BoolProperty(
         name="Statistics",
@@ -223,7 +231,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             "camera or navigate. Its view is drawn as a pyramid. Not saved in the file"
         ),
         options=set(),
-        update=lambda group, context: freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get),
+        update=_freeze_changed,
     )
 
 
