@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from tests.blender.renders import picture, same_samples, small_scene
+from tests.blender.renders import picture, small_scene
 from tests.blender.scenes import depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.attributes import face_offsets, members, read, values_of, write
@@ -107,7 +107,7 @@ def shown(meshes):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_clusters_of_a_mesh_look_like_it(clean_file, engine):
-    small_scene(0.5, same_samples(engine), 50.0, 64, engine, 2.0)
+    small_scene(0.5, 16, 50.0, 64, engine, 2.0)
     obj = ball()
     obj.material_slots[0].link = 'OBJECT'
     obj.material_slots[0].material = material(READS[7])
@@ -128,7 +128,7 @@ def test_clusters_of_a_mesh_look_like_it(clean_file, engine):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_cluster_of_several_surfaces_looks_like_its_objects(clean_file, engine):
     """Mirrored, stretched and turned, with other UV maps, attributes and materials."""
-    small_scene(0.5, same_samples(engine), 50.0, 64, engine, 4.0)
+    small_scene(0.5, 16, 50.0, 64, engine, 4.0)
     first = ball()
     wanted = [*first.data.materials[:2], *first.data.materials[5:]]  # not what counts from the object
     bpy.data.objects.remove(first)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.renders import picture, same_samples, small_scene
+from tests.blender.renders import picture, small_scene
 from tests.blender.scenes import add_camera, add_mesh, datablocks, depsgraph, tiny_render
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
@@ -228,7 +228,7 @@ def forest():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_results_and_a_stand_in_look_like_the_scatterer(clean_file, engine):
-    small_scene(0.6, same_samples(engine), 40.0, 48, engine, 3.0)
+    small_scene(0.6, 16, 40.0, 48, engine, 3.0)
     ground, tree = forest()
     scattered(ground, tree)
     expected = picture()
