@@ -188,7 +188,10 @@ def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera, moving: bool =
 def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
     """Count plants, polygons of the expanded scene and instances of assets, without growing or reading any.
 
-    Errors as of `read_scene` and `compile_for`.
+    Raises
+    ------
+    TetFloraError
+        As `read_scene` and `compile_for`.
     """
     given = read_scene(scene, depsgraph, depsgraph.view_layer)
     if given.unknown:  # who counts in advance wants to know it
@@ -199,7 +202,13 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
 
 
 def check_settings(scene: bpy.types.Scene) -> None:
-    """Refuse settings of a scene that are beyond their limits. Errors as of `check_limits`."""
+    """Refuse settings of a scene that are beyond their limits.
+
+    Raises
+    ------
+    SceneError
+        Names the setting, its value and the limits.
+    """
     for group in (scene.tetflora, scene.tetflora.wind, scene.tetflora.year, scene.tetflora.output):
         check_limits(group, f'Scene "{scene.name}"')
 

@@ -32,7 +32,13 @@ SOURCES = (
 
 
 def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
-    """Relative frequency of each species of a population, at least one; a `SpeciesError` where the catalog is empty."""
+    """Relative frequency of each species of a population, at least one.
+
+    Raises
+    ------
+    SpeciesError
+        The catalog is empty.
+    """
     weights: dict[str, float] = {}
     for entry in population.mix:
         identifier = entry.species or default_species()
@@ -41,7 +47,13 @@ def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
 
 
 def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
-    """Relative frequency of each species that the brush of a scene paints, as `weights_of`."""
+    """Relative frequency of each species that the brush of a scene paints, at least one.
+
+    Raises
+    ------
+    SpeciesError
+        The catalog is empty.
+    """
     brush = scene.tetflora.brush
     if brush.source == 'ONE' and brush.species:
         return {brush.species: 1.0}

@@ -216,7 +216,13 @@ class Search:
     zones: tuple[Zone, ...] = ()
 
     def placement(self) -> Placement:
-        """Find the places; no Blender in it. A `SceneError` tells of settings that leave none."""
+        """Find the places; no Blender in it.
+
+        Raises
+        ------
+        SceneError
+            Settings that leave no place.
+        """
         found = place(self.ground, self.rules, *self.present, suits=self.suits(), zones=self.zones)
         return without(found, self.erased)
 

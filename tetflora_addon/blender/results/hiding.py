@@ -78,7 +78,13 @@ def check_linked(scene: bpy.types.Scene, originals: Sequence[bpy.types.Object]) 
 
 
 def hide_linked(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
-    """Hide linked objects too. Errors as of `check_linked`, before anything is hidden."""
+    """Hide linked objects too.
+
+    Raises
+    ------
+    SceneError
+        As `check_linked`, before anything is hidden.
+    """
     hidden = linked_hidden(scene, purpose)
     wanted = list(dict.fromkeys([*hidden, *originals]))
     if len(wanted) == len(hidden):

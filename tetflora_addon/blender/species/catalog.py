@@ -136,7 +136,13 @@ def operator_items(_operator: bpy.types.OperatorProperties, _context: bpy.types.
 
 
 def default_species() -> str:
-    """The species that the catalog offers first; a `SpeciesError` where it is empty."""
+    """The species that the catalog offers first.
+
+    Raises
+    ------
+    SpeciesError
+        There is none.
+    """
     known = catalog()
     if not known:
         raise SpeciesError("The catalog has no species; reinstall TetFlora, or set a Species Folder in the preferences")
@@ -208,7 +214,13 @@ def write_species(scene: bpy.types.Scene, identifier: str, path: Path) -> Path:
 
 
 def save_species(scene: bpy.types.Scene, identifier: str) -> Path:
-    """Save a species into the user's own folder, over an earlier file of that name. Errors as of `write_species`."""
+    """Save a species into the user's own folder, over an earlier file of that name.
+
+    Raises
+    ------
+    SpeciesError
+        As `write_species`; or there is no folder.
+    """
     species_for(scene, identifier)
     return OWN_FILES.store(identifier, as_text(species_data(scene, identifier)), replace=True)
 
