@@ -68,7 +68,12 @@ def is_regular(path: Path) -> bool:
 
 
 def read_whole(path: Path, most: int) -> bytes:
-    """The content of a regular file of at most so many bytes.
+    """The content of a regular file.
+
+    Parameters
+    ----------
+    most : int
+        Bytes; a larger file is not read.
 
     Raises
     ------

@@ -45,8 +45,12 @@ def cut_off(path: Path) -> bool:
 
 
 def write_blend(path: Path, write: Callable[[str], object]) -> None:
-    """Let Blender write a .blend beside its place, by a function that gets the path, and move it there when it is
-    complete.
+    """Let Blender write a .blend beside its place, and move it there when it is complete.
+
+    Parameters
+    ----------
+    write : callable
+        Gets the path to write to.
 
     Raises
     ------

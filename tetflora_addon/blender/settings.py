@@ -103,8 +103,13 @@ _OPEN = {"proxy_kind"}
 def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
     """Refuse numbers and choices that no slider and no menu gives.
 
-    Scripts that write custom properties, and files of any origin, can store them past Blender's own checks, and
-    Blender takes nan for any number. The message names the ``owner``.
+    Scripts that write custom properties, and files of any origin, can store them past Blender's own checks, and Blender
+    takes nan for any number.
+
+    Parameters
+    ----------
+    owner : str
+        Named in the message.
 
     Raises
     ------

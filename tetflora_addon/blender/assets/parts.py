@@ -386,7 +386,10 @@ def read_source_steps(
 ) -> Generator[float, None, tuple[AssetSource, tuple[str, ...]]]:
     """Read all surfaces of an asset; yields the fraction that is done.
 
-    The dependency graph may be evaluated again between two steps, but must be there.
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        Between two steps it may be evaluated again, but must be there.
 
     Returns
     -------

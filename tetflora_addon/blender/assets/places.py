@@ -74,7 +74,10 @@ def read_places(
 ) -> list[Places]:
     """Places of all assets of a view layer that render: first of plants, then of objects that scatter, by name.
 
-    The dependency graph shows originals, as of `results.hiding.originals_shown`.
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        In which originals are shown, as `results.hiding.originals_shown` does.
 
     Raises
     ------

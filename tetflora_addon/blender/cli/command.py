@@ -45,7 +45,10 @@ _MOST_FRAMES = 2 * LAST_FRAME + 1
 def frame_runs(text: str) -> list[Run]:
     """Read a range expression: ``1-10``, ``7``, ``1-99:2``, or several with commas.
 
-    As in the specification of OpenJD (section 3.4.1.1.1), without negative steps.
+    Parameters
+    ----------
+    text : str
+        As in the specification (section 3.4.1.1.1), without negative steps.
 
     Returns
     -------
@@ -98,7 +101,18 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run one command on the open file: what follows ``--command tetflora``; returns the exit code, see above."""
+    """Run one command on the open file.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        What follows ``--command tetflora``.
+
+    Returns
+    -------
+    int
+        Exit code, see above.
+    """
     return run(_parser(), arguments)
 
 

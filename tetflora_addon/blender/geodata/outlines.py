@@ -41,7 +41,10 @@ BUILDING_MARK = "tetflora_building"
 def outline_steps(order: Import, kind: str = "") -> Steps:
     """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
 
-    All are taken for a ``kind``, or told by their keys where it is empty.
+    Parameters
+    ----------
+    kind : str
+        What all are taken for; empty to tell them by their keys.
 
     Raises
     ------

@@ -52,7 +52,12 @@ _FINEST, _MOST_CELLS = 0.5, 4_000_000  # of the grid that heights are read from:
 
 
 def read_raster(order: Import, path: Path | None = None) -> Generator[Progress, Any, Raster]:
-    """Read the raster of an import, its tiles as one, or another file whole in their place; yields progress.
+    """Read the raster of an import, its tiles as one; yields progress.
+
+    Parameters
+    ----------
+    path : Path, optional
+        Another file, which is read whole, in its place.
 
     Raises
     ------

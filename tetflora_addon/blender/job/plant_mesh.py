@@ -90,8 +90,12 @@ def make_plant_mesh_steps(
 ) -> Generator[Progress, object, list[bpy.types.Object]]:
     """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
 
-    A step for each plant; closing the generator early removes what was made. The scene's edited species and leaf
-    objects count.
+    A step for each plant; closing the generator early removes what was made.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        With edited species and leaf objects.
 
     Returns
     -------

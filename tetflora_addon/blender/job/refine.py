@@ -503,7 +503,12 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
-    """Remove only what refinement made for a scene: for a render (True), for the artist (False), or both (None).
+    """Remove only what refinement made for a scene.
+
+    Parameters
+    ----------
+    for_render : bool, optional
+        Only what was made for a render (True), only what the artist made (False), or both (None).
 
     Returns
     -------

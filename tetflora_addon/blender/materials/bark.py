@@ -155,7 +155,12 @@ def place_group() -> bpy.types.NodeTree:
 
 
 def bark_group(character: str) -> bpy.types.NodeTree:
-    """The group "TetFlora <Character> Bark" of one of `BARKS`.
+    """The group "TetFlora <Character> Bark".
+
+    Parameters
+    ----------
+    character : str
+        One of `BARKS`.
 
     Returns
     -------

@@ -90,7 +90,12 @@ BLADES: dict[str, BladeLook] = {
 
 
 def blade_group(kind: str) -> bpy.types.NodeTree:
-    """The group "TetFlora <Kind> Leaf Blade" of one of `BLADES`.
+    """The group "TetFlora <Kind> Leaf Blade".
+
+    Parameters
+    ----------
+    kind : str
+        One of `BLADES`.
 
     Returns
     -------

@@ -35,7 +35,10 @@ _MOST_BYTES = 4_000_000
 def write_asset_library(folder: Path) -> tuple[Path, int]:
     """Write a .blend with a plant of each species of the catalog, marked as assets, over an earlier one.
 
-    The folder is made if there is none; Blender's file of asset catalogs there gets a line for TetFlora.
+    Parameters
+    ----------
+    folder : Path
+        Made if there is none. Blender's file of asset catalogs there gets a line for TetFlora.
 
     Returns
     -------

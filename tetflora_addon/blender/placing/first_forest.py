@@ -105,7 +105,12 @@ LAYERS = (
 
 
 def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
-    """Make the forest; another seed is another forest on the same ground.
+    """Make the forest.
+
+    Parameters
+    ----------
+    seed : int
+        Another seed is another forest on the same ground.
 
     Returns
     -------

@@ -291,7 +291,10 @@ def plants_from_field(
 def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int:
     """Delete fields that TetFlora made; others keep their object and lose the mark. How many plants they stored.
 
-    ``tidy`` removes collections that this leaves empty.
+    Parameters
+    ----------
+    tidy : bool
+        Remove collections that this leaves empty.
     """
     fields = [o for o in fields_of(objects) if o.library is None]
     number = sum(stored_size(field) for field in fields)

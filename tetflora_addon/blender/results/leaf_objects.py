@@ -155,7 +155,12 @@ def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
 
 
 def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.types.Depsgraph) -> Species:
-    """The species of a kind of plant, with polygons and a skeleton in place of the names of objects.
+    """A species with polygons and a skeleton in place of the names of objects.
+
+    Parameters
+    ----------
+    kind_of_plant : str
+        See `scene.skeletons.kind_of`.
 
     Raises
     ------

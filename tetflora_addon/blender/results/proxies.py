@@ -29,7 +29,10 @@ from .proxy_kinds import ProxyKind, proxy_kind_of
 class Baking:
     """Baked light of one refinement: `add` all polygons, then `add_facets`, then `look`.
 
-    Leaves, blossoms and bark get baked light as well where ``leaves`` says so.
+    Parameters
+    ----------
+    leaves : bool
+        Whether real leaves, blossoms and bark get baked light as well.
     """
 
     def __init__(self, sources: Sources, leaves: bool) -> None:

@@ -183,6 +183,11 @@ def _while_open(
 def _stereo_views(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, ...]:
     """Cameras that a scene renders beside its active one; none without stereoscopy.
 
+    Parameters
+    ----------
+    camera : Camera
+        The active one.
+
     Notes
     -----
     *Stereo 3D* moves the camera by half of the distance of the eyes to either side (or all of it, by the pivot), and
