@@ -98,7 +98,11 @@ def plant_places(
     """Places of plants whose species is an asset, by the variants of each.
 
     An object stands as it is turned and scaled in the scene, at the place of the plant instead of its own.
-    Errors as of `read_places`.
+
+    Raises
+    ------
+    SceneError
+        As `read_places`.
     """
     read = read_asset_plants(scene, depsgraph, view_layer)
     if not read:

@@ -192,7 +192,13 @@ def _plant(
 
 
 def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
-    """Keep the biome's own species in this file; what they are called here, where that differs."""
+    """Keep the biome's own species in this file; what they are called here, where that differs.
+
+    Raises
+    ------
+    SceneError
+        A layer needs a species that is nowhere.
+    """
     renamed = {}
     for identifier, page in pages_of(scene, biome).items():
         name, known = identifier, catalog()

@@ -248,7 +248,13 @@ def _stats(_options: argparse.Namespace) -> dict:
 
 
 def _check_file() -> None:
-    """Refuse to go on where Blender could not open the file, and would render its default cube instead."""
+    """Refuse to go on where Blender could not open the file, and would render its default cube instead.
+
+    Raises
+    ------
+    SceneError
+        The command line names a file, and none is open.
+    """
     named = [
         text
         for text in takewhile(lambda text: text not in ("--command", "--"), sys.argv)

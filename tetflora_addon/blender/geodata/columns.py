@@ -38,7 +38,13 @@ class TetFloraInventoryColumn(bpy.types.PropertyGroup):
 
 
 def show_columns(table: bpy.types.bpy_prop_collection, path: Path) -> None:
-    """Fill a table with the columns of a file. Errors as of `preview`."""
+    """Fill a table with the columns of a file.
+
+    Raises
+    ------
+    OSError, SceneError
+        As `preview`.
+    """
     for column in preview(path):
         row = table.add()
         row.name, row.field, row.values = column.title, column.field.upper() or 'NONE', ", ".join(column.values)

@@ -137,7 +137,13 @@ class Import:
         return place or place_about(system, points.min(axis=0), points.max(axis=0), self.what)
 
     def local(self, place: MapOrigin, points: NDArray[np.float64], system: System) -> NDArray[np.float64]:
-        """Meters from the scene's origin, (n, 2), of points of the file. Errors as of `MapOrigin.local`."""
+        """Meters from the scene's origin, (n, 2), of points of the file.
+
+        Raises
+        ------
+        SceneError
+            As `MapOrigin.local`.
+        """
         return place.local(points, self.known(place, system), self.what)
 
     @staticmethod

@@ -166,7 +166,12 @@ def add_to_digest(content: hashlib._Hash, value: object) -> None:
 def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: SceneContents | None = None) -> Camera:
     """The active camera, or the one of its cell if it moves and the scene shares results between frames.
 
-    Cells are larger where the contents given are far from them. Errors as of `scene.camera.read_camera`.
+    Cells are larger where the contents given are far from them.
+
+    Raises
+    ------
+    SceneError
+        As `scene.camera.read_camera`.
     """
     camera, settings = read_camera(scene, depsgraph, region_only=True), scene.tetflora
     if not (settings.share_frames and camera_moves(scene)) or wind_of(scene) is not None:
@@ -225,7 +230,10 @@ def key_of(
 ) -> str:
     """Digest of all that results for view layers depend on, with their camera and contents.
 
-    Errors as of `scene_digest`.
+    Raises
+    ------
+    TetFloraError
+        As `scene_digest`.
     """
     content = hashlib.sha256(scene_digest(scene, depsgraph, layers[0], camera, given).encode())
     add_to_digest(content, [scene.name, *(layer.name for layer in layers)])

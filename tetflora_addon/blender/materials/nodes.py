@@ -164,6 +164,7 @@ class Graph:
 
     Parameters
     ----------
+    tree : bpy.types.NodeTree
     fresh : bool
         Whether it is emptied first.
     """

@@ -38,6 +38,7 @@ class Ground:
 
     Parameters
     ----------
+    view_layer : bpy.types.ViewLayer
     depsgraph : bpy.types.Depsgraph
         Decides about modifiers and places.
     without : iterable of bpy.types.Object, optional

@@ -87,6 +87,7 @@ def add_plants(
 
     Parameters
     ----------
+    placement : Placement
     species : sequence of str
         Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional
@@ -207,6 +208,7 @@ def add_field(
 
     Parameters
     ----------
+    placement : Placement
     species : sequence of str
         Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional

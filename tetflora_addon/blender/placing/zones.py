@@ -112,7 +112,10 @@ def zoned(
 ) -> Terrain:
     """A ground with the zones of a layer, a population or a stand, in its weights: as they are at the corners.
 
-    Errors as of `read_zones`.
+    Raises
+    ------
+    SceneError
+        As `read_zones`.
     """
     zones = read_zones(scene, depsgraph, owner, grounds)
     if not zones:

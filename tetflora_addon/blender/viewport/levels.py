@@ -47,7 +47,10 @@ def level_steps(
 ) -> Generator[Progress, None, Levels]:
     """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
 
-    Errors as of `job.refine_steps`.
+    Raises
+    ------
+    TetFloraError
+        As `job.refine_steps`.
     """
     data.add_objects([*taking_part(scene), *([] if scene.camera is None else [scene.camera])])
     yield Progress(0.0, "Reading the scene")
