@@ -11,12 +11,7 @@ from ..tetflora_addon.blender.attributes import world_matrix
 from ..tetflora_addon.blender.placing.distances import distance_of, follows_species
 from ..tetflora_addon.blender.placing.first_forest import build
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
-from ..tetflora_addon.blender.placing.populations import (
-    PlacedPlants,
-    add_population,
-    forget_population,
-    make_plants_steps,
-)
+from ..tetflora_addon.blender.placing.populations import PlacedPlants, add_population, make_plants_steps, restored
 from ..tetflora_addon.blender.placing.properties import CREATE_AS, MOST_EMPTIES
 from ..tetflora_addon.blender.placing.rules import copy_entry
 from ..tetflora_addon.blender.scene.skeletons import SKELETON_TYPES, read_skeleton, upright_turn
@@ -198,14 +193,9 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
                 f"{self.count:,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
                 "set Create As to Field, or use fewer plants"
             )
-        active = scene.tetflora.layers_index
-        population = self._population(scene, grounds_to_plant(context), weights)
-        uid = population.uid
-        try:
+        with restored(scene):
+            population = self._population(scene, grounds_to_plant(context), weights)
             return (yield from make_plants_steps(scene, context.evaluated_depsgraph_get(), population))
-        except BaseException:  # an error, or Esc
-            forget_population(scene, uid, active)
-            raise
 
     def finish(self, context: bpy.types.Context, result: PlacedPlants) -> set[str]:
         grounds = grounds_to_plant(context)

@@ -27,10 +27,9 @@ from ..tetflora_addon.blender.biomes.layers import (
     forget_gone,
     index_of,
     move_layer,
-    remove_layer,
 )
 from ..tetflora_addon.blender.placing.cover import cover_with_snow, covered_population
-from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, reroll_steps
+from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
 from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, set_grounds
 from ..tetflora_addon.blender.settings import BIOME, FIELD, with_identity
 from ..tetflora_addon.blender.stands.growing import GrownStand, again_steps, is_stand

@@ -8,8 +8,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..tetflora_addon.blender.biomes.layers import active_layer, children_of, forget_gone
-from ..tetflora_addon.blender.placing.dropping import DropResult, drop_steps
 from ..tetflora_addon.blender.placing.field_edits import assign_field_species, editable, reseed_field
+from ..tetflora_addon.blender.placing.ground import DropResult, drop_steps
 from ..tetflora_addon.blender.placing.plant_objects import (
     assign_species,
     plants_of,

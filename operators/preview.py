@@ -50,7 +50,7 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
         return {'FINISHED'}
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Levels]:
-        return level_steps(context.scene, context.evaluated_depsgraph_get(), context.view_layer)
+        return level_steps(context.scene, context.evaluated_depsgraph_get())
 
     def finish(self, context: bpy.types.Context, levels: Levels) -> set[str]:
         last = levels.levels[-1]

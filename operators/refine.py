@@ -12,13 +12,12 @@ from ..tetflora_addon.blender.job import refine
 from ..tetflora_addon.blender.job.assets import asset_warnings
 from ..tetflora_addon.blender.job.forecast import forecast, learn
 from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
-from ..tetflora_addon.blender.job.render import forget_render_errors
 from ..tetflora_addon.blender.placing.plant_objects import prepare_scene
 from ..tetflora_addon.blender.results import hiding
 from ..tetflora_addon.blender.results.collection import has_results, result_collections
 from ..tetflora_addon.blender.results.hiding import keep_results
 from ..tetflora_addon.blender.results.proxy_kinds import few_bounces
-from ..tetflora_addon.blender.runtime import is_there, redraw, stop_jobs
+from ..tetflora_addon.blender.runtime import failed_frames, is_there, redraw, stop_jobs
 from ..tetflora_addon.blender.scene.lights import read_world
 from ..tetflora_addon.blender.viewport import auto
 from ..tetflora_addon.blender.viewport.warnings import cut_off
@@ -72,7 +71,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         prepare_scene(context.scene)
         if statistics.complete:
             auto.refined(context.scene)
-        forget_render_errors()
+        failed_frames.clear()
         redraw()
         self.report({'INFO'}, _made(context.scene, statistics))
         if not statistics.complete and statistics.passes:

@@ -9,8 +9,8 @@ from typing import Any
 
 from .errors import quoted
 
-#: Files of species, biomes and populations, and properties in .blend files. Raise one when its keys change.
-FORMATS = {"species": 1, "biome": 1, "populations": 1, "properties": 1}
+#: Files of species and of biomes, and properties in .blend files. Raise one when its keys change.
+FORMATS = {"species": 1, "biome": 1, "properties": 1}
 #: What makes data of the next format of data of one: by what it is, and the number before. There is none yet.
 STEPS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = {}
 

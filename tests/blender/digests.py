@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -134,15 +134,14 @@ def _struct(value: Any, depth: int) -> dict[str, Any]:
     """All properties of a datablock, or of a group within one."""
     bulk = _BULK.get(type(value).__name__, frozenset())
     found = {}
-    for prop in value.bl_rna.properties:
-        name = prop.identifier
-        if name in PASSING or name in bulk:
+    for prop in _properties(value):
+        if prop.name in bulk:
             continue
         try:
-            held = getattr(value, name)
+            held = getattr(value, prop.name)
         except (AttributeError, TypeError, RuntimeError):
             continue  # what this Blender does not tell here
-        found[name] = _plain(held, prop, depth)
+        found[prop.name] = _plain(held, prop, depth)
     if bulk:
         found["attributes"] = _bulk(value)
     if isinstance(value, (bpy.types.ID, bpy.types.PropertyGroup)):
@@ -150,8 +149,30 @@ def _struct(value: Any, depth: int) -> dict[str, Any]:
     return found
 
 
-def _plain(held: Any, prop: Any, depth: int) -> Any:
-    if prop.identifier == "species_editor":
+class _Property(NamedTuple):
+    """What `_plain` asks of a property."""
+
+    name: str
+    type: str
+    is_array: bool
+    is_flag: bool
+
+
+def _properties(value: Any) -> list[_Property]:
+    """Properties of a kind of data; Blender takes longer to tell of these than of what they hold."""
+    kind = value.bl_rna.identifier
+    if kind not in _known:
+        every = (p for p in value.bl_rna.properties if p.identifier not in PASSING)
+        flags = ("is_array", "is_enum_flag")
+        _known[kind] = [_Property(p.identifier, p.type, *(getattr(p, f, False) for f in flags)) for p in every]
+    return _known[kind]
+
+
+_known: dict[str, list[_Property]] = {}
+
+
+def _plain(held: Any, prop: _Property, depth: int) -> Any:
+    if prop.name == "species_editor":
         # Its sliders show what is stored elsewhere, in the list of the file's own species: reading them takes long.
         return held.species, held.order_index
     if held is None:
@@ -167,9 +188,9 @@ def _plain(held: Any, prop: Any, depth: int) -> Any:
         if depth >= 6:
             return len(held)
         return {n: _item(item, depth) for n, item in enumerate(held)}
-    if prop.type in {'FLOAT', 'INT', 'BOOLEAN'} and prop.is_array:
+    if prop.is_array:
         return tuple(np.array(held, dtype=float).reshape(-1).round(6).tolist())
-    if prop.type == 'ENUM' and prop.is_enum_flag:
+    if prop.is_flag:
         return tuple(sorted(held))
     if prop.type == 'FLOAT':
         return round(held, 6)

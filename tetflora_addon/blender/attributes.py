@@ -23,19 +23,11 @@ Geometry = bpy.types.Mesh | bpy.types.PointCloud | bpy.types.Curves
 
 
 class Kind(NamedTuple):
-    """How Blender stores one value of an attribute.
+    """How Blender stores one value of an attribute."""
 
-    Attributes
-    ----------
-    field : str
-        Name of the value among the properties of an element.
-    width : int
-        Numbers of a value.
-    """
-
-    field: str
+    field: str  # name of the value among the properties of an element
     dtype: type
-    width: int = 1
+    width: int = 1  # numbers of a value
 
 
 #: By Blender's name of the type. Byte colors as they are stored; their field "color" is linear.

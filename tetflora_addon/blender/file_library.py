@@ -53,29 +53,16 @@ def file_of(folders: Iterable[Path], identifier: str, ending: str = ENDING) -> P
 
 @dataclass(frozen=True)
 class OwnFiles:
-    """The user's own files of a library.
+    """The user's own files of a library."""
 
-    Attributes
-    ----------
-    noun, nouns : str
-        What they are, in errors.
-    folders : callable
-        Gives the folders that exist.
-    folder : callable
-        Gives the one that files are written to, which is made if it is missing.
-    changed : callable
-        Called without arguments after each change.
-    pictures : tuple of str
-        Endings of pictures beside the files, which come and go with them.
-    """
-
+    #: noun, nouns: What they are, in errors
     noun: str
     nouns: str
     error: type[TetFloraError]
-    folders: Callable[[], tuple[Path, ...]]
-    folder: Callable[[], Path]
-    changed: Callable[[], None]
-    pictures: tuple[str, ...] = ()
+    folders: Callable[[], tuple[Path, ...]]  # gives the folders that exist
+    folder: Callable[[], Path]  # gives the one that files are written to, which is made if it is missing
+    changed: Callable[[], None]  # called without arguments after each change
+    pictures: tuple[str, ...] = ()  # endings of pictures beside the files, which come and go with them
 
     def place(self, identifier: str) -> Path:
         """Where a file belongs.

@@ -24,7 +24,12 @@ QUALITY_ITEMS = (
 
 
 def _use_cache(_preferences: object = None, _context: object = None) -> None:
-    storage.set_folder(_cache_folder())
+    """Use the cache folder of the environment or the preferences, or none."""
+    chosen, own = os.environ.get(CACHE_VARIABLE, ""), preferences()
+    if chosen:
+        storage.set_folder(None if chosen.lower() == "off" else Path(chosen).absolute())
+    else:
+        storage.set_folder(_folder("cache") if own is not None and own.use_cache else None)
 
 
 class TetFloraPreferences(bpy.types.AddonPreferences):
@@ -131,23 +136,6 @@ def own_species_folder() -> Path:
     if folder is None:
         raise SpeciesError("No folder for your own species; set a Species Folder in the TetFlora preferences")
     return folder
-
-
-def wanted_threads(scene: bpy.types.Scene) -> int:
-    """Cores to work with: the user's choice, or the scene's; 0 is all."""
-    own = preferences()
-    if own is not None and own.threads:
-        return own.threads
-    return scene.render.threads if scene.render.threads_mode == 'FIXED' else 0
-
-
-def _cache_folder() -> Path | None:
-    """The cache folder of the environment or the preferences; None without a cache."""
-    chosen = os.environ.get(CACHE_VARIABLE, "")
-    if chosen:
-        return None if chosen.lower() == "off" else Path(chosen).absolute()
-    own = preferences()
-    return _folder("cache") if own is not None and own.use_cache else None
 
 
 def _folder(name: str, create: bool = False) -> Path | None:

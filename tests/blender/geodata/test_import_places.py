@@ -21,9 +21,9 @@ from tests.blender.digests import difference, everything
 from tests.blender.scenes import depsgraph, select
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.geodata import columns, outlines, trees
-from tetflora_addon.blender.geodata.completion import curves_of
 from tetflora_addon.blender.geodata.origin import KEY, Import, importing, origin_of
 from tetflora_addon.blender.geodata.terrain import read_raster
+from tetflora_addon.blender.geodata.trees import curves_of
 from tetflora_addon.blender.placing.terrain import lines_of, read_ground
 from tetflora_addon.blender.runtime import GoneError
 from tetflora_addon.blender.species.edits import species_for

@@ -16,7 +16,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tin
 from tetflora_addon.blender.attributes import read, values_of, world_matrix
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results.output import KIND, PARENT
-from tetflora_addon.blender.scene.fields import read_field, upright, write_field
+from tetflora_addon.blender.scene.fields import read_field, write_field
 from tetflora_addon.blender.viewport.levels import level_steps, read_shapes
 from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.camera.camera import GRID
@@ -182,7 +182,7 @@ def test_a_render_names_a_stray_once(scene: bpy.types.Scene, capfd: pytest.Captu
 
 def test_a_field_with_a_stray_is_named(scene: bpy.types.Scene) -> None:
     points = np.array([[0.0, 12.0, 0.0], [3.0, 15.0, 0.0], [5e5, 0.0, 0.0]])
-    rows = upright(np.zeros(3)), np.ones(3), np.zeros(3, np.int32), np.arange(3, dtype=np.int32)
+    rows = np.tile((1.0, 0.0, 0.0, 0.0), (3, 1)), np.ones(3), np.zeros(3, np.int32), np.arange(3, dtype=np.int32)
     field = write_field("meadow", points, *rows, ["bush"])
     scene.collection.objects.link(field)
     statistics = refine.refine(scene, depsgraph())
@@ -192,7 +192,7 @@ def test_a_field_with_a_stray_is_named(scene: bpy.types.Scene) -> None:
 def test_a_new_field_far_out_keeps_its_places(scene: bpy.types.Scene) -> None:
     """In the world's coordinates single precision would move plants by centimeters."""
     points = np.array([[0.123, 12.456, 0.789], [3.21, 15.654, 0.987]]) + 1e6
-    rows = upright(np.zeros(2)), np.ones(2), np.zeros(2, np.int32), np.arange(2, dtype=np.int32)
+    rows = np.tile((1.0, 0.0, 0.0, 0.0), (2, 1)), np.ones(2), np.zeros(2, np.int32), np.arange(2, dtype=np.int32)
     field = write_field("meadow", points, *rows, ["bush"])
     scene.collection.objects.link(field)
     found = read_field(field, depsgraph(), world_matrix(field, depsgraph())[None])

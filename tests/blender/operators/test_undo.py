@@ -44,6 +44,8 @@ def forest() -> None:
     add_camera(location=(0.0, -14.0, 3.0), rotation=(1.4, 0.0, 0.0))
     render = scene().render
     render.resolution_x = render.resolution_y = 48
+    settings = scene().tetflora  # what is refined is coarse: undo brings back few polygons as it does many
+    settings.leaf_limit, settings.cutoff, settings.visibility_resolution = 1.0, 6.0, 64
     plants = [add_plant(s, s, seed=n, location=(3.0 * n - 1.5, 0.0, 1.0)) for n, s in enumerate(("bush", "conifer"))]
     scene().tetflora.populate.count = 12
     bpy.context.view_layer.update()

@@ -10,7 +10,7 @@ import pytest
 
 from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender import attributes
-from tetflora_addon.blender.placing import dropping, plant_objects
+from tetflora_addon.blender.placing import ground, plant_objects
 from tetflora_addon.blender.scene import fields
 from tetflora_addon.errors import SceneError
 from tetflora_addon.planting import places
@@ -94,7 +94,7 @@ def _steps(number=1000):
     """The steps for a field of many plants 4 m above the ground, and a plant that is an object."""
     add_mesh("ground", size=20.0)
     field, plant = _field([(0.0, 0.0, 4.0)] * number), add_plant("plant", location=(3.0, 0.0, 2.0))
-    return dropping.drop_steps(bpy.context.scene, depsgraph(), [plant], [field]), field, plant
+    return ground.drop_steps(bpy.context.scene, depsgraph(), [plant], [field]), field, plant
 
 
 def test_nothing_has_moved_where_the_search_is_stopped():

@@ -269,7 +269,7 @@ def test_soil_of_large_ground_is_as_green_as_if_all_were_planted(monkeypatch):
     ground = _wood(size=15.0)
     _cover()
     whole = _green(ground)
-    populations.remove_population(bpy.context.scene, list(_group().layers).index(_covers()[0]))
+    populations.remove_layer(bpy.context.scene, list(_group().layers).index(_covers()[0]))
     monkeypatch.setattr("tetflora_addon.blender.placing.cover.MOST", 400)
     cover = _cover()
     assert cover.made <= 400

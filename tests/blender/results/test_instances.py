@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.renders import picture, small_scene
+from tests.blender.renders import picture, same_samples, small_scene
 from tests.blender.scenes import add_mesh, datablocks, depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.materials.nodes import is_ours
@@ -80,11 +80,11 @@ def placed(every):
 def pictures_of(make, engine):
     """A picture of the instances that a function makes, and one of the same faces as a plain mesh."""
     if engine not in _expected:
-        small_scene(0.7, 16, 40.0, 32, engine, 3.0)
+        small_scene(0.7, same_samples(engine), 40.0, 32, engine, 3.0)
         add("truth", mesh_of("truth", placed(matrices())))
         _expected[engine] = picture()
         session.clean_file()
-    small_scene(0.7, 16, 40.0, 32, engine, 3.0)
+    small_scene(0.7, same_samples(engine), 40.0, 32, engine, 3.0)
     make()
     return picture(), _expected[engine]
 

@@ -44,7 +44,6 @@ _IDLE |= {"bl_idname", "bl_label", "bl_description", "bl_icon", "bl_static_type"
 _IDLE |= {"bl_width_default", "bl_width_min", "bl_width_max", "bl_height_default", "bl_height_min", "bl_height_max"}
 _IDLE |= {"internal_links", "inputs", "outputs", "color_tag", "hide", "use_custom_color", "show_options"}
 _IDLE |= {"show_preview", "show_texture", "image_user", "texture_mapping", "color_mapping"}
-_VALUES = {'BOOLEAN', 'INT', 'FLOAT', 'STRING', 'ENUM'}
 # Content of packed images by identity and length: they are read once.
 _packed: dict[tuple[int, int], str] = {}
 
@@ -150,21 +149,11 @@ Slots = list[bpy.types.Material | None]
 
 @dataclass
 class AssetPart:
-    """A mesh of an asset.
+    """A mesh of an asset."""
 
-    Attributes
-    ----------
-    name : str
-        Of the object, for messages.
-    shown : bpy.types.Object or bpy.types.GeometrySet
-        The original object whose mesh it is, or the geometry.
-    places : list of (n, 4, 4) float64
-        From its space to that of the asset.
-    """
-
-    name: str
-    shown: bpy.types.Object | bpy.types.GeometrySet
-    places: list[NDArray[np.float64]] = field(default_factory=list)
+    name: str  # of the object, for messages
+    shown: bpy.types.Object | bpy.types.GeometrySet  # the original object whose mesh it is, or the geometry
+    places: list[NDArray[np.float64]] = field(default_factory=list)  # from its space to that of the asset
 
     @property
     def matrices(self) -> NDArray[np.float64]:
@@ -330,25 +319,14 @@ _TYPES = {'FLOAT', 'INT', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLORS}
 
 @dataclass(frozen=True)
 class Target:
-    """What is instanced; equal where it is the same datablock, or the same geometry.
+    """What is instanced; equal where it is the same datablock, or the same geometry."""
 
-    Attributes
-    ----------
-    datablock : bpy.types.Object or bpy.types.Collection or None
-        An original. An object's space is its own, without its place in the scene; that of a collection is where
-        instances of it show it: its objects as they stand, from its offset.
-    geometry : bpy.types.GeometrySet or None
-        Without a datablock: what nodes instance.
-    owner : bpy.types.Object or None
-        Whose nodes.
-    name : str
-        For messages.
-    """
-
+    #: An original. An object's space is its own, without its place in the scene; that of a collection is where
+    #: instances of it show it: its objects as they stand, from its offset.
     datablock: bpy.types.Object | bpy.types.Collection | None
-    geometry: bpy.types.GeometrySet | None
-    owner: bpy.types.Object | None
-    name: str
+    geometry: bpy.types.GeometrySet | None  # without a datablock: what nodes instance
+    owner: bpy.types.Object | None  # whose nodes
+    name: str  # for messages
 
     @property
     def shown(self) -> bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet:

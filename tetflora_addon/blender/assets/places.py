@@ -43,24 +43,12 @@ _TINY = 1e-9  # of an axis over the longest: such instances are flat or have no 
 
 @dataclass(frozen=True)
 class Places:
-    """Places of one asset.
+    """Places of one asset."""
 
-    Attributes
-    ----------
-    target : Target
-        What stands there.
-    matrices : (n, 4, 4) float64
-        From the asset's space to world space.
-    keys : (n,) uint64
-        Tell individuals apart, through animations as well.
-    owners : tuple of bpy.types.Object
-        The original object that shows it: the instancer, the plant or the field; n of them where each place has its
-        own.
-    """
-
-    target: Target
-    matrices: NDArray[np.float64]
-    keys: NDArray[np.uint64]
+    target: Target  # what stands there
+    matrices: NDArray[np.float64]  # (n, 4, 4): from the asset's space to world space
+    keys: NDArray[np.uint64]  # (n,): tell individuals apart, through animations as well
+    #: The original object that shows it: the instancer, the plant or the field; n of them where each place has its own
     owners: tuple[bpy.types.Object, ...]
 
     @property
@@ -221,19 +209,12 @@ def _target(datablock: bpy.types.Object | bpy.types.Collection) -> Target:
 
 
 class Scatter:
-    """What one object scatters: what it instances is followed to its assets, with all places at once.
-
-    Attributes
-    ----------
-    places : list of Places
-        Each target once, when all has been followed.
-    left : dict of str to int
-        Instances that are no assets, by name and number: empties, lights, cameras and volumes.
-    """
+    """What one object scatters: what it instances is followed to its assets, with all places at once."""
 
     def __init__(self, owner: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         self.owner, self.depsgraph = owner, depsgraph
-        self.places: list[Places] = []
+        self.places: list[Places] = []  # each target once, when all has been followed
+        #: Instances that are no assets, by name and number: empties, lights, cameras and volumes
         self.left: dict[str, int] = {}
         self._parts: dict[Target, list[tuple[NDArray, NDArray]]] = {}
         self._faces: dict[Target, bool] = {}

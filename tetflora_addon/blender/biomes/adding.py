@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from math import pi
@@ -25,39 +25,28 @@ from ...species.litter import FALLEN
 from ...species.litter import KIND as FALLEN_LEAVES
 from ..placing.cover import fallen_from
 from ..placing.population_data import fill_population, set_setting
-from ..placing.populations import add_population, free_name, make_plants_steps
+from ..placing.populations import add_population, free_name, make_plants_steps, remove_layer, restored
 from ..placing.rules import set_grounds
 from ..runtime import GoneError, JobData, is_there, job
 from ..scene.field_sizes import has_history
 from ..settings import BIOME, SCATTER, with_identity
-from ..species.edits import catalog, new_identifier, revert_species, species_data, store_species, unknown_text
+from ..species.edits import catalog, new_identifier, species_data, store_species, unknown_text
 from ..stands.growing import GrownStand, again_steps, new_stand_steps
 from .files import Biome, find_biome, layers_of, pages_of, stand_settings, stands_of
 from .ground import lay_biome_soil, make_line
-from .layers import index_of, remove_layer
+from .layers import index_of
 
 _STANDS, _SOIL = 0.5, 0.06  # fractions of the work, at the begin and the end
 
 
 @dataclass(frozen=True)
 class BiomeResult:
-    """What adding or planting a biome made.
-
-    Attributes
-    ----------
-    name : str
-    layers : list of (str, int)
-        Names of the layers, and how many plants each has.
-    bare : list of str
-        Why layers have no plants.
-    kept : list of str
-        Grounds that keep a material of the artist's.
-    """
+    """What adding or planting a biome made."""
 
     name: str
-    layers: list[tuple[str, int]]
-    bare: list[str]
-    kept: list[str]
+    layers: list[tuple[str, int]]  # names of the layers, and how many plants each has
+    bare: list[str]  # why layers have no plants
+    kept: list[str]  # grounds that keep a material of the artist's
 
 
 @job("Adding the biome")
@@ -79,7 +68,7 @@ def add_biome_steps(
     """
     data.add_objects(grounds)
     yield Progress(0.0, "Reading the biome")
-    with _restored(scene):
+    with restored(scene):
         renamed = _own_species(scene, biome)
         group, uid = scene.tetflora, uuid.uuid4().hex
         made = group.layers.add()
@@ -174,8 +163,10 @@ def _plant(
         population = with_identity(scene.tetflora.layers, name)
         if population is None:
             continue
-        for entry in population.mix:
-            _make_litter(scene, entry)
+        for entry in population.mix:  # litter is made where an entry needs it and nobody has it
+            if entry.shed_by and entry.species not in catalog():
+                kind = next((k for k in (*FALLEN, FALLEN_LEAVES) if entry.species.endswith(f"_{k}")), "")
+                entry.species = (kind and fallen_from(scene, entry.shed_by, kind)) or entry.species
         title = population.name
         begin, end = (first + n / len(names) * (1.0 - _SOIL - first) for n in (number, number + 1))
         try:
@@ -223,36 +214,6 @@ def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
             if needed not in known:
                 raise SceneError(f'"{biome.name}", layer "{layer["name"]}": {unknown_text(needed)}')
     return renamed
-
-
-def _make_litter(scene: bpy.types.Scene, entry: bpy.types.PropertyGroup) -> None:
-    """Make a species of what another sheds, where an entry needs it and nobody has it."""
-    if entry.shed_by and entry.species not in catalog():
-        kind = next((k for k in (*FALLEN, FALLEN_LEAVES) if entry.species.endswith(f"_{k}")), "")
-        made = fallen_from(scene, entry.shed_by, kind) if kind else ""
-        entry.species = made or entry.species
-
-
-@contextmanager
-def _restored(scene: bpy.types.Scene) -> Iterator[None]:
-    """Where what is done ends early, forget the biome that was begun, its populations and its species."""
-    group = scene.tetflora
-    before = {layer.uid for layer in group.layers}
-    species = {edit.identifier for edit in group.species_edits}
-    active = group.layers_index
-    try:
-        yield
-    except BaseException:  # an error, or Esc
-        if is_there(scene):
-            for index in [i for i, layer in enumerate(group.layers) if layer.uid not in before][::-1]:
-                layer = group.layers[index]
-                if layer.kind == BIOME and layer.paths is not None:
-                    bpy.data.batch_remove([*layer.paths.objects, layer.paths])
-                remove_layer(scene, index)
-            group.layers_index = active
-            for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
-                revert_species(identifier)
-        raise
 
 
 def growing_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:

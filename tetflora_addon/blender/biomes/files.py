@@ -44,7 +44,7 @@ from ..species.edits import find_edit, new_identifier, species_data
 from ..stands.growing import is_stand
 from ..stands.properties import TetFloraStand, TetFloraStandEntry
 from . import library
-from .properties import GROUND, data_of
+from .library import GROUND, data_of
 
 FORMAT = "TetFlora biome"
 #: What a layer is: plants that keep their distance from others and shade the ground; what grows and lies under them,
@@ -63,21 +63,14 @@ STAND_ENTRY = ("species", "planted", "incoming_seeds")
 
 @dataclass(frozen=True)
 class Biome:
-    """A biome as its file has it, checked.
-
-    Attributes
-    ----------
-    layers : list of dict
-        Each with ``kind`` and the keys of that.
-    species : dict
-        Species of its own by identifier: whole pages, or what differs from one ``of`` the catalog, and what differs
-        in ``every_order`` of that.
-    """
+    """A biome as its file has it, checked."""
 
     identifier: str
     name: str
-    layers: list[dict[str, Any]]
+    layers: list[dict[str, Any]]  # each with ``kind`` and the keys of that
     description: str = ""
+    #: Species of its own by identifier: whole pages, or what differs from one ``of`` the catalog, and what differs in
+    #: ``every_order`` of that
     species: dict[str, dict[str, Any]] = field(default_factory=dict)
     limits: dict[str, float] = field(default_factory=dict)
     gives_way: bool = True
@@ -125,7 +118,9 @@ def checked(data: Any, identifier: str) -> Biome:
         check_text(f'"{key}"', data.get(key, ""))
     if not data["name"].strip():
         raise ValueError('"name" is empty')
-    _check_limits(data.get("limits", {}))
+    known = {one.name for one in fields(Limits)}
+    check_keys('"limits"', data.get("limits", {}), set(), known)
+    check_settings('"limits"', data.get("limits", {}), TetFloraLayer, known)
     if not isinstance(data.get("gives_way", True), bool):
         raise ValueError(f'"gives_way" is {quoted(data["gives_way"])}; it must be true or false')
     _check_ground(data.get("ground", {}))
@@ -156,9 +151,11 @@ def biome_data(
     data |= {key: value for key, value in stored.items() if key in ("ground", "season") and value}
     layers = [_layer_data(population) for population in populations]
     stands = [] if biome is None else [_stand_data(field) for field in stands_of(scene, biome.uid)]
-    species = _species_data(scene, [part for layer in (*stands, *layers) for part in layer["species"]])
-    if species:
-        data["species"] = species
+    parts = [part for layer in (*stands, *layers) for part in layer["species"]]
+    names = {part.get("shed_by", "") for part in parts} - {""}  # what they shed is made from them
+    names |= {part["species"] for part in parts if not part["species"].startswith(part.get("shed_by", "?") + "_")}
+    own = [name for name in sorted(names) if find_edit(scene, name) is not None]
+    data |= {"species": {name: dict(species_data(scene, name)) for name in own}} if own else {}
     if biome is not None:
         limits = limits_of_zone(biome)
         changed = {
@@ -208,19 +205,6 @@ def layers_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.PropertyGroup]
 def stands_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
     """Fields of a biome that are stands."""
     return [obj for obj in scene.objects if is_stand(obj) and obj.tetflora.stand.biome == uid]
-
-
-def _species_data(scene: bpy.types.Scene, parts: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Pages of those species that are edited or new in this file; what they shed is made from them."""
-    names = {part.get("shed_by", "") for part in parts} - {""}
-    names |= {part["species"] for part in parts if not part["species"].startswith(part.get("shed_by", "?") + "_")}
-    return {name: dict(species_data(scene, name)) for name in sorted(names) if find_edit(scene, name) is not None}
-
-
-def _check_limits(limits: Any) -> None:
-    known = {one.name for one in fields(Limits)}
-    check_keys('"limits"', limits, set(), known)
-    check_settings('"limits"', limits, TetFloraLayer, known)
 
 
 def _check_ground(ground: Any) -> None:

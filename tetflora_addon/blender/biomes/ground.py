@@ -23,7 +23,7 @@ from ..placing.terrain import grid_mesh, read_ground
 from ..placing.zones import biomes_in
 from ..scene.crowns import crown_for
 from ..scene.fields import fields_of, read_field
-from .properties import GROUND, data_of
+from .library import GROUND, data_of
 
 NAME = "Land"
 #: Side of land that is made, and of its squares, meters.

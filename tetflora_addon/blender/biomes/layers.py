@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..placing.plant_objects import PAINTED_MARK, note_field, plant_collection, remove_fields
-from ..placing.populations import add_population, remove_population
+from ..placing.plant_objects import PAINTED_MARK, note_field, plant_collection
+from ..placing.populations import add_population
 from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, set_grounds
 from ..runtime import Handlers
 from ..scene.field_sizes import has_history
@@ -105,19 +105,6 @@ def forget_gone(scene: bpy.types.Scene) -> None:
         if layers[index].kind == FIELD and (field is None or scene not in field.users_scene):
             layers.remove(index)
     scene.tetflora.layers_index = min(scene.tetflora.layers_index, len(layers) - 1)
-
-
-def remove_layer(scene: bpy.types.Scene, index: int, keep_plants: bool = False) -> int:
-    """Remove one layer; its plants go with it, unless they are frozen or shall be kept. How many went."""
-    group, layer = scene.tetflora, scene.tetflora.layers[index]
-    if layer.kind == SCATTER:
-        return remove_population(scene, index, keep_plants)
-    number, field, kept = 0, layer.field, keep_plants or layer.frozen
-    group.layers.remove(index)
-    group.layers_index = max(min(group.layers_index, len(group.layers) - 1), 0)
-    if field is not None and not kept:
-        number = remove_fields([field])
-    return number
 
 
 def copy_layer(scene: bpy.types.Scene, source: Layer, grounds: Sequence[bpy.types.Object] | None = None) -> Layer:

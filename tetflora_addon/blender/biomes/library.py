@@ -32,6 +32,26 @@ _seen: tuple[float, dict[str, "BiomeInfo"]] | None = None
 _kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
 pictures = Pictures()
 
+#: Ground: linear RGB of bare soil and of turf, the share that turf hides; and the shape of ground that is made for it:
+#: hills in meters, slope in degrees, depth of a brook's valley in meters. Least and most of each number.
+GROUND = {
+    "earth": ((0.036, 0.025, 0.016), 0.0, 1.0),
+    "turf": ((0.05, 0.08, 0.02), 0.0, 1.0),
+    "turf_share": (0.0, 0.0, 1.0),
+    "hills": (2.0, 0.0, 30.0),
+    "slope": (0.0, 0.0, 45.0),
+    "valley": (0.0, 0.0, 30.0),
+}
+
+
+def data_of(biome: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """What a biome keeps of its file beside its layers; nothing where that cannot be read."""
+    try:
+        data = parse_json(biome.data) if biome.data else {}
+    except ValueError:
+        data = {}
+    return data if isinstance(data, dict) else {}
+
 
 @dataclass(frozen=True)
 class BiomeInfo:

@@ -190,7 +190,10 @@ def _refine(options: argparse.Namespace) -> dict:
     _set_proxies(scene, options)
     target = None if options.save is None else _named(options.save)
     if target is not None:
-        _check_target(target)
+        if not target.parent.is_dir():  # before the work
+            raise SceneError(f"The folder {target.parent} does not exist; create it or choose another")
+        if target.is_dir():
+            raise SceneError(f"{target} is a folder; add a file name")
     statistics = refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
     if target is not None:
         scene.tetflora.output.save_results = True
@@ -198,14 +201,6 @@ def _refine(options: argparse.Namespace) -> dict:
     if statistics.unknown:
         raise SceneError(statistics.unknown)
     return asdict(statistics)
-
-
-def _check_target(path: Path) -> None:
-    """Refuse a path that cannot be written, before the work."""
-    if not path.parent.is_dir():
-        raise SceneError(f"The folder {path.parent} does not exist; create it or choose another")
-    if path.is_dir():
-        raise SceneError(f"{path} is a folder; add a file name")
 
 
 def _render(options: argparse.Namespace) -> dict | None:

@@ -81,40 +81,20 @@ class Box:
 
 @dataclass(frozen=True)
 class Import:
-    """What is imported, and where it goes.
-
-    Attributes
-    ----------
-    scene : bpy.types.Scene
-    depsgraph : bpy.types.Depsgraph
-    path : Path
-    epsg : int
-        EPSG code of the coordinates, `PLAIN`, or 0 where the file tells.
-    new : bool
-        Let its middle be the scene's origin, whatever was imported before.
-    selected : tuple of objects
-        Meshes to lie or stand on; imported ground if empty.
-    crop : str
-        `WHOLE`, `MIDDLE` or `EXISTING`.
-    side : float
-        Of the box around the middle, meters.
-    scale, offset : float
-        Of rasters: meters of a value, and what is added.
-    tiles : tuple of Path
-        Of rasters: other files of the same grid.
-    """
+    """What is imported, and where it goes."""
 
     scene: bpy.types.Scene
     depsgraph: bpy.types.Depsgraph
     path: Path
-    epsg: int = 0
-    new: bool = False
-    selected: tuple[bpy.types.Object, ...] = ()
-    crop: str = WHOLE
-    side: float = 0.0
+    epsg: int = 0  # EPSG code of the coordinates, `PLAIN`, or 0 where the file tells
+    new: bool = False  # let its middle be the scene's origin, whatever was imported before
+    selected: tuple[bpy.types.Object, ...] = ()  # meshes to lie or stand on; imported ground if empty
+    crop: str = WHOLE  # `WHOLE`, `MIDDLE` or `EXISTING`
+    side: float = 0.0  # of the box around the middle, meters
+    #: scale, offset: Of rasters: meters of a value, and what is added
     scale: float = 1.0
     offset: float = 0.0
-    tiles: tuple[Path, ...] = ()
+    tiles: tuple[Path, ...] = ()  # of rasters: other files of the same grid
 
     @property
     def what(self) -> str:

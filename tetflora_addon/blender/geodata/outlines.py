@@ -120,7 +120,9 @@ def _curve(outline: MapFeature, rings: list[NDArray[np.float64]], heights: Heigh
         data.dimensions, data.twist_mode = '3D', 'Z_UP'
         rings = [one_ring(tuple(rings))] if outline.closed else [denser(rings[0], _STEP)] if ribbon else rings
         data.extrude = outline.width / 2.0
-    ground = [_on(heights, ring) for ring in rings]
+    ground = [
+        np.zeros(len(ring)) if heights is None else np.nan_to_num(heights.at(heights.height, ring)) for ring in rings
+    ]
     foot = np.array([*np.round(rings[0][0]), 0.0])
     if filled:
         sunk = _SINK if outline.height else 0.0
@@ -144,11 +146,6 @@ def _curve(outline: MapFeature, rings: list[NDArray[np.float64]], heights: Heigh
     if filled and outline.kind == BUILDING:
         obj[BUILDING_MARK] = True
     return obj
-
-
-def _on(heights: HeightGrid | None, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Heights of the ground (n,); 0 where there is none."""
-    return np.zeros(len(points)) if heights is None else np.nan_to_num(heights.at(heights.height, points), nan=0.0)
 
 
 def _look(kind: str) -> bpy.types.Material:

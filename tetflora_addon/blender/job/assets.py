@@ -38,30 +38,15 @@ asset_warnings: list[str] = []
 
 @dataclass(frozen=True)
 class SceneAssets:
-    """Assets of a scene that take part in refinement, and where they are.
+    """Assets of a scene that take part in refinement, and where they are."""
 
-    Attributes
-    ----------
-    targets : tuple of Target
-        What each asset is of.
-    placed : PlacedAssets
-        Instances, in the coordinates of the job.
-    matrices : (n, 4, 4) float64
-        The same, as Blender takes them.
-    owners : tuple of bpy.types.Object or None
-        Objects that show instances; None for those that are plants of many objects.
-    owner : (n,) int32
-        Index into these.
-    originals : OriginalPolicy
-        Which are always drawn as the originals.
-    """
-
-    targets: tuple[Target, ...]
-    placed: PlacedAssets
-    matrices: NDArray[np.float64]
+    targets: tuple[Target, ...]  # what each asset is of
+    placed: PlacedAssets  # instances, in the coordinates of the job
+    matrices: NDArray[np.float64]  # (n, 4, 4): the same, as Blender takes them
+    #: Objects that show instances; None for those that are plants of many objects
     owners: tuple[bpy.types.Object | None, ...]
-    owner: NDArray[np.int32]
-    originals: OriginalPolicy
+    owner: NDArray[np.int32]  # (n,): index into these
+    originals: OriginalPolicy  # which are always drawn as the originals
     warnings: tuple[str, ...] = field(default=())
 
     @property

@@ -30,7 +30,7 @@ from ...refinement.statistics import Statistics
 from ...species.catalog import list_species, load_species
 from ...species.species import Species
 from ..assets.places import Places, read_places
-from ..preferences import wanted_threads
+from ..preferences import preferences
 from ..results.hiding import originals_shown
 from ..results.leaf_objects import resolved_species
 from ..results.proxy_kinds import proxy_kind_of
@@ -248,7 +248,9 @@ def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
 
 def use_machine(scene: bpy.types.Scene) -> None:
     """Let what follows work with as many threads, and processes with as much memory, as the artist wants."""
-    parallel.set_threads(wanted_threads(scene))
+    own = preferences()
+    fixed = scene.render.threads if scene.render.threads_mode == 'FIXED' else 0  # of all cores
+    parallel.set_threads(own.threads if own is not None and own.threads else fixed)
     pool.set_memory_limit(memory.limit(most_memory(scene)))
 
 

@@ -25,7 +25,7 @@ from ..results.hiding import artists_flags
 from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.meshes import write_mesh
 from ..results.output import remove_made
-from ..runtime import JobData, guarded, is_there
+from ..runtime import JobData, is_there, job
 from ..scene.ages import classed
 from ..scene.looks import LIKE, look_like
 from ..scene.own_ages import stored_ages
@@ -84,8 +84,9 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
     return mesh
 
 
+@job("Convert Plants to Meshes")
 def make_plant_mesh_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
 ) -> Generator[Progress, object, list[bpy.types.Object]]:
     """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
 
@@ -107,15 +108,7 @@ def make_plant_mesh_steps(
         An invalid species or transform, or too many polygons; nothing is made.
     """
     plants = list(plants)
-    data = JobData("Convert Plants to Meshes", scene, depsgraph.view_layer)
-    data.add_objects(plants)
-    data.add_objects(leaf_objects(scene).values())
-    return guarded(data, _make_plant_mesh_steps(data, scene, depsgraph, plants))
-
-
-def _make_plant_mesh_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: list[bpy.types.Object]
-) -> Generator[Progress, object, list[bpy.types.Object]]:
+    data.add_objects([*plants, *leaf_objects(scene).values()])
     world = np.array([world_matrix(p, depsgraph) for p in plants]).reshape(-1, 4, 4)
     frame, scale, sound = frames_of(world[:, :3, :3])
     for plant, good in zip(plants, sound, strict=True):

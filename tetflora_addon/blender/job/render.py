@@ -33,7 +33,7 @@ from ..results.hiding import (
     unpack_override_marks,
 )
 from ..results.output import KIND, adopt_materials, release_materials
-from ..results.proxy_kinds import raise_settings, restore_settings
+from ..results.proxy_kinds import raise_settings
 from ..runtime import Handlers, Listeners, complain, failed_frames, remember, with_uid
 from ..saved_files import clear_unreadable, migrate
 from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
@@ -65,11 +65,6 @@ nothing_refined = Listeners()
 def render_errors() -> list[str]:
     """Messages of the frames of the last render that were rendered without their plants."""
     return list(failed_frames)
-
-
-def forget_render_errors() -> None:
-    """Clear the messages, after Refine has made the plants."""
-    failed_frames.clear()
 
 
 def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
@@ -252,8 +247,8 @@ def _raise(scene: bpy.types.Scene) -> None:
 
 def _lower(scene: int) -> None:
     found = with_uid(bpy.data.scenes, scene)  # a script may delete it between two frames
-    if found is not None:
-        restore_settings(found, _rendering.raised.get(scene, {}))
+    for (engine, name), value in _rendering.raised.get(scene, {}).items() if found is not None else ():
+        setattr(getattr(found, engine), name, value)
 
 
 def _show_hidden() -> None:

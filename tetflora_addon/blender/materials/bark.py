@@ -73,106 +73,55 @@ _WILLOW: Tones = (
 
 @dataclass(frozen=True)
 class Bark:
-    """One character of bark.
+    """One character of bark."""
 
-    Attributes
-    ----------
-    pattern : callable
-        (graph, place) → (factors of the color, height in widths of a feature): terms.
-    scale : float
-        Features to a radius, on a branch of .25 m radius; 2π times as many around it.
-    stretch : float
-        How much longer along the branch than around it features are.
-    mean : (3,) float
-        Mean of the pattern's factors over the surface, measured.
-    contrast : float
-        1: factors as the pattern has them.
-    depth : float
-        Of the relief, in widths of a feature.
-    smooth, full : float
-        Perimeters under which there is no pattern, and over which it is complete, meters.
-    moss, lichen : float
-        How much of it there is.
-    power : float
-        Features to a radius go by this power of the radius: at 1 they are as wide on all branches.
-    """
-
+    #: (graph, place) → (factors of the color, height in widths of a feature): terms
     pattern: Callable[[Graph, Place], tuple[Term, Term]]
-    scale: float
-    stretch: float
-    mean: tuple[float, float, float]
-    contrast: float
-    depth: float
+    scale: float  # features to a radius, on a branch of .25 m radius; 2π times as many around it
+    stretch: float  # how much longer along the branch than around it features are
+    mean: tuple[float, float, float]  # (3,): mean of the pattern's factors over the surface, measured
+    contrast: float  # 1: factors as the pattern has them
+    depth: float  # of the relief, in widths of a feature
+    #: smooth, full: Perimeters under which there is no pattern, and over which it is complete, meters
     smooth: float
     full: float
+    #: moss, lichen: How much of it there is
     moss: float = 0.0
     lichen: float = 0.0
-    power: float = 0.5
+    power: float = 0.5  # features to a radius go by this power of the radius: at 1 they are as wide on all branches
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where on a branch a point lies, as terms.
+    """Where on a branch a point lies, as terms."""
 
-    Attributes
-    ----------
-    round : vector
-        On the cylinder of radius 1, moved by the branch's color.
-    cells : vector
-        The same in features: their widths around the branch, their lengths along it.
-    turn, along : number
-        Turns around the branch, and radii along it from its base.
-    scale, stretch : number
-        Features to a radius, and their length over their width.
-    girth : number
-        Length around the branch at its base, meters.
-    """
-
-    round: Term
-    cells: Term
+    round: Term  # on the cylinder of radius 1, moved by the branch's color
+    cells: Term  # the same in features: their widths around the branch, their lengths along it
+    #: turn, along: Turns around the branch, and radii along it from its base
     turn: Term
     along: Term
+    #: scale, stretch: Features to a radius, and their length over their width
     scale: Term
     stretch: Term
-    girth: Term
+    girth: Term  # length around the branch at its base, meters
 
 
 @dataclass(frozen=True)
 class Cell:
-    """The cell of a scatter of points in which a place lies, as terms.
+    """The cell of a scatter of points in which a place lies, as terms."""
 
-    Attributes
-    ----------
-    border : number
-        Distance to the plane halfway to the next point.
-    across : number
-        How steeply that border crosses the branch: 0 where it runs along, 1 where around.
-    random : three numbers
-        Of this cell.
-    off : vector
-        Place, from the middle of the cell.
-    """
-
-    border: Term
-    across: Term
-    random: tuple[Term, Term, Term]
-    off: Term
+    border: Term  # distance to the plane halfway to the next point
+    across: Term  # how steeply that border crosses the branch: 0 where it runs along, 1 where around
+    random: tuple[Term, Term, Term]  # of this cell
+    off: Term  # place, from the middle of the cell
 
 
 @dataclass(frozen=True)
 class Knot:
-    """The nearest scar of a shed branch, as terms.
+    """The nearest scar of a shed branch, as terms."""
 
-    Attributes
-    ----------
-    off : vector
-        Place from its middle, in sizes of its eye.
-    far : number
-        Length of that; large where there is none.
-    """
-
-    off: Term
-    far: Term
+    off: Term  # place from its middle, in sizes of its eye
+    far: Term  # length of that; large where there is none
 
 
 def place_group() -> bpy.types.NodeTree:
@@ -453,11 +402,6 @@ def netted(graph: Graph, place: Place) -> tuple[Term, Term]:
     return graph.mixed(hollow, tones(graph, tone, _ASH), _BLACK), height
 
 
-def plated(graph: Graph, place: Place) -> tuple[Term, Term]:
-    """Long plates of flakes that lie in layers, each its own red-brown or gray, with dark fissures between."""
-    return _plates(graph, place)[:2]
-
-
 def papery(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Plates low on the trunk; on limbs and high up thin orange skin that curls off in flakes."""
     color, height, part, fine = _plates(graph, place)
@@ -470,7 +414,10 @@ def papery(graph: Graph, place: Place) -> tuple[Term, Term]:
 
 
 def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
-    """Color, height, part of a flake from its rim, and a fine noise."""
+    """Long plates of flakes that lie in layers, each its own red-brown or gray, with dark fissures between.
+
+    Color, height, part of a flake from its rim, and a fine noise.
+    """
     noise, wave = graph.noise(times(place.cells, 0.9, 1.5), 3.0, 0.62)
     where = bent(place.cells, wave, 1.0, 0.6)
     plate = cell(graph, where)
@@ -582,13 +529,6 @@ def foot(graph: Graph, place: Place, noise: Term, uneven: float, start: float) -
     return graph.step(noise * uneven + -place.along, start, start + 1.0)
 
 
-def _dashes(graph: Graph, place: Place, noise: Term, wave: Term) -> Term:
-    """1 in thin dark lines across, some long and many short."""
-    spots = points(graph, bent(times(place.round, 1.3, 8.0), wave, 0.4))
-    size = graph.parts(spots["Color"])[0] ** 2.0 * 0.36 + 0.1
-    return graph.step(noise * 0.4 + (spots["Distance"] - 0.2), size, size * 0.75)
-
-
 def banded(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Satin skin with lenticels in rings, like a cherry's, and curls of skin between."""
     noise, wave = graph.noise(times(place.cells, 0.4, 0.35), 4.0, 0.6)
@@ -607,7 +547,10 @@ def peeling(graph: Graph, place: Place) -> tuple[Term, Term]:
     torn = graph.step(sheet, 0.585, 0.6)
     edge = torn * graph.step(sheet, 0.625, 0.6)
     dots = graph.step(points(graph, bent(place.cells, wave, 0.3))["Distance"], 0.3, 0.2)
-    dashes = _dashes(graph, place, noise, wave)
+    # Thin dark lines across, some long and many short.
+    spots = points(graph, bent(times(place.round, 1.3, 8.0), wave, 0.4))
+    size = graph.parts(spots["Color"])[0] ** 2.0 * 0.36 + 0.1
+    dashes = graph.step(noise * 0.4 + (spots["Distance"] - 0.2), size, size * 0.75)
     eye = knot(graph, place, _SCAR, wave, apart=0.85)
     # A scar is a black diamond, wider than high, and its brows hang from it.
     flat = graph.vector('DOT_PRODUCT', abs(eye.off), (0.45, 0.45, 1.5))
@@ -644,7 +587,7 @@ def jointed(graph: Graph, place: Place) -> tuple[Term, Term]:
 
 _CHARACTERS: dict[str, Bark] = {
     "ridged": Bark(ridged, 11.0, 6.0, (0.427, 0.394, 0.335), 0.95, 0.3, 0.22, 0.8, 1.0, 0.6),
-    "plated": Bark(plated, 6.0, 2.8, (0.33, 0.245, 0.203), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
+    "plated": Bark(lambda *at: _plates(*at)[:2], 6.0, 2.8, (0.33, 0.245, 0.203), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
     "smooth": Bark(smooth, 6.0, 0.3, (0.445, 0.449, 0.422), 1.0, 0.02, 0.12, 0.4, 0.8, 0.9),
     "banded": Bark(banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
     "ringed": Bark(ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),

@@ -58,44 +58,22 @@ _DIGITS = (1187.0, 2039.0, 3121.0)
 
 @dataclass(frozen=True)
 class BladeLook:
-    """How leaves of a kind look.
+    """How leaves of a kind look."""
 
-    Attributes
-    ----------
-    veins : float
-        Veins of second order to a leaf's length, on either side of the midrib; 0 for none. Of parallel ones, to the
-        length as well.
-    angle : float
-        Between them and the midrib, degrees.
-    midrib, lines : float
-        How much lighter midrib and veins are in reflected light.
-    dark : float
-        How much darker they are against the sun; negative for lighter.
-    relief : float
-        Height of the blade between veins, over their distance.
-    mottling : float
-        How uneven the color is.
-    rough : float
-        Roughness of the upper side's gloss.
-    wear : float
-        Fraction of leaves with brown tips and spots.
-    palmate : bool
-        Main veins radiate from the base, each with veins of its own.
-    net : bool
-        Veins of third order.
-    """
-
+    #: Veins of second order to a leaf's length, on either side of the midrib; 0 for none. Of parallel ones, to the
+    #: length as well.
     veins: float
-    angle: float
+    angle: float  # between them and the midrib, degrees
+    #: midrib, lines: How much lighter midrib and veins are in reflected light
     midrib: float = 0.55
     lines: float = 0.3
-    dark: float = 0.3
-    relief: float = 0.025
-    mottling: float = 0.3
-    rough: float = 0.5
-    wear: float = 0.05
-    palmate: bool = False
-    net: bool = False
+    dark: float = 0.3  # how much darker they are against the sun; negative for lighter
+    relief: float = 0.025  # height of the blade between veins, over their distance
+    mottling: float = 0.3  # how uneven the color is
+    rough: float = 0.5  # roughness of the upper side's gloss
+    wear: float = 0.05  # fraction of leaves with brown tips and spots
+    palmate: bool = False  # main veins radiate from the base, each with veins of its own
+    net: bool = False  # veins of third order
 
 
 BLADES: dict[str, BladeLook] = {

@@ -33,23 +33,15 @@ _MOST_BYTES = 512 << 20
 
 @dataclass(frozen=True)
 class Pyramid:
-    """Copies of an image, each half as wide as the one before.
+    """Copies of an image, each half as wide as the one before."""
 
-    Attributes
-    ----------
-    texels : (n,) uint64
-        Of all copies; each is four float16: linear RGB times alpha, and alpha.
-    start, columns, rows : (l,) int32
-        First texel, and size, of each copy.
-    width, height : (l,) float32
-        Texels that the whole image would be wide and high in each copy; of sizes that are no power of two, the last
-        texels stick out.
-    """
-
-    texels: NDArray[np.uint64]
+    texels: NDArray[np.uint64]  # (n,): of all copies; each is four float16: linear RGB times alpha, and alpha
+    #: start, columns, rows: (l,): First texel, and size, of each copy
     start: NDArray[np.int32]
     columns: NDArray[np.int32]
     rows: NDArray[np.int32]
+    #: width, height: (l,): Texels that the whole image would be wide and high in each copy; of sizes that are no power
+    #: of two, the last texels stick out
     width: NDArray[np.float32]
     height: NDArray[np.float32]
 
@@ -225,43 +217,23 @@ class MeshLayers:
 
 @dataclass
 class Plan:
-    """How one material is evaluated on one mesh; a point where everything has its mean, which notes what is asked for.
+    """How a material is evaluated on a mesh; a point where everything has its mean, which notes what is asked for."""
 
-    Attributes
-    ----------
-    name : str
-        Of the material, for messages.
-    problems : list of str
-        For the artist.
-    viewport : (3,) float32
-        The material's color in viewports, for images that are missing.
-    constant : (5,) float32
-        Cover, color times cover, and the lightness of what goes through; of where all has its mean, if it varies.
-    surface : bpy.types.NodeSocket, optional
-        What its shaders lead to; None if it has none.
-    is_known : bool
-        Whether its transmission is.
-    maps, colors : list of str
-        UV maps and other attributes that it depends on.
-    texels : float
-        Of the finest image, along a unit of texture coordinates.
-    uneven : bool
-        Whether it is not the mean that comes out for the mean.
-    """
-
-    name: str
+    name: str  # of the material, for messages
     layers: MeshLayers
     reader: FaceReader
-    viewport: NDArray[np.float32]
+    viewport: NDArray[np.float32]  # (3,): the material's color in viewports, for images that are missing
+    #: (5,): Cover, color times cover, and the lightness of what goes through; of where all has its mean, if it varies
     constant: NDArray[np.float32]
-    problems: list[str] = field(default_factory=list)
-    surface: bpy.types.NodeSocket | None = None
-    is_known: bool = False
+    problems: list[str] = field(default_factory=list)  # for the artist
+    surface: bpy.types.NodeSocket | None = None  # what its shaders lead to; None if it has none
+    is_known: bool = False  # whether its transmission is
+    #: maps, colors: UV maps and other attributes that it depends on
     maps: list[str] = field(default_factory=list)
     colors: list[str] = field(default_factory=list)
     images: set[bpy.types.Image] = field(default_factory=set)
-    texels: float = 1.0
-    uneven: bool = False
+    texels: float = 1.0  # of the finest image, along a unit of texture coordinates
+    uneven: bool = False  # whether it is not the mean that comes out for the mean
 
     def tell(self, problem: str) -> None:
         """Add a problem; those that are told already are left out."""
@@ -471,18 +443,11 @@ class FaceReader:
     ----------
     most : int
         See `pyramid_of`.
-
-    Attributes
-    ----------
-    warnings : list of str
-        What the artist should know, each once.
-    curves : dict of int to ndarray
-        Tables of ramps, see `NodeValues`.
     """
 
     def __init__(self, most: int = MOST_TEXELS) -> None:
-        self.warnings: list[str] = []
-        self.curves: dict[int, NDArray[np.float32]] = {}
+        self.warnings: list[str] = []  # what the artist should know, each once
+        self.curves: dict[int, NDArray[np.float32]] = {}  # tables of ramps, see `NodeValues`
         self._most = most
         self._pyramids: dict[tuple[bpy.types.Image, bool], Pyramid | None] = {}
 
@@ -507,13 +472,7 @@ class FaceReader:
 
 
 class MeshLooks:
-    """The looks of one mesh, evaluated piece by piece.
-
-    Attributes
-    ----------
-    plans : list of Plan
-        One for each material.
-    """
+    """The looks of one mesh, evaluated piece by piece."""
 
     def __init__(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], reader: FaceReader) -> None:
         maps = mesh.uv_layers
@@ -521,7 +480,7 @@ class MeshLooks:
         types = {a.name: a.data_type for a in mesh.attributes if a.domain in _DOMAINS and a.data_type in _TYPES}
         self.materials = materials
         layers = MeshLayers(first, types)
-        self.plans = [_plan_of(material, layers, reader) for material in materials]
+        self.plans = [_plan_of(material, layers, reader) for material in materials]  # one for each material
         self._values: dict[str, tuple[str, NDArray]] = {}
         for name in {name for plan in self.plans for name in plan.names}:
             attribute = mesh.attributes[name]
@@ -575,7 +534,11 @@ class MeshLooks:
             slot = self.slots(low, high)
             values = self._triangles(chosen, verts, face[start:end], slot[of_face], most)
             if high - low < end - start:
-                values = _by_face(values, of_face, _areas(positions, verts), high - low)
+                # Means over faces of those over their triangles.
+                areas, number = _areas(positions, verts), high - low
+                total = np.maximum(np.bincount(of_face, areas, number), _TINY)
+                values = np.stack([np.bincount(of_face, column * areas, number) for column in values.T], axis=1)
+                values = values / total[:, None]
             self._write(made, slice(low, high), values, slot)
             yield end / len(face)
         return made
@@ -680,11 +643,3 @@ def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, reader: Fa
 def _areas(positions: NDArray[np.float32], verts: NDArray[np.int32]) -> NDArray[np.float64]:
     a, b, c = (np.take(positions, column, axis=0).astype(np.float64) for column in verts.T)
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) + _TINY
-
-
-def _by_face(
-    values: NDArray[np.float32], face: NDArray[np.int32], areas: NDArray[np.float64], faces: int
-) -> NDArray[np.float64]:
-    """Means (n, 5) over faces of those over their triangles."""
-    total = np.maximum(np.bincount(face, areas, faces), _TINY)
-    return np.stack([np.bincount(face, column * areas, faces) for column in values.T], axis=1) / total[:, None]

@@ -265,7 +265,9 @@ def shell_group() -> bpy.types.NodeTree:
     def build(graph: Graph, given: Any) -> dict[str, Any]:
         geometry = graph.outputs("ShaderNodeNewGeometry")
         inputs = {name: given[name] for name in ("p", "s", "spear", "Through Tint", "Roundness")}
-        inputs["Color"] = _varied_color(graph, given["Variation"])
+        # Lighter or darker; over many cells the mean stays.
+        varied = (graph.attribute("tf_random", "Fac") * 2.0 + -1.0) * given["Variation"] + 1.0
+        inputs["Color"] = graph.scaled(graph.attribute("tf_color", "Color"), varied)
         inputs["Transmission"] = graph.attribute("tf_transmission", "Fac")
         inputs["Normal"] = graph.attribute("tf_normal", "Vector")
         inputs["Plane"] = graph.attribute("tf_plane", "Fac")
@@ -349,26 +351,17 @@ def _builder(group: Any) -> Any:
 
 @dataclass(frozen=True)
 class _Path:
-    """The ray's way through the cell, from the face that was hit.
+    """The ray's way through the cell, from the face that was hit."""
 
-    Attributes
-    ----------
-    length : Term
-        Meters inside the cell that count at this face.
-    transmittance, depth : Term
-        e^{−κℓ}, and κℓ.
-    levels, slopes : list of Term
-        The four barycentric coordinates at the hit, in the order of the vertices, and what they lose a meter.
-    leaving : Term
-        1 on the faces where the ray leaves.
-    """
-
-    length: Term
+    length: Term  # meters inside the cell that count at this face
+    #: transmittance, depth: e^{−κℓ}, and κℓ
     transmittance: Term
     depth: Term
+    #: levels, slopes: The four barycentric coordinates at the hit, in the order of the vertices, and what they lose a
+    #: meter
     levels: list[Term]
     slopes: list[Term]
-    leaving: Term
+    leaving: Term  # 1 on the faces where the ray leaves
 
 
 def _paths(graph: Graph, geometry: dict[str, Term]) -> dict[str, _Path]:
@@ -433,12 +426,6 @@ def _end_weights(graph: Graph, depth: Term) -> tuple[Term, Term]:
         series = (depth * (depth * third + second) + 0.5) * depth
         weights.append((series - value) * thin + value)
     return weights[0], weights[1]
-
-
-def _varied_color(graph: Graph, amount: Term) -> Term:
-    """The cell's color, lighter or darker by up to `amount`; over many cells the mean stays."""
-    factor = (graph.attribute("tf_random", "Fac") * 2.0 + -1.0) * amount + 1.0
-    return graph.scaled(graph.attribute("tf_color", "Color"), factor)
 
 
 def _decided(graph: Graph, opacity: Term, geometry: dict[str, Term], stochastic: Term) -> Term:

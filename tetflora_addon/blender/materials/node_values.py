@@ -33,18 +33,8 @@ def _ratio(a: Values, b: Values) -> Values:
     return np.divide(a, b, out=np.zeros(np.broadcast_shapes(a.shape, b.shape), np.float32), where=b != 0)
 
 
-def _mod(a: Values, b: Values) -> Values:
-    return a - np.trunc(_ratio(a, b)) * b
-
-
-def _wrap(a: Values, high: Values, low: Values) -> Values:
-    span = high - low
-    return np.where(span != 0, a - span * np.floor(_ratio(a - low, span)), low)
-
-
-def _ping_pong(a: Values, b: Values) -> Values:
-    turns = _ratio(a - b, 2 * b)
-    return np.where(b != 0, np.abs((turns - np.floor(turns)) * b * 2 - b), 0)
+def _fraction(a: Values) -> Values:
+    return a - np.floor(a)
 
 
 #: Operations of nodes *Math* and, for each component, *Vector Math*; with as many operands as they need.
@@ -70,13 +60,13 @@ MATHS: dict[str, Callable[..., Values]] = {
     'FLOOR': np.floor,
     'CEIL': np.ceil,
     'TRUNC': np.trunc,
-    'FRACT': lambda a: a - np.floor(a),
-    'FRACTION': lambda a: a - np.floor(a),
-    'MODULO': _mod,
+    'FRACT': _fraction,
+    'FRACTION': _fraction,
+    'MODULO': lambda a, b: a - np.trunc(_ratio(a, b)) * b,
     'FLOORED_MODULO': lambda a, b: a - np.floor(_ratio(a, b)) * b,
-    'WRAP': _wrap,
+    'WRAP': lambda a, high, low: np.where(high != low, a - (high - low) * np.floor(_ratio(a - low, high - low)), low),
     'SNAP': lambda a, b: np.floor(_ratio(a, b)) * b,
-    'PINGPONG': _ping_pong,
+    'PINGPONG': lambda a, b: np.where(b != 0, np.abs(_fraction(_ratio(a - b, 2 * b)) * b * 2 - b), 0),
     'SINE': np.sin,
     'COSINE': np.cos,
     'RADIANS': np.deg2rad,
@@ -102,27 +92,31 @@ def _dodge(a: Values, b: Values, t: Values) -> Values:
     return np.where(a == 0, 0, np.where(under <= 0, 1, np.minimum(_ratio(a, under), 1)))
 
 
-def _hue_of(a: Values, b: Values, t: Values) -> Values:
-    first, second = to_hsv(a), to_hsv(b)
-    other = from_hsv(np.stack(np.broadcast_arrays(second[0], first[1], first[2])))
-    return np.where(second[1] != 0, (1 - t) * a + t * other, a)
+def _tinted(channels: tuple[int, ...]) -> Callable[[Values, Values, Values], Values]:
+    """A mix by a factor with what has some of another color's hue, saturation and value; grays give no hue."""
+
+    def blend(a: Values, b: Values, t: Values) -> Values:
+        first, second = to_hsv(a), to_hsv(b)
+        other = from_hsv(_stacked(*((second if n in channels else first)[n] for n in range(3))))
+        return np.where(second[1] != 0, (1 - t) * a + t * other, a)
+
+    return blend
 
 
-def _saturation_of(a: Values, b: Values, t: Values) -> Values:
-    first, second = to_hsv(a), to_hsv(b)
-    other = (1 - t) * first[1] + t * second[1]
-    return np.where(first[1] != 0, from_hsv(np.stack(np.broadcast_arrays(first[0], other, first[2]))), a)
+def _graded(channel: int) -> Callable[[Values, Values, Values], Values]:
+    """A mix of saturations or values alone; grays have no saturation that could be changed."""
+
+    def blend(a: Values, b: Values, t: Values) -> Values:
+        parts, second = list(to_hsv(a)), to_hsv(b)
+        known = (parts[1] != 0) | (channel == 2)
+        parts[channel] = (1 - t) * parts[channel] + t * second[channel]
+        return np.where(known, from_hsv(_stacked(*parts)), a)
+
+    return blend
 
 
-def _value_of(a: Values, b: Values, t: Values) -> Values:
-    first, second = to_hsv(a), to_hsv(b)
-    return from_hsv(np.stack(np.broadcast_arrays(first[0], first[1], (1 - t) * first[2] + t * second[2])))
-
-
-def _color_of(a: Values, b: Values, t: Values) -> Values:
-    first, second = to_hsv(a), to_hsv(b)
-    other = from_hsv(np.stack(np.broadcast_arrays(second[0], second[1], first[2])))
-    return np.where(second[1] != 0, (1 - t) * a + t * other, a)
+def _stacked(*parts: Values) -> Values:
+    return np.stack(np.broadcast_arrays(*parts))
 
 
 #: Ways to mix two colors by a factor.
@@ -142,10 +136,10 @@ BLENDS: dict[str, Callable[[Values, Values, Values], Values]] = {
     'EXCLUSION': lambda a, b, t: np.maximum(a + t * (a + b - 2 * a * b - a), 0),
     'SUBTRACT': lambda a, b, t: a - t * b,
     'DIVIDE': lambda a, b, t: np.where(b != 0, (1 - t) * a + t * _ratio(a, b), a),
-    'HUE': _hue_of,
-    'SATURATION': _saturation_of,
-    'COLOR': _color_of,
-    'VALUE': _value_of,
+    'HUE': _tinted((0,)),
+    'SATURATION': _graded(1),
+    'COLOR': _tinted((0, 1)),
+    'VALUE': _graded(2),
 }
 
 
@@ -165,23 +159,6 @@ def from_hsv(color: Values) -> Values:
     shift = np.array([0, 4, 2], np.float32).reshape(3, *[1] * hue.ndim)
     turn = (hue * 6 + shift) % 6
     return value * (1 - saturation * (1 - np.clip(np.abs(turn - 3) - 1, 0, 1)))
-
-
-def hue_saturation(color: Values, hue: Values, saturation: Values, value: Values, factor: Values) -> Values:
-    """The node *Hue/Saturation/Value*."""
-    h, s, v = to_hsv(color)
-    h = h + hue + np.float32(0.5)
-    made = from_hsv(np.stack(np.broadcast_arrays(h - np.floor(h), np.clip(s * saturation, 0, 1), v * value)))
-    return np.maximum(color + factor * (made - color), 0)
-
-
-def map_range(value: Values, low: Values, high: Values, to_low: Values, to_high: Values, kind: str) -> Values:
-    """The node *Map Range*, but for steps."""
-    x = _ratio(value - low, high - low)
-    if kind != 'LINEAR':
-        x = np.clip(x, 0, 1)
-        x = x * x * (3 - 2 * x) if kind == 'SMOOTHSTEP' else x * x * x * (x * (x * 6 - 15) + 10)
-    return to_low + x * (to_high - to_low)
 
 
 Stack = tuple[bpy.types.Node, ...]  # groups that the walk is in
@@ -223,21 +200,11 @@ _SIMPLE = {
 
 
 class Scattered(NamedTuple):
-    """What points of a surface do with light.
+    """What points of a surface do with light."""
 
-    Attributes
-    ----------
-    cover : (p, k)
-        Fraction that is not transparent.
-    color : (3, p, k)
-        Fraction of light that is scattered to either side; none where transparent.
-    through : (p, k)
-        Lightness of the part that leaves on the other side.
-    """
-
-    cover: Values
-    color: Values
-    through: Values
+    cover: Values  # (p, k): fraction that is not transparent
+    color: Values  # (3, p, k): fraction of light that is scattered to either side; none where transparent
+    through: Values  # (p, k): lightness of the part that leaves on the other side
 
 
 _ONE, _NONE = np.ones((1, 1), np.float32), np.zeros((1, 1), np.float32)
@@ -303,42 +270,40 @@ class NodeValues:
         return Scattered(np.clip(a.cover + b.cover - 1, 0, 1), a.color + b.color, a.through + b.through)
 
     def _tint(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
-        try:
-            return np.clip(self.color(node, key, stack), 0, 1)
-        except ImageMissing as error:
-            self._points.tell(str(error))
-            return self._points.viewport.reshape(3, 1, 1)
+        missing = self._points.viewport.reshape(3, 1, 1)
+        return np.clip(self._or_told(self.color, node, key, stack, missing), 0, 1)
 
     def _part(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
+        missing = np.full((1, 1), {"Alpha": 1.0, "Strength": 1.0, "Fac": 0.5}.get(key, 0.0), np.float32)
+        return self._or_told(self.number, node, key, stack, missing)
+
+    def _or_told(self, read: Callable, node: bpy.types.Node, key: str, stack: Stack, missing: Values) -> Values:
+        """An input; what stands for it where it needs an image that cannot be read, which is told."""
         try:
-            return self.number(node, key, stack)
+            return read(node, key, stack)
         except ImageMissing as error:
             self._points.tell(str(error))
-            return np.full((1, 1), {"Alpha": 1.0, "Strength": 1.0, "Fac": 0.5}.get(key, 0.0), np.float32)
+            return missing
 
     # Sockets.
 
     def number(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
         """An input as a number (p, k)."""
-        return self._as(*self._input(find_socket(node.inputs, key), stack), 'VALUE')
+        values, kind = self._input(node, key, stack)
+        if values.ndim == 2:
+            return values
+        return values.mean(axis=0) if kind == 'VECTOR' else luminance(values)
 
     def color(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
         """An input as a color or vector (3, p, k)."""
-        return self._as(*self._input(find_socket(node.inputs, key), stack), 'RGBA')
+        values, _ = self._input(node, key, stack)
+        return np.broadcast_to(values, (3, *values.shape)) if values.ndim == 2 else values
 
-    def _as(self, values: Values, kind: str, wanted: str) -> Values:
-        if (wanted == 'VALUE') == (values.ndim == 2):
-            return values
-        if wanted == 'VALUE':
-            return values.mean(axis=0) if kind == 'VECTOR' else luminance(values)
-        return np.broadcast_to(values, (3, *values.shape))
-
-    def _input(self, socket: bpy.types.NodeSocket, stack: Stack) -> tuple[Values, str]:
+    def _input(self, node: bpy.types.Node, key: str, stack: Stack) -> tuple[Values, str]:
+        socket = find_socket(node.inputs, key)
         source, stack = source_of(socket, stack)
-        if source is None:
-            return _constant(socket), socket.type
-        if not source.is_output:  # an input that nothing feeds, of a group or of a node that is switched off
-            return _constant(source), source.type
+        if source is None or not source.is_output:  # what nothing feeds, of a group or of a node that is switched off
+            return _constant(source or socket), (source or socket).type
         return self._output(source, stack), source.type
 
     def _output(self, socket: bpy.types.NodeSocket, stack: Stack) -> Values:
@@ -437,8 +402,12 @@ class NodeValues:
         return BLENDS[kind](a, b, factor)
 
     def _of_hue_sat(self, node, _socket, stack) -> Values:
-        keys = ("Hue", "Saturation", "Value", "Fac")
-        return hue_saturation(self.color(node, "Color", stack), *(self.number(node, key, stack) for key in keys))
+        color, keys = self.color(node, "Color", stack), ("Hue", "Saturation", "Value", "Fac")
+        hue, saturation, value, factor = (self.number(node, key, stack) for key in keys)
+        h, s, v = to_hsv(color)
+        h = h + hue + np.float32(0.5)
+        made = from_hsv(_stacked(h - np.floor(h), np.clip(s * saturation, 0, 1), v * value))
+        return np.maximum(color + factor * (made - color), 0)
 
     def _of_gamma(self, node, _socket, stack) -> Values:
         return np.maximum(self.color(node, "Color", stack), 0) ** self.number(node, "Gamma", stack)
@@ -510,12 +479,15 @@ class NodeValues:
         if node.data_type != 'FLOAT' or node.interpolation_type == 'STEPPED':
             return self._unknown(node, socket, stack)
         self._points.mark_uneven()
-        keys = ("Value", "From Min", "From Max", "To Min", "To Max")
-        values = [self.number(node, key, stack) for key in keys]
-        made = map_range(*values, node.interpolation_type)
-        if node.clamp and node.interpolation_type == 'LINEAR':
-            made = np.clip(made, np.minimum(values[3], values[4]), np.maximum(values[3], values[4]))
-        return made
+        keys, kind = ("Value", "From Min", "From Max", "To Min", "To Max"), node.interpolation_type
+        value, low, high, to_low, to_high = (self.number(node, key, stack) for key in keys)
+        x = _ratio(value - low, high - low)
+        if kind != 'LINEAR':
+            x = np.clip(x, 0, 1)
+            x = x * x * (3 - 2 * x) if kind == 'SMOOTHSTEP' else x * x * x * (x * (x * 6 - 15) + 10)
+        made = to_low + x * (to_high - to_low)
+        clamped = node.clamp and kind == 'LINEAR'
+        return np.clip(made, np.minimum(to_low, to_high), np.maximum(to_low, to_high)) if clamped else made
 
     def _of_clamp(self, node, _socket, stack) -> Values:
         value, low, high = (self.number(node, key, stack) for key in ("Value", "Min", "Max"))
@@ -534,8 +506,7 @@ class NodeValues:
     def _of_combine_color(self, node, socket, stack) -> Values:
         if getattr(node, "mode", 'RGB') != 'RGB':
             return self._unknown(node, socket, stack)
-        parts = [self.number(node, s.identifier, stack) for s in node.inputs[:3]]
-        return np.stack(np.broadcast_arrays(*parts))
+        return _stacked(*(self.number(node, s.identifier, stack) for s in node.inputs[:3]))
 
     _of_vertex_color, _of_curve_float = _of_attribute, _of_curve_rgb
     _of_sepxyz, _of_combxyz = _of_separate_color, _of_combine_color

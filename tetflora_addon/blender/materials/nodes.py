@@ -195,7 +195,9 @@ class Graph:
             value = value.outputs[0]
         if isinstance(value, Term | bpy.types.NodeSocket):
             self.tree.links.new(value.socket if isinstance(value, Term) else value, socket)
-        elif not _has(socket, value):
+        elif not (isinstance(value, float | int) and isinstance(socket.default_value, float)) or (
+            socket.default_value != value  # as Blender stores it
+        ):
             socket.default_value = value
 
     def attribute(self, name: str, output: str) -> Term:
@@ -315,11 +317,6 @@ def find_socket(sockets: Any, key: str) -> bpy.types.NodeSocket:
             if getattr(socket, attribute) == key:
                 return socket
     raise KeyError(f"No socket {key} among {', '.join(socket.name for socket in sockets)}")
-
-
-def _has(socket: bpy.types.NodeSocket, value: Any) -> bool:
-    """Whether a socket has a number already, as Blender stores it."""
-    return isinstance(value, float | int) and isinstance(socket.default_value, float) and socket.default_value == value
 
 
 def node_group(

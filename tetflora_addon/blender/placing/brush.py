@@ -71,18 +71,7 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
 
 
 class Standing:
-    """Plants of a scene that stand by themselves or in fields, as arrays.
-
-    Attributes
-    ----------
-    places : (n, 3) float64
-        World space.
-    source : (n,) int32
-        Index into ``fields``, or -1 for ``objects``.
-    number : (n,) int64
-        Index into ``objects``, or point of the field.
-    removable : (n,) bool
-    """
+    """Plants of a scene that stand by themselves or in fields, as arrays."""
 
     def __init__(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, covers: bool) -> None:
         """Read a scene, with or without what covers the ground."""
@@ -104,9 +93,11 @@ class Standing:
             source.append(np.full(len(found), index))
             number.append(np.arange(len(found)))
             removable.append(np.full(len(found), own and field.visible_get()))
-        self.places = np.concatenate(places)
+        self.places = np.concatenate(places)  # (n, 3): world space
+        #: number: (n,): Index into ``objects``, or point of the field
+        #: source: (n,): Index into ``fields``, or -1 for ``objects``
         self.source, self.number = np.concatenate(source).astype(np.int32), np.concatenate(number).astype(np.int64)
-        self.removable = np.concatenate(removable)
+        self.removable = np.concatenate(removable)  # (n,)
 
     def add(self, places: NDArray[np.float64], source: int, first: int) -> None:
         """Note new plants: at the end of the list of objects or of a field, from number ``first`` on."""
@@ -263,7 +254,8 @@ class Stroke:
         made = strokes.individuals(brush, keys)
         placement = Placement(position=places, wanted=len(keys), **made)
         standing = self.standing
-        if not self._in_field(len(keys)):
+        store, number = self.scene.tetflora.brush.store, len(standing.objects) + len(keys)
+        if not (store == 'FIELD' or (store == 'AUTOMATIC' and number > MOST_PAINTED_EMPTIES)):
             first = len(standing.objects)
             standing.objects += add_plants(self.scene, placement, species)
             standing.add(places, _OBJECTS, first)
@@ -285,19 +277,15 @@ class Stroke:
         add_points(field, places, frame, placement.scale, placement.species, placement.seed, species)
         standing.add(places, number, first)
 
-    def _in_field(self, more: int) -> bool:
-        store = self.scene.tetflora.brush.store
-        return store == 'FIELD' or (store == 'AUTOMATIC' and len(self.standing.objects) + more > MOST_PAINTED_EMPTIES)
-
 
 def draped_circle(
-    ground: Ground, center: Sequence[float], normal: Sequence[float], radius: float, sides: int = 48
+    ground: Ground, center: Sequence[float], normal: Sequence[float], radius: float
 ) -> NDArray[np.float64]:
-    """The brush's circle on the map laid on the ground, (sides + 1, 3) with the first corner twice.
+    """The brush's circle on the map laid on the ground, (49, 3) with the first corner twice.
 
     Where there is no ground, it goes on in the plane through the center.
     """
-    angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
+    angle = np.linspace(0.0, 2.0 * np.pi, 49)
     x, y = center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)
     reach = max(_REACH * radius, _LEAST_REACH)
     z = ground.heights(np.stack([x[:-1], y[:-1]], axis=1), center[2] + reach, center[2] - reach)

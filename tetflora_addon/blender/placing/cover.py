@@ -9,8 +9,8 @@ so that what grows there, and the litter of years before, keep their places.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -28,14 +28,14 @@ from ...planting.cover import FULL, Floor, Habitat, Stratum, covered, tinted
 from ...species.litter import FALLEN, KIND, leaves_page, shed_share
 from ..materials.snow import add_snow
 from ..materials.soil import SHADED, lay_soil
-from ..runtime import JobData, is_there, job
+from ..runtime import JobData, job
 from ..scene.crowns import crown_for, crown_steps
 from ..settings import with_identity
-from ..species.edits import catalog, revert_species, species_data, species_for, store_species
+from ..species.edits import catalog, species_data, species_for, store_species
 from ..worker import steps_in_thread
 from .canopy import canopy_of, floor_steps, is_cover, shedder_of, standing
 from .distances import HECTARE
-from .populations import PlacedPlants, add_population, forget_population, make_plants_steps, refuse_frozen, still_there
+from .populations import PlacedPlants, add_population, make_plants_steps, refuse_frozen, restored, still_there
 from .rules import active_population, copy_settings, grounds_of
 from .terrain import MASKS, read_ground
 
@@ -77,17 +77,10 @@ class Ingredient:
 
 @dataclass(frozen=True)
 class CoverResult:
-    """What covering made.
-
-    Attributes
-    ----------
-    made : Made
-    bare : list of str
-        Grounds that keep a material of the artist's.
-    """
+    """What covering made."""
 
     made: PlacedPlants
-    bare: list[str]
+    bare: list[str]  # grounds that keep a material of the artist's
 
 
 def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
@@ -138,10 +131,12 @@ def cover_steps(
     if not len(canopy):
         raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
     yield (progress := Progress(0.05, _UNDER))
-    floor = yield from steps_in_thread(_told(floor_steps(canopy, ground.triangles, len(above))), progress)
+    mapping = floor_steps(canopy, ground.triangles, len(above))
+    told = mapped(mapping, lambda done: Progress(0.05 + (_PLANTING - 0.05) * done, _UNDER))
+    floor = yield from steps_in_thread(told, progress)
     yield Progress(_PLANTING, "Planting")
     population = _again(data, scene, population, uid)
-    with _restored(scene, uid):
+    with restored(scene):
         parts = _parts(scene, canopy, above)
         found = cover_of(scene, uid) or _add_cover(scene, population, grounds, masks)
         _mix(found, parts, ground.map_area)
@@ -180,47 +175,10 @@ def _again(
     return population if uid == ANYBODY else still_there(data, scene, uid)
 
 
-def _told(steps: Generator[float, object, Floor]) -> Generator[Progress, object, Floor]:
-    """The maps, with their progress as a part of the whole."""
-    return mapped(steps, lambda done: Progress(0.05 + (_PLANTING - 0.05) * done, _UNDER))
-
-
-@contextmanager
-def _restored(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> Iterator[None]:
-    """Where what is done ends early, forget a cover that is new, or what was added to one, and species of litter."""
-    group, found = scene.tetflora, cover_of(scene, uid, fallen)
-    active, species = group.layers_index, {edit.identifier for edit in group.species_edits}
-    there, density = (len(found.mix), found.density) if found else (0, 0.0)
-    try:
-        yield
-    except BaseException:  # an error, or Esc
-        cover = cover_of(scene, uid, fallen) if is_there(scene) else None
-        if cover is not None and found is None:
-            forget_population(scene, cover.uid, active)
-        elif cover is not None:
-            while len(cover.mix) > there:
-                cover.mix.remove(len(cover.mix) - 1)
-            cover.density = density
-        for identifier in [e.identifier for e in group.species_edits] if is_there(scene) else ():
-            if identifier not in species:
-                revert_species(identifier)
-        raise
-
-
 def cover_of(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> bpy.types.PropertyGroup | None:
     """What covers the ground of a population, or the leaves that fall on it in autumn."""
-    return next(
-        (
-            p
-            for p in scene.tetflora.layers
-            if _is_fallen(p) == fallen and (p.covers == uid or (p.uid == uid and is_cover(p)))
-        ),
-        None,
-    )
-
-
-def _is_fallen(population: bpy.types.PropertyGroup) -> bool:
-    return bool(population.mix) and all(entry.habitat == 'FALLEN' for entry in population.mix)
+    found = (p for p in scene.tetflora.layers if p.covers == uid or (p.uid == uid and is_cover(p)))
+    return next((p for p in found if (bool(p.mix) and all(e.habitat == 'FALLEN' for e in p.mix)) == fallen), None)
 
 
 def _add_cover(
@@ -363,7 +321,7 @@ def strew_steps(
     uid = population.uid or ANYBODY
     grounds = yield from _begun(data, scene, population, fallen=True)
     population = _again(data, scene, population, uid)
-    with _restored(scene, uid, fallen=True):
+    with restored(scene):
         canopy, above = canopy_of(scene, depsgraph)
         parts = _fallen_leaves(scene, canopy, above)
         if not parts:

@@ -137,7 +137,11 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
     camera = _camera()
     collection.objects.link(camera)
     scene.camera = camera
-    collection.objects.link(_sun())
+    sun = bpy.data.objects.new("Forest sun", bpy.data.lights.new("Forest sun", 'SUN'))
+    sun.data.energy, sun.data.angle, sun.data.color = 5.0, radians(0.6), (1.0, 0.93, 0.82)
+    sun.location = (-20.0, 10.0, 30.0)  # where it can be seen and grasped; its light comes from everywhere alike
+    sun.rotation_euler = (radians(52.0), 0.0, radians(-68.0))
+    collection.objects.link(sun)
     if scene.world is not None:
         scene.world.use_fake_user = True  # still the artist's: saved although no scene uses it
     scene.world = sky("First forest sky")
@@ -254,14 +258,6 @@ def _camera() -> bpy.types.Object:
     camera.rotation_euler = (target - eye).to_track_quat('-Z', 'Y').to_euler()
     camera.data.lens, camera.data.clip_end = 28.0, 1000.0
     return camera
-
-
-def _sun() -> bpy.types.Object:
-    sun = bpy.data.objects.new("Forest sun", bpy.data.lights.new("Forest sun", 'SUN'))
-    sun.data.energy, sun.data.angle, sun.data.color = 5.0, radians(0.6), (1.0, 0.93, 0.82)
-    sun.location = (-20.0, 10.0, 30.0)  # where it can be seen and grasped; its light comes from everywhere alike
-    sun.rotation_euler = (radians(52.0), 0.0, radians(-68.0))
-    return sun
 
 
 def _settings(scene: bpy.types.Scene) -> None:

@@ -10,7 +10,8 @@ the artist's.
 from __future__ import annotations
 
 import uuid
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -27,7 +28,8 @@ from ..scene.crowns import crown_steps
 from ..scene.fields import fields_of, stored_size
 from ..scene.own_ages import MOST_YEARS
 from ..scene.skeletons import aged_kind
-from ..settings import with_identity
+from ..settings import BIOME, SCATTER, with_identity
+from ..species.edits import revert_species
 from ..worker import call_in_thread
 from .canopy import is_cover, standing
 from .plant_objects import (
@@ -82,17 +84,14 @@ def recount(scene: bpy.types.Scene) -> None:
 def add_population(
     scene: bpy.types.Scene,
     grounds: Iterable[bpy.types.Object] = (),
-    settings: TetFloraLayer | None = None,
     name: str = NAME,
 ) -> TetFloraLayer:
-    """Add a population without plants and make it the active one.
+    """Add a population without plants, with the scene's settings for new ones, and make it the active one.
 
     Parameters
     ----------
     grounds : iterable of bpy.types.Object
         Meshes to grow on.
-    settings : TetFloraLayer, optional
-        What to begin with; the scene's settings for new populations if not given.
     name : str
         A number is added if another population has it.
     """
@@ -101,7 +100,7 @@ def add_population(
     group.layers_index = len(group.layers) - 1
     population.uid = uuid.uuid4().hex
     population.name = free_name(group.layers, name)
-    copy_settings(settings or group.populate, population)
+    copy_settings(group.populate, population)
     set_grounds(population, grounds)
     return population
 
@@ -225,45 +224,57 @@ def reroll_steps(
     SceneError
         As `make_plants_steps`.
     """
-    old, uid = population.seed, population.uid
-    # A hash and not the next number: populations with neighboring seeds would follow each other's arrangements.
-    population.seed = int(uniform(child_key(key_of_seed(old), 1), 0) * 2**31)
-    try:
+    with restored(scene):
+        # A hash and not the next number: populations with neighboring seeds would follow each other's arrangements.
+        population.seed = int(uniform(child_key(key_of_seed(population.seed), 1), 0) * 2**31)
         return (yield from make_plants_steps(scene, depsgraph, population))
-    except BaseException:  # an error, or Esc
-        found = with_identity(scene.tetflora.layers, uid) if is_there(scene) else None
-        if found is not None:
-            found.seed = old
-        raise
 
 
-def remove_population(scene: bpy.types.Scene, index: int, keep_plants: bool = False) -> int:
-    """Remove a population; its plants go with it, unless they are frozen or shall be kept. How many went.
+def remove_layer(scene: bpy.types.Scene, index: int, keep_plants: bool = False) -> int:
+    """Remove a layer; its plants go with it, unless they are frozen or shall be kept. How many went.
 
     What stays is the artist's own.
     """
     group = scene.tetflora
-    population = group.layers[index]
-    own, copies = _sorted_out(scene, population)
-    kept = keep_plants or population.frozen
+    layer = group.layers[index]
+    kept, field, number = keep_plants or layer.frozen, layer.field, 0
+    own, copies = _sorted_out(scene, layer) if layer.kind == SCATTER else ([], [])
     _release([*own, *copies] if kept else copies)
-    number = 0 if kept else own_number(own)
     if not kept:
+        number = own_number(own)
         _remove(own)
-        _dissolve(scene, population.collection)
+        _dissolve(scene, layer.collection)
+        number += remove_fields([field], tidy=False) if field is not None else 0
     group.layers.remove(index)
     group.layers_index = max(min(group.layers_index, len(group.layers) - 1), 0)
     remove_empty_collections()
     return number
 
 
-def forget_population(scene: bpy.types.Scene, uid: str, active: int) -> None:
-    """Remove a population that has got no plants, if it is still there; another one becomes active again."""
-    group = scene.tetflora if is_there(scene) else None
-    number = next((i for i, p in enumerate(group.layers) if p.uid == uid), None) if group is not None else None
-    if number is not None:
-        remove_population(scene, number)
-        group.layers_index = active
+@contextmanager
+def restored(scene: bpy.types.Scene) -> Iterator[None]:
+    """Where what is done ends early, forget new layers, what was added to mixtures, and species that were made."""
+    group = scene.tetflora
+    before = {layer.uid: (len(layer.mix), layer.density, layer.seed) for layer in group.layers}
+    active, species = group.layers_index, {edit.identifier for edit in group.species_edits}
+    try:
+        yield
+    except BaseException:  # an error, or Esc
+        for index in reversed(range(len(group.layers))) if is_there(scene) else ():
+            layer = group.layers[index]
+            if layer.uid not in before:
+                if layer.kind == BIOME and layer.paths is not None:
+                    bpy.data.batch_remove([*layer.paths.objects, layer.paths])
+                remove_layer(scene, index)
+                continue
+            number, layer.density, layer.seed = before[layer.uid]
+            while len(layer.mix) > number:
+                layer.mix.remove(len(layer.mix) - 1)
+        if is_there(scene):
+            group.layers_index = active
+            for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
+                revert_species(identifier)
+        raise
 
 
 def refuse_frozen(population: TetFloraLayer) -> None:
@@ -283,17 +294,15 @@ def _sorted_out(
 ) -> tuple[list[bpy.types.Object], list[bpy.types.Object]]:
     """A population's own plants and fields by number, and copies of them that the artist made."""
     uid = population.uid
-    marked = [o for o in scene.objects if o.tetflora.population == uid and _is_local(o)] if uid else []
+    marked = [o for o in scene.objects if o.tetflora.population == uid] if uid else []
+    marked = [o for o in marked if o.library is None and o.override_library is None]
+    marked = [o for o in marked if o.tetflora.is_plant or o.tetflora.is_field]
     own: dict[int, bpy.types.Object] = {}
     copies = []
     for obj in sorted(marked, key=lambda o: o.session_uid):
         if own.setdefault(obj.tetflora.population_number, obj) is not obj:
             copies.append(obj)
     return [own[number] for number in sorted(own)], copies
-
-
-def _is_local(obj: bpy.types.Object) -> bool:
-    return obj.library is None and obj.override_library is None and (obj.tetflora.is_plant or obj.tetflora.is_field)
 
 
 def _release(objects: Iterable[bpy.types.Object]) -> None:

@@ -44,21 +44,9 @@ from .zones import read_zones, zone_values
 BIOME_ONLY = ("gives_way", "slope_softness", "altitude_softness", "path_min", "path_max", "path_softness")
 #: Identity and state of a population; all else are settings, which can be copied and written to files.
 IDENTITY = {
-    *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
-    *(
-        "mix_index",
-        "distance_from",
-        "covers",
-        "biome",
-        "kind",
-        "field",
-        "source",
-        "data",
-        "shown",
-        "folded",
-        "limits",
-        "limits_shown",
-    ),
+    *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased", "mix_index"),
+    *("distance_from", "covers", "biome", "kind", "field", "source", "data", "shown", "folded"),
+    *("limits", "limits_shown"),
     *BIOME_ONLY,
 }
 _DIGITS = 4  # of erased places: tenths of a millimeter
@@ -179,26 +167,11 @@ def makes_field(population: bpy.types.PropertyGroup, number: int) -> bool:
     return population.as_field == 'FIELD' or (population.as_field == 'AUTOMATIC' and number > EMPTIES_UNASKED)
 
 
-def unknown_species(population: bpy.types.PropertyGroup) -> list[str]:
-    """Species of a population that the catalog does not have."""
-    known = catalog()
-    return [e.species for e in population.mix if e.species and e.species not in known]
-
-
 def note_erased(population: bpy.types.PropertyGroup, centers: NDArray[np.float64] | Sequence, radius: float) -> None:
     """Keep circles on the map bare, with centers (n, 2) or more columns; meters."""
     flat = np.round(np.asarray(centers, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
     strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
     population.erased = json.dumps(strokes, separators=(",", ":"))
-
-
-def erased_places(population: bpy.types.PropertyGroup) -> tuple[Path, ...]:
-    """Circles that stay bare, as lines of one point."""
-    return tuple(
-        Path(center[None], stroke[0])
-        for stroke in _strokes(population)
-        for center in np.array(stroke[1:], dtype=np.float64).reshape(-1, 2)
-    )
 
 
 def _strokes(population: bpy.types.PropertyGroup) -> list[list[float]]:
@@ -232,20 +205,14 @@ def set_grounds(population: bpy.types.PropertyGroup, grounds: Iterable[bpy.types
 
 @dataclass(frozen=True)
 class Search:
-    """All that the places of a population's plants depend on, as it was read from Blender.
-
-    Attributes
-    ----------
-    species : tuple of str
-        Identifiers that placements count through.
-    """
+    """All that the places of a population's plants depend on, as it was read from Blender."""
 
     ground: Terrain
     rules: Rules
     present: tuple[NDArray[np.float64], NDArray[np.int32]]
     suits: Callable[[], Mapping[int, Suits]]
     erased: tuple[Path, ...]
-    species: tuple[str, ...]
+    species: tuple[str, ...]  # identifiers that placements count through
     zones: tuple[Zone, ...] = ()
 
     def placement(self) -> Placement:
@@ -284,9 +251,10 @@ def read_search(
     SceneError
         No ground, or a species that the catalog does not have.
     """
-    unknown = unknown_species(population)
-    if unknown:
-        raise SceneError(unknown_text(unknown[0]))
+    known = catalog()
+    for entry in population.mix:
+        if entry.species and entry.species not in known:
+            raise SceneError(unknown_text(entry.species))
     grounds = grounds_of(scene, population) if grounds is None else grounds
     if not grounds:
         raise SceneError(
@@ -304,7 +272,12 @@ def read_search(
     suits = read_suits(scene, depsgraph, population, ground.triangles, species)
     present = standing(scene, depsgraph, own, species)
     zones = read_zones(scene, depsgraph, population, grounds)
-    return Search(ground, rules, present, suits, erased_places(population), species, zones)
+    erased = (  # circles, as lines of one point
+        Path(center[None], stroke[0])
+        for stroke in _strokes(population)
+        for center in np.array(stroke[1:], dtype=np.float64).reshape(-1, 2)
+    )
+    return Search(ground, rules, present, suits, tuple(erased), species, zones)
 
 
 def standing(

@@ -15,6 +15,7 @@ from ...errors import SceneError
 from ...planting.terrain import Path, Terrain
 from ..attributes import image_pixels, members, read, values_of, world_matrix
 from ..scene.objects import objects_within
+from ..scene.skeletons import spline_chain
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
 #: Custom property of curves that are paths without a bevel: half their width, meters.
@@ -38,21 +39,11 @@ def grid_mesh(name: str, points: NDArray[np.float64]) -> bpy.types.Mesh:
 
 @dataclass(frozen=True)
 class Line:
-    """One curve.
+    """One curve."""
 
-    Attributes
-    ----------
-    points : (k, 2) float64
-        On the map, meters.
-    cyclic : bool
-        The last point is joined to the first, which is not repeated.
-    half_width : float
-        Width that its bevel adds to each side, meters.
-    """
-
-    points: NDArray[np.float64]
-    cyclic: bool
-    half_width: float
+    points: NDArray[np.float64]  # (k, 2): on the map, meters
+    cyclic: bool  # the last point is joined to the first, which is not repeated
+    half_width: float  # width that its bevel adds to each side, meters
 
 
 def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line]:
@@ -109,20 +100,11 @@ def _from_edges(evaluated: bpy.types.Object) -> list[tuple[NDArray[np.float64], 
 
 
 def _from_spline(spline: bpy.types.Spline, obj: bpy.types.Object) -> tuple[NDArray[np.float64], bool]:
-    cyclic = spline.use_cyclic_u
-    if spline.type == 'POLY':
-        return np.array([p.co[:3] for p in spline.points], dtype=np.float64).reshape(-1, 3), cyclic
-    if spline.type != 'BEZIER':
+    if spline.type == 'NURBS':
         raise SceneError(
             f'The NURBS curve "{obj.name}" has a bevel, extrusion or fill; remove it, or change its type to Bézier'
         )
-    knots = np.array([(p.handle_left, p.co, p.handle_right) for p in spline.bezier_points], dtype=np.float64)
-    following = np.roll(knots, -1, axis=0) if cyclic else knots[1:]
-    before = knots if cyclic else knots[:-1]
-    t = (np.arange(spline.resolution_u) / spline.resolution_u)[None, :, None]
-    a, b, c, d = (p[:, None] for p in (before[:, 1], before[:, 2], following[:, 0], following[:, 1]))
-    points = (1 - t) ** 3 * a + 3 * (1 - t) ** 2 * t * b + 3 * (1 - t) * t**2 * c + t**3 * d
-    return np.concatenate([points.reshape(-1, 3), knots[len(before) :, 1]]), cyclic
+    return spline_chain(spline).points[:, :3], spline.use_cyclic_u
 
 
 def _from_curves(curves: bpy.types.Curves) -> list[tuple[NDArray[np.float64], bool]]:

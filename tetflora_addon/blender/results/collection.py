@@ -57,24 +57,17 @@ class Results:
         Suffix of all names, where there are results of several cameras at the same time.
     data : JobData, optional
         Of the job, which ends when somebody deletes its results.
-
-    Attributes
-    ----------
-    origin : (3,) float
-        Where in the world positions in buffers are counted from, meters: objects are placed there.
-    owners : mapping of bpy.types.Object to str
-        Looks of objects that show instances, where more than they themselves say counts.
-    looks : sequence of str
-        Of plants of each kind, see `scene.looks`; empty where there are none.
     """
 
     def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "", data: JobData | None = None) -> None:
         self.scene = scene
         self.data = data
         self.purpose = purpose
+        #: (3,): Where in the world positions in buffers are counted from, meters: objects are placed there
         self.origin: Sequence[float] = (0.0, 0.0, 0.0)
+        #: Looks of objects that show instances, where more than they themselves say counts
         self.owners: Mapping[bpy.types.Object | None, str] = {}
-        self.looks: Sequence[str] = ()
+        self.looks: Sequence[str] = ()  # of plants of each kind, see `scene.looks`; empty where there are none
         self.mark = f" {mark}" if mark else ""
         self.collection: bpy.types.Collection | None = None
         self._made: list[bpy.types.ID] = []

@@ -135,16 +135,6 @@ def show_linked(scene: bpy.types.Scene, purpose: str) -> None:
     del scene[HIDDEN_LINKED[purpose]]
 
 
-def leave_hidden(scene: bpy.types.Scene) -> None:
-    """Let what is hidden for the artist's results stay so: they are kept."""
-    record = scene.get(HIDDEN_LINKED['VIEW'])
-    if record is not None:
-        for entry in record["beside"]:
-            if entry["collection"] is not None:
-                untag(entry["collection"])
-        del scene[HIDDEN_LINKED['VIEW']]
-
-
 def scenes_hiding() -> Iterator[tuple[bpy.types.Scene, str]]:
     """Scenes of this file for which linked objects are hidden, and for which results; those of renders first."""
     for purpose in ('RENDER', 'VIEW'):
@@ -285,13 +275,6 @@ def artists_flags(original: bpy.types.Object) -> list[bool]:
     return marks[0][0] if marks else [original.hide_render, original.hide_viewport]
 
 
-def forget_marks(copied: bpy.types.Object) -> None:
-    """Let a copy of an object count as never hidden."""
-    for key in HIDDEN.values():
-        if key in copied:
-            del copied[key]
-
-
 def _show(original: bpy.types.Object, purpose: str) -> None:
     original.hide_render, original.hide_viewport = _marker(original, purpose)[0]
     del original[HIDDEN[purpose]]
@@ -342,7 +325,11 @@ def keep_results(scene: bpy.types.Scene) -> int:
     for original in _marked('VIEW'):
         if _concerns(scene, original, 'VIEW') and not _others(scene, original, 'VIEW'):
             del original[HIDDEN['VIEW']]
-    leave_hidden(scene)
+    if (record := scene.get(HIDDEN_LINKED['VIEW'])) is not None:
+        for entry in record["beside"]:
+            if entry["collection"] is not None:
+                untag(entry["collection"])
+        del scene[HIDDEN_LINKED['VIEW']]
     kept = 0
     for collection in result_collections(scene, 'VIEW'):
         mark_runtime(collection, False)

@@ -15,21 +15,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..attributes import read, write
+from ..attributes import write
 from ..compat import set_node_input
 from ..main_thread import in_main_thread
 from ..materials.nodes import Graph, Term, find_socket, node_group
 from ..scene.looks import look_like
-from ..scene.objects import geometry_of
+from ..scene.objects import geometry_of, references_of
 from .collection import Results
-from .hiding import artists_flags, forget_marks
+from .hiding import HIDDEN, artists_flags
 from .output import STAND_IN
 
 #: Attributes of points: where each instance stands, and which of several objects it shows.
@@ -150,14 +149,9 @@ def carrier_of(results: Results, target: Any) -> Source:
 def _carrier(results: Results, name: str, geometry: bpy.types.GeometrySet) -> Source:
     parts = [c for c in (getattr(geometry, kind, None) for kind in _COMPONENTS) if c is not None]
     parts = [c for c in parts if not isinstance(c, bpy.types.Mesh) or len(c.vertices)]
-    points = geometry.instances_pointcloud()
-    nested = points is not None and len(points.points) > 0
     objects = [_carried(results, name, part) for part in parts]
-    if len(objects) == 1 and not nested:
-        return objects[0]
-    if nested:
-        objects += _nested(results, name, geometry, points)
-    return _collection(results, name, objects)
+    nested = _nested(results, name, geometry)
+    return objects[0] if len(objects) == 1 and not nested else _collection(results, name, objects + nested)
 
 
 def _carried(results: Results, name: str, part: bpy.types.ID) -> bpy.types.Object:
@@ -172,25 +166,15 @@ def _carried(results: Results, name: str, part: bpy.types.ID) -> bpy.types.Objec
     return made
 
 
-def _nested(
-    results: Results, name: str, geometry: bpy.types.GeometrySet, points: bpy.types.PointCloud
-) -> list[bpy.types.Object]:
+def _nested(results: Results, name: str, geometry: bpy.types.GeometrySet) -> list[bpy.types.Object]:
     """Objects that show the instances within geometry."""
-    reference = read(points, ".reference_index")
-    transform = read(points, "instance_transform").reshape(-1, 4, 4).transpose(0, 2, 1)
-    order = np.argsort(reference, kind="stable")
-    references = geometry.instance_references()
-    bounds = np.searchsorted(reference[order], np.arange(len(references) + 1))
     made = []
-    for inner, (start, end) in zip(references, pairwise(bounds), strict=True):
-        if inner is None or start == end:
-            continue
+    for inner, rows in references_of(geometry):
         known = isinstance(inner, bpy.types.Object | bpy.types.Collection)
         source = inner.original if known else _carrier(results, name, inner)
         kind = 'COLLECTION' if isinstance(source, bpy.types.Collection) else 'OBJECT'
-        rows = order[start:end]
         own = results.name_for(f"{name} {len(made) + 1}")
-        made.append(_instancer(own, kind, source, transform[rows], rows.astype(np.int32)))
+        made.append(_instancer(own, kind, source, rows.columns.transpose(0, 2, 1), rows.number.astype(np.int32)))
         results.hold(made[-1], own)
     return made
 
@@ -310,7 +294,8 @@ def add_stand_in(
         made = original.copy()
         made.name = name
         flags = artists_flags(original)
-        forget_marks(made)
+        for key in HIDDEN.values():  # it was never hidden
+            made.pop(key, None)
         made.hide_render, made.hide_viewport = flags
         for switch in _TURNED_OFF:
             if getattr(made.tetflora, switch, False):

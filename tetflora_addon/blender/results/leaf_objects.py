@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import connected
 from ...errors import SpeciesError
 from ...leaves.compounds import Compound
 from ...leaves.models import LeafModel, leaf_model
@@ -121,19 +122,9 @@ def _leaflets(model: LeafModel, length: float) -> bool:
     along = model.uv[:, 1]
     starts = model.face_offsets[:-1]
     spans = np.maximum.reduceat(along, starts) - np.minimum.reduceat(along, starts)
-    return len(spans) >= 8 and _parts(model) >= 4 and bool(np.median(spans) < 0.4 * length)
-
-
-def _parts(model: LeafModel) -> int:
-    """Number of parts of the mesh that share no vertex."""
-    label, edges = np.arange(len(model.positions)), model.edges[0]
-    while True:
-        lower = label.copy()
-        np.minimum.at(lower, edges[:, 0], label[edges[:, 1]])
-        np.minimum.at(lower, edges[:, 1], label[edges[:, 0]])
-        if (lower == label).all():
-            return len(np.unique(label))
-        label = lower[lower]
+    if len(spans) < 8 or np.median(spans) >= 0.4 * length:
+        return False
+    return len(np.unique(connected(len(model.positions), *model.edges[0].T))) >= 4  # parts that share no vertex
 
 
 def _filled(model: LeafModel) -> float:

@@ -205,7 +205,9 @@ def point_object(
     ValueError
         Arrays of wrong shape or type; no datablock is left behind.
     """
-    vertices = _as_vertices(buffers)
+    none, values = np.zeros(0, np.int32), {"radius": buffers.radius, **buffers.attributes}
+    attributes = {name: ("POINT", array) for name, array in values.items()}
+    vertices = MeshBuffers(buffers.positions, none.reshape(0, 2), none, none, np.zeros(1, np.int32), attributes)
     by_nodes = not can_resize_point_clouds()
     if by_nodes:
         data = write_mesh(name, vertices, [material])
@@ -216,14 +218,6 @@ def point_object(
     if by_nodes:
         made.modifiers.new("Spheres", 'NODES').node_group = spheres_group(material)
     return made
-
-
-def _as_vertices(buffers: PointBuffers) -> MeshBuffers:
-    """Points as a mesh without edges and faces, its attributes on the vertices."""
-    none = np.zeros(0, np.int32)
-    values = {"radius": buffers.radius, **buffers.attributes}
-    attributes = {name: ("POINT", array) for name, array in values.items()}
-    return MeshBuffers(buffers.positions, none.reshape(0, 2), none, none, np.zeros(1, np.int32), attributes)
 
 
 def _write_cloud(name: str, vertices: MeshBuffers) -> bpy.types.PointCloud:
@@ -261,53 +255,28 @@ _OWN = {"position", "material_index", "sharp_face", "sharp_edge", "custom_normal
 
 @dataclass(frozen=True)
 class AttributeArray:
-    """An attribute of a mesh.
+    """An attribute of a mesh."""
 
-    Attributes
-    ----------
-    domain : {'POINT', 'FACE', 'CORNER'}
-    data_type : str
-        One of `attributes.KINDS`.
-    values : (n,) or (n, width)
-    """
-
-    domain: str
-    data_type: str
-    values: NDArray
+    domain: str  # {'POINT', 'FACE', 'CORNER'}
+    data_type: str  # one of `attributes.KINDS`
+    values: NDArray  # (n,) or (n, width)
 
 
 @dataclass(frozen=True)
 class SurfaceArrays:
-    """All of one mesh that renderers read.
+    """All of one mesh that renderers read."""
 
-    Attributes
-    ----------
-    positions : (v, 3) float32
-    corner_verts : (c,) int32
-    face_offsets : (f + 1,) int32
-    slots : (f,) int32
-        Material of each face.
-    materials : list of bpy.types.Material or None
-        At least one.
-    rendered : (str, str)
-        Names of the UV map and the color attribute that materials read if they name none; empty without any.
-    normals : (c, 3) float32 or None
-        Of corners; None where all faces are flat.
-    flat : (f,) bool
-    texture_space : (2, 3) float64
-        Location and size of the box that generated coordinates fill.
-    """
-
-    positions: NDArray[np.float32]
-    corner_verts: NDArray[np.int32]
-    face_offsets: NDArray[np.int32]
-    slots: NDArray[np.int32]
-    materials: list[bpy.types.Material | None]
+    positions: NDArray[np.float32]  # (v, 3)
+    corner_verts: NDArray[np.int32]  # (c,)
+    face_offsets: NDArray[np.int32]  # (f + 1,)
+    slots: NDArray[np.int32]  # (f,): material of each face
+    materials: list[bpy.types.Material | None]  # at least one
     layers: Mapping[str, AttributeArray]
+    #: (str, str): Names of the UV map and the color attribute that materials read if they name none; empty without any
     rendered: tuple[str, str]
-    normals: NDArray[np.float32] | None
-    flat: NDArray[np.bool_]
-    texture_space: NDArray[np.float64]
+    normals: NDArray[np.float32] | None  # (c, 3): of corners; None where all faces are flat
+    flat: NDArray[np.bool_]  # (f,)
+    texture_space: NDArray[np.float64]  # (2, 3): location and size of the box that generated coordinates fill
 
 
 def read_mesh(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> SurfaceArrays:

@@ -35,41 +35,25 @@ _ASSET_FACETS, _ASSET_SPHERES = partial(proxy_material, own=True), partial(spher
 
 @dataclass(frozen=True)
 class ProxyKind:
-    """One form of proxies.
+    """One form of proxies."""
 
-    Attributes
-    ----------
-    identifier, label, description, icon : str
-        Of the item in the setting Proxies.
-    number : int
-        Value of the item in saved files: never change or reuse it.
-    emission : ProxyEmitter
-        How buffers are made: in a thread, so without bpy.
-    material : callable
-        Returns the material of meshes, made if needed.
-    point_material, baked_material : callable
-        The same for point clouds, and for either where light is baked.
-    asset_material, asset_point_material : callable
-        The first two for what stands for assets.
-    sockets : mapping of str to str
-        Properties of ``scene.tetflora``, shown in the panel Proxy Shading, by the sockets of `material` that they set.
-    bounces : int
-        Transparent bounces that Cycles needs for a ray through many proxies; 0 for opaque ones.
-    """
-
+    #: identifier, label, description, icon: Of the item in the setting Proxies
     identifier: str
-    number: int
+    number: int  # value of the item in saved files: never change or reuse it
     label: str
     description: str
     icon: str
-    emission: ProxyEmitter
-    material: _Material = proxy_material
+    emission: ProxyEmitter  # how buffers are made: in a thread, so without bpy
+    material: _Material = proxy_material  # returns the material of meshes, made if needed
+    #: point_material, baked_material: The same for point clouds, and for either where light is baked
     point_material: _Material = sphere_material
     baked_material: _Material = baked_material
+    #: asset_material, asset_point_material: The first two for what stands for assets
     asset_material: _Material = _ASSET_FACETS
     asset_point_material: _Material = _ASSET_SPHERES
+    #: Properties of ``scene.tetflora``, shown in the panel Proxy Shading, by the sockets of `material` that they set
     sockets: Mapping[str, str] = field(default_factory=dict)
-    bounces: int = 0
+    bounces: int = 0  # transparent bounces that Cycles needs for a ray through many proxies; 0 for opaque ones
 
 
 _FORMS = {
@@ -183,12 +167,6 @@ def raise_settings(scene: bpy.types.Scene) -> dict[tuple[str, str], int]:
     for engine, name in before:
         setattr(getattr(scene, engine), name, bounces if engine == "cycles" else True)
     return before
-
-
-def restore_settings(scene: bpy.types.Scene, before: Mapping[tuple[str, str], int]) -> None:
-    """Undo `raise_settings`."""
-    for (engine, name), value in before.items():
-        setattr(getattr(scene, engine), name, value)
 
 
 def few_bounces(scene: bpy.types.Scene) -> str:

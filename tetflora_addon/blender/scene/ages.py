@@ -52,7 +52,12 @@ def classed(scene: bpy.types.Scene, parts: Sequence[Part]) -> list[tuple[str, Se
     found = [(name, *with_sizes(scene, seeds, ages, sizes)) for name, seeds, ages, sizes in parts]
     if all(ages is None for _, _, ages in found):
         return [(name, seeds) for name, seeds, _ in found]
-    many = _with_many(found)
+    different: dict[str, set[float]] = {}
+    for _, seeds, ages in found:
+        for number, kind in enumerate(seeds.identifiers if ages is not None else ()):
+            some = np.unique(ages[seeds.species == number])[: MOST + 2]
+            different.setdefault(species_of(kind), set()).update(some.tolist())
+    many = {species for species, ages in different.items() if len(ages - {0.0}) > MOST}
     return [(name, seeds if ages is None else _classed(scene, seeds, ages, many)) for name, seeds, ages in found]
 
 
@@ -105,16 +110,6 @@ def kind_species(species: Species, kind: str, years: float = 0.0) -> Species:
     """A species as plants of a kind are after so many years."""
     age, dead = age_of(kind), dead_of(kind)
     return at_age(species, age, dead + years) if dead > 0.0 else at_age(species, age + years)
-
-
-def _with_many(parts: Sequence[tuple[str, Seeds, NDArray[np.float64] | None]]) -> set[str]:
-    """Species that have more than `MOST` different ages."""
-    found: dict[str, set[float]] = {}
-    for _, seeds, ages in parts:
-        for number, kind in enumerate(seeds.identifiers if ages is not None else ()):
-            different = np.unique(ages[seeds.species == number])[: MOST + 2]
-            found.setdefault(species_of(kind), set()).update(different.tolist())
-    return {species for species, ages in found.items() if len(ages - {0.0}) > MOST}
 
 
 def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: NDArray[np.float64], many: set[str]) -> Seeds:

@@ -18,7 +18,7 @@ from ...errors import SpeciesError
 from ...jobs import Progress
 from ...species.species import Species
 from ..runtime import call_soon, redraw
-from ..species.asset_species import TetFloraAssetSpecies, find_asset
+from ..species.asset_species import find_asset
 from ..species.edits import display_height, species_for
 from ..worker import call_in_thread
 from .ages import kind_species
@@ -35,25 +35,17 @@ _without: set[Species] = set()  # an object for a leaf
 
 def crown_for(scene: bpy.types.Scene, kind: str) -> Crown:
     """The mean crown of a species at the age of a kind; a guess where it cannot be compiled."""
-    asset = find_asset(scene, species_of(kind))
-    if asset is not None:
-        return _measured(asset)
+    found = _found(scene, kind)
     try:
-        return crown_of(_grown(scene, kind))
-    except SpeciesError:  # missing, broken, or with an object for a leaf
+        return crown_of(found) if isinstance(found, Species) else found
+    except SpeciesError:  # with an object for a leaf
         return _guess(species_of(kind))
 
 
 def crown_to_draw(scene: bpy.types.Scene, kind: str) -> Crown | None:
     """The same for a panel, without waiting: None where it is only being looked for; the window is then drawn again."""
-    asset = find_asset(scene, species_of(kind))
-    if asset is not None:
-        return _measured(asset)
-    try:
-        species = _grown(scene, kind)
-    except SpeciesError:
-        return _guess(species_of(kind))
-    if _in_background():
+    species = _found(scene, kind)
+    if _in_background() or isinstance(species, Crown):
         return crown_for(scene, kind)
     if species in _without:
         return _guess(species_of(kind))
@@ -106,9 +98,16 @@ def _find_all(species: Iterable[Species], find: Callable[[Species], object]) -> 
             _without.add(one)
 
 
-def _measured(asset: TetFloraAssetSpecies) -> Crown:
-    color = tuple(asset.color)
-    return Crown(asset.radius, asset.height, asset.polygons, asset.base, asset.leaves, 0.0, color)
+def _found(scene: bpy.types.Scene, kind: str) -> Species | Crown:
+    """A species at the age of a kind; the crown itself of what is an asset, missing or broken."""
+    asset = find_asset(scene, species_of(kind))
+    if asset is not None:
+        size = asset.radius, asset.height, asset.polygons, asset.base, asset.leaves
+        return Crown(*size, 0.0, tuple(asset.color))
+    try:
+        return _grown(scene, kind)
+    except SpeciesError:
+        return _guess(species_of(kind))
 
 
 def _guess(identifier: str) -> Crown:

@@ -42,19 +42,11 @@ _OWN = {"position", "custom_normal"}
 
 @dataclass(frozen=True)
 class Explicit:
-    """Explicit polygons of a scene.
-
-    Attributes
-    ----------
-    materials : list of list of bpy.types.Material or None
-        Slots of each surface.
-    originals : list of bpy.types.Object
-        Whose place the refined polygons take.
-    """
+    """Explicit polygons of a scene."""
 
     meshes: Meshes
-    materials: list[list[bpy.types.Material | None]]
-    originals: list[bpy.types.Object]
+    materials: list[list[bpy.types.Material | None]]  # slots of each surface
+    originals: list[bpy.types.Object]  # whose place the refined polygons take
 
 
 def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Explicit | None:

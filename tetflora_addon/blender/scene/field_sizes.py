@@ -68,17 +68,10 @@ _STEADY = np.cos(np.radians(30.0))  # trunks that turn further from one record t
 
 @dataclass(frozen=True)
 class History:
-    """Which points are records of which plant.
+    """Which points are records of which plant."""
 
-    Attributes
-    ----------
-    year : (n,) float64
-    first : (n,) int64
-        First record of the same plant.
-    """
-
-    year: NDArray[np.float64]
-    first: NDArray[np.int64]
+    year: NDArray[np.float64]  # (n,)
+    first: NDArray[np.int64]  # (n,): first record of the same plant
 
     def chosen(self, now: float) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Records (m,) before and after a year of those plants that are there, and how far it is from the first."""

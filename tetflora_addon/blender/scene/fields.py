@@ -240,12 +240,6 @@ def write_field(
     return obj
 
 
-def upright(azimuth: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternions, (n, 4), of turns about the vertical in radians, (n,)."""
-    half, none = 0.5 * np.asarray(azimuth), np.zeros(len(azimuth))
-    return np.stack([np.cos(half), none, none, np.sin(half)], axis=1)
-
-
 def quaternions(frame: NDArray[np.float64]) -> NDArray[np.float64]:
     """Unit quaternions, (n, 4) with w first, of rotations, (n, 3, 3).
 

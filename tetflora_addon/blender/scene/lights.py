@@ -29,8 +29,6 @@ from .objects import read_occluders, renderable_objects
 BLACK = World.plain((0.0, 0.0, 0.0))
 #: Rows of an image that are looked at, about.
 _ROWS = 256
-#: Color of ground whose material cannot be read.
-_GROUND = (0.2, 0.2, 0.2)
 # Sun's elevations, degrees, of the rows below.
 _ELEVATIONS = (2.0, 10.0, 30.0, 60.0, 90.0)
 # Radiance above the horizon M + B (z − ½) + C f, with z up and f toward the sun's azimuth; mean radiance D below it;
@@ -90,35 +88,22 @@ def _color(data: bpy.types.Light) -> NDArray[np.float64]:
     color = np.array(data.color[:]) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if getattr(data, "use_temperature", False):
         color = color * np.array(data.temperature_color[:])
-    if (emission := _emission(data)) is not None:
+    output = active_output(tree_in_use(data), 'OUTPUT_LIGHT')
+    emission = next(upstream(output.inputs["Surface"]), None) if output is not None else None
+    if emission is not None and emission.type == 'EMISSION':
         tint, strength = emission.inputs["Color"], emission.inputs["Strength"]
         color = color * (1.0 if tint.is_linked else np.array(tint.default_value[:3]))
         color = color * (1.0 if strength.is_linked else strength.default_value)
     return np.maximum(color.astype(np.float64), 0.0)
 
 
-def _emission(data: bpy.types.Light) -> bpy.types.Node | None:
-    """The emission that a light's own nodes link to its output."""
-    output = active_output(tree_in_use(data), 'OUTPUT_LIGHT')
-    node = next(upstream(output.inputs["Surface"]), None) if output is not None else None
-    return node if node is not None and node.type == 'EMISSION' else None
-
-
 @dataclass(frozen=True)
 class WorldLight:
-    """Light of the world.
-
-    Attributes
-    ----------
-    suns : tuple of Light
-        The sun's disc of a sky.
-    note : str
-        What is not supported and how it counts instead; empty if nothing.
-    """
+    """Light of the world."""
 
     world: World
-    suns: tuple[Light, ...] = ()
-    note: str = ""
+    suns: tuple[Light, ...] = ()  # the sun's disc of a sky
+    note: str = ""  # what is not supported and how it counts instead; empty if nothing
 
 
 def read_world(scene: bpy.types.Scene) -> WorldLight:
@@ -233,24 +218,8 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
 def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Sources:
     """Lights, world, and occluders, which cast shadows and reflect light upward."""
     world = read_world(scene)
-    colors = [_ground_color(o) for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
+    grounds, looks = (o for o in renderable_objects(view_layer) if o.tetflora.is_occluder), Looks()
+    colors = [looks.of(ground.active_material, {}).color for ground in grounds]
     ground = np.mean(colors, axis=0) if colors else np.zeros(3)
     lights = (*read_lights(depsgraph, view_layer), *world.suns)
     return Sources(lights, world.world, read_occluders(depsgraph, view_layer), ground)
-
-
-def _ground_color(obj: bpy.types.Object) -> NDArray[np.float64]:
-    """Mean color of a mesh's first material."""
-    material = obj.active_material
-    if material is None:
-        return np.array(Looks().of(None, {}).color)
-    tree = tree_in_use(material)
-    nodes = tree.nodes if tree else ()
-    if not any(n.type == 'TEX_IMAGE' and n.image is not None for n in nodes):
-        # Only color ramps tell which colors noise becomes.
-        stops = [stop.color[:3] for n in nodes if n.type == 'VALTORGB' for stop in n.color_ramp.elements]
-        if stops:
-            return np.mean(stops, axis=0)
-        if any(n.type.startswith(("BSDF", "EMISSION")) and n.inputs[0].is_linked for n in nodes):
-            return np.array(_GROUND)
-    return np.array(Looks().of(material, {}).color)

@@ -296,26 +296,14 @@ def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
 
 @dataclass(frozen=True)
 class Copies:
-    """All places of one plant or field within one instancer.
+    """All places of one plant or field within one instancer."""
 
-    Attributes
-    ----------
-    owner : bpy.types.Object
-        The original object that is a plant or a field.
-    geometry : bpy.types.GeometrySet or None
-        None for the object itself; else geometry that its nodes instance, which counts for fields only.
-    matrices : (n, 4, 4) float64
-        To world space.
-    keys : (n,) uint64
-        Tell individuals apart.
-    instancer : bpy.types.Object or None
-        The original object that shows all of them, or another with the same look.
-    """
-
-    owner: bpy.types.Object
+    owner: bpy.types.Object  # the original object that is a plant or a field
+    #: None for the object itself; else geometry that its nodes instance, which counts for fields only
     geometry: bpy.types.GeometrySet | None
-    matrices: NDArray[np.float64]
-    keys: NDArray[np.uint64]
+    matrices: NDArray[np.float64]  # (n, 4, 4): to world space
+    keys: NDArray[np.uint64]  # (n,): tell individuals apart
+    #: The original object that shows all of them, or another with the same look
     instancer: bpy.types.Object | None = None
 
 

@@ -60,52 +60,30 @@ def sound_ages(ages: NDArray[np.floating]) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Lives:
-    """All records (n,) of a history, and the year that is looked at.
-
-    Attributes
-    ----------
-    year, height, dead : (n,) float64
-        As of `Sizes`.
-    first : (n,) int64
-        First record of the same plant; its records follow each other.
-    species : (n,) int64
-        Number of the kind in the field.
-    """
+    """All records (n,) of a history, and the year that is looked at."""
 
     now: float
+    #: year, height, dead: (n,): As of `Sizes`
     year: NDArray[np.float64]
     height: NDArray[np.float64]
     dead: NDArray[np.float64]
-    first: NDArray[np.int64]
-    species: NDArray[np.int64]
+    first: NDArray[np.int64]  # (n,): first record of the same plant; its records follow each other
+    species: NDArray[np.int64]  # (n,): number of the kind in the field
 
 
 @dataclass(frozen=True)
 class Sizes(Arrays):
-    """Sizes of plants (n,), meters in the field's space; 0 is not known.
+    """Sizes of plants (n,), meters in the field's space; 0 is not known."""
 
-    Attributes
-    ----------
-    height, diameter, width, base : (n,) float64
-        Of the plant, of its trunk at 1.3 m, mean width of its crown, height of its lowest limb.
-    dead : (n,) float64
-        Years since it died; 0 alive.
-    offset : (n, 2) float64
-        By which fraction limbs to the east and north are longer.
-    fit : (n, 2) float64
-        Factors on height and crown width that make up for what is random in the plant.
-    plant : (n,) int64 or None
-        First record of the plant among those of ``lives``, where a history is to be animated.
-    lives : Lives or None
-        All of that history.
-    """
-
+    #: height, diameter, width, base: (n,): Of the plant, of its trunk at 1.3 m, mean width of its crown, height of its
+    #: lowest limb
     height: NDArray[np.float64]
     diameter: NDArray[np.float64]
     width: NDArray[np.float64]
     base: NDArray[np.float64]
-    dead: NDArray[np.float64]
-    offset: NDArray[np.float64]
-    fit: NDArray[np.float64]
+    dead: NDArray[np.float64]  # (n,): years since it died; 0 alive
+    offset: NDArray[np.float64]  # (n, 2): by which fraction limbs to the east and north are longer
+    fit: NDArray[np.float64]  # (n, 2): factors on height and crown width that make up for what is random in the plant
+    #: (n,): First record of the plant among those of ``lives``, where a history is to be animated
     plant: NDArray[np.int64] | None = None
-    lives: Lives | None = None
+    lives: Lives | None = None  # all of that history

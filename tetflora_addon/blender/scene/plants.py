@@ -170,23 +170,14 @@ def _grown(part: Part, assets: Container[str]) -> Part:
 
 @dataclass(frozen=True)
 class AssetPlants:
-    """Plants of one species that is an asset.
+    """Plants of one species that is an asset."""
 
-    Attributes
-    ----------
-    species : str
-        Identifier.
-    owners : tuple of bpy.types.Object
-        The original object that they are, that they are instances of, or whose points they are; several objects of a
-        plant each, one for each place.
-    seed : (n,) int64
-    matrices : (n, 4, 4) float64
-        To world space; stretched and mirrored as the objects, points and instances are.
-    """
-
-    species: str
+    species: str  # identifier
+    #: The original object that they are, that they are instances of, or whose points they are; several objects of a
+    #: plant each, one for each place
     owners: tuple[bpy.types.Object, ...]
-    seed: NDArray[np.int64]
+    seed: NDArray[np.int64]  # (n,)
+    #: (n, 4, 4): To world space; stretched and mirrored as the objects, points and instances are
     matrices: NDArray[np.float64]
 
 

@@ -209,19 +209,11 @@ def _classes(species: Species, every: int) -> NDArray[np.float64]:
 
 
 class Measure:
-    """Sizes of a compiled species at one age, for trunks that are not bent to some length by chance.
-
-    Attributes
-    ----------
-    flora : Flora
-        Of this species alone.
-    """
+    """Sizes of a compiled species at one age, for trunks that are not bent to some length by chance."""
 
     def __init__(self, species: Species, ratios: tuple[float, float] | None = None) -> None:
-        self.flora, self._ratios = compile_species([species]), ratios
-        number = np.arange(_PLANTS)
-        place, upright, one = np.zeros((_PLANTS, 3)), np.tile(np.eye(3), (_PLANTS, 1, 1)), np.ones(_PLANTS)
-        self._some = Seeds((species.name,), np.zeros(_PLANTS, np.int32), number, place, upright, one)
+        self.flora, self._ratios = compile_species([species]), ratios  # flora: of this species alone
+        self._some = Seeds.upright(_PLANTS)
         self._lengths = trunks(self.flora.rows, self._some).length
         self.length = float(self._lengths.mean())
         self._typical = species.orders[0].length.mean

@@ -104,7 +104,7 @@ def _of_curve(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
     evaluated = obj.evaluated_get(depsgraph)
     curve = evaluated.to_curve(depsgraph, apply_modifiers=True) if evaluated.is_evaluated else obj.data
     try:
-        parts = [_of_spline(spline) for spline in curve.splines]
+        parts = [spline_chain(spline) for spline in curve.splines]
     finally:
         if evaluated.is_evaluated:
             evaluated.to_curve_clear()
@@ -112,7 +112,8 @@ def _of_curve(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
     return _meant_radii(chains, _thickness(obj.data))
 
 
-def _of_spline(spline: bpy.types.Spline) -> Chains:
+def spline_chain(spline: bpy.types.Spline) -> Chains:
+    """A spline as it is drawn, in its object's space."""
     cyclic = np.array([spline.use_cyclic_u])
     if spline.type == 'BEZIER':
         knots = spline.bezier_points

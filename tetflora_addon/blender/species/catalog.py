@@ -53,28 +53,17 @@ def thumbnail_file(identifier: str, season: str = "") -> Path | None:
     return next((path for folder in folders for e in endings if (path := file_of([folder], identifier, e))), None)
 
 
-def _season() -> str:
-    """The season that the open scene shows, empty for none."""
-    scene = getattr(bpy.context, "scene", None)  # none while add-ons are enabled
-    season = season_of(scene) if scene is not None else None
-    return "" if season is None else season_name(season)
-
-
 def icon_of(identifier: str) -> int:
     """Number of a species' thumbnail for items and layouts, loaded at first use; 0 where it has none."""
-    now, season = time.monotonic(), _season()
+    scene = getattr(bpy.context, "scene", None)  # none while add-ons are enabled
+    shown = season_of(scene) if scene is not None else None
+    now, season = time.monotonic(), "" if shown is None else season_name(shown)
     seen, icon = _icons.get((identifier, season), (-_TRUSTED, 0))
     if now - seen >= _TRUSTED:
-        icon = _icon_of(identifier, season)
+        asset = find_asset(None, identifier)
+        icon = thumbnails.icon_of(thumbnail_file(identifier, season)) if asset is None else _icon_of_asset(asset)
         _icons[identifier, season] = now, icon
     return icon
-
-
-def _icon_of(identifier: str, season: str) -> int:
-    asset = find_asset(None, identifier)
-    if asset is not None:
-        return _icon_of_asset(asset)
-    return thumbnails.icon_of(thumbnail_file(identifier, season))
 
 
 def _icon_of_asset(asset: TetFloraAssetSpecies) -> int:

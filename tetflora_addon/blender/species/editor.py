@@ -6,7 +6,6 @@ The properties store nothing. They read the JSON of the chosen species and write
 (`species.edits`), so there is nothing to keep in step with undo, loading or other scenes.
 """
 
-from collections.abc import Callable
 from math import degrees, isfinite, radians
 from typing import Any
 
@@ -141,12 +140,6 @@ def write(editor: bpy.types.PropertyGroup, name: str, value: Any) -> None:
             (orders[index] if index < len(orders) else data["spur"])[name] = value
 
         change_species(editor.id_data, present_species(editor), change)
-
-
-def write_range(editor: bpy.types.PropertyGroup, name: str, part: int, value: float) -> None:
-    """Write the mean (0) or the variation (1) of a range of the shown order."""
-    old = value_of(editor, name)
-    write(editor, name, [value if i == part else rounded(number_in(old, i)) for i in (0, 1)])
 
 
 def _order_items(editor: bpy.types.PropertyGroup, _context: Any) -> list[tuple[str, str, str, int]]:
@@ -314,7 +307,7 @@ _VARIES = "Maximum deviation from the mean, in both directions"
 
 
 def _label(name: str) -> str:
-    return name.replace("_", " ").replace("color", "color").title()
+    return name.replace("_", " ").title()
 
 
 def _description(name: str, key: Key) -> str:
@@ -346,115 +339,59 @@ def _float_options(key: Key, low: float, high: float) -> dict[str, Any]:
     return options
 
 
-def _floats(
-    name: str,
-    key: Key,
-    read: Callable[[bpy.types.PropertyGroup], float],
-    write: Callable[[bpy.types.PropertyGroup, float], None],
-    variation: bool = False,
-) -> Any:
+def _float(name: str, key: Key, part: tuple[int, ...], said: dict[str, Any]) -> Any:
     to_file, to_slider = (degrees, radians) if key.unit == "degrees" else (float, float)
-    low, high = (0.0, key.high - key.low) if variation else (key.low, key.high)
-    return FloatProperty(
-        name=_label(name) + (" Variation" if variation else ""),
-        description=f"{_VARIES}: {key.meaning}" if variation else _description(name, key),
-        get=lambda self: to_slider(read(self)),
-        set=lambda self, value: write(self, rounded(to_file(value))),
-        options=set(),
-        **_float_options(key, low, high),
-    )
+    low, high = (0.0, key.high - key.low) if part == (1,) else (key.low, key.high)
+
+    def change(editor: bpy.types.PropertyGroup, value: float) -> None:
+        new, old = rounded(to_file(value)), value_of(editor, name) if part else None
+        write(editor, name, [new if i in part else rounded(number_in(old, i)) for i in (0, 1)] if part else new)
+
+    def read(editor: bpy.types.PropertyGroup) -> float:
+        return to_slider(number_in(value_of(editor, name), *part))
+
+    return FloatProperty(get=read, set=change, **said, **_float_options(key, low, high))
 
 
-def _range(name: str, key: Key) -> dict[str, Any]:
-    parts = {}
-    for part, suffix in enumerate(("", VARIATION)):
-        parts[name + suffix] = _floats(
-            name,
-            key,
-            lambda self, part=part: number_in(value_of(self, name), part),
-            lambda self, value, part=part: write_range(self, name, part, value),
-            variation=part == 1,
+def _color(name: str, part: tuple[int, ...], said: dict[str, Any]) -> Any:
+    def change(editor: bpy.types.PropertyGroup, value: Any) -> None:
+        new, old = [rounded(c) for c in value], value_of(editor, name) if part else None
+        others = [[rounded(number_in(old, i, c)) for c in range(3)] for i in (0, 1)] if part else []
+        write(editor, name, [new if i in part else other for i, other in enumerate(others)] if part else new)
+
+    def read(editor: bpy.types.PropertyGroup) -> tuple[float, ...]:
+        return tuple(number_in(value_of(editor, name), *part, c) for c in range(3))
+
+    return FloatVectorProperty(subtype='COLOR', size=3, min=0.0, max=1.0, get=read, set=change, **said)
+
+
+def _sliders(name: str, key: Key) -> dict[str, Any]:
+    """Properties of a key: one, or two where it has a mean and a variation."""
+    said = {"name": _label(name), "description": _description(name, key), "options": set()}
+    varies = {"name": f"{_label(name)} Variation", "description": f"{_VARIES}: {key.meaning}", "options": set()}
+    choices = key.choices
+    if key.kind == "range":
+        return {name: _float(name, key, (0,), said), name + VARIATION: _float(name, key, (1,), varies)}
+    if key.kind == "color":
+        return {name: _color(name, (0,), said), name + VARIATION: _color(name, (1,), varies)}
+    if key.kind in {"rgb", "number"}:
+        return {name: _color(name, (), said) if key.kind == "rgb" else _float(name, key, (), said)}
+    if key.kind == "choice":
+        made = EnumProperty(
+            items=[(choice, _label(choice), "", number) for number, choice in enumerate(choices)],
+            get=lambda self: choices.index(value) if (value := value_of(self, name)) in choices else 0,
+            set=lambda self, number: write(self, name, choices[number]),
+            **said,
         )
-    return parts
-
-
-def _single(name: str, key: Key) -> dict[str, Any]:
-    return {
-        name: _floats(
-            name, key, lambda self: number_in(value_of(self, name)), lambda self, value: write(self, name, value)
-        )
-    }
-
-
-def _common(name: str, key: Key) -> dict[str, Any]:
-    return {"name": _label(name), "description": _description(name, key), "options": set()}
-
-
-def _integer(name: str, key: Key) -> dict[str, Any]:
+        return {name: made}
     made = IntProperty(
         min=int(key.low),
         max=int(key.high),
         get=lambda self: int(min(max(number_in(value_of(self, name)), key.low), key.high)),
         set=lambda self, value: write(self, name, value),
-        **_common(name, key),
-    )
-    return {name: made}
-
-
-def _color(name: str, key: Key) -> dict[str, Any]:
-    """A color, or that of a mean and its variation."""
-    if key.kind == "rgb":
-        return {name: _tone(name, (), _common(name, key))}
-    varies = {"name": f"{_label(name)} Variation", "description": f"{_VARIES}: {key.meaning}", "options": set()}
-    return {name: _tone(name, (0,), _common(name, key)), name + VARIATION: _tone(name, (1,), varies)}
-
-
-def _tone(name: str, part: tuple[int, ...], said: dict[str, Any]) -> Any:
-    return FloatVectorProperty(
-        subtype='COLOR',
-        size=3,
-        min=0.0,
-        max=1.0,
-        get=lambda self: tuple(number_in(value_of(self, name), *part, c) for c in range(3)),
-        set=lambda self, value: _write_color(self, name, part, value),
         **said,
     )
-
-
-def _write_color(group: bpy.types.PropertyGroup, name: str, part: tuple[int, ...], value: Any) -> None:
-    new = [rounded(c) for c in value]
-    if part:
-        old = value_of(group, name)
-        new = [new if i in part else [rounded(number_in(old, i, c)) for c in range(3)] for i in (0, 1)]
-    write(group, name, new)
-
-
-def _choice(name: str, key: Key) -> dict[str, Any]:
-    choices = key.choices
-    made = EnumProperty(
-        items=[(choice, _label(choice), "", number) for number, choice in enumerate(choices)],
-        get=lambda self: choices.index(value) if (value := value_of(self, name)) in choices else 0,
-        set=lambda self, number: write(self, name, choices[number]),
-        **_common(name, key),
-    )
     return {name: made}
-
-
-_MAKERS: dict[str, Callable[[str, Key], dict[str, Any]]] = {
-    "range": _range,
-    "number": _single,
-    "integer": _integer,
-    "color": _color,
-    "rgb": _color,
-    "choice": _choice,
-}
-
-
-def _annotations() -> dict[str, Any]:
-    made: dict[str, Any] = {}
-    for name, key in ORDER_KEYS.items():
-        made |= _MAKERS[key.kind](name, key)
-    return made
 
 
 #: ``Scene.tetflora.species_editor``: what the panel shows, and a property for each key of an order.
@@ -462,7 +399,7 @@ TetFloraSpeciesEditor = type(
     "TetFloraSpeciesEditor",
     (bpy.types.PropertyGroup, WholeSpecies),
     {
-        "__annotations__": _annotations(),
+        "__annotations__": {n: made for name, key in ORDER_KEYS.items() for n, made in _sliders(name, key).items()},
         "__doc__": "What the species editor shows; values come from the species' JSON and go there.",
         "__module__": __name__,
     },

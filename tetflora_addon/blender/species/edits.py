@@ -19,10 +19,9 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 from bpy.props import StringProperty
@@ -118,8 +117,7 @@ def look_again() -> None:
     _seen = _assets = None
 
 
-@dataclass(frozen=True)
-class Page:
+class Page(NamedTuple):
     """A species that came with a collection, as `TetFloraSpeciesEdit` has it."""
 
     identifier: str
@@ -339,18 +337,12 @@ def catalog() -> dict[str, SpeciesInfo]:
 
     Assets are among them; `grown` leaves them out.
     """
-    known = listed()
-    own = edited_infos() | _seen_assets()
-    return in_order(known | own) if own else known
-
-
-def _seen_assets() -> dict[str, SpeciesInfo]:
-    """What menus show of assets; looked at as often as folders."""
     global _assets, _assets_at
-    now = time.monotonic()
-    if _assets is None or now - _assets_at >= _TRUSTED:
+    known, now = listed(), time.monotonic()
+    if _assets is None or now - _assets_at >= _TRUSTED:  # as often as folders
         _assets, _assets_at = asset_infos(), now
-    return _assets
+    own = edited_infos() | _assets
+    return in_order(known | own) if own else known
 
 
 def unknown_text(identifier: str) -> str:
@@ -392,7 +384,8 @@ def pack(_path: object = None, _other: object = None) -> None:
     for collection in bpy.data.collections:
         if collection.library is not None or not (own or PAGES in collection):
             continue
-        needed = set(_species_in(collection))
+        plants = [group for obj in collection.objects if (group := obj.tetflora).is_plant or group.is_field]
+        needed = {name for plant in plants for name in (plant.species, *(e.species for e in plant.field_species))}
         # What came by another way, such as Make Local, goes on.
         pages = {page.identifier: page.text for page in pages_of(collection) if page.identifier in needed}
         for name in sorted(own & needed):
@@ -401,13 +394,6 @@ def pack(_path: object = None, _other: object = None) -> None:
         text = json.dumps(pages, ensure_ascii=False)
         if collection.get(PAGES, "{}") != text:
             collection[PAGES] = text
-
-
-def _species_in(collection: bpy.types.Collection) -> Iterator[str]:
-    for group in (obj.tetflora for obj in collection.objects):
-        if group.is_plant or group.is_field:
-            yield group.species
-            yield from (entry.species for entry in group.field_species)
 
 
 def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> None:

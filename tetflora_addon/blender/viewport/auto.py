@@ -243,7 +243,12 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _seen[scene.session_uid] = settings
     concerns = [update for update in depsgraph.updates if _concerns(update)]
     at_it = _state.steps is not None and scene.session_uid == _state.scene
-    if at_it and not other and all(_only_flags(update) for update in concerns):
+    # Objects that have neither moved nor another form nor other settings may have been hidden.
+    flags = (
+        isinstance(one.id.original, bpy.types.Object) and not (one.is_updated_transform or one.is_updated_geometry)
+        for one in concerns
+    )
+    if at_it and not other and all(flags):
         # Results that are linked have the flags of all other objects updated, and that when we are no longer at work:
         # the job would stop itself for ever. Whoever hid an object meanwhile is heard when it is done.
         _state.again = _state.again or bool(concerns)
@@ -263,12 +268,6 @@ def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 def _concerns(update: bpy.types.DepsgraphUpdate) -> bool:
     changed = update.id.original
     return isinstance(changed, _CHANGING) and not is_ours(changed)
-
-
-def _only_flags(update: bpy.types.DepsgraphUpdate) -> bool:
-    """Whether an object has neither moved nor another form nor other settings; it may have been hidden."""
-    moved = update.is_updated_transform or update.is_updated_geometry
-    return isinstance(update.id.original, bpy.types.Object) and not moved
 
 
 def on_interruption(*_arguments: object) -> None:

@@ -19,12 +19,12 @@ from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...jobs import Progress, mapped
-from ...preview.levels import Level, Levels, gather
+from ...preview.levels import Levels, gather
 from ...preview.light_plants import Shapes, bounds_of_plants, joined, light_plants, simple_crowns, thinned
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
 from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
-from ..runtime import Handlers, JobData, call_off, call_soon, guarded, redraw
+from ..runtime import Handlers, JobData, call_off, call_soon, job, redraw
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
 from ..scene.field_sizes import stand_years
@@ -41,8 +41,9 @@ _MANY_KINDS = 12  # more are compiled one by one, and kept
 _SOON = 0.2  # seconds from a change of plants to reading them again
 
 
+@job("Compute Levels")
 def level_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
 ) -> Generator[Progress, None, Levels]:
     """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
 
@@ -51,24 +52,14 @@ def level_steps(
     TetFloraError
         As `job.refine_steps`.
     """
-    layer = view_layer or depsgraph.view_layer
-    data = JobData("Compute Levels", scene, layer)
-    data.add_objects(taking_part(scene))
-    if scene.camera is not None:
-        data.add_objects([scene.camera])
-    return guarded(data, _level_steps(data, scene, depsgraph, layer))
-
-
-def _level_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layer: bpy.types.ViewLayer
-) -> Generator[Progress, None, Levels]:
+    data.add_objects([*taking_part(scene), *([] if scene.camera is None else [scene.camera])])
     yield Progress(0.0, "Reading the scene")
     depsgraph.update()  # reading what was deleted since the last step would crash Blender
     looked = camera_now(scene)
     before = find(scene)
     camera = before.frozen if before is not None and before.frozen is not None else read_camera(scene, depsgraph)
     camera = camera.local()
-    given = read_scene(scene, depsgraph, layer).counted_from(camera.origin)
+    given = read_scene(scene, depsgraph, depsgraph.view_layer).counted_from(camera.origin)
     progress = Progress(0.02, "Compiling species")
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
@@ -77,7 +68,13 @@ def _level_steps(
     bound = yield from bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera))
     others = given.occluders, given.polygons, given.lights, None if bound is None else bound.placed
     states = refine_loop(flora, given.seeds, camera, settings, *others)
-    levels = yield from steps_in_thread(_shown(gather(states, flora, camera)), Progress(0.05, "Level 0"))
+    # Nobody knows how many passes will follow.
+    fractions = (1.0 - 0.95 * 0.85**number for number in count(1))
+    shown = mapped(
+        gather(states, flora, camera),
+        lambda one: Progress(next(fractions), f"Level {one.number}: {len(one):,} tetrahedra"),
+    )
+    levels = yield from steps_in_thread(shown, Progress(0.05, "Level 0"))
     data.check()
     preview = of(scene)
     preview.levels, preview.looked = levels, looked
@@ -86,13 +83,6 @@ def _level_steps(
         preview.frozen = camera
     redraw()
     return levels
-
-
-def _shown(levels: Generator[Level, None, Levels]) -> Generator[Progress, object, Levels]:
-    """Levels as progress."""
-    # Nobody knows how many passes will follow.
-    fractions = (1.0 - 0.95 * 0.85**number for number in count(1))
-    return mapped(levels, lambda one: Progress(next(fractions), f"Level {one.number}: {len(one):,} tetrahedra"))
 
 
 def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shapes | None:
@@ -158,7 +148,7 @@ def schedule() -> None:
     """Read the plants of what is open soon; many changes in a row are one reading."""
     if not bpy.app.background:
         # A forest of many plants must not keep the window busy while one of them is moved.
-        call_soon(_on_timer, max(_SOON, state.longest_reading()))
+        call_soon(_on_timer, max([_SOON, *(preview.seconds for preview in state.previews.values())]))
 
 
 def _on_timer() -> None:
@@ -200,12 +190,8 @@ def _moment(scene: bpy.types.Scene) -> tuple:
     return season_of(scene), years_of(scene), stand_years(scene)
 
 
-def _on_undo(scene: bpy.types.Scene, _other: object = None) -> None:
-    state.bring_in_step(scene)
-
-
 def _on_load_pre(_path: object, _other: object = None) -> None:
-    state.forget_all()
+    state.previews.clear()
     call_off(_on_timer)
 
 
@@ -220,7 +206,10 @@ def _on_load_post(_path: object, _other: object = None) -> None:
 
 _HANDLERS = Handlers(load_pre=_on_load_pre, load_post=_on_load_post)
 _IN_WINDOW = Handlers(
-    depsgraph_update_post=_on_update, frame_change_post=_on_frame, undo_post=_on_undo, redo_post=_on_undo
+    depsgraph_update_post=_on_update,
+    frame_change_post=_on_frame,
+    undo_post=state.bring_in_step,
+    redo_post=state.bring_in_step,
 )
 
 
@@ -237,7 +226,7 @@ def unregister() -> None:
     """Forget everything and stop listening."""
     for listeners in (edits.listeners, state.listeners):
         listeners.remove(schedule)
-    state.forget_all()
+    state.previews.clear()
     call_off(_on_timer)
     _IN_WINDOW.unregister()
     _HANDLERS.unregister()

@@ -149,12 +149,6 @@ def _draw(made: gpu.types.GPUBatch | None, origin: NDArray[np.float64]) -> None:
             made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
 
 
-def refined_seen(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> bool:
-    """Whether viewports show refined plants, in place of which simple ones stand."""
-    done = [c for c in result_collections(scene, 'VIEW') if UNFINISHED not in c]
-    return any(obj.visible_get(view_layer=layer) for collection in done for obj in collection.objects)
-
-
 def _draw_plants(preview: Preview) -> None:
     shapes = preview.shapes
     made = _kept(preview, "plants", (preview.made,), lambda: plants(shapes))
@@ -200,14 +194,6 @@ def _made_in_time(preview: Preview, level: Level, forms: frozenset[str], camera:
         most = int(most * np.clip(_MOMENT / seconds, 0.5, 2.0))
         preview.cache["most"] = int(np.clip(most, _LEAST, _MOST))
     return made
-
-
-def _draw_frozen(preview: Preview) -> None:
-    camera = preview.frozen.local()
-    far = _reach(preview, camera)
-    made = _kept(preview, "frozen", (*_place(camera), far), lambda: pyramid(camera, far, _FROZEN))
-    gpu.state.depth_test_set('LESS_EQUAL')
-    _draw(made, camera.origin)
 
 
 def _reach(preview: Preview, camera: Camera) -> float:
@@ -258,10 +244,11 @@ def lines_of(scene: bpy.types.Scene, preview: Preview) -> list[tuple[str, tuple[
     return lines
 
 
-def _draw_figures(scene: bpy.types.Scene, preview: Preview, area: bpy.types.Area) -> None:
-    lines = lines_of(scene, preview)
-    scale = bpy.context.preferences.system.ui_scale
-    left = next((r.width for r in area.regions if r.type == 'TOOLS' and r.alignment == 'LEFT'), 0)
+def _draw_figures(context: bpy.types.Context, preview: Preview) -> None:
+    if not context.scene.tetflora.preview.statistics:
+        return
+    lines, scale = lines_of(context.scene, preview), context.preferences.system.ui_scale
+    left = next((r.width for r in context.area.regions if r.type == 'TOOLS' and r.alignment == 'LEFT'), 0)
     step = 18.0 * scale
     blf.size(0, 12.0 * scale)
     blf.enable(0, blf.SHADOW)
@@ -295,24 +282,25 @@ def _guarded(draw: Callable[[bpy.types.Context, Preview], None]) -> None:
 
 
 def _in_space(context: bpy.types.Context, preview: Preview) -> None:
-    if preview.shapes is not None and not refined_seen(context.scene, context.view_layer):
+    # Simple plants stand in place of refined ones, where viewports show none.
+    done = [c for c in result_collections(context.scene, 'VIEW') if UNFINISHED not in c]
+    seen = (obj.visible_get(view_layer=context.view_layer) for collection in done for obj in collection.objects)
+    if preview.shapes is not None and not any(seen):
         _draw_plants(preview)
     if preview.levels is not None:
         _draw_levels(preview, context.scene.tetflora.preview, context.space_data)
     if preview.frozen is not None:
-        _draw_frozen(preview)
-
-
-def _on_screen(context: bpy.types.Context, preview: Preview) -> None:
-    if context.scene.tetflora.preview.statistics:
-        _draw_figures(context.scene, preview, context.area)
+        camera = preview.frozen.local()
+        far = _reach(preview, camera)
+        gpu.state.depth_test_set('LESS_EQUAL')
+        _draw(_kept(preview, "frozen", (*_place(camera), far), lambda: pyramid(camera, far, _FROZEN)), camera.origin)
 
 
 def register() -> None:
     """Draw over all 3D viewports from now on; in the background there are none."""
     if bpy.app.background:
         return
-    for draw, kind in ((_in_space, 'POST_VIEW'), (_on_screen, 'POST_PIXEL')):
+    for draw, kind in ((_in_space, 'POST_VIEW'), (_draw_figures, 'POST_PIXEL')):
         _handles.append(bpy.types.SpaceView3D.draw_handler_add(_guarded, (draw,), 'WINDOW', kind))
 
 

@@ -87,11 +87,6 @@ def show(scene: bpy.types.Scene, on: bool) -> None:
         _clear()
 
 
-def found_for(population: bpy.types.PropertyGroup) -> Dots | None:
-    """What the preview found for a population by its present settings, if it is shown."""
-    return _state.dots if _state.scene is not None and population.uid == _state.uid else None
-
-
 def error() -> str:
     """Why there are no dots, empty if there are some."""
     return _state.error
@@ -133,7 +128,7 @@ def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: 
 
 def status(population: bpy.types.PropertyGroup) -> str:
     """How many plants there are or will be, and as what; reads no geometry, so that panels may call it."""
-    dots = found_for(population)
+    dots = _state.dots if _state.scene is not None and population.uid == _state.uid else None
     if dots is not None:
         number, known = dots.plants, not dots.more or population.by_density
     elif population.uid and not awaits_update(population):

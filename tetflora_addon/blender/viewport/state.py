@@ -38,65 +38,32 @@ listeners = Listeners()
 
 @dataclass
 class Preview:
-    """What is shown of one scene.
+    """What is shown of one scene."""
 
-    Attributes
-    ----------
-    levels : Levels, optional
-        All levels of the last refinement that was asked for.
-    looked : tuple
-        How the scene's camera was then, see `camera_now`.
-    frozen : Camera, optional
-        Camera that stays whatever becomes of the scene's.
-    shapes : Shapes, optional
-        All plants in the form that is chosen.
-    objects : int
-        Objects of the scene when they were read.
-    moment : tuple
-        Its day of the year and years then.
-    message : str
-        Why plants cannot be shown; empty if they can.
-    seconds : float
-        What reading them took.
-    made : int
-        Counts changes of levels and shapes, to know what the graphics card already has.
-    cache : dict
-        What the overlay keeps.
-    """
-
-    levels: Levels | None = None
-    looked: tuple = ()
-    frozen: Camera | None = None
-    shapes: Shapes | None = None
-    objects: int = 0
-    moment: tuple = ()
-    message: str = ""
-    seconds: float = 0.0
-    made: int = 0
-    cache: dict = field(default_factory=dict)
+    levels: Levels | None = None  # all levels of the last refinement that was asked for
+    looked: tuple = ()  # how the scene's camera was then, see `camera_now`
+    frozen: Camera | None = None  # camera that stays whatever becomes of the scene's
+    shapes: Shapes | None = None  # all plants in the form that is chosen
+    objects: int = 0  # objects of the scene when they were read
+    moment: tuple = ()  # its day of the year and years then
+    message: str = ""  # why plants cannot be shown; empty if they can
+    seconds: float = 0.0  # what reading them took
+    made: int = 0  # counts changes of levels and shapes, to know what the graphics card already has
+    cache: dict = field(default_factory=dict)  # what the overlay keeps
 
 
-_previews: dict[int, Preview] = {}
+previews: dict[int, Preview] = {}
+"""By the scene's `session_uid`."""
 
 
 def find(scene: bpy.types.Scene) -> Preview | None:
     """What is previewed of a scene, if anything."""
-    return _previews.get(scene.session_uid)
+    return previews.get(scene.session_uid)
 
 
 def of(scene: bpy.types.Scene) -> Preview:
     """The same, made if there is none."""
-    return _previews.setdefault(scene.session_uid, Preview())
-
-
-def forget_all() -> None:
-    """Forget everything: another file is opened, or TetFlora is switched off."""
-    _previews.clear()
-
-
-def longest_reading() -> float:
-    """Seconds that reading the plants of any scene took last."""
-    return max((preview.seconds for preview in _previews.values()), default=0.0)
+    return previews.setdefault(scene.session_uid, Preview())
 
 
 def forget(scene: bpy.types.Scene) -> None:
@@ -142,7 +109,7 @@ def freeze(scene: bpy.types.Scene, on: bool, depsgraph: Callable[[], bpy.types.D
     redraw()
 
 
-def bring_in_step(scene: bpy.types.Scene) -> None:
+def bring_in_step(scene: bpy.types.Scene, *_: object) -> None:
     """After undo, which changes settings without a word: what is frozen, and shown of plants, follows them."""
     preview, settings = find(scene), scene.tetflora.preview
     if preview is not None:

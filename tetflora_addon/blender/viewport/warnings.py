@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from math import isclose
 
 import bpy
@@ -37,25 +38,14 @@ _SOON, _PATIENCE = 0.3, 30.0  # seconds to the next look, and times that one too
 
 @dataclass(frozen=True)
 class Warned:
-    """Something that is wrong.
+    """Something that is wrong."""
 
-    Attributes
-    ----------
-    key : str
-        Names it for `mend`.
-    short, text : str
-        In a few letters beside a button, and at length.
-    button : str
-        What a click does, empty where none can; where ``mend`` is missing, an operator does it.
-    mend : callable, optional
-        Does that to a scene.
-    """
-
-    key: str
+    key: str  # names it for `mend`
+    #: short, text: In a few letters beside a button, and at length
     short: str
     text: str
-    button: str = ""
-    mend: Callable[[bpy.types.Scene], object] | None = None
+    button: str = ""  # what a click does, empty where none can; where ``mend`` is missing, an operator does it
+    mend: Callable[[bpy.types.Scene], object] | None = None  # does that to a scene
 
 
 _found: dict[int, list[Warned]] = {}
@@ -142,26 +132,20 @@ def _grounds(scene: bpy.types.Scene) -> Iterator[Warned]:
             text = (
                 f'"{obj.name}" is {wide:.3g} m wide, and trees are tens of meters tall. Scale it, or take a larger mesh'
             )
-            yield Warned(f"small {obj.name}", "Small ground", text, "Make 100 m", _enlarger(obj))
+            yield Warned(f"small {obj.name}", "Small ground", text, "Make 100 m", partial(_enlarge, obj))
         elif obj.parent is None and obj.data.users == 1 and not np.allclose(obj.scale, 1.0, rtol=1e-3):
             text = f'The scale of "{obj.name}" is not applied: textures on it are stretched. Apply makes it 1'
-            yield Warned(f"scale {obj.name}", "Scale not applied", text, "Apply", _applier(obj))
+            yield Warned(f"scale {obj.name}", "Scale not applied", text, "Apply", partial(_apply, obj))
 
 
-def _enlarger(obj: bpy.types.Object) -> Callable[[bpy.types.Scene], None]:
-    def change(_scene: bpy.types.Scene) -> None:
-        factor = _SIDE / max(obj.dimensions[:2])
-        obj.scale = [factor * value for value in obj.scale]
-
-    return change
+def _enlarge(obj: bpy.types.Object, _scene: bpy.types.Scene) -> None:
+    factor = _SIDE / max(obj.dimensions[:2])
+    obj.scale = [factor * value for value in obj.scale]
 
 
-def _applier(obj: bpy.types.Object) -> Callable[[bpy.types.Scene], None]:
-    def change(_scene: bpy.types.Scene) -> None:
-        obj.data.transform(Matrix.Diagonal((*obj.scale, 1.0)))
-        obj.scale = (1.0, 1.0, 1.0)
-
-    return change
+def _apply(obj: bpy.types.Object, _scene: bpy.types.Scene) -> None:
+    obj.data.transform(Matrix.Diagonal((*obj.scale, 1.0)))
+    obj.scale = (1.0, 1.0, 1.0)
 
 
 def _places(scene: bpy.types.Scene) -> NDArray[np.float64]:
@@ -187,16 +171,11 @@ def _crowns(scene: bpy.types.Scene, at: NDArray[np.float64]) -> list[tuple[NDArr
     for field, own in _fields(scene):
         names, mesh = [species_of(kind) for kind in field_kinds(field)], field.data
         for n in np.flatnonzero(np.linalg.norm(own[:, :2] - at[:2], axis=1) < _NEAR).tolist():
-            number, scale = (_of_point(mesh, name, n) for name in ("species", "scale"))
+            stored = (mesh.attributes[a].data[n] if a in mesh.attributes else None for a in ("species", "scale"))
+            number, scale = (float(getattr(one, "value", 0.0)) for one in stored)
             near += [(own[n], names[min(int(number), len(names) - 1)], scale or 1.0)] if names else []
     crowns = ((foot, crown_to_draw(scene, species), scale) for foot, species, scale in near)
     return [(foot, crown.radius * scale, crown.height * scale) for foot, crown, scale in crowns if crown is not None]
-
-
-def _of_point(mesh: bpy.types.Mesh, name: str, number: int) -> float:
-    """A number of a point; 0 where none is stored."""
-    value = getattr(mesh.attributes[name].data[number], "value", 0.0) if name in mesh.attributes else 0.0
-    return float(value)
 
 
 def _camera(scene: bpy.types.Scene, place: NDArray[np.float64]) -> Iterator[Warned]:
