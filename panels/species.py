@@ -125,15 +125,18 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
     head = split.row(align=True)
     head.label(text="Mean")
     head.label(text="±")
-    bare = editor.leaves + editor.leaves_variation <= 0.0
+    bare = sum(editor.leaves) <= 0.0
     for name, key in ORDER_KEYS.items():
         if name.startswith(_LEAVES) != leaves:
             continue
         row = column.row(align=True)
         # It can be changed, but has no effect at present.
         row.active = not (bare and leaves and name != "leaves") and not (name == "branches" and last)
-        row.prop(editor, name)
-        if name + VARIATION in editor.bl_rna.properties:
-            row.prop(editor, name + VARIATION, text="")
+        if key.kind == "range":
+            row.prop(editor, name, index=0, slider=key.high <= 1)
+            row.prop(editor, name, index=1, slider=key.high <= 1, text="")
+        else:
+            row.prop(editor, name)
         if key.kind == "color":
+            row.prop(editor, name + VARIATION, text="")
             column.separator()

@@ -143,12 +143,6 @@ def write(editor: bpy.types.PropertyGroup, name: str, value: Any) -> None:
         change_species(editor.id_data, present_species(editor), change)
 
 
-def write_range(editor: bpy.types.PropertyGroup, name: str, part: int, value: float) -> None:
-    """Write the mean (0) or the variation (1) of a range of the shown order."""
-    old = value_of(editor, name)
-    write(editor, name, [value if i == part else rounded(number_in(old, i)) for i in (0, 1)])
-
-
 def _order_items(editor: bpy.types.PropertyGroup, _context: Any) -> list[tuple[str, str, str, int]]:
     orders = len(orders_of(editor))
     labels = tuple(order_label(i, part, i >= orders) for i, part in enumerate(parts_of(editor)[: MAX_ORDERS + 1]))
@@ -308,7 +302,7 @@ class WholeSpecies(SpeciesChoice):
     )
 
 
-#: Added to a key's name for the property of a range's second number.
+#: Added to a key's name for the property of a color's variation.
 VARIATION = "_variation"
 _VARIES = "Maximum deviation from the mean, in both directions"
 
@@ -334,60 +328,51 @@ def _soft_high(key: Key) -> float:
     return 10.0 * mean if 0.0 < 50.0 * mean < key.high else min(key.high, 360.0)
 
 
-def _float_options(key: Key, low: float, high: float) -> dict[str, Any]:
+def _common(name: str, key: Key) -> dict[str, Any]:
+    return {"name": _label(name), "description": _description(name, key), "options": set()}
+
+
+def _number_options(key: Key) -> dict[str, Any]:
+    """How a number, or both of a range, are typed; those of a range are kept within limits of their own."""
+    ranged = key.kind == "range"
+    low, high = min(key.low, 0.0) if ranged else key.low, key.high
     if key.unit == "degrees":
-        angle = {"subtype": 'ANGLE', "unit": 'ROTATION', "step": 100, "precision": 4}
-        return {"min": radians(low), "max": radians(high), **angle}
-    options: dict[str, Any] = {"min": low, "max": high, "soft_max": min(_soft_high(key), high), "precision": 3}
+        options = {"min": radians(low), "max": radians(high), "unit": 'ROTATION', "step": 100, "precision": 4}
+    else:
+        options = {"min": low, "max": high, "soft_max": min(_soft_high(key), high), "precision": 3}
     if key.unit == "m":
-        options |= {"subtype": 'DISTANCE', "unit": 'LENGTH', "step": 1}
-    elif (low, high) == (0, 1):
-        options |= {"subtype": 'FACTOR'}
+        options |= {"unit": 'LENGTH', "step": 1}
+    if not ranged:  # pairs have no such subtypes
+        options["subtype"] = {"degrees": 'ANGLE', "m": 'DISTANCE'}.get(key.unit, 'FACTOR' if (low, high) == (0, 1) else 'NONE')
     return options
 
 
-def _floats(
-    name: str,
-    key: Key,
-    read: Callable[[bpy.types.PropertyGroup], float],
-    write: Callable[[bpy.types.PropertyGroup, float], None],
-    variation: bool = False,
-) -> Any:
-    to_file, to_slider = (degrees, radians) if key.unit == "degrees" else (float, float)
-    low, high = (0.0, key.high - key.low) if variation else (key.low, key.high)
-    return FloatProperty(
-        name=_label(name) + (" Variation" if variation else ""),
-        description=f"{_VARIES}: {key.meaning}" if variation else _description(name, key),
-        get=lambda self: to_slider(read(self)),
-        set=lambda self, value: write(self, rounded(to_file(value))),
-        options=set(),
-        **_float_options(key, low, high),
-    )
-
-
 def _range(name: str, key: Key) -> dict[str, Any]:
-    parts = {}
-    for part, suffix in enumerate(("", VARIATION)):
-        parts[name + suffix] = _floats(
-            name,
-            key,
-            lambda self, part=part: number_in(value_of(self, name), part),
-            lambda self, value, part=part: write_range(self, name, part, value),
-            variation=part == 1,
-        )
-    return parts
+    """A range is one setting of two numbers, as in the file: mean and variation."""
+    to_file, to_slider = (degrees, radians) if key.unit == "degrees" else (float, float)
+    limits = ((key.low, key.high), (0.0, key.high - key.low))
+
+    def read(editor: bpy.types.PropertyGroup) -> tuple[float, ...]:
+        value = value_of(editor, name)
+        return tuple(to_slider(number_in(value, part)) for part in (0, 1))
+
+    def store(editor: bpy.types.PropertyGroup, pair: Any) -> None:
+        typed = zip(map(to_file, pair), limits, strict=True)
+        write(editor, name, [rounded(min(max(number, low), high)) for number, (low, high) in typed])
+
+    said = {**_common(name, key), "description": f"{_description(name, key)}. Mean, and {_VARIES.lower()}"}
+    return {name: FloatVectorProperty(size=2, get=read, set=store, **said, **_number_options(key))}
 
 
 def _single(name: str, key: Key) -> dict[str, Any]:
-    return {
-        name: _floats(
-            name, key, lambda self: number_in(value_of(self, name)), lambda self, value: write(self, name, value)
-        )
-    }
-
-
-def _common(name: str, key: Key) -> dict[str, Any]:
-    return {"name": _label(name), "description": _description(name, key), "options": set()}
+    to_file, to_slider = (degrees, radians) if key.unit == "degrees" else (float, float)
+    made = FloatProperty(
+        get=lambda self: to_slider(number_in(value_of(self, name))),
+        set=lambda self, value: write(self, name, rounded(to_file(value))),
+        **_common(name, key),
+        **_number_options(key),
+    )
+    return {name: made}
 
 
 def _integer(name: str, key: Key) -> dict[str, Any]:
