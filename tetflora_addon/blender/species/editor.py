@@ -343,7 +343,9 @@ def _number_options(key: Key) -> dict[str, Any]:
     if key.unit == "m":
         options |= {"unit": 'LENGTH', "step": 1}
     if not ranged:  # pairs have no such subtypes
-        options["subtype"] = {"degrees": 'ANGLE', "m": 'DISTANCE'}.get(key.unit, 'FACTOR' if (low, high) == (0, 1) else 'NONE')
+        options["subtype"] = {"degrees": 'ANGLE', "m": 'DISTANCE'}.get(
+            key.unit, 'FACTOR' if (low, high) == (0, 1) else 'NONE'
+        )
     return options
 
 
