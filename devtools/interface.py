@@ -65,8 +65,13 @@ def settings(group: type) -> list[Any]:
     import bpy
 
     skipped = {"rna_type", "bl_idname"} | ({"name"} - set(group.__annotations__))
-    own = (p for p in group.bl_rna.properties if not p.is_hidden and p.identifier not in skipped)
-    return [p for p in own if getattr(getattr(p, "fixed_type", None), "base", None) != bpy.types.PropertyGroup.bl_rna]
+    # Blender lists a property twice that a group declares again, as that of all groups for a name.
+    own = {p.identifier: p for p in group.bl_rna.properties if not p.is_hidden and p.identifier not in skipped}
+    return [
+        p
+        for p in own.values()
+        if getattr(getattr(p, "fixed_type", None), "base", None) != bpy.types.PropertyGroup.bl_rna
+    ]
 
 
 def operator_types() -> dict[str, Any]:

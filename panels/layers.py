@@ -17,6 +17,7 @@ from .base import (
     draw_below,
     draw_buttons,
     draw_message,
+    draw_numbers,
     draw_properties,
     draw_species,
     draw_where,
@@ -208,8 +209,7 @@ def _draw_spacing(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) ->
     layout.prop(layer, "clumping")
     if layer.clumping:
         layout.prop(layer, "clump_size")
-    column = layout.column(align=True)
-    draw_properties(column, layer, "scale_min", "scale_max")
+    draw_numbers(layout, layer, "scale_range")
     column = layout.column(align=True)
     column.prop(layer, "age")
     if layer.age > 0.0:

@@ -17,7 +17,7 @@ from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skippe
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.schema import ORDER_KEYS
 from ..tetflora_addon.species.species import LEAF_KINDS
-from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_properties, section, split_layout
+from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_numbers, draw_properties, section, split_layout
 
 _MOST_TOLD = 3  # files of the folder that are not used
 # Prefixes of an order's keys about leaves; the others are about branches.
@@ -133,8 +133,7 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
         # It can be changed, but has no effect at present.
         row.active = not (bare and leaves and name != "leaves") and not (name == "branches" and last)
         if key.kind == "range":
-            row.prop(editor, name, index=0, slider=key.high <= 1)
-            row.prop(editor, name, index=1, slider=key.high <= 1, text="")
+            draw_numbers(row, editor, name)
         else:
             row.prop(editor, name)
         if key.kind == "color":

@@ -19,6 +19,7 @@ from ...parameters import Key
 from ...species.schema import LENGTH_HIGH, ORDER_KEYS
 from ...species.skeletons import MAX_ORDERS
 from ...species.species import BARKS, QUALITY_LIMITS
+from ..settings import SUBTYPES
 from .catalog import SpeciesChoice
 from .edits import catalog, change_species, species_data, species_for, tell_listeners
 
@@ -337,15 +338,15 @@ def _number_options(key: Key) -> dict[str, Any]:
     ranged = key.kind == "range"
     low, high = min(key.low, 0.0) if ranged else key.low, key.high
     if key.unit == "degrees":
-        options = {"min": radians(low), "max": radians(high), "unit": 'ROTATION', "step": 100, "precision": 4}
+        options = {"min": radians(low), "max": radians(high), "subtype": 'ANGLE', "step": 100, "precision": 4}
     else:
         options = {"min": low, "max": high, "soft_max": min(_soft_high(key), high), "precision": 3}
     if key.unit == "m":
-        options |= {"unit": 'LENGTH', "step": 1}
-    if not ranged:  # pairs have no such subtypes
-        options["subtype"] = {"degrees": 'ANGLE', "m": 'DISTANCE'}.get(
-            key.unit, 'FACTOR' if (low, high) == (0, 1) else 'NONE'
-        )
+        options |= {"subtype": 'DISTANCE', "step": 1}
+    elif (low, high) == (0, 1):
+        options["subtype"] = 'FACTOR'
+    if ranged:
+        options["subtype"] = SUBTYPES.get(options.get("subtype"), 'NONE')
     return options
 
 
