@@ -175,7 +175,9 @@ def _many() -> None:
 
 
 def _as_in_a_window() -> None:
-    """Let folders be looked at, and warnings be looked for, as seldom as in a window: not in every draw."""
+    """Look at folders, look for warnings and forecast as seldom as in a window: not in every draw."""
+    import bpy
+
     from panels import refine
     from tetflora_addon.blender.biomes import library
     from tetflora_addon.blender.species import catalog, edits
@@ -184,6 +186,8 @@ def _as_in_a_window() -> None:
         module._TRUSTED = 60.0
     found = refine.warned(_context())
     refine.warned = lambda _context: found
+    text = refine.forecast_text(bpy.context.scene, bpy.context.view_layer)
+    refine.forecast_text = lambda _scene, _layer: text
 
 
 def _milliseconds(cls: type, context: Any) -> float | None:

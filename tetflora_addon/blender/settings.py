@@ -197,7 +197,7 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
     for prop in group.bl_rna.properties:
         if prop.type not in {'INT', 'FLOAT', 'ENUM'} or not group.is_property_set(prop.identifier):
             continue
-        if prop.identifier in _OPEN:
+        if prop.identifier in _OPEN or prop.is_skip_save:  # or shows others
             continue
         value = getattr(group, prop.identifier)
         if prop.type == 'ENUM':
