@@ -214,6 +214,7 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
     """
 
     bl_label = "Move Layer"
+    told = "direction"
     needs = (layer_exists,)
 
     direction: EnumProperty(
@@ -228,12 +229,6 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
         ),
     )
     layer: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})  # identity of the one to drag
-
-    @classmethod
-    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return (
-            f"{cls.bl_label}: {properties.bl_rna.properties['direction'].enum_items[properties.direction].description}"
-        )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self.direction != 'DRAG':

@@ -128,7 +128,7 @@ def copy_layer(scene: bpy.types.Scene, source: Layer, grounds: Sequence[bpy.type
     old, made = source.uid, {}
     for uid in [old, *(one.uid for one in children_of(source))]:
         made[uid] = _copy_one(scene, uid, grounds, made.get(old, ""))
-    sort_layers(scene, [uid for block in _blocks(scene.tetflora.layers) for uid in block], made[old])
+    _tidy(scene, made[old])
     return scene.tetflora.layers[index_of(scene, made[old])]
 
 
@@ -204,7 +204,7 @@ def group_layer(scene: bpy.types.Scene) -> bool:
         made.kind, made.limits, made.gives_way, group = BIOME, set(), False, made.uid
         for one in (*above, uid):
             _put_into(layers[index_of(scene, one)], group)
-    sort_layers(scene, [one for block in _blocks(layers) for one in block], uid)
+    _tidy(scene, uid)
     return True
 
 
@@ -215,7 +215,7 @@ def ungroup_layer(scene: bpy.types.Scene) -> bool:
         return False
     uid = layer.uid
     _put_into(layer, "")
-    sort_layers(scene, [one for block in _blocks(layers) for one in block], uid)
+    _tidy(scene, uid)
     return True
 
 
@@ -230,9 +230,14 @@ def order_of(scene: bpy.types.Scene) -> list[str]:
     return [layer.uid for layer in scene.tetflora.layers]
 
 
+def _tidy(scene: bpy.types.Scene, active: str) -> None:
+    """Let layers follow their biomes and groups."""
+    sort_layers(scene, [uid for block in _blocks(scene.tetflora.layers) for uid in block], active)
+
+
 def sort_layers(scene: bpy.types.Scene, order: Sequence[str], active: str) -> None:
     """Bring the list into an order of identities."""
-    for place, uid in enumerate(order):
+    for place, uid in enumerate(order if list(order) != order_of(scene) else ()):
         scene.tetflora.layers.move(index_of(scene, uid), place)
     scene.tetflora.layers_index = index_of(scene, active)
 
@@ -247,9 +252,7 @@ def bring_together(scene: bpy.types.Scene) -> None:
     for obj in scene.objects:
         if obj.tetflora.is_field and obj.tetflora.population not in uids and obj not in known and obj.library is None:
             note_field(scene, obj)
-    order = [uid for block in _blocks(layers) for uid in block]
-    if order != order_of(scene):
-        sort_layers(scene, order, shown)
+    _tidy(scene, shown)
     scene.tetflora.layers_index = max(index_of(scene, shown), min(len(layers) - 1, 0))
 
 
