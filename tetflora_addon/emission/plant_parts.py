@@ -41,8 +41,9 @@ from .plants import Transition
 
 #: Pixels from which on a branch that nothing else grows on has a line of its own; smaller ones are as straight.
 LINES = 6.0
-#: Width in pixels up to which wood is thin triangles; tubes take their place up to `decisions.BAND` times that.
-TUBES = 0.8
+#: Width in pixels up to which wood is thin triangles; tubes take their place up to `decisions.BAND` times that. A flat
+#: branch has one side for all of its length, bright or dark: with .8, twice as many pixels were off beside the truth.
+TUBES = 0.25
 #: Pixels that the axis of a branch may be off a straight line; ribbons follow those that bend more.
 BENT = 0.5
 #: Width in pixels from which on tubes have all of their sides, and how many they have below.

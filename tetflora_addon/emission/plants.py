@@ -38,8 +38,9 @@ from .leaf_detail import TOLERANCE, LeafDetail
 
 #: Pixels from which on a part that lies in explicit tetrahedra in part is opened.
 MIXED = 24.0
-#: Width in pixels up to which real leaves are kites.
-KITES = 2.0
+#: Width in pixels up to which real leaves are kites, and the same of those that are solid: a kite that shows as much
+#: on average is half as wide again where it is seen from its front, and has one side, in the light or not.
+KITES, SOLID_KITES = 2.0, 0.8
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,13 @@ class Transition:
 
     def of_kites(self, branches: Branches) -> NDArray[np.float64]:
         """Fraction (n,) of the real leaves of branches themselves that are single kites."""
-        return 1.0 - self._fraction(branches, self._own_width, KITES)
+        return 1.0 - self._fraction(branches, self._own_width * np.where(self._solid, KITES / SOLID_KITES, 1.0), KITES)
+
+    @property
+    def _solid(self) -> NDArray[np.bool_]:
+        """Rows (r,) whose leaves are solid, as cones and fruit are: half of their surface is never seen."""
+        solid = [[any(form.solid for form in kinds) for kinds in one] for one in self.flora.forms]
+        return np.array(solid)[self.flora.rows["species"], self.flora.rows["leaf_kind"]]
 
     @property
     def _own_width(self) -> NDArray[np.float64]:

@@ -143,6 +143,11 @@ class LeafModel:
         shown = 2.0 * mean_silhouette(self)
         return shown if shown < _SOLID * self.area else self.area
 
+    @property
+    def solid(self) -> bool:
+        """Whether half of the surface or more is never seen, as of fruit and cones."""
+        return self.shown_area < self.area
+
     @cached_property
     def moment(self) -> Floats:
         """(3, 3) float64: area-weighted mean of n nᵀ over the faces, in the leaf's own axes; its trace is 1."""
