@@ -139,11 +139,13 @@ def _draw_search(
         layout.prop(owner, name)
 
 
-def draw_numbers(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str, number: int = 2) -> None:
-    """Draw the first numbers of a setting beside each other."""
-    row, factors = layout.row(align=True), owner.bl_rna.properties[name].hard_max <= 1.0
+def draw_numbers(
+    layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str, number: int = 2, text: str | None = None
+) -> None:
+    """Draw the first numbers of a setting beside each other, with another text than its label where one is given."""
+    prop, row = owner.bl_rna.properties[name], layout.row(align=True)
     for index in range(number):
-        row.prop(owner, name, index=index, slider=factors, **({"text": ""} if index else {}))
+        row.prop(owner, name, index=index, slider=prop.hard_max <= 1.0, text="" if index else text or prop.name)
 
 
 class Button(NamedTuple):

@@ -22,6 +22,7 @@ from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_numbers
 _MOST_TOLD = 3  # files of the folder that are not used
 # Prefixes of an order's keys about leaves; the others are about branches.
 _LEAVES = ("leaf", "leaves")
+_SHORT = {"count_by_length": "By Length", "leaf_envelope_radius": "Radius"}  # labels that have no room
 
 
 class TETFLORA_MT_species_files(bpy.types.Menu):
@@ -132,10 +133,11 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
         row = column.row(align=True)
         # It can be changed, but has no effect at present.
         row.active = not (bare and leaves and name != "leaves") and not (name == "branches" and last)
+        text = _SHORT.get(name) or editor.bl_rna.properties[name].name.removeprefix("Leaf ")
         if key.kind == "range":
-            draw_numbers(row, editor, name)
+            draw_numbers(row, editor, name, text=text)
         else:
-            row.prop(editor, name)
+            row.prop(editor, name, text=text)
         if key.kind == "color":
             row.prop(editor, name + VARIATION, text="")
             column.separator()

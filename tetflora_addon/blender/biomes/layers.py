@@ -210,7 +210,7 @@ def group_layer(scene: bpy.types.Scene) -> bool:
 
 def ungroup_layer(scene: bpy.types.Scene) -> bool:
     """Take the active layer out of its group, to below it; False where it is in none."""
-    layers, layer = scene.tetflora.layers, active_layer(scene)
+    layer = active_layer(scene)
     if not layer.biome or layer.kind == BIOME:
         return False
     uid = layer.uid
