@@ -55,7 +55,7 @@ HIDDEN_LEAVES = 8
 #: Optical depth in the shade from which on hidden facets shrink instead of being divided.
 DARK = 1.0
 #: Facets of hidden parts, and of those outside, for each pixel of the image, at most.
-HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.6, 0.3
+HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.3, 0.2
 #: So many of each are never too many.
 NEVER_TOO_MANY = 50_000.0
 #: Pixels down to which shadows that fall into the view are refined where nobody asks for finer ones, the optical depth
@@ -65,7 +65,7 @@ NEVER_TOO_MANY = 50_000.0
 SHADOW, LIT, LIT_LEAVES = 4.0, 1.5, 3.0
 #: How many times as many facets there may be for shadows where somebody asks for finer ones.
 SHADOWS = 6.0
-#: Meters from which on shadows are the coarser the farther they fall: most of what they reach is in the shade of others.
+#: Meters from which on shadows are the coarser the farther they fall: most of what they reach lies in other shade.
 FALLEN = 8.0
 #: Largest side of facets outside over their distance from the view; meters that count least, and from which on it grows
 #: faster. The same of those whose shadows fall into the view, over the meters that these fall, and the least of these.

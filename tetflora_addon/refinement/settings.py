@@ -92,8 +92,8 @@ class RefinementSettings:
     shadow_cutoff: float = setting(
         0.0,
         "Shadow Cutoff",
-        "Size in pixels below which shadows of hidden plants are refined no further; 0 leaves them coarse. About 4 "
-        "pixels sharpens shadows of trees behind the camera, for roughly a quarter more polygons",
+        "Size in pixels below which shadows of hidden plants are refined no further; 0 refines those that fall into "
+        "the picture with few polygons. About 4 pixels sharpens them for roughly a quarter more",
         subtype='PIXEL',
         min=0.0,
         soft_max=16.0,

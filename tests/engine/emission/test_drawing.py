@@ -19,8 +19,10 @@ from tetflora_addon.emission import drawing as subject
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.coverage import MARGIN, Coverage
 from tetflora_addon.emission.emitters import as_triangles, facet_blocks
-from tetflora_addon.emission.plants import expanded_blocks
+from tetflora_addon.emission.plant_parts import GrownPlants
+from tetflora_addon.emission.plants import Transition, expanded_blocks
 from tetflora_addon.emission.shade import Shade
+from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.primitives import triangle_corners
 from tetflora_addon.refinement.contents import PlantParts
@@ -328,3 +330,49 @@ def test_triangles_are_the_facets() -> None:
 
 def test_margins_are_part_of_the_image() -> None:
     assert Coverage(wood()[2]).width == WIDTH + 2 * MARGIN
+
+
+def test_wood_of_a_pixel_is_lit_from_all_sides() -> None:
+    """A flat branch has one side for all of its length; faces around it point everywhere, so that areas cancel."""
+    flora = support.flora()
+    seeds = support.plants([3], support.SPECIES.index("birch"))
+    trunk = support.trunks(flora.rows, seeds)
+    away = 2.0 * trunk.radius[0] / (0.75 * 0.7 / WIDTH)
+    camera = support.camera((0, -away, 6), (0, 0, 6), pixels=WIDTH, view=0.7)
+    wide = 2.0 * trunk.radius / camera.extent_around(trunk.position)
+    assert 0.6 < wide[0] < 0.9
+    plants = GrownPlants(flora, camera, Transition(flora, camera, 1e9), facet_weights(flora, [seeds.species[0]]), ())
+    canvas = _Meshes()
+    plants._draw_branches(canvas, trunk, 1.2 * camera.extent_around(trunk.position))
+    vectors = np.concatenate([support.face_vectors(mesh) for mesh in canvas.meshes])
+    assert np.linalg.norm(vectors.sum(axis=0)) < 0.2 * np.linalg.norm(vectors, axis=1).sum()
+
+
+class _Meshes:
+    """Keeps what is drawn as meshes."""
+
+    def __init__(self) -> None:
+        self.meshes: list = []
+
+    def add_mesh(self, what: tuple, buffers: object, culled: bool = False) -> None:
+        if what[0] == "bark" and buffers is not None:
+            self.meshes.append(buffers)
+
+    def add_facets(self, *_: object) -> None:
+        """Leaves do not matter."""
+
+    def thin(self, key: np.ndarray, *_: object) -> tuple[np.ndarray, np.ndarray]:
+        return np.arange(len(key)), np.ones(len(key))
+
+
+def test_shadows_from_just_beside_the_image_are_fine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trees out of view, of which many throw shadows that fall far: the nearest has what it needs."""
+    monkeypatch.setattr(subject, "NEVER_TOO_MANY", 4000.0)
+    flora = support.flora()
+    beside = [(-16.5, 0, 0), *((-20.0 - 2.0 * (k // 5), 6.0 * (k % 5 - 2), 0) for k in range(40))]
+    seeds = support.plants(np.arange(1, 43), support.SPECIES.index("birch"), [(0, 0, 0), *beside])
+    camera = support.camera((0, -30, 8), (0, 0, 8), pixels=WIDTH, view=0.7)
+    lit = Light("SUN", np.zeros(3), np.array([0.8, 0.1, -0.6]), 0.01)
+    _, facets, _ = support.drawn(flora, replace(run(flora, seeds, camera)[1], lights=(lit,)), camera, 1.2, 0.6)
+    near = facets.take(np.flatnonzero(np.hypot(facets.center[:, 0] + 16.5, facets.center[:, 1]) < 1.5))
+    assert np.average(near.side, weights=near.side**2) < 0.2

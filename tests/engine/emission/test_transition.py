@@ -16,6 +16,7 @@ from tests.engine.refinement.test_loop import run
 from tetflora_addon.emission.plants import Transition, expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.refinement.decisions import BAND, explicit_fraction
+from tetflora_addon.species.species import LEAF_KINDS
 
 
 def scene():
@@ -121,3 +122,15 @@ def test_large_leaves_of_a_leader_are_themselves() -> None:
     transition = Transition(flora, camera, limit)
     assert transition.of_own_leaves(leaders).max() == 1.0
     assert transition.of_branches(leaders).max() < 0.5
+
+
+@pytest.mark.parametrize(("name", "kind", "kites"), [("spruce", "blossom", 0.0), ("beech", "leaf", 1.0)])
+def test_cones_of_two_pixels_are_no_kites(name: str, kind: str, kites: float) -> None:
+    """What is solid has no plane that could stand for all of its sides; a leaf as wide has."""
+    flora = support.compiled(support.shipped(name))
+    bears = (flora.rows["leaf_kind"] == LEAF_KINDS.index(kind)) & (flora.rows["leaves"].sum(axis=1) > 0)
+    branch = replace(trunks(flora.rows, support.grove(1, 3.0)), row=np.flatnonzero(bears)[:1])
+    width = (flora.rows["leaf_size"][:, 0] * flora.leaf.width)[branch.row] * branch.scale
+    extent = support.camera((0, -1, 0), (0, 0, 0), pixels=100, view=0.3).extent_around(branch.position)
+    camera = support.camera((0, -width[0] / (1.99 * extent[0]), 0), (0, 0, 0), pixels=100, view=0.3)
+    assert Transition(flora, camera, 1.0).of_kites(branch) == pytest.approx(kites, abs=1e-3)
