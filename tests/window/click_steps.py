@@ -61,8 +61,8 @@ class Hand:
         return x, y + above
 
     def add_layer(self, operator):
-        """The + beside the list of layers, which is above its -, and a button of what it opens."""
-        x, y = yield from self.click("ops.tetflora.remove_layer(", above=20)
+        """The + beside the list of layers, above the dots of the points preview, and a button of what it opens."""
+        x, y = yield from self.click("tetflora_points", place=self._places('UI', (-30,)), above=154, shift=True)
         yield 0.5
         yield from self.ui.picture(f"add_{operator}")
         right = (x - 60, x - 160, x - 260)
@@ -98,10 +98,10 @@ class Hand:
         self.ui.press('ESC')
         yield 1.0
 
-    def _places(self, kind):
+    def _places(self, kind, across=()):
         area = next(a for a in self.ui.window.screen.areas if a.type == ('VIEW_3D' if kind == 'UI' else kind))
         region = next(r for r in area.regions if r.type == ('UI' if kind == 'UI' else 'WINDOW'))
-        across = (region.width // 3, region.width * 2 // 3, region.width - 30)
+        across = [x % region.width for x in across] or (region.width // 3, region.width * 2 // 3)
         down = range(region.y + region.height - STEP, region.y, -STEP)
         return [(region.x + x, y) for x in across for y in down]
 
