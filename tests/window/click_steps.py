@@ -62,7 +62,7 @@ class Hand:
 
     def add_layer(self, operator):
         """The + beside the list of layers, above the dots of the points preview, and a button of what it opens."""
-        x, y = yield from self.click("tetflora_points", place=self._places('UI', (-30,)), above=154, shift=True)
+        x, y = yield from self.click("tetflora_points", place=self._places('UI', (-36, -46)), above=154, shift=True)
         yield 0.5
         yield from self.ui.picture(f"add_{operator}")
         right = (x - 60, x - 160, x - 260)
