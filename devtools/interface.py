@@ -65,8 +65,13 @@ def settings(group: type) -> list[Any]:
     import bpy
 
     skipped = {"rna_type", "bl_idname"} | ({"name"} - set(group.__annotations__))
-    own = (p for p in group.bl_rna.properties if not p.is_hidden and p.identifier not in skipped)
-    return [p for p in own if getattr(getattr(p, "fixed_type", None), "base", None) != bpy.types.PropertyGroup.bl_rna]
+    # Blender lists a property twice that a group declares again, as that of all groups for a name.
+    own = {p.identifier: p for p in group.bl_rna.properties if not p.is_hidden and p.identifier not in skipped}
+    return [
+        p
+        for p in own.values()
+        if getattr(getattr(p, "fixed_type", None), "base", None) != bpy.types.PropertyGroup.bl_rna
+    ]
 
 
 def operator_types() -> dict[str, Any]:
@@ -170,7 +175,9 @@ def _many() -> None:
 
 
 def _as_in_a_window() -> None:
-    """Let folders be looked at, and warnings be looked for, as seldom as in a window: not in every draw."""
+    """Look at folders, look for warnings and forecast as seldom as in a window: not in every draw."""
+    import bpy
+
     from panels import refine
     from tetflora_addon.blender.biomes import library
     from tetflora_addon.blender.species import catalog, edits
@@ -179,6 +186,8 @@ def _as_in_a_window() -> None:
         module._TRUSTED = 60.0
     found = refine.warned(_context())
     refine.warned = lambda _context: found
+    text = refine.forecast_text(bpy.context.scene, bpy.context.view_layer)
+    refine.forecast_text = lambda _scene, _layer: text
 
 
 def _milliseconds(cls: type, context: Any) -> float | None:

@@ -21,13 +21,20 @@ class Layout:
     ----------
     drawn : list of (str, tuple, dict)
         Function, and its arguments, in the order of the calls.
+    beside : list of str
+        Labels of settings that stand to the left of their values, where they have less room than elsewhere.
     """
 
-    def __init__(self, drawn: list | None = None) -> None:
-        self.drawn = [] if drawn is None else drawn
+    use_property_split = False
+
+    def __init__(self, above: Layout | None = None) -> None:
+        self.drawn = [] if above is None else above.drawn
+        self.beside = [] if above is None else above.beside
+        if above is not None:
+            self.use_property_split = above.use_property_split
 
     def __setattr__(self, name: str, value: Any) -> None:
-        assert name == "drawn" or name in _SETTINGS, f"UILayout has no setting {name}"
+        assert name in {"drawn", "beside"} or name in _SETTINGS, f"UILayout has no setting {name}"
         super().__setattr__(name, value)
 
     def __getattr__(self, name: str) -> Any:
@@ -41,15 +48,19 @@ class Layout:
                 owner, prop = arguments[:2]
                 assert prop in owner.bl_rna.properties, f"{owner} has no property {prop}"
             self.drawn.append((name, arguments, options))
+            if name in {"prop", "prop_search"} and self.use_property_split:
+                shown = owner.bl_rna.properties[prop]
+                if shown.type != 'BOOLEAN':  # its label is to the right
+                    self.beside.append(options.get("text", shown.name))
             return self._result(name, arguments)
 
         return call
 
     def _result(self, name: str, arguments: tuple) -> Any:
         if name == "panel":
-            return Layout(self.drawn), Layout(self.drawn)
+            return Layout(self), Layout(self)
         if name != "operator":
-            return Layout(self.drawn)
+            return Layout(self)
         group, operator = arguments[0].split(".")
         known = getattr(getattr(bpy.ops, group), operator).get_rna_type().properties.keys()
         return _Operator(frozenset(known))

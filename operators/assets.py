@@ -31,6 +31,7 @@ class TETFLORA_OT_use_as_species(Reporting, bpy.types.Operator):
     """
 
     bl_label = "Use as Species"
+    told = "stop"
 
     collection: StringProperty(
         name="Collection",
@@ -60,10 +61,6 @@ class TETFLORA_OT_use_as_species(Reporting, bpy.types.Operator):
         )
         nothing = "Select objects with faces, or a collection in the Outliner, first"
         return in_object_mode(context) or ("" if found else nothing)
-
-    @classmethod
-    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return properties.bl_rna.properties["stop"].description if properties.stop else cls.bl_description
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.prop(self, "variants")

@@ -27,12 +27,22 @@ _SLICE = 0.01  # seconds of work between two looks at the keyboard
 Need = Callable[[bpy.types.Context], str]
 
 
+def _told(cls: type, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+    """The tooltip of an operator whose choice or switch says what it does."""
+    prop, value = properties.bl_rna.properties[cls.told], getattr(properties, cls.told)
+    if prop.type == 'ENUM':
+        return prop.enum_items[value].description
+    return prop.description if value else cls.bl_description
+
+
 class Tool:
     """Mix-in for operators: the identifier follows from the class's name, the docstring is the tooltip, and `needs`
     decides whether the operator is available.
     """
 
     needs: tuple[Need, ...] = ()
+    #: Choice or switch of which the tooltip tells, where it is set.
+    told = ""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -40,6 +50,8 @@ class Tool:
             cls.bl_idname = cls.__name__.replace("TETFLORA_OT_", "tetflora.", 1)
         if "bl_description" not in vars(cls):
             cls.bl_description = " ".join((cls.__doc__ or "").split()).removesuffix(".")
+        if cls.told:  # of others, Blender translates the tooltip
+            cls.description = classmethod(_told)
 
     @classmethod
     def missing(cls, context: bpy.types.Context) -> str:

@@ -25,8 +25,12 @@ from ..tetflora_addon.blender.biomes.layers import (
     copy_layer,
     due_layers,
     forget_gone,
+    group_layer,
     index_of,
     move_layer,
+    order_of,
+    sort_layers,
+    ungroup_layer,
 )
 from ..tetflora_addon.blender.placing.cover import cover_with_snow, covered_population
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
@@ -56,6 +60,7 @@ ground_selected = need(selected_grounds, "Select a mesh to plant on")
 ground_found = need(grounds_to_plant, "Select a mesh to plant on")
 layer_exists = need(lambda context: active_layer(context.scene), "Add a layer first")
 _ACTIVE = (in_object_mode, layer_exists)
+_ROW = 20.0  # pixels of a row of a list at a scale of 1
 
 
 def tell_placed(operator: Reporting, made: PlacedPlants) -> set[str]:
@@ -208,16 +213,53 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
     """
 
     bl_label = "Move Layer"
+    told = "direction"
     needs = (layer_exists,)
 
     direction: EnumProperty(
         name="Direction",
         description="Where to move it",
-        items=(('UP', "Up", "Before the layer above"), ('DOWN', "Down", "After the layer below")),
+        items=(
+            ('UP', "Up", "Before the layer above"),
+            ('DOWN', "Down", "After the layer below"),
+            ('DRAG', "Drag", "With the mouse, until you click; Esc puts it back"),
+            ('IN', "Group", "Into the group above or, without one, into a new group with the layer above it"),
+            ('OUT', "Ungroup", "Out of its group, to below it"),
+        ),
     )
+    layer: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})  # identity of the one to drag
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self.direction != 'DRAG':
+            return self.execute(context)
+        if (index := index_of(context.scene, self.layer)) >= 0:
+            context.scene.tetflora.layers_index = index
+        self._before, self._at = order_of(context.scene), event.mouse_y
+        context.window_manager.modal_handler_add(self)
+        context.window.cursor_modal_set('MOVE_Y')
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        scene, row = context.scene, _ROW * context.preferences.system.ui_scale
+        while abs(self._at - event.mouse_y) >= row:
+            step = 1 if event.mouse_y < self._at else -1
+            self._at -= step * row
+            move_layer(scene, step)
+            context.area.tag_redraw()
+        done = event.type in {'LEFTMOUSE', 'RET'} and event.value == 'PRESS'
+        if not done and event.type not in {'ESC', 'RIGHTMOUSE'}:
+            return {'RUNNING_MODAL'}
+        context.window.cursor_modal_restore()
+        if not done:
+            sort_layers(scene, self._before, active_layer(scene).uid)
+        points.schedule()
+        return {'FINISHED' if done else 'CANCELLED'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        if not move_layer(context.scene, -1 if self.direction == 'UP' else 1):
+        scene = context.scene
+        if self.direction in {'IN', 'OUT'} and not (group_layer if self.direction == 'IN' else ungroup_layer)(scene):
+            return self.refused("Groups are of single layers" if self.direction == 'IN' else "The layer is in no group")
+        if self.direction in {'UP', 'DOWN'} and not move_layer(scene, -1 if self.direction == 'UP' else 1):
             return {'CANCELLED'}
         points.schedule()
         return {'FINISHED'}

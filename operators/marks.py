@@ -69,6 +69,7 @@ class TETFLORA_OT_mark(Reporting, bpy.types.Operator):
     """Let selected objects be something to TetFlora, or no more."""
 
     bl_label = "Use Selected Objects As"
+    told = "what"
     needs = (in_object_mode,)
 
     what: EnumProperty(
@@ -112,10 +113,6 @@ class TETFLORA_OT_mark(Reporting, bpy.types.Operator):
         default='TOGGLE',
         options={'SKIP_SAVE'},
     )
-
-    @classmethod
-    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return properties.bl_rna.properties["what"].enum_items[properties.what].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
         if self.what == 'FIELD':
@@ -196,6 +193,7 @@ class TETFLORA_OT_convert_plants(Reporting, bpy.types.Operator):
     """Replace the selected plants with one object whose vertices are the same plants, or take fields apart again."""
 
     bl_label = "Convert Plants"
+    told = "to"
     needs = (in_object_mode, plants_or_fields_selected)
 
     to: EnumProperty(
@@ -215,10 +213,6 @@ class TETFLORA_OT_convert_plants(Reporting, bpy.types.Operator):
             ),
         ),
     )
-
-    @classmethod
-    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return properties.bl_rna.properties["to"].enum_items[properties.to].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
         return self._to_field(context) if self.to == 'FIELD' else self._to_objects(context)
@@ -260,6 +254,7 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
     """Add an entry to a list of species, or remove the active one."""
 
     bl_label = "Edit List"
+    told = "action"
     bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
 
     owner: StringProperty(
@@ -274,10 +269,6 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
             ('REMOVE', "Remove", "Remove the active entry"),
         ),
     )
-
-    @classmethod
-    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return properties.bl_rna.properties["action"].enum_items[properties.action].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
         try:

@@ -115,6 +115,7 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
     """Delete plants from the scene."""
 
     bl_label = "Remove Plants"
+    told = "which"
     needs = (in_object_mode,)
 
     which: EnumProperty(
@@ -128,10 +129,6 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
         default='SELECTED',
     )
     species: StringProperty(name="Species", description="Identifier of the species to remove", options={'SKIP_SAVE'})
-
-    @classmethod
-    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return properties.bl_rna.properties["which"].enum_items[properties.which].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
         objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects

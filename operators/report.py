@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Write a report of a fault."""
 
-from pathlib import Path
-
 import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper
@@ -11,10 +9,10 @@ from bpy_extras.io_utils import ExportHelper
 from ..tetflora_addon.blender.report import report_text
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.files import write_whole
-from .base import Reporting
+from .base import FileTool
 
 
-class TETFLORA_OT_write_report(Reporting, bpy.types.Operator, ExportHelper):
+class TETFLORA_OT_write_report(FileTool, bpy.types.Operator, ExportHelper):
     """Write versions, cores, memory, settings and the last error to a text file, to report a fault with.
 
     Nothing of the scene is in it, and no names or folders.
@@ -31,7 +29,7 @@ class TETFLORA_OT_write_report(Reporting, bpy.types.Operator, ExportHelper):
         return super().invoke(context, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath))
+        path = self.path
         try:
             write_whole(path, report_text(context.scene))
         except OSError as error:

@@ -107,6 +107,7 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
     """Add or remove an order of branches or the short shoots of the species."""
 
     bl_label = "Edit Orders"
+    told = "action"
     needs = (species_shown,)
 
     action: EnumProperty(
@@ -118,10 +119,6 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
             ('SPUR', "Short Shoots", "Add or remove short shoots with blossoms, fruit or leaves"),
         ),
     )
-
-    @classmethod
-    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return properties.bl_rna.properties["action"].enum_items[properties.action].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene

@@ -12,6 +12,16 @@ from . import base, layers, menus, outputs, places, plants, preferences, refine,
 _MODULES = (base, refine, layers, plants, season, places, species, outputs, menus)
 CLASSES = classes_in(_MODULES, bpy.types.Panel, bpy.types.Menu, bpy.types.UIList)
 
+#: Menus and popovers of Blender's, and what draws entries in them.
+_ADDED = (
+    ("VIEW3D_PT_overlay_object", outputs.draw_in_overlays),
+    ("VIEW3D_MT_add", menus.draw_in_add_menu),
+    ("TOPBAR_MT_file_import", places.draw_in_import_menu),
+    ("VIEW3D_MT_object", menus.draw_in_object_menu),
+    ("OUTLINER_MT_object", menus.draw_in_outliner),
+    ("OUTLINER_MT_collection", menus.draw_in_outliner),
+)
+
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 
@@ -20,24 +30,16 @@ def register() -> None:
     _register()
     preferences.register()
     tools.register()
-    bpy.types.VIEW3D_PT_overlay_object.append(outputs.draw_in_overlays)
-    bpy.types.VIEW3D_MT_add.append(menus.draw_in_add_menu)
-    bpy.types.TOPBAR_MT_file_import.append(places.draw_in_import_menu)
-    bpy.types.VIEW3D_MT_object.append(menus.draw_in_object_menu)
-    for menu in (bpy.types.OUTLINER_MT_object, bpy.types.OUTLINER_MT_collection):
-        menu.append(menus.draw_in_outliner)
+    for name, draw in _ADDED:
+        getattr(bpy.types, name).append(draw)
     render.nothing_refined.append(menus.open_nothing_refined)
 
 
 def unregister() -> None:
     """Unregister panels and menus."""
     render.nothing_refined.remove(menus.open_nothing_refined)
-    for menu in (bpy.types.OUTLINER_MT_object, bpy.types.OUTLINER_MT_collection):
-        menu.remove(menus.draw_in_outliner)
-    bpy.types.VIEW3D_MT_object.remove(menus.draw_in_object_menu)
-    bpy.types.TOPBAR_MT_file_import.remove(places.draw_in_import_menu)
-    bpy.types.VIEW3D_MT_add.remove(menus.draw_in_add_menu)
-    bpy.types.VIEW3D_PT_overlay_object.remove(outputs.draw_in_overlays)
+    for name, draw in reversed(_ADDED):
+        getattr(bpy.types, name).remove(draw)
     tools.unregister()
     preferences.unregister()
     _unregister()

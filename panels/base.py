@@ -106,23 +106,25 @@ def draw_where(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> No
         row.prop(owner, "invert_image", text="", icon='ARROW_LEFTRIGHT')
         mesh = ground.data if ground is not None and ground.type == 'MESH' else None
         _draw_search(layout, owner, "uv_layer", mesh, "uv_layers")
+    biome = getattr(owner, "kind", "") == 'BIOME'
     for limit in ("slope", "altitude", "wetness"):
-        if limit.upper() in shown:
-            _draw_limits(layout, owner, limit)
+        if limit.upper() in shown and f"{limit}_range" in known:
+            # Biomes blend; of others, only the edges of some limits are soft.
+            draw_numbers(layout, owner, f"{limit}_range", 3 if biome or limit != "slope" else 2)
+        elif limit.upper() in shown:
+            layout.prop(owner, f"{limit}_max")
     if 'ALTITUDE' in shown and "scale_at_top" in known:
         layout.prop(owner, "scale_at_top")
     if 'FACING' in shown:
-        column = layout.column(align=True)
-        column.prop(owner, "aspect")
-        column.prop(owner, "aspect_spread", text="Spread")
+        draw_numbers(layout, owner, "aspect_range")
     if 'EDGE' in shown:
         layout.prop(owner, "edge_falloff")
     if 'AREAS' in shown:
         layout.prop(owner, "areas")
     if 'PATHS' in shown:
         layout.prop(owner, "paths")
-        if getattr(owner, "kind", "") == 'BIOME':
-            _draw_limits(layout, owner, "path")
+        if biome:
+            draw_numbers(layout, owner, "path_range", 3)
         else:
             layout.prop(owner, "path_distance")
 
@@ -137,18 +139,13 @@ def _draw_search(
         layout.prop(owner, name)
 
 
-def _draw_limits(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str) -> None:
-    """Draw the limits of something as far as they are there, and how soft they are."""
-    known, column = owner.bl_rna.properties, layout.column(align=True)
-    ends = [f"{name}_{end}" for end in ("min", "max") if f"{name}_{end}" in known]
-    draw_properties(column, owner, *ends[:1])
-    for part in ends[1:]:
-        column.prop(owner, part, text="Max")
-    # Biomes blend; of others, only the edges of some limits are soft.
-    soft = ("softness",) if getattr(owner, "kind", "") == 'BIOME' or name == "wetness" else ("falloff",)
-    for part in soft:
-        if f"{name}_{part}" in known:
-            column.prop(owner, f"{name}_{part}", text=part.title())
+def draw_numbers(
+    layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str, number: int = 2, text: str | None = None
+) -> None:
+    """Draw the first numbers of a setting beside each other, with another text than its label where one is given."""
+    prop, row = owner.bl_rna.properties[name], layout.row(align=True)
+    for index in range(number):
+        row.prop(owner, name, index=index, slider=prop.hard_max <= 1.0, text="" if index else text or prop.name)
 
 
 class Button(NamedTuple):

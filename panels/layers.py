@@ -17,6 +17,7 @@ from .base import (
     draw_below,
     draw_buttons,
     draw_message,
+    draw_numbers,
     draw_properties,
     draw_species,
     draw_where,
@@ -37,6 +38,7 @@ class TETFLORA_UL_layers(bpy.types.UIList):
         elif item.biome:
             row.separator(factor=2.0)
         named = item.field if item.kind == FIELD and item.field is not None else item
+        Button("move_layer", 'GRIP', "", {"direction": 'DRAG', "layer": item.uid}).draw(row, emboss=False)
         row.prop(named, "name", text="", emboss=False, icon=kind.icon)
         right = row.row(align=True)
         right.alignment = 'RIGHT'
@@ -116,6 +118,8 @@ class TETFLORA_MT_layers(bpy.types.Menu):
             Button("duplicate_layer", 'DUPLICATE'),
             Button("duplicate_layer", 'MESH_GRID', "Copy to Selected Meshes", {"to_selected": True}),
             Button("set_layer_ground", 'MESH_GRID'),
+            Button("move_layer", 'GROUP', "Group with Layer Above", {"direction": 'IN'}),
+            Button("move_layer", 'X', "Take Out of Group", {"direction": 'OUT'}),
             Button("select_plants", 'RESTRICT_SELECT_OFF', "Select Plants of Layer", {"layer": True}),
             Button("remove_layer", 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
             None,
@@ -208,8 +212,7 @@ def _draw_spacing(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) ->
     layout.prop(layer, "clumping")
     if layer.clumping:
         layout.prop(layer, "clump_size")
-    column = layout.column(align=True)
-    draw_properties(column, layer, "scale_min", "scale_max")
+    draw_numbers(layout, layer, "scale_range")
     column = layout.column(align=True)
     column.prop(layer, "age")
     if layer.age > 0.0:

@@ -54,10 +54,7 @@ class TETFLORA_PT_output(PropertiesPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, output = split_layout(self), context.scene.tetflora.output
-        layout.prop(output, "save_results")
-        column = layout.column(heading="Results")
-        column.prop(output, "show_viewport", text="Viewports")
-        column.prop(output, "show_render", text="Renders")
+        layout.column().prop(output, "results_in")
         for collection in plant_collections(context.scene):
             column = layout.column(heading=collection.name)
             column.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)
@@ -77,7 +74,7 @@ class TETFLORA_PT_view_layer(PropertiesPanel, bpy.types.Panel):
         layout.prop(output, "pass_index")
         layout.prop_search(output, "light_group", layer, "lightgroups")
         if body := section(layout, "Ray Visibility"):
-            draw_properties(body, output, "camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+            body.column().prop(output, "ray_visibility", text="")
         if body := section(layout, "By Species"):
             draw_species(body, output)
             if entry := active_in(output, "species"):

@@ -14,6 +14,10 @@ IMPORTS = (
     Button("import_inventory", 'SPREADSHEET'),
     Button("import_outlines", 'OUTLINER_OB_CURVE'),
 )
+_ENDINGS = (
+    *("Terrain (.tif, .asc, .hgt)", "Canopy Height (.tif, .asc, .xyz)"),
+    *("Tree Inventory (.csv, .geojson)", "Map Outlines (.geojson, .shp, .gpkg)"),
+)
 
 
 class TETFLORA_UL_inventory_columns(bpy.types.UIList):
@@ -28,10 +32,5 @@ class TETFLORA_UL_inventory_columns(bpy.types.UIList):
 def draw_in_import_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Entries in Blender's File > Import."""
     menu.layout.separator()
-    for kind, ending, icon in (
-        ("import_terrain", "Terrain (.tif, .asc, .hgt)", 'RNDCURVE'),
-        ("import_canopy", "Canopy Height (.tif, .asc, .xyz)", 'OUTLINER_OB_POINTCLOUD'),
-        ("import_inventory", "Tree Inventory (.csv, .geojson)", 'SPREADSHEET'),
-        ("import_outlines", "Map Outlines (.geojson, .shp, .gpkg)", 'OUTLINER_OB_CURVE'),
-    ):
-        Button(kind, icon, ending).draw(menu.layout)
+    for button, text in zip(IMPORTS, _ENDINGS, strict=True):
+        button._replace(text=text).draw(menu.layout)

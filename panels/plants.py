@@ -64,7 +64,6 @@ class TETFLORA_PT_object(PropertiesPanel, bpy.types.Panel):
         if group.is_field:
             _draw_field(layout.column(), obj)
             if group.stand.is_grown:
-                layout.prop(group, "stand_smooth")
                 layout.prop(group.stand, "seed")
         column = layout.column(heading="Use As")
         if obj.type == 'MESH':

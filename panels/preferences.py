@@ -12,6 +12,7 @@ import bpy
 from ..tetflora_addon import storage
 from ..tetflora_addon.blender.preferences import CACHE_VARIABLE, TetFloraPreferences, species_folders
 from ..tetflora_addon.blender.species.edits import skipped_files
+from .base import draw_properties
 
 KEYMAP = "Object Mode"
 PIE = "TETFLORA_MT_pie"
@@ -80,10 +81,7 @@ def _draw(self: TetFloraPreferences, context: bpy.types.Context) -> None:
         layout.label(text="This folder does not exist", icon='ERROR')
     for text in skipped_files()[:_MOST_TOLD]:
         layout.label(text=text, icon='ERROR')
-    layout.prop(self, "threads")
-    layout.prop(self, "new_quality")
-    layout.prop(self, "max_memory")
-    layout.prop(self, "kept_memory")
+    draw_properties(layout, self, "threads", "new_quality", "max_memory", "kept_memory")
     _draw_cache(layout.column(), self)
     layout.operator("tetflora.write_report", icon='TEXT')
     _draw_keys(layout.column(), context)

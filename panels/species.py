@@ -17,11 +17,12 @@ from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skippe
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.schema import ORDER_KEYS
 from ..tetflora_addon.species.species import LEAF_KINDS
-from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_properties, section, split_layout
+from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_numbers, draw_properties, section, split_layout
 
 _MOST_TOLD = 3  # files of the folder that are not used
 # Prefixes of an order's keys about leaves; the others are about branches.
 _LEAVES = ("leaf", "leaves")
+_SHORT = {"count_by_length": "By Length", "leaf_envelope_radius": "Radius"}  # labels that have no room
 
 
 class TETFLORA_MT_species_files(bpy.types.Menu):
@@ -125,15 +126,18 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
     head = split.row(align=True)
     head.label(text="Mean")
     head.label(text="±")
-    bare = editor.leaves + editor.leaves_variation <= 0.0
+    bare = sum(editor.leaves) <= 0.0
     for name, key in ORDER_KEYS.items():
         if name.startswith(_LEAVES) != leaves:
             continue
         row = column.row(align=True)
         # It can be changed, but has no effect at present.
         row.active = not (bare and leaves and name != "leaves") and not (name == "branches" and last)
-        row.prop(editor, name)
-        if name + VARIATION in editor.bl_rna.properties:
-            row.prop(editor, name + VARIATION, text="")
+        text = _SHORT.get(name) or editor.bl_rna.properties[name].name.removeprefix("Leaf ")
+        if key.kind == "range":
+            draw_numbers(row, editor, name, text=text)
+        else:
+            row.prop(editor, name, text=text)
         if key.kind == "color":
+            row.prop(editor, name + VARIATION, text="")
             column.separator()

@@ -4,7 +4,7 @@
 
 import bpy
 
-from .base import draw_properties
+from .base import draw_numbers, draw_properties
 from .layers import draw_distance
 
 
@@ -35,7 +35,8 @@ class PaintTool(_GroundTool, bpy.types.WorkSpaceTool):
             layout.prop(settings, "species_choice", text="")
         if context.region.type != 'TOOL_HEADER':
             draw_distance(layout, settings)
-            draw_properties(layout, settings, "scale_min", "scale_max", "store", "seed")
+            draw_numbers(layout, settings, "scale_range")
+            layout.prop(settings, "store")
 
 
 class PlaceTool(_GroundTool, bpy.types.WorkSpaceTool):

@@ -57,7 +57,7 @@ def test_an_edited_species_is_looked_at_once(cache, tmp_path, monkeypatch):
     scene.render.resolution_x = scene.render.resolution_y = 32
     editor = scene.tetflora.species_editor
     editor.species, editor.order = "fern", "0"
-    editor.length = 0.05
+    editor.length[0] = 0.05
     monkeypatch.setattr(facet_weights, "_found", {})
     refine.refine(scene, depsgraph())
     (kept,) = (tmp_path / "cache").iterdir()

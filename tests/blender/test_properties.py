@@ -63,13 +63,35 @@ def test_properties_are_made_from_the_fields_of_the_engine(engine, group, engine
     for field in fields(engine):
         if field.metadata:
             made = group.bl_rna.properties[field.name]
-            if made.is_hidden:
-                assert "name" not in field.metadata
-            else:
+            if "name" in field.metadata:
                 assert (made.name, made.description) == (field.metadata["name"], field.metadata["description"])
+                ranges = (p for p in group.bl_rna.properties if p.identifier.endswith("_range"))
+                assert made.is_hidden == any(made.description in p.description for p in ranges)
+            else:
+                assert made.is_hidden
             assert made.default == pytest.approx(field.metadata.get("default", field.default), rel=1e-6)
             assert field.type in {"bool", "int", "float"}
             assert made.type == {"bool": 'BOOLEAN'}.get(field.type, field.type.upper())
+
+
+def test_ranges_and_switches_show_what_is_stored():
+    """Artists see them; scripts and files have the single ones, whose limits stay their own."""
+    scene = bpy.context.scene.tetflora
+    layer = scene.layers.add()
+    layer.slope_range = 0.25, 9.0, 0.0
+    assert (layer.slope_min, layer.slope_max, layer.slope_softness) == pytest.approx((0.25, np.pi / 2, 0.0))
+    layer.altitude_falloff, layer.altitude_softness = 3.0, 7.0
+    assert layer.altitude_range[2] == 3.0
+    layer.kind = 'BIOME'
+    assert layer.altitude_range[2] == 7.0
+    layer.altitude_range[2] = 8.0
+    assert (layer.altitude_falloff, layer.altitude_softness) == (3.0, 8.0)
+    scene.brush.scale_max = 3.0
+    assert tuple(scene.brush.scale_range) == pytest.approx((0.8, 3.0))
+    output = scene.output
+    assert output.results_in == {'SHOW_VIEWPORT', 'SHOW_RENDER'}
+    output.ray_visibility = {'CAMERA', 'SHADOW'}
+    assert (output.camera, output.diffuse, output.glossy, output.shadow) == (True, False, False, True)
 
 
 def test_qualities_set_what_they_say_and_are_recognized():

@@ -80,7 +80,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
     is_plant: BoolProperty(
         name="Plant",
         description="This object is a plant: its species and seed define how it grows, its transform where",
-        options=set(),
+        options={'HIDDEN'},
     )
     seed: IntProperty(
         name="Seed",
@@ -101,7 +101,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
             "Each point of this mesh or point cloud is a plant, defined by the attributes species, seed, rotation, "
             "scale and age of the points. The attribute species is an index into the list of species"
         ),
-        options=set(),
+        options={'HIDDEN'},
     )
     field_species: CollectionProperty(
         name="Field Species",

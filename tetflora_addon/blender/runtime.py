@@ -10,13 +10,15 @@ before each step it is asked whether anything was deleted. It then takes back wh
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial, wraps
+from math import inf
 from pathlib import Path
 from textwrap import wrap
 from traceback import FrameSummary, extract_tb
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import bpy
 from bpy.app.handlers import persistent
@@ -97,6 +99,58 @@ def call_off(function: Callable[[], float | None]) -> None:
 
 
 _Result = TypeVar("_Result")
+
+
+class Outlook(Generic[_Result]):
+    """What panels say of a scene, found a moment after a change, and the less often the longer that takes.
+
+    So nothing computes while it is drawn. In the background, where no timer runs, it is found when it is asked for.
+
+    Parameters
+    ----------
+    find : callable
+        Finds it for a scene and a view layer.
+    old : float
+        Seconds after which a panel that is drawn asks for it anew.
+    """
+
+    def __init__(self, find: Callable[[bpy.types.Scene, bpy.types.ViewLayer], _Result], old: float = inf) -> None:
+        self._find, self._old = find, old
+        self._found: dict[tuple[int, str], _Result] = {}
+        self._took, self._at = 0.0, -inf
+        self._timer = partial(self._look)  # one object, which Blender can find again
+
+        def ask(*_: object) -> None:
+            if not bpy.app.background:
+                call_soon(self._timer, max(0.2, 30.0 * self._took))
+
+        self.ask = ask
+        self._handlers = Handlers(depsgraph_update_post=ask, undo_post=ask, redo_post=ask, load_post=ask)
+        self.register = self._handlers.register
+
+    def of(self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> _Result | None:
+        """What was found last."""
+        if bpy.app.background:
+            return self._find(scene, view_layer)
+        key = scene.session_uid, view_layer.name
+        if key not in self._found or time.perf_counter() - self._at > self._old:
+            self.ask()
+        return self._found.get(key)
+
+    def _look(self) -> None:
+        begin, windows = time.perf_counter(), bpy.context.window_manager.windows
+        found = {(w.scene.session_uid, w.view_layer.name): self._find(w.scene, w.view_layer) for w in windows}
+        self._at = time.perf_counter()
+        self._took = self._at - begin
+        if found != self._found:
+            self._found = found
+            redraw()
+
+    def unregister(self) -> None:
+        """Look no more."""
+        self._handlers.unregister()
+        call_off(self._timer)
+        self._found = {}
 
 
 def is_there(datablock: bpy.types.ID | None) -> bool:

@@ -16,7 +16,7 @@ from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 
 from ..camera.view_cells import ViewCells
 from ..errors import SceneError, quoted, readable
@@ -62,9 +62,54 @@ def properties_of(settings: type, **common: Any) -> SimpleNamespace:
     return made
 
 
-def settings_in(settings: type, **common: Any) -> type:
-    """A mix-in for property groups with all settings of a dataclass, as `properties_of`."""
-    return type(settings.__name__, (), {"__annotations__": vars(properties_of(settings, **common))})
+def settings_in(*settings: type, only: Iterable[str] = (), **common: Any) -> type:
+    """A mix-in for property groups with settings of dataclasses, those of later ones first, as `properties_of`.
+
+    What belongs together is one setting for artists: the least and the most of something with how soft both are, and a
+    direction with its spread. Each number keeps its own name for files and scripts.
+    """
+    made = {name: value for one in settings for name, value in vars(properties_of(one, **common)).items()}
+    made = {name: made[name] for name in only or made}
+    ends = {name.removesuffix("_min"): (name, f"{name[:-3]}max") for name in made if name.endswith("_min")}
+    ends |= {name.removesuffix("_spread"): (name[:-7], name) for name in made if name.endswith("_spread")}
+    for stem, names in ends.items():
+        soft = tuple(name for name in (f"{stem}_falloff", f"{stem}_softness") if name in made)
+        made[f"{stem}_range"] = _range(names, soft, {name: made[name].keywords for name in (*names, *soft)})
+    return type(settings[0].__name__, (), {"__annotations__": made})
+
+
+#: Of several numbers, by those of one: Blender knows no others for them.
+SUBTYPES = {'ANGLE': 'EULER', 'DISTANCE': 'XYZ_LENGTH'}
+
+
+def _range(ends: tuple[str, str], soft: tuple[str, ...], given: dict[str, dict[str, Any]]) -> Any:
+    """One setting of several numbers, which are hidden; biomes blend, so their edges are soft in another way."""
+
+    def names_for(group: bpy.types.PropertyGroup) -> tuple[str, ...]:
+        return (*ends, *(soft[-1:] if getattr(group, "kind", "") == BIOME else soft[:1]))
+
+    def store(group: bpy.types.PropertyGroup, values: Any) -> None:
+        for name, value in zip(names_for(group), values, strict=True):
+            if getattr(group, name) != value:
+                setattr(group, name, value)
+
+    options: dict[str, Any] = {"subtype": SUBTYPES.get(given[ends[0]].get("subtype"), 'NONE')}
+    for name, outermost in (("min", min), ("max", max), ("soft_min", min), ("soft_max", max)):
+        values = [one[name] for one in given.values() if name in one]
+        if len(values) == len(given):
+            options[name] = outermost(values)
+    text = ". ".join(f"{one['name']}: {one['description']}" for one in given.values())
+    for one in given.values():
+        one["options"] = {'HIDDEN'}
+    return FloatVectorProperty(
+        name=given[ends[1]]["name"].removeprefix("Max ").removesuffix(" Spread").replace("To", "Path"),
+        description=text,
+        size=2 + bool(soft),
+        get=lambda self: tuple(getattr(self, name) for name in names_for(self)),
+        set=store,
+        options={'SKIP_SAVE'},
+        **options,
+    )
 
 
 #: What a layer is: plants placed by rules, which are a cover where it says what it covers; a group of layers from a
@@ -81,6 +126,39 @@ def active_in(owner: bpy.types.PropertyGroup, entries: str) -> bpy.types.Propert
     """The active entry of a list of an owner; None without one."""
     found, index = getattr(owner, entries), getattr(owner, f"{entries}_index")
     return found[index] if 0 <= index < len(found) else None
+
+
+def switches(name: str, description: str, made: dict[str, Any]) -> type:
+    """A mix-in with Boolean properties, which are hidden, and one by which artists see them side by side.
+
+    Parameters
+    ----------
+    name : str
+        Identifier of that; in title case its label.
+    made : dict
+        The properties by their names.
+    """
+    said = [one.keywords for one in made.values()]
+
+    def store(group: bpy.types.PropertyGroup, bits: int) -> None:
+        for number, one in enumerate(made):
+            if getattr(group, one) != bool(bits >> number & 1):
+                setattr(group, one, bool(bits >> number & 1))
+
+    for one in said:
+        one["options"] = {'HIDDEN'}
+    together = EnumProperty(
+        name=name.replace("_", " ").title(),
+        description=description,
+        items=[
+            (key.upper(), one["name"], one["description"], 1 << n)
+            for n, (key, one) in enumerate(zip(made, said, strict=True))
+        ],
+        get=lambda self: sum(getattr(self, one) << number for number, one in enumerate(made)),
+        set=store,
+        options={'ENUM_FLAG', 'SKIP_SAVE'},
+    )
+    return type(name, (), {"__annotations__": {**made, name: together}})
 
 
 _ENDLESS = 1e30  # what Blender has for no bound is larger
@@ -119,7 +197,7 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
     for prop in group.bl_rna.properties:
         if prop.type not in {'INT', 'FLOAT', 'ENUM'} or not group.is_property_set(prop.identifier):
             continue
-        if prop.identifier in _OPEN:
+        if prop.identifier in _OPEN or prop.is_skip_save:  # or shows others
             continue
         value = getattr(group, prop.identifier)
         if prop.type == 'ENUM':

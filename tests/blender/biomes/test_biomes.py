@@ -167,7 +167,8 @@ def test_what_is_saved_comes_back():
     path = files.save_biome(scene(), "Small", "For tests", picture=False, replace=False)
     read = files.read_biome(library.biomes()["small"].path)
     assert path == library.biomes()["small"].path and library.biomes()["small"].is_own
-    assert [{k: v for k, v in layer.items() if k != "seed"} for layer in read.layers] == given.layers
+    assert [{k: v for k, v in layer.items() if k not in {"seed", "grounds"}} for layer in read.layers] == given.layers
+    assert all(layer["grounds"] == ["ground"] for layer in read.layers)
     assert read.limits == {"slope_max": 42.0, "altitude_max": 30.0} and read.ground == given.ground
     assert files.pages_of(scene(), read) == files.pages_of(scene(), given)
     with pytest.raises(SceneError, match="already has"):
@@ -418,10 +419,18 @@ def test_masks_and_paths_are_saved_by_their_names_and_found_again():
     land = add_mesh("land", size=20.0)
     roads = ground.make_line(scene(), "roads", [land])
     population = populations.add_population(scene(), [land], name="Trees")
-    population.paths = roads
+    population.paths, population.vertex_group, population.uv_layer = roads, "meadow", "Map"
     population.mix.add().species = "bush"
+    land.vertex_groups.new(name="meadow").add(range(4), 1.0, 'REPLACE')
+    land.data.uv_layers.new(name="Map")
     path = files.save_biome(scene(), "Masked", "", False, False)
     read = files.read_biome(path)
-    assert read.layers[0]["paths"] == "roads"
-    add(read, land)
-    assert scene().tetflora.layers[-1].paths == roads
+    assert read.layers[0]["paths"] == "roads" and read.layers[0]["grounds"] == ["land"]
+    hill = add_mesh("hill", size=20.0)
+    for grounds, masks, own in (([land], ("meadow", "Map"), [land]), ([hill], ("", ""), [hill])):
+        add(read, *grounds)
+        layer = scene().tetflora.layers[-1]
+        assert layer.paths == roads and (layer.vertex_group, layer.uv_layer) == masks
+        assert [entry.object for entry in layer.grounds] == own
+    add(read, land, hill)  # the layer was on one of them
+    assert [entry.object for entry in scene().tetflora.layers[-1].grounds] == [land]

@@ -98,6 +98,29 @@ def test_a_biome_moves_with_its_layers_and_they_stay_within_it():
     assert layers.active_layer(bpy.context.scene).name == "First"
 
 
+def test_layers_are_grouped_with_the_one_above_and_taken_out_again():
+    _scatter("A", 4), _scatter("B", 5), _scatter("C", 2)
+    due = layers.due_layers(bpy.context.scene)
+    _group().layers_index = 1
+    assert _ops().move_layer(direction='IN') == {'FINISHED'}
+    assert _names() == ["Group", "A", "B", "C"]
+    assert layers.active_layer(bpy.context.scene).name == "B"
+    group = _group().layers[0]
+    assert [one.name for one in layers.children_of(group)] == ["A", "B"]
+    assert (layers.plants_in(group), group.grounds[0].object.name) == (9, "ground")
+    assert _ops().move_layer(direction='IN') == {'CANCELLED'}  # it is in one
+    _group().layers_index = 3
+    _ops().move_layer(direction='IN')
+    assert [one.name for one in layers.children_of(_group().layers[0])] == ["A", "B", "C"]
+    assert layers.due_layers(bpy.context.scene) == due == []  # a group limits nothing at first
+    assert _ops().update_layers(which='ACTIVE') == {'FINISHED'}
+    assert not bpy.data.objects["ground"].data.materials  # nor is it a biome with a soil
+    _group().layers_index = 1
+    _ops().move_layer(direction='OUT')
+    assert _names() == ["Group", "B", "C", "A"]
+    assert _ops().move_layer(direction='OUT') == {'CANCELLED'}
+
+
 def test_copies_grow_on_the_same_or_on_another_ground():
     layer = _scatter("Bushes", 5)
     layer.clumping, uid = 0.5, layer.uid

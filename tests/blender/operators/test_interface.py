@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+import blf
 import bpy
 import pytest
 
 from devtools import interface
 from devtools.layouts import Layout
 from tests.blender.scenes import add_mesh, select
+from tetflora_addon.blender.biomes.layers import active_layer
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -30,7 +32,7 @@ def test_every_setting_and_operator_has_a_short_name_and_settings_have_a_tooltip
     found = interface.named(interface.classes("TETFLORA_PT_"))
     assert found["bare"] == []
     assert found["long_labels"] == {}
-    assert sum(found["properties_of"].values()) > 100
+    assert 100 < sum(found["properties_of"].values()) <= interface.LIMITS["properties"]
 
 
 def test_panels_and_operators_are_few(blender):
@@ -38,6 +40,23 @@ def test_panels_and_operators_are_few(blender):
     assert len(panels) <= interface.LIMITS["panels"]
     assert len(interface.sidebar(panels)) <= interface.LIMITS["sidebar_panels"]
     assert 40 < len(interface.operator_types()) <= interface.LIMITS["operators"]
+
+
+def test_no_label_of_the_sidebar_is_cut():
+    """Four tenths of a sidebar of usual width are for labels, less their margin: measured in the window, at scale 1."""
+    select(add_mesh("ground", size=20.0))
+    bpy.ops.tetflora.populate(count=3, species="bush", min_distance=0.1)
+    select(next(obj for obj in bpy.data.objects if obj.tetflora.is_plant))
+    layer = active_layer(bpy.context.scene)
+    layer.vertex_group, layer.use_altitude, layer.wetness_min, layer.age, layer.clumping = "a", True, 0.1, 9.0, 0.5
+    layer.mix[0].companion = "oak"
+    bpy.context.scene.tetflora.species_editor.shown = True
+    blf.size(0, 11)
+    layout = Layout()
+    for cls in interface.sidebar(interface.classes("TETFLORA_PT_")):
+        interface.drawn(cls, interface._context(), layout)
+    assert {"Quality", "Altitude", "Day of Year", "Angle Tip"} <= set(layout.beside)
+    assert {text for text in layout.beside if blf.dimensions(0, text)[0] > 84.0} == set()
 
 
 def test_the_sidebar_stays_short():

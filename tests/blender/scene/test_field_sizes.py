@@ -207,6 +207,21 @@ def test_growth_that_is_smooth_has_no_jumps():
     assert np.abs(np.diff(np.log(length))).max() < 0.1
 
 
+def test_growth_is_smooth_where_the_year_has_keys():
+    """Whoever keys it by hand has the same plants as Animate Growth gives."""
+    found = []
+    for smooth, keyed in ((False, False), (True, False), (False, True)):
+        obj = history()
+        obj.tetflora.stand_year, obj.tetflora.stand_smooth = 24.0, smooth
+        if keyed:
+            obj.tetflora.keyframe_insert("stand_year", frame=1)
+        read = plants()
+        found.append(sorted(read.identifiers[n] for n in read.species))
+        bpy.data.objects.remove(obj)
+    still, smooth, keyed = found
+    assert keyed == smooth != still
+
+
 @pytest.mark.parametrize(
     ("name", "values", "message"),
     [

@@ -95,7 +95,7 @@ def test_every_setting_that_can_be_set_is_within_its_limits(scene):
         for prop in group.bl_rna.properties:
             if prop.type in {'INT', 'FLOAT'} and not prop.is_readonly:
                 for value in (prop.hard_min, prop.hard_max):
-                    setattr(group, prop.identifier, value)
+                    setattr(group, prop.identifier, (value,) * prop.array_length if prop.is_array else value)
                     settings.check_limits(group, "x")
                 group.property_unset(prop.identifier)
 

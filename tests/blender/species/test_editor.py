@@ -50,10 +50,12 @@ def test_every_key_of_an_order_has_its_sliders_with_limits_and_tooltip():
     for name, key in keys.items():
         assert name in properties, name
         assert key.meaning[1:] in properties[name].description
-        assert (name + "_variation" in properties) == (key.kind in {"range", "color"})
+        assert (name + "_variation" in properties) == (key.kind == "color")
+        assert getattr(properties[name], "array_length", 0) == {"range": 2, "color": 3, "rgb": 3}.get(key.kind, 0)
         if key.kind in {"range", "number", "integer"}:
             scale = math.pi / 180.0 if key.unit == "degrees" else 1.0
-            assert properties[name].hard_min == pytest.approx(key.low * scale, rel=1e-6)
+            low = min(key.low, 0.0) if key.kind == "range" else key.low  # variations begin at 0
+            assert properties[name].hard_min == pytest.approx(low * scale, rel=1e-6)
             assert properties[name].hard_max == pytest.approx(key.high * scale, rel=1e-6)
 
 
@@ -65,7 +67,7 @@ def test_sliders_show_what_the_species_has(identifier):
         for name, key in schema.ORDER_KEYS.items():
             shown, value = getattr(editor, name), getattr(order, name)
             if key.kind == "range":
-                shown, value = (shown, getattr(editor, name + "_variation")), tuple(value)
+                shown, value = tuple(shown), tuple(value)
             elif key.kind == "color":
                 shown = (*shown, *getattr(editor, name + "_variation"))
                 value = (*value.mean, *value.variation)
@@ -77,6 +79,15 @@ def test_sliders_show_what_the_species_has(identifier):
                 assert shown == value
             else:
                 assert shown == pytest.approx(value, rel=1e-5, abs=1e-6), (index, name)
+
+
+def test_a_range_takes_no_mean_and_no_variation_beyond_its_own_limits():
+    """Both share the limits that Blender knows of, which are wider than those of either."""
+    editor = _editor("bush", 1)
+    editor.length = 0.0, 0.0
+    assert tuple(_edited().orders[1].length) == (0.001, 0.0)
+    editor.curvature = -0.5, -0.5
+    assert tuple(_edited().orders[1].curvature) == (pytest.approx(math.degrees(-0.5), rel=1e-5), 0.0)
 
 
 def test_looking_stores_nothing():
@@ -94,7 +105,11 @@ def test_every_slider_changes_its_own_value_and_no_other():
         if name == "branches":
             continue  # none after the last order
         editor = _editor("bush", last)
-        if key.kind in {"range", "number"}:
+        if key.kind == "range":
+            value = getattr(editor, name)[0] * 0.9 + 0.01 * min(editor.bl_rna.properties[name].hard_max, 10.0)
+            getattr(editor, name)[0] = value
+            meant = math.degrees(value) if key.unit == "degrees" else value
+        elif key.kind == "number":
             value = getattr(editor, name) * 0.9 + 0.01 * min(editor.bl_rna.properties[name].hard_max, 10.0)
             setattr(editor, name, value)
             meant = math.degrees(value) if key.unit == "degrees" else value
@@ -123,7 +138,7 @@ def test_every_slider_changes_its_own_value_and_no_other():
 
 def test_edits_live_in_the_file_and_override_the_catalog(tmp_path):
     editor = _editor("bush", 2)
-    editor.leaf_size = 0.2
+    editor.leaf_size[0] = 0.2
     editor.leaf_form, editor.leaf_transmission = "kite", 0.1
     editor.species_name = "Broad Bush"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
@@ -138,11 +153,11 @@ def test_edits_live_in_the_file_and_override_the_catalog(tmp_path):
 
 
 def test_edits_hold_for_all_scenes_of_the_file_and_are_kept_once():
-    _editor().length = 0.3
+    _editor().length[0] = 0.3
     other = bpy.data.scenes.new("other")
     assert edits.species_for(other, "bush").orders[0].length.mean == pytest.approx(0.3)
     other.tetflora.species_editor.species = "bush"
-    other.tetflora.species_editor.length = 0.4
+    other.tetflora.species_editor.length[0] = 0.4
     assert sum(len(s.tetflora.species_edits) for s in bpy.data.scenes) == 1
     assert _edited().orders[0].length.mean == pytest.approx(0.4)
 
@@ -152,7 +167,7 @@ def test_refinement_takes_the_edited_species():
     plant = add_plant()
     before = contents.estimate(bpy.context.scene, depsgraph()).polygons_full
     editor = _editor("bush", 3)
-    editor.leaves, editor.leaves_variation = 10.0, 0.0
+    editor.leaves = 10.0, 0.0
     after = contents.estimate(bpy.context.scene, depsgraph()).polygons_full
     assert after > before * 1.3
     bpy.ops.tetflora.duplicate_species(name="My Own")
@@ -164,14 +179,14 @@ def test_refinement_takes_the_edited_species():
 def test_what_breaks_a_rule_is_said_and_stops_refinement():
     add_plant()
     editor = _editor("bush", 1)
-    editor.angle_variation = math.radians(100.0)
+    editor.angle[1] = math.radians(100.0)
     problem = edits.problem_of(bpy.context.scene, "bush")
     assert "orders[1].angle" in problem
     assert "0 to 180" in problem
     with pytest.raises(errors.SpeciesError, match=r"orders\[1\].angle"):
         contents.estimate(bpy.context.scene, depsgraph())
-    assert editor.angle_variation == pytest.approx(math.radians(100.0), rel=1e-5)  # the slider stays where it was put
-    editor.angle_variation = 0.1
+    assert editor.angle[1] == pytest.approx(math.radians(100.0), rel=1e-5)  # the slider stays where it was put
+    editor.angle[1] = 0.1
     assert edits.problem_of(bpy.context.scene, "bush") == ""
 
 
@@ -214,7 +229,7 @@ def test_duplicate_revert_and_orders():
 def test_saved_species_come_back_as_they_were(own_folder, tmp_path):
     editor = _editor("conifer", 1)
     bpy.ops.tetflora.duplicate_species(name="Łąka fir")
-    editor.curvature = 0.5
+    editor.curvature[0] = 0.5
     identifier, species = editor.species, _edited(editor.species)
     assert identifier.isascii()
     bpy.ops.tetflora.save_species()
@@ -263,7 +278,7 @@ def test_loading_replaces_only_when_told(own_folder, tmp_path):
 
 
 def test_a_broken_species_is_not_saved(own_folder):
-    _editor("bush", 1).length_variation = 19.0
+    _editor("bush", 1).length[1] = 19.0
     with pytest.raises(RuntimeError, match=r"orders\[1\].length"):
         bpy.ops.tetflora.save_species()
     assert not own_folder.exists() or not list(own_folder.iterdir())
@@ -281,7 +296,7 @@ def test_the_default_folder_belongs_to_the_user():
 def test_undo_takes_an_edit_back():
     _editor("bush")
     bpy.ops.ed.undo_push(message="before")
-    bpy.context.scene.tetflora.species_editor.length = 0.3
+    bpy.context.scene.tetflora.species_editor.length[0] = 0.3
     bpy.ops.ed.undo_push(message="slider")
     bpy.ops.ed.undo()
     assert _edited() == _shipped()

@@ -77,7 +77,7 @@ def test_follows_changes_and_keeps_the_last_sound_plant(preview):
     after = len(shown.data.polygons)
     assert after != before
     editor.order_index = 1
-    editor.length_variation = 15.0
+    editor.length[1] = 15.0
     preview.refresh()
     assert len(_objects()[0].data.polygons) == after
     message, failed = preview.message()
@@ -118,7 +118,7 @@ def test_is_not_saved(preview, tmp_path):
 def test_not_saved_after_undo_either(preview, tmp_path):
     editor = _switch_on(preview)
     bpy.ops.ed.undo_push(message="before")
-    editor.length = 0.3
+    editor.length[0] = 0.3
     bpy.ops.ed.undo_push(message="slider")
     bpy.ops.ed.undo()
     preview.refresh()

@@ -93,8 +93,8 @@ def add_biome_steps(
             if layer["kind"] == "stand":
                 continue
             population = add_population(scene, grounds, name=layer["name"])
-            fill_population(population, {k: v for k, v in layer.items() if k != "kind"}, scene, [])
-            set_grounds(population, grounds)
+            fill_population(population, layer, scene, [])
+            _lay_on(population, grounds)
             population.biome, population.covers = uid, uid if layer["kind"] == "cover" else ""
             if layer["kind"] == "cover" and "as_field" not in layer:
                 population.as_field = 'FIELD'
@@ -106,6 +106,20 @@ def add_biome_steps(
                 entry.shed_by = renamed.get(entry.shed_by, entry.shed_by)
         group.layers_index = index_of(scene, uid)
         return (yield from _plant(scene, depsgraph, uid, *grown))
+
+
+def _lay_on(population: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object]) -> None:
+    """Let a layer that was read grow on those of the grounds that it names or, without any, on all of them.
+
+    Masks are those of the grounds that it was made for: it keeps what it finds.
+    """
+    named = {entry.object for entry in population.grounds}
+    own = [obj for obj in grounds if obj in named] or grounds
+    set_grounds(population, own)
+    if all(population.vertex_group not in obj.vertex_groups for obj in own):
+        population.vertex_group = ""
+    if all(population.uv_layer not in obj.data.uv_layers for obj in own):
+        population.uv_layer = ""
 
 
 @job("Planting the biome")

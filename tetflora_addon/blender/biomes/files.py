@@ -54,9 +54,6 @@ KINDS = ("population", "cover", "stand")
 SEASON = {"day": (1.0, 365.0), "latitude": (-66.0, 66.0)}
 _KEYS = {"format", "version", "name", "layers"}
 _MORE = {"description", "species", "limits", "gives_way", "ground", "season"}
-#: Settings of the ground that a layer grows on: that is chosen when it is added. Images and collections are found by
-#: their names, if at all.
-_LOCAL = ("grounds", "ground_collection", "vertex_group", "uv_layer")
 #: Settings of a species of a stand.
 STAND_ENTRY = ("species", "planted", "incoming_seeds")
 
@@ -170,11 +167,8 @@ def biome_data(
 
 
 def _layer_data(population: bpy.types.PropertyGroup) -> dict[str, Any]:
-    """What differs from a new population."""
-    data = population_data(population, changed=True)
-    species = data.pop("species")
-    layer = {"kind": "cover" if population.covers else "population", "name": population.name}
-    return layer | {key: value for key, value in data.items() if key not in _LOCAL} | {"species": species}
+    """What differs from a new population; grounds, masks and collections by their names."""
+    return {"kind": "cover" if population.covers else "population", **population_data(population, changed=True)}
 
 
 def _stand_data(stand: bpy.types.Object) -> dict[str, Any]:

@@ -102,7 +102,10 @@ def lay_biome_soil(
     sheet = Sheet.over(triangles.reshape(-1, 3), _CELL, _MOST)
     cells = sheet.rows * sheet.columns
     on_it = set(fits)
-    found = [b for b in biomes_in(scene) if on_it & {entry.object for entry in b.grounds}]
+    # Groups of the artist's own layers have no file, which says what soil is like.
+    found = [b for b in biomes_in(scene) if b.source and on_it & {entry.object for entry in b.grounds}]
+    if not found:
+        return []
     earth, turf, share, here = np.zeros((cells, 3)), np.zeros((cells, 3)), np.zeros(cells), np.full(cells, 1e-9)
     hidden, color = np.zeros(cells), np.zeros((cells, 3))
     for biome in found:

@@ -14,7 +14,7 @@ import bpy
 
 from ..placing.plant_objects import PAINTED_MARK, note_field, plant_collection
 from ..placing.populations import add_population
-from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, set_grounds
+from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, grounds_of, set_grounds
 from ..runtime import Handlers
 from ..scene.field_sizes import has_history
 from ..scene.fields import stored_size
@@ -115,7 +115,7 @@ def copy_layer(scene: bpy.types.Scene, source: Layer, grounds: Sequence[bpy.type
     old, made = source.uid, {}
     for uid in [old, *(one.uid for one in children_of(source))]:
         made[uid] = _copy_one(scene, uid, grounds, made.get(old, ""))
-    _sort(scene, [uid for block in _blocks(scene.tetflora.layers) for uid in block], made[old])
+    _tidy(scene, made[old])
     return scene.tetflora.layers[index_of(scene, made[old])]
 
 
@@ -168,13 +168,63 @@ def move_layer(scene: bpy.types.Scene, step: int) -> bool:
     if not first <= own + step < len(rows):
         return False
     rows.insert(own + step, rows.pop(own))
-    _sort(scene, [uid for block in blocks for uid in block], layer.uid)
+    sort_layers(scene, [uid for block in blocks for uid in block], layer.uid)
     return True
 
 
-def _sort(scene: bpy.types.Scene, order: Sequence[str], active: str) -> None:
+def group_layer(scene: bpy.types.Scene) -> bool:
+    """Put the active layer into the group above or, without one, into a new group with the layer above it.
+
+    False for groups, and for what is in one.
+    """
+    layers, layer = scene.tetflora.layers, active_layer(scene)
+    blocks, uid = _blocks(layers), layer.uid
+    own = next((n for n, block in enumerate(blocks) if block == [uid]), -1)
+    if own < 0 or layer.kind == BIOME:
+        return False
+    above = blocks[own - 1] if own else []
+    if above and layers[index_of(scene, above[0])].kind == BIOME:
+        _put_into(layer, above[0])
+    else:
+        grounds = grounds_of(scene, layer.field.tetflora.stand if layer.kind == FIELD else layer)
+        made = add_population(scene, grounds, name="Group")
+        made.kind, made.limits, made.gives_way, group = BIOME, set(), False, made.uid
+        for one in (*above, uid):
+            _put_into(layers[index_of(scene, one)], group)
+    _tidy(scene, uid)
+    return True
+
+
+def ungroup_layer(scene: bpy.types.Scene) -> bool:
+    """Take the active layer out of its group, to below it; False where it is in none."""
+    layer = active_layer(scene)
+    if not layer.biome or layer.kind == BIOME:
+        return False
+    uid = layer.uid
+    _put_into(layer, "")
+    _tidy(scene, uid)
+    return True
+
+
+def _put_into(layer: Layer, group: str) -> None:
+    layer.biome = group
+    if layer.kind == FIELD and layer.field is not None:
+        layer.field.tetflora.stand.biome = group
+
+
+def order_of(scene: bpy.types.Scene) -> list[str]:
+    """Identities of all layers in their order."""
+    return [layer.uid for layer in scene.tetflora.layers]
+
+
+def _tidy(scene: bpy.types.Scene, active: str) -> None:
+    """Let layers follow their biomes and groups."""
+    sort_layers(scene, [uid for block in _blocks(scene.tetflora.layers) for uid in block], active)
+
+
+def sort_layers(scene: bpy.types.Scene, order: Sequence[str], active: str) -> None:
     """Bring the list into an order of identities."""
-    for place, uid in enumerate(order):
+    for place, uid in enumerate(order if list(order) != order_of(scene) else ()):
         scene.tetflora.layers.move(index_of(scene, uid), place)
     scene.tetflora.layers_index = index_of(scene, active)
 
@@ -189,9 +239,7 @@ def bring_together(scene: bpy.types.Scene) -> None:
     for obj in scene.objects:
         if obj.tetflora.is_field and obj.tetflora.population not in uids and obj not in known and obj.library is None:
             note_field(scene, obj)
-    order = [uid for block in _blocks(layers) for uid in block]
-    if order != [layer.uid for layer in layers]:
-        _sort(scene, order, shown)
+    _tidy(scene, shown)
     scene.tetflora.layers_index = max(index_of(scene, shown), min(len(layers) - 1, 0))
 
 

@@ -29,6 +29,7 @@ NO_BIOME, FALLBACK_ICON = "NONE", 'WORLD'
 # Seconds for which folders are not looked at again: menus and panels ask at each redraw.
 _TRUSTED = 0.0 if bpy.app.background else 1.0
 _seen: tuple[float, dict[str, "BiomeInfo"]] | None = None
+_items: tuple[dict[str, "BiomeInfo"], list[Item]] | None = None
 _kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
 pictures = Pictures()
 
@@ -115,12 +116,17 @@ def icon_of(info: BiomeInfo) -> int:
 
 
 def items(_owner: object = None, _context: bpy.types.Context | None = None) -> list[Item]:
-    """Items of an enumeration of all biomes."""
+    """Items of an enumeration of all biomes; panels ask for them at each redraw."""
+    global _items
+    known = biomes()
+    if _items is not None and _items[0] is known:
+        return _items[1]
     found = [
         (i.identifier, i.name, i.description, icon_of(i) or FALLBACK_ICON, number_of(i.identifier))
-        for i in biomes().values()
+        for i in known.values()
     ] or [(NO_BIOME, "No biomes found", "The library is empty", 'ERROR', 0)]
-    return _kept.setdefault(tuple(found), found)
+    _items = known, _kept.setdefault(tuple(found), found)
+    return _items[1]
 
 
 def biome_property(**options: Any) -> Any:

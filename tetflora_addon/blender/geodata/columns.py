@@ -34,7 +34,7 @@ class TetFloraInventoryColumn(bpy.types.PropertyGroup):
             *((unit, label, "") for unit, label in zip(("m", "cm", "mm", "ft", "in"), _UNITS, strict=True)),
         ],
     )
-    values: StringProperty(name="Values", description="Some of its values")
+    values: StringProperty(name="Values", options={'HIDDEN'})
 
 
 def show_columns(table: bpy.types.bpy_prop_collection, path: Path) -> None:

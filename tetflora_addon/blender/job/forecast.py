@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What refining a scene will take, as a line for panels; and the limit of memory in words.
 
-Plants are counted and some of them looked at when something has changed, and not more often than a few hundredths of
-the time allow. All else is computed at each redraw, in less than a millisecond.
+Plants are counted, some of them looked at, and figures computed a moment after something has changed, and not more
+often than a few hundredths of the time allow; never while a panel is drawn.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
 from ..attributes import read, values_of
-from ..runtime import Handlers
+from ..runtime import Handlers, Outlook
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
@@ -89,7 +89,14 @@ def learn(expected: Estimate | None, seconds: float) -> None:
 
 
 def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
-    """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing is known."""
+    """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing is known.
+
+    As it was found last.
+    """
+    return _outlook.of(scene, view_layer) or ""
+
+
+def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     found = forecast(scene, view_layer)
     if found is None:
         return ""
@@ -277,4 +284,17 @@ def _on_load(*_: object) -> None:
 
 
 _HANDLERS = Handlers(depsgraph_update_post=_on_change, undo_post=_on_change, redo_post=_on_change, load_post=_on_load)
-register, unregister = _HANDLERS.register, _HANDLERS.unregister
+#: By now crowns may be known, or memory short.
+_outlook = Outlook(_text_for, old=2.0)
+
+
+def register() -> None:
+    """Count and forecast from now on."""
+    _HANDLERS.register()
+    _outlook.register()
+
+
+def unregister() -> None:
+    """Do so no more."""
+    _outlook.unregister()
+    _HANDLERS.unregister()

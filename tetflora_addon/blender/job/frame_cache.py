@@ -247,7 +247,8 @@ def _values(group: bpy.types.PropertyGroup) -> list[object]:
     found: list[object] = []
     for prop in group.bl_rna.properties:
         name = prop.identifier
-        if name not in _IGNORED and prop.type not in {'POINTER', 'COLLECTION'}:
+        shows_others = prop.type == 'ENUM' and prop.is_enum_flag
+        if name not in _IGNORED and prop.type not in {'POINTER', 'COLLECTION'} and not shows_others:
             value = getattr(group, name)
             found.append((name, list(value) if getattr(prop, "is_array", False) else value))
     return found

@@ -149,7 +149,7 @@ class TetFloraGround(bpy.types.PropertyGroup):
         description="Mesh that the plants grow on, including its modifiers",
         type=bpy.types.Object,
         poll=lambda _group, candidate: candidate.type == 'MESH' and not candidate.tetflora.is_field,
-        update=_notify,
+        **{**LIVE, **HIDDEN},
     )
 
 
@@ -298,9 +298,7 @@ def _show(layer: "TetFloraLayer", on: bool) -> None:
         one.hide_render = one.hide_viewport = not on
 
 
-class TetFloraLayer(
-    bpy.types.PropertyGroup, settings_in(Rules, **LIVE), settings_in(Limits, **LIVE), GroundMask, AroundPaths
-):
+class TetFloraLayer(bpy.types.PropertyGroup, settings_in(Limits, Rules, **LIVE), GroundMask, AroundPaths):
     """Something that grows on a ground, and how it is placed there."""
 
     # Identity and state. Plants refer to ``uid``, never to the name or the place in the list.
@@ -377,7 +375,7 @@ class TetFloraLayer(
     )
 
     biome: StringProperty(name="Biome", **HIDDEN)  # ``uid`` of the biome of which it is a layer
-    folded: BoolProperty(name="Fold", description="Hide the layers of this biome in the list", options=set())
+    folded: BoolProperty(name="Fold", description="Hide the layers of this biome in the list", **HIDDEN)
     gives_way: BoolProperty(
         name="Give Way",
         description=(
@@ -395,10 +393,11 @@ MODES = (
     ('THIN', "Thin", "Remove plants above the density, or closer than the minimum distance", 'PARTICLES', 2),
 )
 _BRUSH = properties_of(Brush, options=set())
-_SIZES = properties_of(Rules, options=set())
 
 
-class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
+class TetFloraBrush(
+    bpy.types.PropertyGroup, settings_in(Rules, only=("scale_min", "scale_max"), options=set()), SpeciesChoice
+):
     """How the brush paints."""
 
     mode: EnumProperty(name="Mode", description="What dragging does; hold Shift to erase", items=MODES, options=set())
@@ -428,8 +427,6 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
         ),
         options=set(),
     )
-    scale_min: _SIZES.scale_min
-    scale_max: _SIZES.scale_max
     store: EnumProperty(
         name="Create As",
         description="What painted plants are created as. Erase and Thin affect both kinds",
@@ -445,9 +442,7 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
         ),
         options=set(),
     )
-    seed: IntProperty(
-        name="Seed", description="A different seed paints different plants in different places", options=set()
-    )
+    seed: IntProperty(name="Seed", **HIDDEN)
     strokes: IntProperty(
         name="Strokes",
         description="Strokes painted so far; each draws its own random numbers",

@@ -55,8 +55,8 @@ ENTRY = ("species", "weight", "companion", "companion_strength", "companion_dist
 
 
 def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
-    """Properties of a population that define how plants are placed."""
-    return [p for p in group.bl_rna.properties if p.identifier not in IDENTITY]
+    """Properties of a population that define how plants are placed; a range is those of its numbers."""
+    return [p for p in group.bl_rna.properties if p.identifier not in IDENTITY and not p.identifier.endswith("_range")]
 
 
 def fingerprint(population: bpy.types.PropertyGroup) -> str:

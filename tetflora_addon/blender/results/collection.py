@@ -16,6 +16,7 @@ from ..materials import snow
 from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
 from ..scene.looks import LIKE
+from ..settings import switches
 from ..species.catalog import SpeciesChoice
 from .hiding import adopt_copies
 from .meshes import mesh_steps, point_object
@@ -305,36 +306,35 @@ class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
     bark: PointerProperty(**_replaced("Bark"))
 
 
-class TetFloraOutput(bpy.types.PropertyGroup):
-    """Output settings of all results."""
-
-    save_results: BoolProperty(
-        name="Save Results in File",
+_PLACES = {
+    "show_viewport": BoolProperty(
+        name="Viewports",
+        description="Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
+        default=True,
+        **_COMMON,
+    ),
+    "show_render": BoolProperty(
+        name="Renders", description="Show meshes and proxies in renders", default=True, **_COMMON
+    ),
+    "save_results": BoolProperty(
+        name="File",
         description=(
             "Save the meshes made by Refine in the file. Otherwise files stay as small as their plants, and Refine "
             "makes the same meshes again"
         ),
-        default=False,
         **_COMMON,
-    )
-    show_viewport: BoolProperty(
-        name="Show in Viewports",
-        description="Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
-        default=True,
-        **_COMMON,
-    )
-    show_render: BoolProperty(
-        name="Show in Renders",
-        description="Show meshes and proxies in renders",
-        default=True,
-        **_COMMON,
-    )
-    camera: BoolProperty(**SWITCHES["camera"], **_COMMON)
-    diffuse: BoolProperty(**SWITCHES["diffuse"], **_COMMON)
-    glossy: BoolProperty(**SWITCHES["glossy"], **_COMMON)
-    transmission: BoolProperty(**SWITCHES["transmission"], **_COMMON)
-    volume_scatter: BoolProperty(**SWITCHES["volume_scatter"], **_COMMON)
-    shadow: BoolProperty(**SWITCHES["shadow"], **_COMMON)
+    ),
+}
+_RAYS = {name: BoolProperty(**given, **_COMMON) for name, given in SWITCHES.items()}
+
+
+class TetFloraOutput(
+    bpy.types.PropertyGroup,
+    switches("results_in", "Where the meshes and proxies that Refine makes are", _PLACES),
+    switches("ray_visibility", "Rays that see the meshes and proxies", _RAYS),
+):
+    """Output settings of all results."""
+
     pass_index: IntProperty(
         name="Pass Index",
         description="Object index of all meshes and proxies, except for species with their own",

@@ -61,6 +61,7 @@ STAND_SMOOTH = {
         "Off, each plant has the form that is nearest to its size, which is best for stills"
     ),
     "default": False,
+    "options": {'HIDDEN'},
 }
 _MOST_FIT, _MOST_OFFSET = 10.0, 10.0
 _STEADY = np.cos(np.radians(30.0))  # trunks that turn further from one record to the next have fallen

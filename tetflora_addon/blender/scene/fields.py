@@ -22,7 +22,7 @@ from ...growth.seeds import Seeds
 from ..attributes import write
 from ..species.asset_species import find_asset
 from .field_points import FieldPoints, parts_of, placed_frames, read_points, refuse
-from .field_sizes import in_year, read_records, read_sizes, year_now
+from .field_sizes import in_year, read_records, read_sizes, year_curves, year_now
 from .objects import geometry_of
 from .own_ages import AGE, Sizes
 from .skeletons import kind_of, kind_of_choice, species_of
@@ -180,7 +180,8 @@ def _read(
     points, sizes, records = read_points(obj, field_kinds(obj), parts), read_sizes(obj, parts), read_records(obj, parts)
     if records is not None:
         refuse(obj, ~np.isfinite(points.position).all(axis=1), "an invalid position")
-        points, sizes = in_year(points, sizes, records, year_now(obj, depsgraph), obj.tetflora.stand_smooth)
+        smooth = obj.tetflora.stand_smooth or bool(year_curves(obj))  # stills are best without
+        points, sizes = in_year(points, sizes, records, year_now(obj, depsgraph), smooth)
     if sizes is not None and (sizes.height > 0.0).any():
         points = replace(points, scale=np.where(sizes.height > 0.0, 1.0, points.scale))
     return points, sizes

@@ -6,6 +6,7 @@ The properties store nothing. They read the JSON of the chosen species and write
 (`species.edits`), so there is nothing to keep in step with undo, loading or other scenes.
 """
 
+from collections.abc import Callable
 from math import degrees, isfinite, radians
 from typing import Any
 
@@ -18,6 +19,7 @@ from ...parameters import Key
 from ...species.schema import LENGTH_HIGH, ORDER_KEYS
 from ...species.skeletons import MAX_ORDERS
 from ...species.species import BARKS, QUALITY_LIMITS
+from ..settings import SUBTYPES
 from .catalog import SpeciesChoice
 from .edits import catalog, change_species, species_data, species_for, tell_listeners
 
@@ -301,7 +303,7 @@ class WholeSpecies(SpeciesChoice):
     )
 
 
-#: Added to a key's name for the property of a range's second number.
+#: Added to a key's name for the property of a color's variation.
 VARIATION = "_variation"
 _VARIES = "Maximum deviation from the mean, in both directions"
 
@@ -327,71 +329,120 @@ def _soft_high(key: Key) -> float:
     return 10.0 * mean if 0.0 < 50.0 * mean < key.high else min(key.high, 360.0)
 
 
-def _float_options(key: Key, low: float, high: float) -> dict[str, Any]:
+def _common(name: str, key: Key) -> dict[str, Any]:
+    return {"name": _label(name), "description": _description(name, key), "options": set()}
+
+
+def _number_options(key: Key) -> dict[str, Any]:
+    """How a number, or both of a range, are typed; those of a range are kept within limits of their own."""
+    ranged = key.kind == "range"
+    low, high = min(key.low, 0.0) if ranged else key.low, key.high
     if key.unit == "degrees":
-        angle = {"subtype": 'ANGLE', "unit": 'ROTATION', "step": 100, "precision": 4}
-        return {"min": radians(low), "max": radians(high), **angle}
-    options: dict[str, Any] = {"min": low, "max": high, "soft_max": min(_soft_high(key), high), "precision": 3}
+        options = {"min": radians(low), "max": radians(high), "subtype": 'ANGLE', "step": 100, "precision": 4}
+    else:
+        options = {"min": low, "max": high, "soft_max": min(_soft_high(key), high), "precision": 3}
     if key.unit == "m":
-        options |= {"subtype": 'DISTANCE', "unit": 'LENGTH', "step": 1}
+        options |= {"subtype": 'DISTANCE', "step": 1}
     elif (low, high) == (0, 1):
-        options |= {"subtype": 'FACTOR'}
+        options["subtype"] = 'FACTOR'
+    if ranged:
+        options["subtype"] = SUBTYPES.get(options.get("subtype"), 'NONE')
     return options
 
 
-def _float(name: str, key: Key, part: tuple[int, ...], said: dict[str, Any]) -> Any:
+def _range(name: str, key: Key) -> dict[str, Any]:
+    """A range is one setting of two numbers, as in the file: mean and variation."""
     to_file, to_slider = (degrees, radians) if key.unit == "degrees" else (float, float)
-    low, high = (0.0, key.high - key.low) if part == (1,) else (key.low, key.high)
-
-    def change(editor: bpy.types.PropertyGroup, value: float) -> None:
-        new, old = rounded(to_file(value)), value_of(editor, name) if part else None
-        write(editor, name, [new if i in part else rounded(number_in(old, i)) for i in (0, 1)] if part else new)
-
-    def read(editor: bpy.types.PropertyGroup) -> float:
-        return to_slider(number_in(value_of(editor, name), *part))
-
-    return FloatProperty(get=read, set=change, **said, **_float_options(key, low, high))
-
-
-def _color(name: str, part: tuple[int, ...], said: dict[str, Any]) -> Any:
-    def change(editor: bpy.types.PropertyGroup, value: Any) -> None:
-        new, old = [rounded(c) for c in value], value_of(editor, name) if part else None
-        others = [[rounded(number_in(old, i, c)) for c in range(3)] for i in (0, 1)] if part else []
-        write(editor, name, [new if i in part else other for i, other in enumerate(others)] if part else new)
+    limits = ((key.low, key.high), (0.0, key.high - key.low))
 
     def read(editor: bpy.types.PropertyGroup) -> tuple[float, ...]:
-        return tuple(number_in(value_of(editor, name), *part, c) for c in range(3))
+        value = value_of(editor, name)
+        return tuple(to_slider(number_in(value, part)) for part in (0, 1))
 
-    return FloatVectorProperty(subtype='COLOR', size=3, min=0.0, max=1.0, get=read, set=change, **said)
+    def store(editor: bpy.types.PropertyGroup, pair: Any) -> None:
+        typed = zip(map(to_file, pair), limits, strict=True)
+        write(editor, name, [rounded(min(max(number, low), high)) for number, (low, high) in typed])
+
+    said = {**_common(name, key), "description": f"{_description(name, key)}. Mean, and {_VARIES.lower()}"}
+    return {name: FloatVectorProperty(size=2, get=read, set=store, **said, **_number_options(key))}
 
 
-def _sliders(name: str, key: Key) -> dict[str, Any]:
-    """Properties of a key: one, or two where it has a mean and a variation."""
-    said = {"name": _label(name), "description": _description(name, key), "options": set()}
-    varies = {"name": f"{_label(name)} Variation", "description": f"{_VARIES}: {key.meaning}", "options": set()}
-    choices = key.choices
-    if key.kind == "range":
-        return {name: _float(name, key, (0,), said), name + VARIATION: _float(name, key, (1,), varies)}
-    if key.kind == "color":
-        return {name: _color(name, (0,), said), name + VARIATION: _color(name, (1,), varies)}
-    if key.kind in {"rgb", "number"}:
-        return {name: _color(name, (), said) if key.kind == "rgb" else _float(name, key, (), said)}
-    if key.kind == "choice":
-        made = EnumProperty(
-            items=[(choice, _label(choice), "", number) for number, choice in enumerate(choices)],
-            get=lambda self: choices.index(value) if (value := value_of(self, name)) in choices else 0,
-            set=lambda self, number: write(self, name, choices[number]),
-            **said,
-        )
-        return {name: made}
+def _single(name: str, key: Key) -> dict[str, Any]:
+    to_file, to_slider = (degrees, radians) if key.unit == "degrees" else (float, float)
+    made = FloatProperty(
+        get=lambda self: to_slider(number_in(value_of(self, name))),
+        set=lambda self, value: write(self, name, rounded(to_file(value))),
+        **_common(name, key),
+        **_number_options(key),
+    )
+    return {name: made}
+
+
+def _integer(name: str, key: Key) -> dict[str, Any]:
     made = IntProperty(
         min=int(key.low),
         max=int(key.high),
         get=lambda self: int(min(max(number_in(value_of(self, name)), key.low), key.high)),
         set=lambda self, value: write(self, name, value),
-        **said,
+        **_common(name, key),
     )
     return {name: made}
+
+
+def _color(name: str, key: Key) -> dict[str, Any]:
+    """A color, or that of a mean and its variation."""
+    if key.kind == "rgb":
+        return {name: _tone(name, (), _common(name, key))}
+    varies = {"name": f"{_label(name)} Variation", "description": f"{_VARIES}: {key.meaning}", "options": set()}
+    return {name: _tone(name, (0,), _common(name, key)), name + VARIATION: _tone(name, (1,), varies)}
+
+
+def _tone(name: str, part: tuple[int, ...], said: dict[str, Any]) -> Any:
+    return FloatVectorProperty(
+        subtype='COLOR',
+        size=3,
+        min=0.0,
+        max=1.0,
+        get=lambda self: tuple(number_in(value_of(self, name), *part, c) for c in range(3)),
+        set=lambda self, value: _write_color(self, name, part, value),
+        **said,
+    )
+
+
+def _write_color(group: bpy.types.PropertyGroup, name: str, part: tuple[int, ...], value: Any) -> None:
+    new = [rounded(c) for c in value]
+    if part:
+        old = value_of(group, name)
+        new = [new if i in part else [rounded(number_in(old, i, c)) for c in range(3)] for i in (0, 1)]
+    write(group, name, new)
+
+
+def _choice(name: str, key: Key) -> dict[str, Any]:
+    choices = key.choices
+    made = EnumProperty(
+        items=[(choice, _label(choice), "", number) for number, choice in enumerate(choices)],
+        get=lambda self: choices.index(value) if (value := value_of(self, name)) in choices else 0,
+        set=lambda self, number: write(self, name, choices[number]),
+        **_common(name, key),
+    )
+    return {name: made}
+
+
+_MAKERS: dict[str, Callable[[str, Key], dict[str, Any]]] = {
+    "range": _range,
+    "number": _single,
+    "integer": _integer,
+    "color": _color,
+    "rgb": _color,
+    "choice": _choice,
+}
+
+
+def _annotations() -> dict[str, Any]:
+    made: dict[str, Any] = {}
+    for name, key in ORDER_KEYS.items():
+        made |= _MAKERS[key.kind](name, key)
+    return made
 
 
 #: ``Scene.tetflora.species_editor``: what the panel shows, and a property for each key of an order.
@@ -399,7 +450,7 @@ TetFloraSpeciesEditor = type(
     "TetFloraSpeciesEditor",
     (bpy.types.PropertyGroup, WholeSpecies),
     {
-        "__annotations__": {n: made for name, key in ORDER_KEYS.items() for n, made in _sliders(name, key).items()},
+        "__annotations__": _annotations(),
         "__doc__": "What the species editor shows; values come from the species' JSON and go there.",
         "__module__": __name__,
     },

@@ -140,7 +140,8 @@ def _freeze_changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) 
     freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get)
 
 
-_SHOWN = {"options": set(), "update": lambda _group, _context: redraw()}
+#: Of settings that only panels for developers show.
+_SHOWN = {"options": {'HIDDEN'}, "update": lambda _group, _context: redraw()}
 
 
 class TetFloraPreview(bpy.types.PropertyGroup):
@@ -204,7 +205,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             ('SPLIT', "To Split", "Tetrahedra that the next level splits", 8),
         ),
         default={'EXPLICIT', 'PROXY', 'HIDDEN', 'SPLIT'},
-        **{**_SHOWN, "options": {'ENUM_FLAG'}},
+        **{**_SHOWN, "options": {'ENUM_FLAG', 'HIDDEN'}},
     )
     plants: EnumProperty(
         name="Plants",
@@ -230,7 +231,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             "Keep the current camera for the preview, even when levels are computed again, while you move the scene's "
             "camera or navigate. Its view is drawn as a pyramid. Not saved in the file"
         ),
-        options=set(),
+        options={'HIDDEN'},
         update=_freeze_changed,
     )
 

@@ -7,7 +7,6 @@ Looked for a moment after a change, never while panels are drawn; the larger the
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -22,7 +21,7 @@ from ..job.render import render_errors
 from ..placing.field_edits import positions
 from ..placing.plant_objects import plants_of
 from ..results.proxy_kinds import few_bounces
-from ..runtime import Handlers, call_off, call_soon, redraw
+from ..runtime import Outlook
 from ..scene.crowns import crown_to_draw
 from ..scene.fields import field_kinds, fields_of
 from ..scene.skeletons import species_of
@@ -33,7 +32,6 @@ _SIDE = 100.0  # of ground that was too small, meters
 #: Light of a world from all around that shows plants; a new file's gray is 0.05.
 _DARK = 0.1
 _NEAR = 20.0  # meters around the camera where crowns are looked at
-_SOON, _PATIENCE = 0.3, 30.0  # seconds to the next look, and times that one took before another
 
 
 @dataclass(frozen=True)
@@ -48,18 +46,9 @@ class Warned:
     mend: Callable[[bpy.types.Scene], object] | None = None  # does that to a scene
 
 
-_found: dict[int, list[Warned]] = {}
-_took = 0.0
-
-
 def warned(context: bpy.types.Context) -> list[Warned]:
-    """What was found last in a scene; in the background, where no timer runs, it is looked for now."""
-    if bpy.app.background:
-        return list(_look(context.scene))
-    found = _found.get(context.scene.session_uid)
-    if found is None:
-        _on_change()
-    return found or []
+    """What was found last in a scene."""
+    return _outlook.of(context.scene, context.view_layer) or []
 
 
 def mend(scene: bpy.types.Scene, key: str) -> bool:
@@ -67,7 +56,7 @@ def mend(scene: bpy.types.Scene, key: str) -> bool:
     one = next((one for one in _look(scene) if one.key == key and one.mend is not None), None)
     if one is not None:
         one.mend(scene)
-        _on_change()
+        _outlook.ask()
     return one is not None
 
 
@@ -234,30 +223,5 @@ def _step_out(scene: bpy.types.Scene) -> None:
     camera.matrix_world = matrix
 
 
-def _on_timer() -> None:
-    global _took
-    begin = time.perf_counter()
-    found = {}
-    for window in bpy.context.window_manager.windows:
-        found[window.scene.session_uid] = list(_look(window.scene))
-    _took = time.perf_counter() - begin
-    if found != _found:
-        _found.clear()
-        _found.update(found)
-        redraw()
-
-
-def _on_change(*_: object) -> None:
-    if not bpy.app.background:
-        call_soon(_on_timer, max(_SOON, _PATIENCE * _took))
-
-
-_HANDLERS = Handlers(depsgraph_update_post=_on_change, undo_post=_on_change, redo_post=_on_change, load_post=_on_change)
-register = _HANDLERS.register
-
-
-def unregister() -> None:
-    """Look no more."""
-    _HANDLERS.unregister()
-    call_off(_on_timer)
-    _found.clear()
+_outlook = Outlook(lambda scene, _layer: list(_look(scene)))
+register, unregister = _outlook.register, _outlook.unregister
