@@ -81,9 +81,8 @@ def sockets() -> dict[str, list[str]]:
 
 def file_keys() -> dict[str, list[str]]:
     """Keys of files that artists exchange."""
-    from tetflora_addon.blender.biomes.properties import GROUND
-
     from tetflora_addon.blender.biomes import files
+    from tetflora_addon.blender.biomes.library import GROUND
     from tetflora_addon.blender.placing.population_data import simple_settings
     from tetflora_addon.blender.placing.properties import TetFloraLayer
     from tetflora_addon.blender.placing.rules import ENTRY
