@@ -32,18 +32,11 @@ NEVER = 2.0
 
 @dataclass(frozen=True)
 class AssetCosts:
-    """What there is of each asset (a).
+    """What there is of each asset (a)."""
 
-    Attributes
-    ----------
-    triangles : (a,) int64
-    instances : (a,) int64
-    pixels : (a,) float64
-        Pixels of the image that its instances would cover if nothing hid them; infinite where that is not known.
-    """
-
-    triangles: NDArray[np.int64]
-    instances: NDArray[np.int64]
+    triangles: NDArray[np.int64]  # (a,)
+    instances: NDArray[np.int64]  # (a,)
+    #: (a,): pixels of the image that its instances would cover if nothing hid them; infinite where that is not known.
     pixels: NDArray[np.float64]
 
     def plain(self, cycles: bool, left: float) -> bool:

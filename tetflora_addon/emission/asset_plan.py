@@ -44,40 +44,24 @@ _KITES_BATCH = 200_000
 
 @dataclass(frozen=True)
 class OriginalPolicy:
-    """When an instance is drawn as the original.
+    """When an instance is drawn as the original."""
 
-    Attributes
-    ----------
-    always : (a,) bool
-        Assets of which every instance is.
-    fraction : float
-        Fraction of its faces that are to be real; more than 1 for never.
-    shared : bool
-        Meshes of clusters cost the renderer as much as one of them, in however many places. Else each place counts.
-    kites : bool
-        Leaves of few pixels are kites. Without them nothing is gained by any, and all that is seen is real, but for
-        specks: `FARTHER` times as far as else.
-    """
-
-    always: NDArray[np.bool_]
-    fraction: float = 0.6
+    always: NDArray[np.bool_]  # (a,): assets of which every instance is
+    fraction: float = 0.6  # fraction of its faces that are to be real; more than 1 for never
+    #: Meshes of clusters cost the renderer as much as one of them, in however many places. Else each place counts.
     shared: bool = False
+    #: Leaves of few pixels are kites. Without them nothing is gained by any, and all that is seen is real, but for
+    #: specks: `FARTHER` times as far as else.
     kites: bool = True
 
 
 @dataclass(frozen=True)
 class AssetPlan:
-    """Instances of assets that are drawn as they are.
+    """Instances of assets that are drawn as they are."""
 
-    Attributes
-    ----------
-    originals : (k,) int64
-        Instances that are the originals.
-    meshes, kites : AssetParts of m, of k
-        PlacedClusters that are meshes of their own faces, and of kites for their leaves.
-    """
-
+    #: (k,): instances that are the originals.
     originals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    #: meshes and kites, of m, of k: PlacedClusters that are meshes of their own faces, and of kites for their leaves.
     meshes: AssetParts = field(default_factory=AssetParts.empty)
     kites: AssetParts = field(default_factory=AssetParts.empty)
 
@@ -96,15 +80,9 @@ class AssetPlan:
 
 @dataclass(frozen=True)
 class ClusterRows(AssetParts):
-    """PlacedClusters of instances (n), as the frontier has them.
+    """PlacedClusters of instances (n), as the frontier has them."""
 
-    Attributes
-    ----------
-    shown : (n,) bool
-        Drawn as they are: only what they cover is to be found.
-    """
-
-    shown: NDArray[np.bool_] = column(dtype=bool)
+    shown: NDArray[np.bool_] = column(dtype=bool)  # (n,): drawn as they are: only what they cover is to be found
 
     @classmethod
     def of(cls, parts: AssetParts, shown: NDArray[np.bool_]) -> ClusterRows:
@@ -119,26 +97,14 @@ class ClusterRows(AssetParts):
 
 @dataclass(frozen=True)
 class PlacedClusters(FrontierKind):
-    """PlacedClusters of instances.
-
-    Attributes
-    ----------
-    placed : PlacedAssets
-    camera : Camera
-    originals : OriginalPolicy
-    limit : float
-        Width in pixels up to which leaves are facets.
-    looks : (i,) str
-        Of instances; what stands for different ones is kept apart.
-    larger : float
-        As of `FrontierKind`: where there are few facets, only those of plants gain by being finer than asked for.
-    """
+    """PlacedClusters of instances."""
 
     placed: PlacedAssets
     camera: Camera
     originals: OriginalPolicy
-    limit: float
-    looks: NDArray[np.str_]
+    limit: float  # width in pixels up to which leaves are facets
+    looks: NDArray[np.str_]  # (i,) str: of instances; what stands for different ones is kept apart
+    #: As of `FrontierKind`: where there are few facets, only those of plants gain by being finer than asked for.
     larger: float = 1.0
 
     def everything(self) -> ClusterRows:

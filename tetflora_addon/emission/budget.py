@@ -41,30 +41,15 @@ ASSETS_FINEST = 0.67
 
 @dataclass(frozen=True)
 class Detail:
-    """How finely a refined scene is drawn.
+    """How finely a refined scene is drawn."""
 
-    Attributes
-    ----------
-    refinement : Refinement
-        Decisions that fit into the budget.
-    facet : float
-        Side of facets, pixels.
-    leaf_limit : float
-        Width in pixels up to which leaves are facets.
-    coarser : float
-        Sides over those that are asked for.
-    tolerance : float
-        Pixels by which the margins of near leaves may be off; infinite where only their models are drawn.
-    most : float
-        Polygons and facets that there may be.
-    """
-
-    refinement: Refinement
-    facet: float
-    leaf_limit: float
-    coarser: float = 1.0
+    refinement: Refinement  # decisions that fit into the budget
+    facet: float  # side of facets, pixels
+    leaf_limit: float  # width in pixels up to which leaves are facets
+    coarser: float = 1.0  # sides over those that are asked for
+    #: Pixels by which the margins of near leaves may be off; infinite where only their models are drawn.
     tolerance: float = TOLERANCE
-    most: float = np.inf
+    most: float = np.inf  # polygons and facets that there may be
 
     @property
     def asset_limit(self) -> float:

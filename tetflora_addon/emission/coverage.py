@@ -32,19 +32,12 @@ _NEARER = 1.0
 
 @dataclass(frozen=True)
 class Footprints(Arrays):
-    """What things (n) may touch of the image.
+    """What things (n) may touch of the image."""
 
-    Attributes
-    ----------
-    low, high : (n, 2) float32
-        Corners of a rectangle that holds each of them, pixels from the lower left of the buffer.
-    near : (n,) float32
-        Least depth, meters.
-    """
-
+    #: low and high, (n, 2): corners of a rectangle that holds each of them, pixels from the lower left of the buffer.
     low: NDArray[np.float32]
     high: NDArray[np.float32]
-    near: NDArray[np.float32]
+    near: NDArray[np.float32]  # (n,): least depth, meters
 
 
 class Coverage:

@@ -102,42 +102,19 @@ class Parts:
 
 @dataclass(frozen=True)
 class Drawing:
-    """What all tiles are drawn with.
+    """What all tiles are drawn with."""
 
-    Attributes
-    ----------
-    kinds : sequence of FrontierKind
-        Of all that there is.
-    parts : sequence of Arrays
-        What there is of each, to begin with.
-    camera : Camera
-    facet : float
-        Side of facets that are seen, pixels.
-    hidden : float
-        Sides of facets over those that are asked for: the larger, the fewer stand for what is not seen.
-    shadows : ShadowReach
-    shade : Shade
-    occluders : (t, 3, 3) float64
-        Triangles of opaque polygons, meters.
-    form : callable or None
-        What becomes of facets where they are made; without, they stay what they are.
-    most : float
-        Polygons and facets that there may be, should what is expected be wrong.
-    shadow : float
-        Pixels down to which shadows of what is not seen are refined; 0 leaves them coarse.
-    """
-
-    kinds: Sequence[FrontierKind]
-    parts: Sequence[Arrays]
+    kinds: Sequence[FrontierKind]  # of all that there is
+    parts: Sequence[Arrays]  # what there is of each, to begin with
     camera: Camera
-    facet: float
-    hidden: float
+    facet: float  # side of facets that are seen, pixels
+    hidden: float  # sides of facets over those that are asked for: the larger, the fewer stand for what is not seen
     shadows: ShadowReach
     shade: Shade
-    occluders: NDArray[np.float64]
-    form: FacetConverter | None = None
-    most: float = np.inf
-    shadow: float = 0.0
+    occluders: NDArray[np.float64]  # (t, 3, 3): triangles of opaque polygons, meters
+    form: FacetConverter | None = None  # what becomes of facets where they are made; without, they stay what they are
+    most: float = np.inf  # polygons and facets that there may be, should what is expected be wrong
+    shadow: float = 0.0  # pixels down to which shadows of what is not seen are refined; 0 leaves them coarse
 
 
 def drawing(

@@ -42,30 +42,16 @@ Buffers = MeshBuffers | PointBuffers
 
 @dataclass(frozen=True)
 class EmissionInput:
-    """A refined scene, the input of all forms of proxies.
-
-    Attributes
-    ----------
-    flora : Flora
-    refinement : Refinement
-    camera : Camera
-    drawing : Drawing or None
-        What all is drawn with; None in forms without facets.
-    tolerance : float
-        Pixels by which the margins of near leaves may be off, in forms without facets.
-    originals : OriginalPolicy or None
-        When instances of assets are the originals; None where there are no instances.
-    disc : float
-        Area that the renderer draws of a sphere of radius 1.
-    """
+    """A refined scene, the input of all forms of proxies."""
 
     flora: Flora
     refinement: Refinement
     camera: Camera
-    drawing: Drawing | None = None
-    tolerance: float = TOLERANCE
+    drawing: Drawing | None = None  # what all is drawn with; None in forms without facets
+    tolerance: float = TOLERANCE  # pixels by which the margins of near leaves may be off, in forms without facets
+    #: When instances of assets are the originals; None where there are no instances.
     originals: OriginalPolicy | None = None
-    disc: float = np.pi
+    disc: float = np.pi  # area that the renderer draws of a sphere of radius 1
     _waiting: list[Parts] = field(default_factory=list, compare=False)
     _shown: list[Shown] = field(default_factory=list, compare=False)
 
@@ -117,27 +103,18 @@ class EmissionInput:
 
 @dataclass(frozen=True)
 class ProxyEmitter:
-    """How one form of proxies becomes buffers.
+    """How one form of proxies becomes buffers."""
 
-    Attributes
-    ----------
-    blocks : callable
-        Makes the buffers of a `EmissionInput`, for proxies that the renderer lights.
-    form : callable or None
-        Given the camera and `EmissionInput.disc`, what facets become where they are made; None in forms without facets.
-    baked_blocks : callable or None
-        The same with baked light, given that light and the number of the first facet in its list of sheets. None:
-        proxies of this form are always lit by the renderer.
-    faces : float or None
-        Faces per proxy tetrahedron; None where the proxies are facets, whose number follows from Facet Size.
-    hidden_block, proxy_block : float
-        As in `RefinementSettings`.
-    """
-
+    #: Makes the buffers of a `EmissionInput`, for proxies that the renderer lights.
     blocks: Callable[[EmissionInput], Iterator[Buffers]]
+    #: Given the camera and `EmissionInput.disc`, what facets become where they are made; None in forms without facets.
     form: Callable[[Camera, float], FacetConverter] | None = None
+    #: The same with baked light, given that light and the number of the first facet in its list of sheets. None:
+    #: proxies of this form are always lit by the renderer.
     baked_blocks: Callable[[EmissionInput, BakedLight, int], Iterator[Buffers]] | None = None
+    #: Faces per proxy tetrahedron; None where the proxies are facets, whose number follows from Facet Size.
     faces: float | None = None
+    #: hidden_block and proxy_block: as in `RefinementSettings`.
     hidden_block: float = math.inf
     proxy_block: float = math.inf
 

@@ -54,24 +54,12 @@ _BEND = 1 / 8
 
 @dataclass(frozen=True)
 class Stand:
-    """Plants of a scene, or some of them that stand for all.
+    """Plants of a scene, or some of them that stand for all."""
 
-    Attributes
-    ----------
-    number : int
-        All plants.
-    foot : (k, 3) float64
-        Where some of them stand, meters.
-    scale : (k,) float64
-    which : (k,) int64
-        Their crowns, as indices into the next.
-    crowns : tuple of Crown
-    """
-
-    number: int
-    foot: Floats
-    scale: Floats
-    which: Integers
+    number: int  # all plants
+    foot: Floats  # (k, 3): where some of them stand, meters
+    scale: Floats  # (k,)
+    which: Integers  # (k,): their crowns, as indices into the next
     crowns: tuple[Crown, ...]
 
     def in_view(self, camera: Camera) -> Mask:
@@ -121,25 +109,13 @@ class Stand:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a refinement will take.
-
-    Attributes
-    ----------
-    plants : int
-    primitives : float
-        Polygons and facets.
-    seconds : float
-    memory : float
-        Bytes of the whole process with the result, and rendering it.
-    limited : bool
-        Whether a limit of the settings makes plants coarser.
-    """
+    """What a refinement will take."""
 
     plants: int
-    primitives: float
+    primitives: float  # polygons and facets
     seconds: float
-    memory: float
-    limited: bool
+    memory: float  # bytes of the whole process with the result, and rendering it
+    limited: bool  # whether a limit of the settings makes plants coarser
 
 
 def estimate(

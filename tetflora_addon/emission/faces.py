@@ -38,23 +38,13 @@ _PLACE_U, _PLACE_V = 222, 223
 
 @dataclass(frozen=True)
 class FaceRows(Arrays):
-    """Faces of instances of meshes (n).
+    """Faces of instances of meshes (n)."""
 
-    Attributes
-    ----------
-    face, instance : (n,) int32
-    center : (n, 3) float64
-    reach : (n,) float64
-        As of `Polygons`.
-    optical : (n,) float64
-        Area that each blocks, m².
-    """
-
-    face: NDArray[np.int32] = column(dtype=np.int32)
-    instance: NDArray[np.int32] = column(dtype=np.int32)
-    center: NDArray[np.float64] = column(3)
-    reach: NDArray[np.float64]
-    optical: NDArray[np.float64]
+    face: NDArray[np.int32] = column(dtype=np.int32)  # (n,)
+    instance: NDArray[np.int32] = column(dtype=np.int32)  # (n,)
+    center: NDArray[np.float64] = column(3)  # (n, 3)
+    reach: NDArray[np.float64]  # (n,): as of `Polygons`
+    optical: NDArray[np.float64]  # (n,): area that each blocks, m²
 
     @classmethod
     def of(cls, whole: Polygons) -> FaceRows:
@@ -69,23 +59,12 @@ class FaceRows(Arrays):
 
 @dataclass(frozen=True)
 class Faces(FrontierKind):
-    """Faces of your own meshes.
+    """Faces of your own meshes."""
 
-    Attributes
-    ----------
-    meshes : Meshes
-        Without what only results need.
-    looks : tuple of str
-        Of surfaces.
-    camera : Camera
-    limit : float
-        Width in pixels from which on features are drawn as they are.
-    """
-
-    meshes: Meshes
-    looks: tuple[str, ...]
+    meshes: Meshes  # without what only results need
+    looks: tuple[str, ...]  # of surfaces
     camera: Camera
-    limit: float
+    limit: float  # width in pixels from which on features are drawn as they are
 
     @classmethod
     def of(cls, meshes: Meshes, camera: Camera, limit: float) -> Faces:

@@ -42,28 +42,14 @@ Shown = tuple[str, Arrays]
 
 @dataclass(frozen=True)
 class Waiting(Arrays):
-    """Parts (n) of one kind, and spheres around them.
+    """Parts (n) of one kind, and spheres around them."""
 
-    Attributes
-    ----------
-    parts : Arrays of n
-    center : (n, 3) float64
-    radius : (n,) float64
-        Meters.
-    near : (n,) float64
-        Least depth of the sphere, meters.
-    cell : (n,) int64
-        Cell of the image that its middle is in.
-    count : (n,) float64
-        Facets that they would have, all of them.
-    """
-
-    parts: Arrays
-    center: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    near: NDArray[np.float64]
-    cell: NDArray[np.int64]
-    count: NDArray[np.float64]
+    parts: Arrays  # of n
+    center: NDArray[np.float64]  # (n, 3)
+    radius: NDArray[np.float64]  # (n,): meters
+    near: NDArray[np.float64]  # (n,): least depth of the sphere, meters
+    cell: NDArray[np.int64]  # (n,): cell of the image that its middle is in
+    count: NDArray[np.float64]  # (n,): facets that they would have, all of them
 
 
 class Canvas(Protocol):

@@ -29,19 +29,11 @@ NEARER = 4.0
 
 @dataclass(frozen=True)
 class LeafDetail:
-    """Lengths of leaves in the image.
-
-    Attributes
-    ----------
-    flora : Flora
-    camera : Camera
-    tolerance : float
-        Pixels by which margins may be off; infinite for none but the models of the species.
-    """
+    """Lengths of leaves in the image."""
 
     flora: Flora
     camera: Camera
-    tolerance: float = TOLERANCE
+    tolerance: float = TOLERANCE  # pixels by which margins may be off; infinite for none but the models of the species
 
     @property
     def wood(self) -> Pixels | None:

@@ -104,22 +104,12 @@ def shadow_steps(
 
 @dataclass(frozen=True)
 class Sources:
-    """Lights and opaque polygons of a scene.
-
-    Attributes
-    ----------
-    lights : tuple of Light
-    world : World
-    occluders : (t, 3, 3) float64
-        Triangles of ground and buildings, meters.
-    ground : (3,) float64
-        Their mean color, linear.
-    """
+    """Lights and opaque polygons of a scene."""
 
     lights: tuple[Light, ...]
     world: World
-    occluders: NDArray[np.float64]
-    ground: NDArray[np.float64]
+    occluders: NDArray[np.float64]  # (t, 3, 3): triangles of ground and buildings, meters
+    ground: NDArray[np.float64]  # (3,): their mean color, linear
 
     def counted_from(self, origin: NDArray[np.float64]) -> Sources:
         """The same in coordinates that begin at a place (3,) of the present ones."""
@@ -162,17 +152,10 @@ def _four_corners(offsets: NDArray[np.integer]) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class BakedLight:
-    """Light in a refined scene, as `baked_light` finds it.
-
-    Attributes
-    ----------
-    illumination : Illumination
-    cell : (m,) int64
-        Tetrahedron (index into the clouds) of each sheet, −1 where it lies in none that holds something.
-    camera : Camera
-    """
+    """Light in a refined scene, as `baked_light` finds it."""
 
     illumination: Illumination
+    #: (m,): tetrahedron (index into the clouds) of each sheet, −1 where it lies in none that holds something.
     cell: NDArray[np.int64]
     camera: Camera
 

@@ -56,19 +56,12 @@ _THIN = 231
 
 @dataclass(frozen=True)
 class PlantRows(PlantParts):
-    """Parts of plants (n) as the frontier has them: about straight lines.
+    """Parts of plants (n) as the frontier has them: about straight lines."""
 
-    Attributes
-    ----------
-    start, end : (n, 3) float64
-        Of the line, meters.
-    beside : (n,) float64
-        How far they reach from it, meters.
-    """
-
+    #: start and end, (n, 3): of the line, meters.
     start: NDArray[np.float64] = column(3)
     end: NDArray[np.float64] = column(3)
-    beside: NDArray[np.float64]
+    beside: NDArray[np.float64]  # (n,): how far they reach from it, meters
 
     @classmethod
     def of(cls, flora: Flora, parts: PlantParts, lines: Axes | None = None) -> PlantRows:
@@ -93,16 +86,7 @@ class PlantRows(PlantParts):
 
 @dataclass(frozen=True)
 class GrownPlants(FrontierKind):
-    """Sub-plants, and branches without what grows on them.
-
-    Attributes
-    ----------
-    flora : Flora
-    camera : Camera
-    transition : Transition
-    weights : FacetWeights
-    lights : sequence of Light
-    """
+    """Sub-plants, and branches without what grows on them."""
 
     flora: Flora
     camera: Camera

@@ -45,22 +45,12 @@ KITES, SOLID_KITES = 2.0, 0.8
 
 @dataclass(frozen=True)
 class Transition:
-    """Fractions of leaves that are real.
-
-    Attributes
-    ----------
-    flora : Flora
-    camera : Camera
-    limit : float
-        Width in pixels up to which leaves are facets.
-    tolerance : float
-        Pixels by which margins of near leaves may be off.
-    """
+    """Fractions of leaves that are real."""
 
     flora: Flora
     camera: Camera
-    limit: float
-    tolerance: float = TOLERANCE
+    limit: float  # width in pixels up to which leaves are facets
+    tolerance: float = TOLERANCE  # pixels by which margins of near leaves may be off
 
     @property
     def detail(self) -> LeafDetail:
@@ -97,28 +87,14 @@ class Transition:
 
 @dataclass(frozen=True)
 class Block:
-    """One mesh of a block of space.
-
-    Attributes
-    ----------
-    kind : {'leaf', 'blossom', 'bark'}
-    form : int
-        Which of the species' forms of leaves or blossoms.
-    species : int
-        Index into the flora's species.
-    number : int
-        Of the block, front to back.
-    buffers : MeshBuffers
-    fraction : float
-        Fraction of all polygons that is done with this block.
-    """
+    """One mesh of a block of space."""
 
     kind: str
-    form: int
-    species: int
-    number: int
+    form: int  # which of the species' forms of leaves or blossoms
+    species: int  # index into the flora's species
+    number: int  # of the block, front to back
     buffers: MeshBuffers
-    fraction: float
+    fraction: float  # fraction of all polygons that is done with this block
 
 
 def inside_explicit(

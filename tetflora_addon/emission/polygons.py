@@ -28,24 +28,12 @@ _WHOLE = 1e-6
 
 @dataclass(frozen=True)
 class PolygonBlock:
-    """Polygons of one surface in one block of space.
+    """Polygons of one surface in one block of space."""
 
-    Attributes
-    ----------
-    surface : int
-        Index into the surfaces of the meshes.
-    number : int
-        Of the block, front to back.
-    buffers : MeshBuffers
-        ``material_index`` is the surface's slot.
-    fraction : float
-        Fraction of all polygons that is done with this block.
-    """
-
-    surface: int
-    number: int
-    buffers: MeshBuffers
-    fraction: float
+    surface: int  # index into the surfaces of the meshes
+    number: int  # of the block, front to back
+    buffers: MeshBuffers  # ``material_index`` is the surface's slot
+    fraction: float  # fraction of all polygons that is done with this block
 
 
 def kept_polygons(result: Refinement) -> Polygons:

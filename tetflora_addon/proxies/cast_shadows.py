@@ -28,20 +28,11 @@ _UNKNOWN = 2.5
 
 @dataclass(frozen=True)
 class ShadowReach:
-    """Where shadows of things end up.
-
-    Attributes
-    ----------
-    camera : Camera
-    lights : sequence of Light
-        Those that throw shadows.
-    floor : float
-        Height below which nothing receives any, meters.
-    """
+    """Where shadows of things end up."""
 
     camera: Camera
-    lights: Sequence[Light] = ()
-    floor: float = -np.inf
+    lights: Sequence[Light] = ()  # those that throw shadows
+    floor: float = -np.inf  # height below which nothing receives any, meters
 
     def distance(self, points: Floats, distance_to_view: Floats, reach: Floats | float = 0.0) -> Floats:
         """Meters (n,) that shadows of points (n, 3) fall before they are in view; infinite where they never are.

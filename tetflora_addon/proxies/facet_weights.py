@@ -72,20 +72,14 @@ _KIND = "facet_shares"
 
 @dataclass(frozen=True)
 class FacetWeights:
-    """Fraction of their area that facets get, by row and number of facets.
+    """Fraction of their area that facets get, by row and number of facets."""
 
-    Attributes
-    ----------
-    whole, own : (s, r, k) float64
-        For the first s of `SHARES`, and each of `COUNTS`, of sub-plants, and of what branches themselves bear, by the
-        facets of a whole branch.
-    solid : (r,) bool, optional
-        Rows of which a branch has more facets than that: its leaves fill a solid and nothing else grows on it. Facets
-        reach beyond its surface by a part of their side, so what is missing falls as the root of their number.
-    """
-
+    #: whole and own, (s, r, k): for the first s of `SHARES`, and each of `COUNTS`, of sub-plants, and of what branches
+    #: themselves bear, by the facets of a whole branch.
     whole: Floats
     own: Floats
+    #: (r,): rows of which a branch has more facets than that: its leaves fill a solid and nothing else grows on it.
+    #: Facets reach beyond its surface by a part of their side, so what is missing falls as the root of their number.
     solid: Mask | None = None
 
     def of_subplants(self, row: Integers, count: Floats, share: Floats | None = None) -> Floats:
@@ -374,26 +368,15 @@ class View:
 
 @dataclass(frozen=True)
 class SiblingGroups:
-    """Siblings of sub-plants, or what their branches themselves bear.
-
-    Attributes
-    ----------
-    flora : Flora
-    some : Branches of n
-    beyond : (3,) float64
-        Offset at which a copy meets none of them, meters.
-    area, leaf : (n,) float64
-        Optical area of each, and area of one of its leaves, m².
-    pieces : Pieces or None
-        Of the branches, where only these count.
-    """
+    """Siblings of sub-plants, or what their branches themselves bear."""
 
     flora: Flora
-    some: Branches
-    beyond: Floats
+    some: Branches  # of n
+    beyond: Floats  # (3,): offset at which a copy meets none of them, meters
+    #: area and leaf, (n,): optical area of each, and area of one of its leaves, m².
     area: Floats
     leaf: Floats
-    pieces: Pieces | None
+    pieces: Pieces | None  # of the branches, where only these count
 
     @classmethod
     def of_subplants(cls, flora: Flora, some: Branches, beyond: Floats) -> SiblingGroups:

@@ -56,37 +56,20 @@ CIRCUMRADIUS = 2 / 27**0.25
 
 @dataclass(frozen=True)
 class Facets(Arrays):
-    """Triangles as a structure of arrays, with two sides of equal length.
+    """Triangles as a structure of arrays, with two sides of equal length."""
 
-    Attributes
-    ----------
-    center : (n, 3) float64
-    across, along : (n, 3) float64
-        Unit vectors in the facet's plane.
-    side : (n,) float64
-        Root of the area, meters.
-    color : (n, 3) float64
-    transmission : (n,) float64
-    velocity : (n, 3) float64 or None
-        Meters a second; None for plants at rest.
-    roughness : (n,) float64 or None
-        Of the gloss of assets; None where the material knows.
-    stretch : (n,) float64 or None
-        Length along ``along`` over that of an equilateral triangle of the same area; None for 1.
-    dull : (n,) float64 or None
-        Part of the gloss of leaves that these hide from each other, 0 to 1; None for 0.
-    """
-
-    center: Floats
+    center: Floats  # (n, 3)
+    #: across and along, (n, 3): unit vectors in the facet's plane.
     across: Floats
     along: Floats
-    side: Floats
-    color: Floats
-    transmission: Floats
-    velocity: Floats | None = None
-    roughness: Floats | None = None
+    side: Floats  # (n,): root of the area, meters
+    color: Floats  # (n, 3)
+    transmission: Floats  # (n,)
+    velocity: Floats | None = None  # (n, 3): meters a second; None for plants at rest
+    roughness: Floats | None = None  # (n,): of the gloss of assets; None where the material knows
+    #: (n,): length along ``along`` over that of an equilateral triangle of the same area; None for 1.
     stretch: Floats | None = None
-    dull: Floats | None = None
+    dull: Floats | None = None  # (n,): part of the gloss of leaves that these hide from each other, 0 to 1; None for 0
 
     @property
     def normal(self) -> Floats:

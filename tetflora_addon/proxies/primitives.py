@@ -31,47 +31,26 @@ MEAN_COVER = 0.5
 
 @dataclass(frozen=True)
 class Triangles(Arrays):
-    """Equilateral triangles.
+    """Equilateral triangles."""
 
-    Attributes
-    ----------
-    corners : (n, 3, 3) float32
-        World space, meters.
-    color : (n, 3) float32
-    transmission : (n,) float32
-    velocity : (n, 3) float32 or None
-        Meters a second; None for plants at rest.
-    roughness, dull : (n,) float32 or None
-        As of facets.
-    """
-
-    corners: NDArray[np.float32]
-    color: NDArray[np.float32]
-    transmission: NDArray[np.float32]
-    velocity: NDArray[np.float32] | None = None
+    corners: NDArray[np.float32]  # (n, 3, 3): world space, meters
+    color: NDArray[np.float32]  # (n, 3)
+    transmission: NDArray[np.float32]  # (n,)
+    velocity: NDArray[np.float32] | None = None  # (n, 3): meters a second; None for plants at rest
+    #: roughness and dull, (n,): as of facets.
     roughness: NDArray[np.float32] | None = None
     dull: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
 class Spheres(Arrays):
-    """Spheres.
+    """Spheres."""
 
-    Attributes
-    ----------
-    center : (n, 3) float32
-        World space, meters.
-    radius : (n,) float32
-    color : (n, 3) float32
-    transmission : (n,) float32
-    velocity, roughness, dull : (n, 3) float32 or None, (n,) float32 or None, (n,) float32 or None
-        As of triangles.
-    """
-
-    center: NDArray[np.float32]
-    radius: NDArray[np.float32]
-    color: NDArray[np.float32]
-    transmission: NDArray[np.float32]
+    center: NDArray[np.float32]  # (n, 3): world space, meters
+    radius: NDArray[np.float32]  # (n,)
+    color: NDArray[np.float32]  # (n, 3)
+    transmission: NDArray[np.float32]  # (n,)
+    #: velocity, roughness and dull, (n, 3) or None, (n,) float32 or None, (n,) float32: as of triangles.
     velocity: NDArray[np.float32] | None = None
     roughness: NDArray[np.float32] | None = None
     dull: NDArray[np.float32] | None = None

@@ -25,27 +25,14 @@ _ROOT = np.log(2) / np.log(3)
 
 @dataclass(frozen=True)
 class Summaries:
-    """Area-weighted means over what each of n tetrahedra holds.
+    """Area-weighted means over what each of n tetrahedra holds."""
 
-    Attributes
-    ----------
-    optical_area : (n,) float64
-        m², as it is; leaves count once, the closed surfaces of branches and other solids half.
-    color : (n, 3) float64
-        Linear RGB.
-    transmission : (n,) float64
-        Fraction of scattered light that goes through.
-    moment : (n, 3, 3) float64
-        Mean of n nᵀ; its trace is 1 where there is anything.
-    clumping : (n, 2) float64, optional
-        Determines the factor on their extinction, see `compiled.clumping.factors`; the factor is 1 where not given,
-        and for what polygons contribute.
-    """
-
-    optical_area: Floats
-    color: Floats
-    transmission: Floats
-    moment: Floats
+    optical_area: Floats  # (n,): m², as it is; leaves count once, the closed surfaces of branches and other solids half
+    color: Floats  # (n, 3): linear RGB
+    transmission: Floats  # (n,): fraction of scattered light that goes through
+    moment: Floats  # (n, 3, 3): mean of n nᵀ; its trace is 1 where there is anything
+    #: (n, 2): determines the factor on their extinction, see `compiled.clumping.factors`; the factor is 1 where not
+    #: given, and for what polygons contribute.
     clumping: Floats | None = None
 
     def effective_area(self, volumes: Floats) -> Floats:
