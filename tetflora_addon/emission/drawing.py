@@ -513,7 +513,7 @@ class _Tile:
         times = max(np.sqrt(float(sum(number.sum() for *_, number in drawn)) / max(most, 1.0)), 1.0)
         for kind, pool, side, kept, number in drawn:
             # Most parts have a small part of a facet each: so many fewer of them have so much more, which is as much.
-            scarce = (number > 0.0) & (number < 0.5 * times**2 / leaves)
+            scarce = (number > 0.0) & (number < 0.5 * times**2 / leaves) & (not kind.stays)
             chosen = scarce & (uniform(_keys_of(pool.center), _SCARCE) < 1.0 / leaves)
             for more, some in ((1.0, np.flatnonzero(~scarce)), (np.sqrt(leaves), np.flatnonzero(chosen))):
                 given = pool.parts.take(some), times * side[some] / more, kept[some], self.frontier.shown

@@ -65,6 +65,7 @@ class Faces(FrontierKind):
     looks: tuple[str, ...]  # of surfaces
     camera: Camera
     limit: float  # width in pixels from which on features are drawn as they are
+    stays = True
 
     @classmethod
     def of(cls, meshes: Meshes, camera: Camera, limit: float) -> Faces:

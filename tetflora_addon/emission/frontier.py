@@ -80,6 +80,8 @@ class FrontierKind:
     """
 
     larger = 1.0
+    #: Whether parts that nobody sees may stay as they are; then none of them can stand for others.
+    stays = False
 
     def spheres(self, parts: Arrays) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Middles (n, 3) of spheres around parts, and radii (n,), meters."""

@@ -220,7 +220,8 @@ class Spacing:
         undecided = np.flatnonzero(~Neighbors(self.points, self.distance).near(candidates))
         chosen = []
         while len(undecided):
-            # One speaker a cell, the earliest; those with no earlier speaker nearby are in.
+            # One speaker a cell, the earliest; those with no earlier speaker around are in. What is close to one may be
+            # another of that speaker's cell, which has to be decided before.
             _, first = np.unique(cells_of(candidates[undecided], self.cell), return_index=True)
             speakers = np.sort(undecided[first])
             winners = speakers[~self._outranked(candidates[speakers])]
@@ -231,7 +232,7 @@ class Spacing:
         return kept
 
     def _outranked(self, speakers: Floats) -> Mask:
-        """Which speakers, one a cell and in order of rank, have an earlier one too close."""
+        """Which speakers, one a cell and in order of rank, have an earlier one in cells that are close."""
         outranked = np.zeros(len(speakers), bool)
         own = cells_of(speakers, self.cell)
         order = np.argsort(own)
@@ -240,9 +241,7 @@ class Spacing:
             wanted = cells_of(speakers, self.cell, step)
             place = np.minimum(np.searchsorted(cells, wanted), len(cells) - 1)
             other = order[place]
-            met = np.flatnonzero((cells[place] == wanted) & (other < np.arange(len(speakers))))
-            gap = speakers[met] - speakers[other[met]]
-            outranked[met] |= gap[:, 0] ** 2 + gap[:, 1] ** 2 < self.distance**2
+            outranked |= (cells[place] == wanted) & (other < np.arange(len(speakers)))
         return outranked
 
 

@@ -70,7 +70,7 @@ def test_what_a_moving_camera_sees_is_in_the_wider_view(seed: int) -> None:
     camera = replace(CAMERA, shutter=(other,))
     center, reach = rng.uniform([-3, 8, -3], [3, 60, 3], (30, 3)), rng.uniform(0.1, 2.0, 30)
     margins = blur_margins(camera, center, reach)
-    assert 0 < max(margins) < MOST
+    assert 0 <= max(margins) < MOST  # 0 where the camera moves ahead, and sees less and less
     wide = camera.widened(*margins)
     inside = other.distance_to_view(center) < 0
     pixel = 0.51 * camera.pixel_size * np.linalg.norm(center, axis=1)

@@ -365,9 +365,8 @@ class _Meshes:
         return np.arange(len(key)), np.ones(len(key))
 
 
-def test_shadows_from_just_beside_the_image_are_fine(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shadows_from_just_beside_the_image_are_fine() -> None:
     """Trees out of view, of which many throw shadows that fall far: the nearest has what it needs."""
-    monkeypatch.setattr(subject, "NEVER_TOO_MANY", 4000.0)
     flora = support.flora()
     beside = [(-16.5, 0, 0), *((-20.0 - 2.0 * (k // 5), 6.0 * (k % 5 - 2), 0) for k in range(40))]
     seeds = support.plants(np.arange(1, 43), support.SPECIES.index("birch"), [(0, 0, 0), *beside])
