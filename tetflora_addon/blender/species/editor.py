@@ -194,7 +194,7 @@ def _form_property(kind: str, items: list[tuple[str, str, str, int]], name: str,
         description=description,
         items=items,
         get=lambda self: next(i for key, _, _, i in items if key == _form(self, kind)),
-        set=lambda self, number: _set_form(self, kind, items[number][0]),
+        set=lambda self, number: _set_form(self, kind, {i: key for key, _, _, i in items}.get(number, OWN_LEAF)),
         options={'SKIP_SAVE'},
     )
 
