@@ -77,6 +77,9 @@ class Stand:
         """
         away = np.linalg.norm(self.foot - camera.eye, axis=1)
         size = np.maximum(self._of_crowns("radius"), self._of_crowns("height"))
+        # Places and scales without a number, or with one too large, are for Refine to tell; here they count as nothing.
+        there = np.isfinite(away + size)
+        away, size = (np.where(there, of, 0.0) for of in (away, size))
         near = size / np.maximum(np.maximum(away, size), 1e-9)
         near = np.where(self.in_view(camera), near, near / _IN_VIEW)
         every = np.array([len(crown.parts) for crown in self.crowns])[self.which]
@@ -86,7 +89,7 @@ class Stand:
         turn = order * GOLDEN_TURN
         found, plants = [CrownParts.empty()], [np.zeros(0, np.int64)]
         for number, crown in enumerate(self.crowns):
-            own = np.flatnonzero(self.which == number)
+            own = np.flatnonzero((self.which == number) & there)
             owner, index = spread(some[own])
             plant = own[owner]
             each, scale = every[plant] / some[plant], self.scale[plant]

@@ -190,3 +190,17 @@ def test_other_cameras_have_estimates_too(kind):
     window = (-60.0, 60.0, -34.0, 34.0) if kind == "ORTHO" else (-np.pi, np.pi, -np.pi / 2.0, np.pi / 2.0)
     found = _estimate(_stand(), _camera(kind=kind, window=window))
     assert 10_000 < found.primitives < np.inf
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e300])
+def test_plants_without_a_place_or_a_size_count_as_nothing(wrong):
+    """Refine names them; an estimate that failed would come before."""
+    stand = _stand(50)
+    foot, scale = stand.foot.copy(), stand.scale.copy()
+    foot[3, 1], scale[7] = wrong, wrong
+    rest = np.setdiff1d(np.arange(50), [3, 7])
+    alone = replace(stand, foot=stand.foot[rest], scale=scale[rest], which=stand.which[rest], number=48)
+    with np.errstate(all="ignore"):
+        found = _estimate(replace(stand, foot=foot, scale=scale)).primitives
+    assert found == pytest.approx(_estimate(alone).primitives, rel=0.2)
+    assert np.isfinite(_estimate(replace(stand, foot=np.full((50, 3), np.nan))).primitives)
