@@ -10,6 +10,7 @@ import random
 import struct
 import zipfile
 from collections.abc import Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +113,7 @@ def json_value(rng: random.Random, depth: int) -> Any:
     if depth and rng.random() < 0.6:
         inner = [json_value(rng, depth - 1) for _ in range(rng.randint(0, 4))]
         return inner if rng.random() < 0.5 else {rng.choice(["a", "b", "name", "\x1b", "x" * 300]): v for v in inner}
-    return rng.choice(VALUES)
+    return deepcopy(rng.choice(VALUES))
 
 
 def mutated(rng: random.Random, data: Any, most: int = 3) -> Any:
@@ -129,7 +130,7 @@ def mutated(rng: random.Random, data: Any, most: int = 3) -> Any:
         if rng.random() < 0.2:
             inner.pop(last)
         else:
-            inner[last] = rng.choice(VALUES)
+            inner[last] = deepcopy(rng.choice(VALUES))  # or a later change would be one of the values, and hold itself
     return data
 
 
