@@ -21,7 +21,7 @@ _HEAD = """<!-- SPDX-FileCopyrightText: 2026 TetFlora Authors -->
 
 # Names
 
-What files and scripts hold stays as it is. Written by `python -m devtools.names` and held by a test; a name that has to
+These identifiers do not change, as files and scripts use them. Written by `python -m devtools.names` and held by a test; a name that has to
 change needs a step in `tetflora_addon/formats.py`.
 """
 #: Where scripts find groups of properties.

@@ -222,9 +222,9 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
         items=(
             ('UP', "Up", "Before the layer above"),
             ('DOWN', "Down", "After the layer below"),
-            ('DRAG', "Drag", "With the mouse, until you click; Esc puts it back"),
-            ('IN', "Group", "Into the group above or, without one, into a new group with the layer above it"),
-            ('OUT', "Ungroup", "Out of its group, to below it"),
+            ('DRAG', "Drag", "Move it with the mouse; click to drop it, Esc to put it back"),
+            ('IN', "Group", "Add it to the group above, or make a new group with the layer above"),
+            ('OUT', "Ungroup", "Take it out of its group, and place it below"),
         ),
     )
     layer: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})  # identity of the one to drag
@@ -258,7 +258,8 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         if self.direction in {'IN', 'OUT'} and not (group_layer if self.direction == 'IN' else ungroup_layer)(scene):
-            return self.refused("Groups are of single layers" if self.direction == 'IN' else "The layer is in no group")
+            refusal = {'IN': "Select a single layer to group", 'OUT': "This layer is not in a group"}
+            return self.refused(refusal[self.direction])
         if self.direction in {'UP', 'DOWN'} and not move_layer(scene, -1 if self.direction == 'UP' else 1):
             return {'CANCELLED'}
         points.schedule()

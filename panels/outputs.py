@@ -74,7 +74,8 @@ class TETFLORA_PT_view_layer(PropertiesPanel, bpy.types.Panel):
         layout.prop(output, "pass_index")
         layout.prop_search(output, "light_group", layer, "lightgroups")
         if body := section(layout, "Ray Visibility"):
-            body.column().prop(output, "ray_visibility", text="")
+            body.use_property_split = False
+            body.column(align=True).prop(output, "ray_visibility", expand=True)
         if body := section(layout, "By Species"):
             draw_species(body, output)
             if entry := active_in(output, "species"):

@@ -102,7 +102,7 @@ def _range(ends: tuple[str, str], soft: tuple[str, ...], given: dict[str, dict[s
     for one in given.values():
         one["options"] = {'HIDDEN'}
     return FloatVectorProperty(
-        name=given[ends[1]]["name"].removeprefix("Max ").removesuffix(" Spread").replace("To", "Path"),
+        name="Path" if ends[1] == "path_max" else given[ends[1]]["name"].removeprefix("Max ").removesuffix(" Spread"),
         description=text,
         size=2 + bool(soft),
         get=lambda self: tuple(getattr(self, name) for name in names_for(self)),

@@ -71,17 +71,10 @@ class Canvas(Protocol):
 
 
 class FrontierKind:
-    """One kind of things. Parts are `Arrays`; each kind says what is different about its own.
+    """One kind of things. Parts are `Arrays`; each kind says what is different about its own."""
 
-    Attributes
-    ----------
-    larger : float
-        Sides of its facets over those of plants.
-    """
-
-    larger = 1.0
-    #: Whether parts that nobody sees may stay as they are; then none of them can stand for others.
-    stays = False
+    larger = 1.0  # sides of its facets over those of plants
+    stays = False  # whether parts that nobody sees may stay as they are: then none of them can stand for others
 
     def spheres(self, parts: Arrays) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Middles (n, 3) of spheres around parts, and radii (n,), meters."""
