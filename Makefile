@@ -12,7 +12,8 @@ LTS_VENV = .venv-4.5
 LTS_VERSIONS = 3.11
 
 export PYTHON
-export PYTHONDONTWRITEBYTECODE = 1
+# Two cores and a process each: threads of products of matrices would only wait for one another.
+export OPENBLAS_NUM_THREADS = 1
 
 .PHONY: help environment demo results test quick test-lts lint build bench docs-images clean
 .DEFAULT_GOAL := help
