@@ -178,7 +178,7 @@ FORMS = ['MICROSURFACES', 'SHELLS', 'MICROSPHERES']
 def bush_before_the_sky(engine='CYCLES', samples=16):
     """A bush that is proxies for the most part, in sun and skylight, 48 pixels wide; gives the scene."""
     samples = samples if engine == 'CYCLES' else 4  # of half a second each, without a GPU
-    small_scene(sky=0.4, samples=samples, sun=40.0, size=48, width=3.6)
+    small_scene(sky=0.4, samples=samples, sun=40.0, size=48, width=3.6, shadows=True)
     scene = bpy.context.scene
     scene.render.engine = engine if engine == 'CYCLES' else compat.eevee_engine()
     scene.cycles.transparent_max_bounces = scene.cycles.min_transparent_bounces = 256
