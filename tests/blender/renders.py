@@ -63,6 +63,11 @@ def small_scene(
         scene.collection.objects.link(made)
 
 
+def few_directions(world: bpy.types.World) -> None:
+    """A sky of large patches is known from few points: by itself Cycles looks at half a million before it renders."""
+    world.cycles.sampling_method, world.cycles.sample_map_resolution = 'MANUAL', 64
+
+
 def same_samples(engine: str) -> int:
     """Samples for pictures that are compared with each other: EEVEE's are the same ones in each, so one is enough."""
     return 16 if engine == "CYCLES" else 1

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.renders import picture, small_scene
+from tests.blender.renders import few_directions, picture, small_scene
 from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
@@ -107,6 +107,7 @@ def test_an_image_is_the_right_way_round(tilt, broken):
     pixels[13, 3, 1] += broken  # as the sun is in some pictures of skies
     image.pixels.foreach_set(pixels.ravel())
     feed_background("ShaderNodeTexEnvironment").image = image
+    few_directions(bpy.context.scene.world)
     plane, camera = white_plane(), bpy.context.scene.camera
     plane.rotation_euler = camera.rotation_euler = (0.0, radians(tilt), 0.0)
     normal = np.array([[np.sin(radians(tilt)), 0.0, np.cos(radians(tilt))]])
