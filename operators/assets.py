@@ -3,9 +3,9 @@
 """Assets: use objects and collections as species."""
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
 
 from ..tetflora_addon.blender.assets.marks import can_be_species, is_species, stop_using, use_as_species
+from ..tetflora_addon.blender.declare import boolean, once
 from ..tetflora_addon.blender.placing.plant_objects import prepare_scene
 from ..tetflora_addon.blender.species.asset_species import Datablock, asset_of
 from ..tetflora_addon.errors import SceneError
@@ -33,24 +33,14 @@ class TETFLORA_OT_use_as_species(Reporting, bpy.types.Operator):
     bl_label = "Use as Species"
     told = "stop"
 
-    collection: StringProperty(
-        name="Collection",
-        description="Name of a collection to use instead of what is selected",
-        options={'SKIP_SAVE'},
+    collection: once.string("Collection", "Name of a collection to use instead of what is selected")
+    variants: boolean(
+        "Objects Are Variants",
+        "Each object of a collection, and each collection in it, is a plant; the seed of a plant chooses one. "
+        "Otherwise the whole collection is one plant",
+        True,
     )
-    variants: BoolProperty(
-        name="Objects Are Variants",
-        description=(
-            "Each object of a collection, and each collection in it, is a plant; the seed of a plant chooses one. "
-            "Otherwise the whole collection is one plant"
-        ),
-        default=True,
-    )
-    stop: BoolProperty(
-        name="Stop",
-        description="Use them as species no more. Plants of them stay, and need another species",
-        options={'SKIP_SAVE'},
-    )
+    stop: once.boolean("Stop", "Use them as species no more. Plants of them stay, and need another species")
 
     @classmethod
     def missing(cls, context: bpy.types.Context) -> str:

@@ -8,8 +8,8 @@ import time
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, StringProperty
 
+from ..tetflora_addon.blender.declare import once, string
 from ..tetflora_addon.blender.placing.brush import Stroke, draped_circle
 from ..tetflora_addon.blender.placing.plant_objects import remove_empty_collections
 from ..tetflora_addon.blender.placing.properties import MODES
@@ -41,18 +41,11 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
 
     bl_label = "Paint Plants"
 
-    mode: EnumProperty(
-        name="Mode",
-        description="Brush mode; that of the panel if not set",
-        items=MODES,
-        options={'SKIP_SAVE'},
-    )
-    stroke: StringProperty(
-        name="Stroke",
-        description=(
-            "For scripts: path of the brush on the ground in world space, three numbers per point, for example 0 "
-            "0 0, 5 2.5 0"
-        ),
+    mode: once.choice("Mode", "Brush mode; that of the panel if not set", MODES)
+    stroke: string(
+        "Stroke",
+        "For scripts: path of the brush on the ground in world space, three numbers per point, for example 0 "
+        "0 0, 5 2.5 0",
         options={'SKIP_SAVE', 'HIDDEN'},
     )
 

@@ -8,9 +8,9 @@ from math import radians, tau
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty
 from bpy_extras import view3d_utils
 
+from ..tetflora_addon.blender.declare import choice
 from ..tetflora_addon.blender.placing.ground import Ground, Hit
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.runtime import GoneError, JobData, redraw
@@ -171,7 +171,7 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
 
     bl_label = "Place Plants by Clicking"
 
-    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
+    species: choice("Species", "Species from the catalog", operator_items)
 
     _turn = 0.0
     _scale = 1.0

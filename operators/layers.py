@@ -9,7 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import StringProperty
 
 from ..tetflora_addon.blender.biomes.adding import plant_biome_steps, remove_biome
 from ..tetflora_addon.blender.biomes.files import (
@@ -32,6 +32,7 @@ from ..tetflora_addon.blender.biomes.layers import (
     sort_layers,
     ungroup_layer,
 )
+from ..tetflora_addon.blender.declare import boolean, choice, once, string
 from ..tetflora_addon.blender.placing.cover import cover_with_snow, covered_population
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
 from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, set_grounds
@@ -111,21 +112,16 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
     needs = _ACTIVE
     cancelled = "Stopped; layers that were done already keep their new plants"
 
-    which: EnumProperty(
-        name="Layers",
-        description="Which layers to grow again",
-        items=(
+    which: once.choice(
+        "Layers",
+        "Which layers to grow again",
+        (
             ('DUE', "All That Are Due", "All whose settings have changed, and those without plants"),
             ('ACTIVE', "Active", "The active layer, a biome with all of its layers and its soil, whatever has changed"),
         ),
-        options={'SKIP_SAVE'},
     )
-    reroll: BoolProperty(name="Re-roll", description="With a new seed, for another arrangement", options={'SKIP_SAVE'})
-    forget_erased: BoolProperty(
-        name="Clear Erased Places",
-        description="Let plants grow again where you erased with the brush",
-        options={'SKIP_SAVE'},
-    )
+    reroll: once.boolean("Re-roll", "With a new seed, for another arrangement")
+    forget_erased: once.boolean("Clear Erased Places", "Let plants grow again where you erased with the brush")
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
@@ -216,10 +212,10 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
     told = "direction"
     needs = (layer_exists,)
 
-    direction: EnumProperty(
-        name="Direction",
-        description="Where to move it",
-        items=(
+    direction: choice(
+        "Direction",
+        "Where to move it",
+        (
             ('UP', "Up", "Before the layer above"),
             ('DOWN', "Down", "After the layer below"),
             ('DRAG', "Drag", "Move it with the mouse; click to drop it, Esc to put it back"),
@@ -272,10 +268,8 @@ class TETFLORA_OT_duplicate_layer(Reporting, bpy.types.Operator):
     bl_label = "Duplicate Layer"
     needs = _ACTIVE
 
-    to_selected: BoolProperty(
-        name="To Selected Meshes",
-        description="Let the copy grow on the selected meshes instead of the same ground",
-        options={'SKIP_SAVE'},
+    to_selected: once.boolean(
+        "To Selected Meshes", "Let the copy grow on the selected meshes instead of the same ground"
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
@@ -295,11 +289,7 @@ class TETFLORA_OT_remove_layer(Reporting, bpy.types.Operator):
     bl_label = "Remove Layer"
     needs = _ACTIVE
 
-    keep_plants: BoolProperty(
-        name="Keep Plants",
-        description="Remove only the layer, and keep its plants as plants of your own",
-        options={'SKIP_SAVE'},
-    )
+    keep_plants: once.boolean("Keep Plants", "Remove only the layer, and keep its plants as plants of your own")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene, layer = context.scene, active_layer(context.scene)
@@ -356,12 +346,10 @@ class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
     needs = (need(lambda context: saved_populations(context.scene), "Add a layer with plants first"),)
     bl_options = {'REGISTER'}
 
-    name: StringProperty(name="Name", description="Name of the biome, from which that of its file follows")
-    description: StringProperty(name="Description", description="What grows there, for the tooltip in menus")
-    picture: BoolProperty(name="Last Render", description="Use the last render as the picture of the biome")
-    replace: BoolProperty(
-        name="Replace", description="Replace your own biome of the same file name", options={'SKIP_SAVE'}
-    )
+    name: string("Name", "Name of the biome, from which that of its file follows")
+    description: string("Description", "What grows there, for the tooltip in menus")
+    picture: boolean("Last Render", "Use the last render as the picture of the biome")
+    replace: once.boolean("Replace", "Replace your own biome of the same file name")
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         biome = active_biome(context.scene)

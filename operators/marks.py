@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
 
 from ..tetflora_addon.blender.assets.marks import scattered
 from ..tetflora_addon.blender.biomes.layers import forget_gone
+from ..tetflora_addon.blender.declare import choice, once, string
 from ..tetflora_addon.blender.placing.plant_objects import (
     field_from_plants,
     note_field,
@@ -72,10 +72,10 @@ class TETFLORA_OT_mark(Reporting, bpy.types.Operator):
     told = "what"
     needs = (in_object_mode,)
 
-    what: EnumProperty(
-        name="What",
-        description="What the objects are",
-        items=(
+    what: choice(
+        "What",
+        "What the objects are",
+        (
             (
                 'OCCLUDER',
                 "Occluder",
@@ -102,16 +102,14 @@ class TETFLORA_OT_mark(Reporting, bpy.types.Operator):
             ),
         ),
     )
-    action: EnumProperty(
-        name="Action",
-        description="How to change the mark",
-        items=(
+    action: once.choice(
+        "Action",
+        "How to change the mark",
+        (
             ('TOGGLE', "Toggle", "Mark all, or unmark them if all are marked"),
             ('MARK', "Mark", "Mark all"),
             ('UNMARK', "Unmark", "Unmark all"),
         ),
-        default='TOGGLE',
-        options={'SKIP_SAVE'},
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
@@ -196,10 +194,10 @@ class TETFLORA_OT_convert_plants(Reporting, bpy.types.Operator):
     told = "to"
     needs = (in_object_mode, plants_or_fields_selected)
 
-    to: EnumProperty(
-        name="To",
-        description="What the plants become",
-        items=(
+    to: choice(
+        "To",
+        "What the plants become",
+        (
             (
                 'FIELD',
                 "Field",
@@ -257,14 +255,12 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
     told = "action"
     bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
 
-    owner: StringProperty(
-        name="Owner", description="Where in the context the owner of the list is, such as scene.tetflora.populate"
-    )
-    entries: StringProperty(name="List", description="Name of the list")
-    action: EnumProperty(
-        name="Action",
-        description="Change to make",
-        items=(
+    owner: string("Owner", "Where in the context the owner of the list is, such as scene.tetflora.populate")
+    entries: string("List", "Name of the list")
+    action: choice(
+        "Action",
+        "Change to make",
+        (
             ('ADD', "Add", "Add an entry, if possible with a species that is not yet in the list"),
             ('REMOVE', "Remove", "Remove the active entry"),
         ),

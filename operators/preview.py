@@ -5,8 +5,8 @@
 from collections.abc import Generator
 
 import bpy
-from bpy.props import BoolProperty
 
+from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.viewport import state
 from ..tetflora_addon.blender.viewport.levels import level_steps
 from ..tetflora_addon.jobs import Progress
@@ -32,11 +32,7 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
 
     cancelled = "Cancelled; the levels are unchanged"
 
-    clear: BoolProperty(
-        name="Clear Levels",
-        description="Remove the levels from viewports and memory instead. The file does not change",
-        options={'SKIP_SAVE'},
-    )
+    clear: once.boolean("Clear Levels", "Remove the levels from viewports and memory instead. The file does not change")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.execute(context) if self.clear else super().invoke(context, event)

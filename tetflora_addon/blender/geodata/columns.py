@@ -9,11 +9,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
 
 from ...errors import SceneError
 from ...geodata.inventories import preview
 from ...geodata.titles import FIELDS
+from ..declare import HIDDEN, choice, string
 
 _UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
 
@@ -21,20 +21,18 @@ _UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
 class TetFloraInventoryColumn(bpy.types.PropertyGroup):
     """A column, whose title is the name."""
 
-    field: EnumProperty(
-        name="Meaning",
-        description="What the column holds",
-        items=[(name.upper() or 'NONE', label, "") for name, label in FIELDS.items()],
+    field: choice(
+        "Meaning", "What the column holds", [(name.upper() or 'NONE', label, "") for name, label in FIELDS.items()]
     )
-    unit: EnumProperty(
-        name="Unit",
-        description="Unit of its numbers, where neither they nor the title name one",
-        items=[
+    unit: choice(
+        "Unit",
+        "Unit of its numbers, where neither they nor the title name one",
+        [
             ('AUTO', "Automatic", ""),
             *((unit, label, "") for unit, label in zip(("m", "cm", "mm", "ft", "in"), _UNITS, strict=True)),
         ],
     )
-    values: StringProperty(name="Values", options={'HIDDEN'})
+    values: string("Values", **HIDDEN)
 
 
 def show_columns(table: bpy.types.bpy_prop_collection, path: Path) -> None:

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty, StringProperty
 
 from ...buffers import MeshBuffers, PointBuffers
+from ...setting import within
 from ...species.species import Species
+from ..declare import FIXED, boolean, integer, list_of, pointer_to, string
 from ..materials import snow
 from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
@@ -271,61 +272,52 @@ def leave_out_of_file() -> None:
                 keep_materials(collection)
 
 
-_COMMON = {"update": lambda self, _context: dress_results(self.id_data), "options": set()}
+_COMMON = {"update": lambda self, _context: dress_results(self.id_data), **FIXED}
 
 
-def _replaced(kind: str) -> dict:
-    return {
-        "name": f"{kind} Material",
-        "description": (
-            f"Your material for the {kind.lower()} of this species, used instead of TetFlora's and kept when refining. "
-            "Proxies keep the colors of the species"
-        ),
-        "type": bpy.types.Material,
-    }
+def _replaced(kind: str) -> Any:
+    return pointer_to(
+        bpy.types.Material,
+        f"{kind} Material",
+        f"Your material for the {kind.lower()} of this species, used instead of TetFlora's and kept when refining. "
+        "Proxies keep the colors of the species",
+    )
 
 
 class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
     """Output settings of one species."""
 
-    pass_index: IntProperty(
-        name="Pass Index",
-        description="Object index of this species' meshes and proxies, for compositing masks",
-        default=1,
-        min=0,
-        max=32767,
+    pass_index: integer(
+        "Pass Index",
+        "Object index of this species' meshes and proxies, for compositing masks",
+        1,
+        **within(0, high=32767),
         **_COMMON,
     )
-    light_group: StringProperty(
-        name="Light Group",
-        description="Light group of this species' meshes and proxies; if empty, that of all results",
-        **_COMMON,
+    light_group: string(
+        "Light Group", "Light group of this species' meshes and proxies; if empty, that of all results", **_COMMON
     )
-    leaf: PointerProperty(**_replaced("Leaf"))
-    blossom: PointerProperty(**_replaced("Blossom"))
-    bark: PointerProperty(**_replaced("Bark"))
+    leaf: _replaced("Leaf")
+    blossom: _replaced("Blossom")
+    bark: _replaced("Bark")
 
 
 _PLACES = {
-    "show_viewport": BoolProperty(
-        name="Viewports",
-        description="Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
-        default=True,
+    "show_viewport": boolean(
+        "Viewports",
+        "Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
+        True,
         **_COMMON,
     ),
-    "show_render": BoolProperty(
-        name="Renders", description="Show meshes and proxies in renders", default=True, **_COMMON
-    ),
-    "save_results": BoolProperty(
-        name="File",
-        description=(
-            "Save the meshes made by Refine in the file. Otherwise files stay as small as their plants, and Refine "
-            "makes the same meshes again"
-        ),
+    "show_render": boolean("Renders", "Show meshes and proxies in renders", True, **_COMMON),
+    "save_results": boolean(
+        "File",
+        "Save the meshes made by Refine in the file. Otherwise files stay as small as their plants, and Refine "
+        "makes the same meshes again",
         **_COMMON,
     ),
 }
-_RAYS = {name: BoolProperty(**given, **_COMMON) for name, given in SWITCHES.items()}
+_RAYS = {name: boolean(**given, **_COMMON) for name, given in SWITCHES.items()}
 
 
 class TetFloraOutput(
@@ -335,25 +327,19 @@ class TetFloraOutput(
 ):
     """Output settings of all results."""
 
-    pass_index: IntProperty(
-        name="Pass Index",
-        description="Object index of all meshes and proxies, except for species with their own",
-        default=0,
-        min=0,
-        max=32767,
+    pass_index: integer(
+        "Pass Index",
+        "Object index of all meshes and proxies, except for species with their own",
+        **within(0, high=32767),
         **_COMMON,
     )
-    light_group: StringProperty(
-        name="Light Group",
-        description="Light group of all meshes and proxies; matters where they emit light, as with baked lighting",
+    light_group: string(
+        "Light Group",
+        "Light group of all meshes and proxies; matters where they emit light, as with baked lighting",
         **_COMMON,
     )
-    species: CollectionProperty(
-        name="Species",
-        description="Species with their own pass index, light group or materials",
-        type=TetFloraSpeciesOutput,
-    )
-    species_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+    species: list_of(TetFloraSpeciesOutput, "Species", "Species with their own pass index, light group or materials")
+    species_index: integer("Active Species", options={'HIDDEN', 'SKIP_SAVE'})
 
 
 CLASSES = (TetFloraSpeciesOutput, TetFloraOutput)

@@ -25,15 +25,6 @@ from ..materials.nodes import is_ours
 from .looks import LayerLooks
 from .objects import SURFACE_TYPES, materials_of, may_instance, renderable_objects, scatters
 
-#: Of the property `is_explicit`.
-EXPLICIT_PROPERTY = {
-    "name": "Refine This Mesh",
-    "description": (
-        "Refine the object's own polygons with the plants: kept where they are near, drawn as proxies where they are "
-        "far or hidden. Use it for trees from other sources, rocks and scans, and for objects that instance them"
-    ),
-    "options": set(),
-}
 #: Transmission of sheets whose material leaves it open.
 _SHEET_TRANSMISSION = 0.3
 _TYPES = {'FLOAT', 'FLOAT2', 'FLOAT_VECTOR', 'FLOAT_COLOR', 'BYTE_COLOR'}

@@ -43,26 +43,6 @@ SIZE_ATTRIBUTES = {
     YEAR: 'FLOAT',
     PLANT: 'INT',
 }
-#: Properties of objects that are histories.
-STAND_YEAR = {
-    "name": "Stand Year",
-    "description": "Year of the stand's growth that is shown. Animate it to let the stand grow",
-    "default": 100.0,
-    "min": 0.0,
-    "soft_max": 200.0,
-    "max": 10_000.0,
-    "step": 100,
-    "precision": 1,
-}
-STAND_SMOOTH = {
-    "name": "Smooth Growth",
-    "description": (
-        "Let plants grow without jumps from frame to frame, for animations. Each frame then takes longer to prepare. "
-        "Off, each plant has the form that is nearest to its size, which is best for stills"
-    ),
-    "default": False,
-    "options": {'HIDDEN'},
-}
 _MOST_FIT, _MOST_OFFSET = 10.0, 10.0
 _STEADY = np.cos(np.radians(30.0))  # trunks that turn further from one record to the next have fallen
 

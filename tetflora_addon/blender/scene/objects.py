@@ -18,31 +18,20 @@ from zlib import crc32
 
 import bpy
 import numpy as np
-from bpy.props import PointerProperty
 from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
 from ..attributes import evaluated_mesh, members, read, values_of, world_matrix
+from ..declare import pointer_to
 from ..species.asset_species import asset_of, asset_species
 from .looks import LayerLooks
-
-#: Of the property `is_scatter`.
-SCATTER_PROPERTY = {
-    "name": "Refine Scatter",
-    "description": (
-        "Refine what the object's modifiers or particles scatter: instances stay as they are where they are near, and "
-        "become proxies where they are far or hidden. The object goes on scattering by its own rules, and its own "
-        "surface stays as it is"
-    ),
-    "options": set(),
-}
 
 
 class TetFloraLinkedScatter(bpy.types.PropertyGroup):
     """A linked object whose scatter is refined."""
 
-    object: PointerProperty(name="Object", description="Linked object whose scatter is refined", type=bpy.types.Object)
+    object: pointer_to(bpy.types.Object, "Object", "Linked object whose scatter is refined")
 
 
 def is_scatter(obj: bpy.types.Object) -> bool:

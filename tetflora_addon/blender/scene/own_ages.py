@@ -17,17 +17,6 @@ from ...errors import SceneError
 MOST_YEARS = 10_000.0
 #: Attribute of fields whose plants differ in their ages; one with `field_points.PREFIX` overrides it.
 AGE = "age"
-#: The age of a plant, for property groups.
-AGE_PROPERTY = {
-    "name": "Age",
-    "description": "Age in years; 0 is full-grown, as the species describes it. Species that are assets have none",
-    "default": 0.0,
-    "min": 0.0,
-    "soft_max": 200.0,
-    "max": MOST_YEARS,
-    "step": 100,
-    "precision": 1,
-}
 
 
 def stored_ages(plants: Sequence[bpy.types.Object]) -> NDArray[np.float64] | None:

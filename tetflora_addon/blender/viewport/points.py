@@ -15,13 +15,13 @@ from dataclasses import dataclass, field
 import bpy
 import gpu
 import numpy as np
-from bpy.props import BoolProperty
 from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
 from ...camera.camera import origin_near
 from ...errors import TetFloraError
 from .. import compat
+from ..declare import once
 from ..placing import properties
 from ..placing.populations import own_objects
 from ..placing.rules import awaits_update, makes_field, read_search, shown_population
@@ -213,15 +213,12 @@ _HANDLERS = Handlers(undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_p
 
 def register() -> None:
     """Listen to changes of populations and species, undo and loading."""
-    bpy.types.WindowManager.tetflora_points = BoolProperty(
-        name="Preview Points",
-        description=(
-            "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
-            "colored by species, updated with every change. Creates no objects"
-        ),
+    bpy.types.WindowManager.tetflora_points = once.boolean(
+        "Preview Points",
+        "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
+        "colored by species, updated with every change. Creates no objects",
         get=lambda _: bpy.context.scene is not None and shown_in(bpy.context.scene),
         set=lambda _, on: show(bpy.context.scene, on),
-        options={'SKIP_SAVE'},
     )
     properties.listeners.append(schedule)
     edits.listeners.append(schedule)
