@@ -15,7 +15,7 @@ from .placing import properties
 from .placing.plant_objects import show_age
 from .results import collection
 from .results.proxy_kinds import proxy_kind_property
-from .runtime import Listeners
+from .runtime import Listeners, classes_in
 from .scene import objects
 from .scene.field_sizes import stored_now
 from .scene.skeletons import SKELETON_TYPES
@@ -264,11 +264,8 @@ _MODULES = (
     *(editor, edits, asset_species, objects, settings, columns),
 )
 CLASSES = (
-    *(cls for module in _MODULES for cls in module.CLASSES),
-    TetFloraFieldEntry,
-    TetFloraLeafObject,
-    TetFloraObject,
-    TetFloraScene,
+    *classes_in(_MODULES, bpy.types.PropertyGroup),
+    *(TetFloraFieldEntry, TetFloraLeafObject, TetFloraObject, TetFloraScene),
 )
 
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
@@ -276,9 +273,8 @@ _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 def register() -> None:
     """Register the property groups and add them to Blender's types."""
-    TetFloraScene.__annotations__["proxy_kind"] = (
-        proxy_kind_property()
-    )  # forms may have come while it was not registered
+    # Forms may have come while it was not registered.
+    TetFloraScene.__annotations__["proxy_kind"] = proxy_kind_property()
     _register()
     bpy.types.Object.tetflora = pointer_to(TetFloraObject, override=_OVERRIDES)
     bpy.types.Scene.tetflora = pointer_to(TetFloraScene)

@@ -321,10 +321,6 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
 _MIDDLES, _HALF = (20.0, 125.0, 196.0, 293.0), 182.0
 
 
-def _season_number(year: bpy.types.PropertyGroup) -> int:
-    return SEASONS.index(season_name(Season(year.day % DAYS, year.latitude)))
-
-
 def _go_to_season(year: bpy.types.PropertyGroup, number: int) -> None:
     day = _MIDDLES[number] + (0.0 if year.latitude >= 0.0 else _HALF)
     year.enabled, year.day = True, (day - 1.0) % 365.0 + 1.0
@@ -349,7 +345,7 @@ class TetFloraYear(bpy.types.PropertyGroup):
             ('SUMMER', "Summer", "Full leaves of July"),
             ('AUTUMN', "Autumn", "Leaves of late October, most of them turned"),
         ),
-        get=_season_number,
+        get=lambda year: SEASONS.index(season_name(Season(year.day % DAYS, year.latitude))),
         set=_go_to_season,
     )
     day: _SEASON.day
@@ -406,6 +402,3 @@ def begin(scene: bpy.types.Scene) -> None:
     values = QUALITIES[chosen.new_quality]
     if not any(group.is_property_set(name) for name in values):
         set_quality(group, list(QUALITIES).index(chosen.new_quality))
-
-
-CLASSES = (TetFloraWind, TetFloraYear)

@@ -86,17 +86,6 @@ class _Mesh:
         return float((np.abs(np.linalg.det(self.places[:, :3, :3])) ** (2.0 / 3.0)).sum())
 
 
-def _meshes_of(
-    target: Target, matrix: NDArray[np.float64], depsgraph: bpy.types.Depsgraph, looks: Looks
-) -> list[_Mesh]:
-    found = []
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                found.append(_read_one(*opened, matrix @ part.matrices, looks))
-    return found
-
-
 def _read_one(
     mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], places: NDArray[np.float64], looks: Looks
 ) -> _Mesh:
@@ -149,7 +138,7 @@ def measure(variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: b
     """
     found, looks = [], Looks()
     for target, matrix in variants:
-        meshes = _meshes_of(target, matrix, depsgraph, looks)
+        meshes = [_read_one(*one, matrix @ part.matrices, looks) for part, *one in target.meshes(depsgraph)]
         if meshes:
             found.append(_measured(meshes, picture=not found))
     if not found:
@@ -186,11 +175,9 @@ def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
 
 def _boxes(target: Target, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
     """Extent of each mesh of a target, and its places."""
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                positions = np.nan_to_num(read(opened[0], "position"))
-                yield positions.min(axis=0), positions.max(axis=0), part.matrices
+    for part, mesh, _ in target.meshes(depsgraph):
+        positions = np.nan_to_num(read(mesh, "position"))
+        yield positions.min(axis=0), positions.max(axis=0), part.matrices
 
 
 def _extent(low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[float, float]:

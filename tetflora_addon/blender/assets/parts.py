@@ -337,6 +337,13 @@ class Target:
         """What it consists of, see `parts.parts_of`."""
         return parts_of(self.shown, self.name, depsgraph)
 
+    def meshes(self, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[AssetPart, bpy.types.Mesh, Slots]]:
+        """Its parts with faces one after the other, each with its mesh and materials while it is looked at."""
+        for part in self.parts(depsgraph)[0]:
+            with part.opened(depsgraph) as opened:
+                if opened is not None:
+                    yield part, *opened
+
 
 def digest_of(target: Target, depsgraph: bpy.types.Depsgraph) -> str:
     """Hexadecimal digest of all that a target shows: meshes, their attributes, materials and images, and places.

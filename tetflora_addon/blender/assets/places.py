@@ -197,11 +197,7 @@ def shows_faces(target: Target, depsgraph: bpy.types.Depsgraph) -> bool:
     SceneError
         It instances itself; the message names what does.
     """
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                return True
-    return False
+    return any(True for _ in target.meshes(depsgraph))
 
 
 def _target(datablock: bpy.types.Object | bpy.types.Collection) -> Target:

@@ -69,6 +69,3 @@ def columns_in(text: str) -> dict[str, str]:
     if not isinstance(columns, dict) or not all(isinstance(value, str) for value in columns.values()):
         raise SceneError('Columns is not a JSON object of texts, such as {"H": "height"}')
     return columns
-
-
-CLASSES = (TetFloraInventoryColumn,)

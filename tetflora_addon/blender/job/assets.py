@@ -128,12 +128,7 @@ def _costs(
 
 def triangles_of(target: Target, depsgraph: bpy.types.Depsgraph) -> int:
     """Triangles of an asset, without reading any."""
-    number = 0
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                number += (len(opened[0].loops) - 2 * len(opened[0].polygons)) * len(part.matrices)
-    return number
+    return sum((len(m.loops) - 2 * len(m.polygons)) * len(part.matrices) for part, m, _ in target.meshes(depsgraph))
 
 
 def _covered(placed: PlacedAssets, camera: Camera) -> NDArray[np.float64]:

@@ -241,12 +241,10 @@ def _write_clusters(
 def read_meshes(target: Target, depsgraph: bpy.types.Depsgraph) -> AssetMeshes:
     """All surfaces of an asset, numbered as those of its `AssetSource`."""
     surfaces, numbers, matrices = [], [], []
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                numbers += [len(surfaces)] * len(part.matrices)
-                surfaces.append(read_mesh(*opened))
-                matrices.append(part.matrices)
+    for part, *one in target.meshes(depsgraph):
+        numbers += [len(surfaces)] * len(part.matrices)
+        surfaces.append(read_mesh(*one))
+        matrices.append(part.matrices)
     return AssetMeshes(surfaces, np.array(numbers, np.int32), np.concatenate(matrices))
 
 

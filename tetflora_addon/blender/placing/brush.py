@@ -176,27 +176,24 @@ class Stroke:
     def dab(self, center: Sequence[float], pressure: float = 1.0) -> int:
         """Do what the brush does at a place on the ground (3 floats); how many plants that adds or removes."""
         with self._data.watched():
-            return self._dab(center, pressure)
-
-    def _dab(self, center: Sequence[float], pressure: float) -> int:
-        brush, _ = brush_of(self.scene, pressure)
-        dab, self.dabs = self.dabs, self.dabs + 1
-        if self.mode == 'PAINT':
-            return self._paint(brush, center, dab)
-        # Those that cannot be removed count for Thin: they are denser all the same.
-        decide = strokes.erase if self.mode == 'ERASE' else strokes.thin
-        alive = np.flatnonzero(~self._gone)
-        chosen = alive[decide(brush, center, self.standing.places[alive], self.key, dab)]
-        chosen = chosen[self.standing.removable[chosen]]
-        self._gone[chosen] = True
-        self.removed += len(chosen)
-        if self.mode == 'THIN' or brush.strength < _STRONG:
-            self._weak = True
-        else:
-            last = np.subtract(self._cleared[-1], center[:2]) if self._cleared else np.inf
-            if len(chosen) or np.linalg.norm(last) > _SAME * brush.radius:
-                self._cleared.append((center[0], center[1]))
-        return len(chosen)
+            brush, _ = brush_of(self.scene, pressure)
+            dab, self.dabs = self.dabs, self.dabs + 1
+            if self.mode == 'PAINT':
+                return self._paint(brush, center, dab)
+            # Those that cannot be removed count for Thin: they are denser all the same.
+            decide = strokes.erase if self.mode == 'ERASE' else strokes.thin
+            alive = np.flatnonzero(~self._gone)
+            chosen = alive[decide(brush, center, self.standing.places[alive], self.key, dab)]
+            chosen = chosen[self.standing.removable[chosen]]
+            self._gone[chosen] = True
+            self.removed += len(chosen)
+            if self.mode == 'THIN' or brush.strength < _STRONG:
+                self._weak = True
+            else:
+                last = np.subtract(self._cleared[-1], center[:2]) if self._cleared else np.inf
+                if len(chosen) or np.linalg.norm(last) > _SAME * brush.radius:
+                    self._cleared.append((center[0], center[1]))
+            return len(chosen)
 
     def _paint(self, brush: Brush, center: Sequence[float], dab: int) -> int:
         # Of a million plants only those nearby are copied.
@@ -218,36 +215,30 @@ class Stroke:
     def flush(self) -> None:
         """Change the scene by what the dabs since the last flush decided."""
         with self._data.watched():
-            self._flush()
-
-    def _flush(self) -> None:
-        changes = self.pending > 0
-        if self._gone.any():
-            for uid, places in self.standing.by_population(self._gone).items():
-                self._taken.setdefault(uid, []).append(places)
-            self.standing.remove(self._gone)
-        if any(len(keys) for _, keys in self._new):
-            self._make(*(np.concatenate(part) for part in zip(*self._new, strict=True)))
-        self._new, self._gone = [], np.zeros(len(self.standing.places), bool)
-        self.changed = self.changed or changes
+            changes = self.pending > 0
+            if self._gone.any():
+                for uid, places in self.standing.by_population(self._gone).items():
+                    self._taken.setdefault(uid, []).append(places)
+                self.standing.remove(self._gone)
+            if any(len(keys) for _, keys in self._new):
+                self._make(*(np.concatenate(part) for part in zip(*self._new, strict=True)))
+            self._new, self._gone = [], np.zeros(len(self.standing.places), bool)
+            self.changed = self.changed or changes
 
     def finish(self) -> None:
         """Flush, and store in populations which plants the stroke removed."""
         with self._data.watched():
-            self._finish()
-
-    def _finish(self) -> None:
-        self._flush()
-        for population in self.scene.tetflora.layers:
-            taken = self._taken.get(population.uid)
-            if taken is None:
-                continue
-            population.made = own_number(own_objects(self.scene, population))
-            if self._weak:
-                note_erased(population, np.concatenate(taken), _PLACE)
-            if self._cleared:
-                note_erased(population, self._cleared, self.scene.tetflora.brush.radius)
-        self._taken, self._cleared, self._weak = {}, [], False
+            self.flush()
+            for population in self.scene.tetflora.layers:
+                taken = self._taken.get(population.uid)
+                if taken is None:
+                    continue
+                population.made = own_number(own_objects(self.scene, population))
+                if self._weak:
+                    note_erased(population, np.concatenate(taken), _PLACE)
+                if self._cleared:
+                    note_erased(population, self._cleared, self.scene.tetflora.brush.radius)
+            self._taken, self._cleared, self._weak = {}, [], False
 
     def _make(self, places: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
         brush, species = brush_of(self.scene)

@@ -8,7 +8,6 @@ scene.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
 
@@ -22,6 +21,7 @@ from ...planting.places import Placement
 from ...planting.plane import Spacing
 from ..attributes import write
 from ..compat import shader_tree
+from ..materials.bark import tones
 from ..materials.nodes import Graph, find_socket
 from ..species.catalog import default_species
 from ..species.edits import catalog
@@ -53,7 +53,7 @@ def tread(material: bpy.types.Material) -> None:
         graph.node("ShaderNodeTexNoise", {"Vector": place, "Scale": scale, "Detail": detail})
         for scale, detail in ((1.2, 5.0), (9.0, 6.0))
     )
-    earth = _ramp(graph, fine, ((0.35, (0.085, 0.06, 0.038)), (0.65, (0.19, 0.14, 0.09))))
+    earth = tones(graph, fine, ((0.35, (0.085, 0.06, 0.038)), (0.65, (0.19, 0.14, 0.09))))
     ragged = graph.math('MULTIPLY_ADD', coarse, 1.8, graph.attribute("aside", "Fac"))
     graph.feed(color, graph.mixed(graph.step(ragged, 1.3, 2.6), earth, floor))
 
@@ -68,18 +68,10 @@ def sky(name: str) -> bpy.types.World:
     graph = Graph(shader_tree(world))
     place = find_socket(graph.node("ShaderNodeTexCoord").outputs, "Generated")
     height = graph.node("ShaderNodeSeparateXYZ", {"Vector": place}).outputs["Z"]
-    color = _ramp(graph, height, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.2, 0.3, 0.51))))
+    color = tones(graph, height, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.2, 0.3, 0.51))))
     background = graph.node("ShaderNodeBackground", {"Color": color, "Strength": 0.7})
     graph.node("ShaderNodeOutputWorld", {"Surface": background})
     return world
-
-
-def _ramp(graph: Graph, factor: object, stops: Sequence[tuple[float, tuple[float, ...]]]) -> bpy.types.NodeSocket:
-    """Colors between two stops."""
-    ramp = graph.node("ShaderNodeValToRGB", {"Fac": factor})
-    for element, (position, color) in zip(ramp.color_ramp.elements, stops, strict=True):
-        element.position, element.color = position, (*color, 1.0)
-    return ramp.outputs["Color"]
 
 
 @dataclass(frozen=True)

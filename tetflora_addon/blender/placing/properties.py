@@ -45,10 +45,6 @@ listeners = Listeners()
 _kept_items: dict[int, list] = {}  # Blender keeps no copy of the strings of dynamic items
 
 
-def _notify(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    listeners.notify()
-
-
 def _on_distance(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     settings.distance_from = 'OWN'
     listeners.notify()
@@ -60,7 +56,7 @@ def _choose_distance(settings: bpy.types.PropertyGroup, by_species: bool) -> Non
 
 
 #: Options of settings that the preview follows.
-LIVE = {**FIXED, "update": _notify}
+LIVE = {**FIXED, "update": lambda _group, _context: listeners.notify()}
 _COMPANION = properties_of(Companion, **LIVE)
 _DISTANCE = {**FIXED, "update": _on_distance}
 _BY_SPECIES = partial(
@@ -112,7 +108,7 @@ class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
     companion_distance: _COMPANION.distance
     habitat: choice("Grows", "Where under the other plants this species is found", HABITATS, default='ANYWHERE', **LIVE)
     shed_by: string(
-        "Shed By", "Identifier of the species that sheds what lies there; any if empty", **HIDDEN, update=_notify
+        "Shed By", "Identifier of the species that sheds what lies there; any if empty", **{**LIVE, **HIDDEN}
     )
 
 
@@ -381,11 +377,3 @@ class TetFloraBrush(
     )
     seed: integer("Seed", **HIDDEN)
     strokes: integer("Strokes", "Strokes painted so far; each draws its own random numbers", min=0, **HIDDEN)
-
-
-CLASSES = (
-    TetFloraMixEntry,
-    TetFloraGround,
-    TetFloraLayer,
-    TetFloraBrush,
-)

@@ -340,6 +340,3 @@ class TetFloraOutput(
     )
     species: list_of(TetFloraSpeciesOutput, "Species", "Species with their own pass index, light group or materials")
     species_index: integer("Active Species", options={'HIDDEN', 'SKIP_SAVE'})
-
-
-CLASSES = (TetFloraSpeciesOutput, TetFloraOutput)

@@ -72,9 +72,6 @@ def is_drop(obj: bpy.types.Object) -> bool:
     return species is not None and not species.variants
 
 
-CLASSES = (TetFloraLinkedScatter,)
-
-
 #: What nodes instance.
 Reference = bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet
 

@@ -156,6 +156,3 @@ def picture_of(entry: TetFloraAssetSpecies) -> NDArray[np.uint8] | None:
     if len(pixels) != size:
         return None
     return np.frombuffer(pixels, np.uint8).reshape(PICTURE_SIDE, PICTURE_SIDE, 4)
-
-
-CLASSES = (TetFloraAssetSpecies,)

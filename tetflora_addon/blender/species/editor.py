@@ -447,6 +447,3 @@ TetFloraSpeciesEditor = type(
         "__module__": __name__,
     },
 )
-
-
-CLASSES = (TetFloraSpeciesEditor,)

@@ -371,9 +371,6 @@ def edited_infos() -> dict[str, SpeciesInfo]:
     return found
 
 
-CLASSES = (TetFloraSpeciesEdit,)
-
-
 def pack(_path: object = None, _other: object = None) -> None:
     """Before a file is written: bring the pages of its collections up to date."""
     shipped = builtin_folder()

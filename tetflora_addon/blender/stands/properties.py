@@ -87,6 +87,3 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
     vertex_group: string(
         "Vertex Group", "Vertex group of the ground whose weights say where plants can stand: 0 is bare", **FIXED
     )
-
-
-CLASSES = (TetFloraStandEntry, TetFloraStand)
