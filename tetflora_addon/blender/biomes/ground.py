@@ -11,8 +11,8 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers
 from ...growth.hashing import key_of_seed
 from ...planting.canopy import Sheet
 from ...planting.plane import gradient_noise
@@ -36,9 +36,7 @@ _WAVES = ((46.0, 0.42), (17.0, 0.1), (5.0, 0.016))
 _FLOOR, _BANK, _BROOK, _DEEP = 7.0, 22.0, 4.5, 0.16
 
 
-def heights(
-    x: NDArray[np.float64], y: NDArray[np.float64], ground: Mapping[str, Any], seed: int = 0
-) -> NDArray[np.float64]:
+def heights(x: Floats, y: Floats, ground: Mapping[str, Any], seed: int = 0) -> Floats:
     """Of land for a biome, meters: hills, a slope that rises to the north, and a valley from west to east."""
     value = {name: ground.get(name, GROUND[name][0]) for name in ("hills", "slope", "valley")}
     points, key = np.stack([x, y], axis=-1).reshape(-1, 2), key_of_seed(seed)
@@ -52,7 +50,7 @@ def heights(
     return value["hills"] * 2.0 * rough + tan(radians(value["slope"])) * y + low
 
 
-def brook(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def brook(x: Floats) -> Floats:
     """Where the middle of a valley is, y by x, meters."""
     return 7.0 * np.sin(np.asarray(x) / 19.0) + 3.0 * np.sin(np.asarray(x) / 7.3 + 1.0)
 
@@ -134,7 +132,7 @@ def lay_biome_soil(
 
 def _low_plants(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str, sheet: Sheet
-) -> Iterable[tuple[bool, NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]]:
+) -> Iterable[tuple[bool, Integers, Floats, Floats]]:
     """Plants of the layers of a biome: whether they are low, their cells, what each hides, m², and its color."""
     for population in scene.tetflora.layers:
         if population.biome != uid:
@@ -149,7 +147,7 @@ def _low_plants(
             yield bool(population.covers), place[:, 1] * sheet.columns + place[:, 0], seen, colors
 
 
-def _blurred(grid: NDArray[np.float64], reach: int = 8) -> NDArray[np.float64]:
+def _blurred(grid: Floats, reach: int = 8) -> Floats:
     """Means over squares of 2 · reach + 1 cells, (rows, columns)."""
     for axis in (0, 1):
         sums = np.cumsum(np.pad(grid, [(reach + 1, reach) if a == axis else (0, 0) for a in (0, 1)], mode="edge"), axis)

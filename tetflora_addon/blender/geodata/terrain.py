@@ -20,6 +20,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers
 from ...errors import SceneError
 from ...files import read_whole
 from ...geodata.geotiff import place_of_image, use_zstandard
@@ -184,7 +185,7 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
     return Imported(made, [ground, *notes])
 
 
-def _faces(raster: Raster) -> NDArray[np.int64]:
+def _faces(raster: Raster) -> Integers:
     """Cells at the corners of quads, (f, 4), counter-clockwise from above, between cells that have values."""
     known = np.isfinite(raster.values)
     whole = known[:-1, :-1] & known[1:, :-1] & known[1:, 1:] & known[:-1, 1:]
@@ -206,7 +207,7 @@ def _photo_place(path: Path, ground: System) -> Raster:
     return place if place.system.epsg else replace(place, system=ground)
 
 
-def _photo_material(path: Path, cells: NDArray[np.float64]) -> tuple[bpy.types.Material, NDArray[np.float64], int]:
+def _photo_material(path: Path, cells: Floats) -> tuple[bpy.types.Material, Floats, int]:
     """A material of an image, UV (n, 2) of places in its pixels (n, 2), and how many of these lie beside it."""
     unreadable = "Blender cannot read this image; write it as JPEG, PNG or 8-bit TIFF"
     image = _loaded(path, unreadable)

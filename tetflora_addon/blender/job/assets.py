@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers32
 from ...assets import asset_cache
 from ...assets.asset import Asset, AssetSource, AssetTable, Instances
 from ...assets.compiled import compile_steps
@@ -42,10 +42,10 @@ class SceneAssets:
 
     targets: tuple[Target, ...]  # what each asset is of
     placed: PlacedAssets  # instances, in the coordinates of the job
-    matrices: NDArray[np.float64]  # (n, 4, 4): the same, as Blender takes them
+    matrices: Floats  # (n, 4, 4): the same, as Blender takes them
     #: Objects that show instances; None for those that are plants of many objects
     owners: tuple[bpy.types.Object | None, ...]
-    owner: NDArray[np.int32]  # (n,): index into these
+    owner: Integers32  # (n,): index into these
     originals: OriginalPolicy  # which are always drawn as the originals
     warnings: tuple[str, ...] = field(default=())
 
@@ -65,11 +65,7 @@ def is_plain(scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.ty
 
 
 def bind_steps(
-    scene: bpy.types.Scene,
-    places: Sequence[Places],
-    depsgraph: bpy.types.Depsgraph,
-    camera: Camera,
-    left: float,
+    scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.types.Depsgraph, camera: Camera, left: float
 ) -> Generator[Progress, bool | None, SceneAssets | None]:
     """Compile the assets of places, which count from the camera's origin; None where there are none.
 
@@ -115,7 +111,7 @@ def _in_cycles(scene: bpy.types.Scene) -> bool:
 
 
 def _costs(
-    places: Sequence[Places], depsgraph: bpy.types.Depsgraph, pixels: NDArray[np.float64] | None = None
+    places: Sequence[Places], depsgraph: bpy.types.Depsgraph, pixels: Floats | None = None
 ) -> tuple[list[Target], AssetCosts]:
     numbers: dict[Target, int] = {}
     for one in places:
@@ -131,7 +127,7 @@ def triangles_of(target: Target, depsgraph: bpy.types.Depsgraph) -> int:
     return sum((len(m.loops) - 2 * len(m.polygons)) * len(part.matrices) for part, m, _ in target.meshes(depsgraph))
 
 
-def _covered(placed: PlacedAssets, camera: Camera) -> NDArray[np.float64]:
+def _covered(placed: PlacedAssets, camera: Camera) -> Floats:
     """Pixels (a,) that instances of each asset would cover if nothing hid them."""
     wholes = placed.wholes()
     seen = camera.distance_to_view(wholes.center) < wholes.reach
@@ -140,11 +136,7 @@ def _covered(placed: PlacedAssets, camera: Camera) -> NDArray[np.float64]:
 
 
 def _compiled(
-    scene: bpy.types.Scene,
-    target: Target,
-    depsgraph: bpy.types.Depsgraph,
-    progress: Progress,
-    warnings: list[str],
+    scene: bpy.types.Scene, target: Target, depsgraph: bpy.types.Depsgraph, progress: Progress, warnings: list[str]
 ) -> Generator[Progress, bool | None, Asset]:
     """The compiled asset of a target, known already or made now."""
     hidden = bool(hidden_originals(scene))

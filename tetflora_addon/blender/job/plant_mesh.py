@@ -10,8 +10,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...compiled.flora import Flora
 from ...emission.expansion import coarse_faces
@@ -36,7 +36,7 @@ from .contents import check_fits, compile_for, in_year, memory_left
 _UPRIGHT = np.eye(3)
 
 
-def single_seed(identifier: str, seed: int, frame: NDArray[np.float64] = _UPRIGHT) -> Seeds:
+def single_seed(identifier: str, seed: int, frame: Floats = _UPRIGHT) -> Seeds:
     """One plant at the origin, of scale 1; its frame (3, 3) matters because leaves turn to the sky."""
     return Seeds(
         identifiers=(identifier,),
@@ -151,9 +151,7 @@ def make_plant_mesh_steps(
     return made
 
 
-def _placed(
-    mesh: bpy.types.Mesh, plant: bpy.types.Object, frame: NDArray[np.float64], position: NDArray[np.float64]
-) -> bpy.types.Object:
+def _placed(mesh: bpy.types.Mesh, plant: bpy.types.Object, frame: Floats, position: Floats) -> bpy.types.Object:
     """An object of a plant's mesh with the plant's look and collections, at its place (3,) with its axes (3, 3)."""
     obj = bpy.data.objects.new(mesh.name, mesh)
     for collection in plant.users_collection:

@@ -20,9 +20,9 @@ from typing import TypeVar
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import memory
+from ...arrays import Integers, Integers32, Keys, Mask
 from ...assets.kites import kite_mesh
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...camera.camera import Camera, origin_near
@@ -106,7 +106,7 @@ class _Run:
     baking: Baking | None = None
 
 
-def left_alone(bound: SceneAssets, plan: AssetPlan) -> NDArray[np.bool_]:
+def left_alone(bound: SceneAssets, plan: AssetPlan) -> Mask:
     """Owners (k,) of which every instance is the original: they go on showing them themselves."""
     whole = np.zeros(len(bound.placed), bool)
     whole[plan.originals] = True
@@ -132,7 +132,7 @@ def _write_plain(run: _Run) -> None:
         add_instances(run.results, f"{target.name} {number:03d}", source, matrices, _ids(keys))
 
 
-def _ids(keys: NDArray[np.uint64]) -> NDArray[np.int32]:
+def _ids(keys: Keys) -> Integers32:
     return (keys >> np.uint64(33)).astype(np.int32)
 
 
@@ -165,8 +165,8 @@ def write_assets(run: _Run, plan: AssetPlan) -> Generator[Progress, None, None]:
 
 
 def _groups(
-    bound: SceneAssets, asset: NDArray[np.int32], owner: NDArray[np.int32]
-) -> Iterator[tuple[Target, bpy.types.Object | None, NDArray[np.int64]]]:
+    bound: SceneAssets, asset: Integers32, owner: Integers32
+) -> Iterator[tuple[Target, bpy.types.Object | None, Integers]]:
     """Rows (k,) of the same asset and the same owner each."""
     for pair in np.unique(asset.astype(np.int64) * len(bound.owners) + owner).tolist():
         target, shown = divmod(pair, len(bound.owners))
@@ -205,9 +205,9 @@ def _kites(run: _Run, target: int) -> Maker:
 def _write_clusters(
     run: _Run,
     target: int,
-    cluster: NDArray[np.int64],
-    instance: NDArray[np.int32],
-    ids: NDArray[np.int32],
+    cluster: Integers,
+    instance: Integers32,
+    ids: Integers32,
     kites: bool,
     maker: Callable[[_Run, int], Maker],
 ) -> Generator[Progress, None, None]:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Keys, Mask
 from ...errors import SceneError
 from ...planting import strokes
 from ...planting.places import Placement
@@ -99,16 +99,16 @@ class Standing:
         self.source, self.number = np.concatenate(source).astype(np.int32), np.concatenate(number).astype(np.int64)
         self.removable = np.concatenate(removable)  # (n,)
 
-    def add(self, places: NDArray[np.float64], source: int, first: int) -> None:
+    def add(self, places: Floats, source: int, first: int) -> None:
         """Note new plants: at the end of the list of objects or of a field, from number ``first`` on."""
         self.places = np.concatenate([self.places, places])
         self.source = np.concatenate([self.source, np.full(len(places), source, np.int32)])
         self.number = np.concatenate([self.number, first + np.arange(len(places))])
         self.removable = np.concatenate([self.removable, np.ones(len(places), bool)])
 
-    def by_population(self, gone: NDArray[np.bool_]) -> dict[str, NDArray[np.float64]]:
+    def by_population(self, gone: Mask) -> dict[str, Floats]:
         """Places of plants, (n,) bool, by the identity of their population; without those of none."""
-        found: dict[str, list[NDArray[np.float64]]] = {}
+        found: dict[str, list[Floats]] = {}
         for source in np.unique(self.source[gone]).tolist():
             own = np.flatnonzero(gone & (self.source == source))
             if source != _OBJECTS:
@@ -119,7 +119,7 @@ class Standing:
                 found.setdefault(uid, []).append(self.places[own[uids == uid]])
         return {uid: np.concatenate(places) for uid, places in found.items() if uid}
 
-    def remove(self, gone: NDArray[np.bool_]) -> None:
+    def remove(self, gone: Mask) -> None:
         """Take plants, (n,) bool, out of the scene and out of the arrays."""
         single = gone & (self.source == _OBJECTS)
         if single.any():
@@ -148,11 +148,7 @@ class Stroke:
     """
 
     def __init__(
-        self,
-        scene: bpy.types.Scene,
-        view_layer: bpy.types.ViewLayer,
-        depsgraph: bpy.types.Depsgraph,
-        mode: str,
+        self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, depsgraph: bpy.types.Depsgraph, mode: str
     ) -> None:
         settings = scene.tetflora.brush
         self.scene, self.mode = scene, mode
@@ -167,11 +163,11 @@ class Stroke:
         self.key = strokes.stroke_key(settings.seed, settings.strokes)
         settings.strokes += 1
         self.dabs = self.added = self.removed = 0
-        self._new: list[tuple[NDArray[np.float64], NDArray[np.uint64]]] = []
+        self._new: list[tuple[Floats, Keys]] = []
         self._gone = np.zeros(len(self.standing.places), bool)
         self._cleared: list[tuple[float, float]] = []  # middles of dabs that clear the ground
         self._weak = False  # whether there were others
-        self._taken: dict[str, list[NDArray[np.float64]]] = {}  # places of plants by their population
+        self._taken: dict[str, list[Floats]] = {}  # places of plants by their population
 
     def dab(self, center: Sequence[float], pressure: float = 1.0) -> int:
         """Do what the brush does at a place on the ground (3 floats); how many plants that adds or removes."""
@@ -240,7 +236,7 @@ class Stroke:
                     note_erased(population, self._cleared, self.scene.tetflora.brush.radius)
             self._taken, self._cleared, self._weak = {}, [], False
 
-    def _make(self, places: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+    def _make(self, places: Floats, keys: Keys) -> None:
         brush, species = brush_of(self.scene)
         made = strokes.individuals(brush, keys)
         placement = Placement(position=places, wanted=len(keys), **made)
@@ -269,9 +265,7 @@ class Stroke:
         standing.add(places, number, first)
 
 
-def draped_circle(
-    ground: Ground, center: Sequence[float], normal: Sequence[float], radius: float
-) -> NDArray[np.float64]:
+def draped_circle(ground: Ground, center: Sequence[float], normal: Sequence[float], radius: float) -> Floats:
     """The brush's circle on the map laid on the ground, (49, 3) with the first corner twice.
 
     Where there is no ground, it goes on in the plane through the center.

@@ -13,8 +13,8 @@ from hashlib import blake2b
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...growth.crown_shapes import BASE, WIDTH
 from ...planting.canopy import Canopy, Sheet
 from ...planting.cover import Floor, Habitat, Suits, mapping
@@ -69,7 +69,7 @@ def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     return canopy, tuple(numbers)
 
 
-def _shaped(crowns: NDArray[np.float64], form: NDArray[np.float64] | None) -> NDArray[np.float64]:
+def _shaped(crowns: Floats, form: Floats | None) -> Floats:
     """Radius, base, top and leaf area (n, 4) of crowns that have forms (n, 5) of their own."""
     if form is None:
         return crowns
@@ -88,7 +88,7 @@ def standing(scene: bpy.types.Scene) -> set[str]:
     return found
 
 
-def floor_steps(canopy: Canopy, triangles: NDArray[np.float64], kinds: int) -> Generator[float, object, Floor]:
+def floor_steps(canopy: Canopy, triangles: Floats, kinds: int) -> Generator[float, object, Floor]:
     """Maps of the ground (t, 3, 3) under plants; those of the same ground and plants are made once."""
     sheet = Sheet.over(triangles.reshape(-1, 3))
     content = blake2b(repr((sheet, kinds)).encode(), digest_size=16)
@@ -107,7 +107,7 @@ def read_suits(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     population: bpy.types.PropertyGroup,
-    triangles: NDArray[np.float64],
+    triangles: Floats,
     species: tuple[str, ...],
 ) -> Callable[[], dict[int, Suits]]:
     """What finds, without Blender, how suitable the ground (t, 3, 3) is for those species that do not grow anywhere."""

@@ -17,8 +17,8 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...errors import SceneError, TetFloraError
 from ...files import is_identifier
 from ...growth.hashing import child_key, key_of_seed, uniform
@@ -297,7 +297,7 @@ def _strata(
     growing: list[Stratum] = []
     for entry in cover.mix:
         habitat, crown = Habitat[entry.habitat], crown_for(scene, entry.species)
-        suits: NDArray[np.float64] = floor.map_of(habitat, shedder_of(entry, above))
+        suits: Floats = floor.map_of(habitat, shedder_of(entry, above))
         patch = 0.6 if habitat.value[1] else 1.0  # of the ground is within patches
         one = Stratum(patch * suits, thin * entry.weight, crown.seen, np.array(crown.color))
         (lying if habitat.falls else growing).append(one)

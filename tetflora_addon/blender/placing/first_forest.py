@@ -14,8 +14,8 @@ from math import radians
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...planting.places import Placement
 from ...planting.plane import Spacing
@@ -141,7 +141,7 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
     return scene, note
 
 
-def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def height(x: Floats, y: Floats) -> Floats:
     """The ground's height at places on the map, meters; the path lies in a shallow hollow and the land rises beyond."""
     x, y = np.asarray(x, float), np.asarray(y, float)
     waves = 0.5 * np.sin(0.11 * x + 0.6) * np.cos(0.083 * y) + 0.22 * np.sin(0.29 * x - 0.17 * y + 1.0)
@@ -150,7 +150,7 @@ def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64
     return waves * np.clip(aside / 4.0, 0.25, 1.0) + banks + 5.0 * np.clip((y - 20.0) / 90.0, 0.0, 1.0) ** 2
 
 
-def path(y: NDArray[np.float64]) -> NDArray[np.float64]:
+def path(y: Floats) -> Floats:
     """Where the middle of the path is, x by y, meters."""
     return 5.0 * np.sin(np.asarray(y, float) / 21.0)
 
@@ -197,7 +197,7 @@ def _ground() -> bpy.types.Object:
     return ground
 
 
-def places(seed: int) -> list[NDArray[np.float64]]:
+def places(seed: int) -> list[Floats]:
     """Places on the map of the plants of each layer, (n, 2) each."""
     standing, out = np.zeros((0, 2)), []
     for number, layer in enumerate(LAYERS):

@@ -14,8 +14,8 @@ from math import inf
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...errors import SceneError
 from ...jobs import Progress, mapped
 from ..attributes import read, write
@@ -46,10 +46,7 @@ class Ground:
     """
 
     def __init__(
-        self,
-        view_layer: bpy.types.ViewLayer,
-        depsgraph: bpy.types.Depsgraph,
-        without: Iterable[bpy.types.Object] = (),
+        self, view_layer: bpy.types.ViewLayer, depsgraph: bpy.types.Depsgraph, without: Iterable[bpy.types.Object] = ()
     ) -> None:
         self.depsgraph = depsgraph
         left_out = set(without)
@@ -84,9 +81,7 @@ class Ground:
                 nearest, found = gap, (world, -turned if turned.dot(direction) > 0.0 else turned)
         return found
 
-    def heights(
-        self, places: NDArray[np.float64], above: float | NDArray[np.float64], below: float | NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def heights(self, places: Floats, above: float | Floats, below: float | Floats) -> Floats:
         """Height of the uppermost ground at places on the map.
 
         Parameters
@@ -109,7 +104,7 @@ class Ground:
                 out[i] = hit[0].z
         return out
 
-    def nearest_heights(self, places: NDArray[np.float64]) -> Generator[float, object, NDArray[np.float64]]:
+    def nearest_heights(self, places: Floats) -> Generator[float, object, Floats]:
         """Find the height of the ground that is nearest along z, below or above, for places (n, 3).
 
         Yields the fraction that is done, and returns (n,) float64, NaN where there is no ground.
@@ -201,9 +196,7 @@ def drop_steps(
     return DropResult(moved, int(np.isnan(heights).sum()))
 
 
-def _drop_plants(
-    view_layer: bpy.types.ViewLayer, plants: Sequence[bpy.types.Object], heights: NDArray[np.float64]
-) -> int:
+def _drop_plants(view_layer: bpy.types.ViewLayer, plants: Sequence[bpy.types.Object], heights: Floats) -> int:
     """Move plants that are objects to heights (n,); how many moved."""
     now = np.array([o.matrix_world.translation.z for o in plants], dtype=np.float64)
     fall = np.flatnonzero(np.abs(heights - now) > _STAYS)
@@ -222,7 +215,7 @@ def _depth(obj: bpy.types.Object) -> int:
     return 0 if obj.parent is None else 1 + _depth(obj.parent)
 
 
-def _drop_field(field: bpy.types.Object, heights: NDArray[np.float64]) -> int:
+def _drop_field(field: bpy.types.Object, heights: Floats) -> int:
     """Move the points of an editable field to heights (n,); how many moved."""
     stored, places = read(field.data, "position"), positions(field)
     world = np.array(field.matrix_world, dtype=np.float64)

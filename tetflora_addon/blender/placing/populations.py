@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats32
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
@@ -81,11 +81,7 @@ def recount(scene: bpy.types.Scene) -> None:
         population.made = own_number(own_objects(scene, population))
 
 
-def add_population(
-    scene: bpy.types.Scene,
-    grounds: Iterable[bpy.types.Object] = (),
-    name: str = NAME,
-) -> TetFloraLayer:
+def add_population(scene: bpy.types.Scene, grounds: Iterable[bpy.types.Object] = (), name: str = NAME) -> TetFloraLayer:
     """Add a population without plants, with the scene's settings for new ones, and make it the active one.
 
     Parameters
@@ -184,7 +180,7 @@ def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraLaye
     return found
 
 
-def own_ages(population: TetFloraLayer, placement: Placement) -> NDArray[np.float32] | None:
+def own_ages(population: TetFloraLayer, placement: Placement) -> Floats32 | None:
     """Ages (n,) of a population's plants in years; None where all are full-grown."""
     if population.age == 0.0:
         return None
@@ -196,7 +192,7 @@ def _new_plants(
     placement: Placement,
     species: tuple[str, ...],
     collection: bpy.types.Collection,
-    ages: NDArray[np.float32] | None,
+    ages: Floats32 | None,
 ) -> Generator[Progress, object, list[bpy.types.Object]]:
     """Plants where none have to go before."""
     steps, made = add_plants_steps(scene, placement, species, collection, ages), []

@@ -18,8 +18,8 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers32
 from ...errors import SceneError
 from ...files import parse_json
 from ...planting.cover import Suits
@@ -167,7 +167,7 @@ def makes_field(population: bpy.types.PropertyGroup, number: int) -> bool:
     return population.as_field == 'FIELD' or (population.as_field == 'AUTOMATIC' and number > EMPTIES_UNASKED)
 
 
-def note_erased(population: bpy.types.PropertyGroup, centers: NDArray[np.float64] | Sequence, radius: float) -> None:
+def note_erased(population: bpy.types.PropertyGroup, centers: Floats | Sequence, radius: float) -> None:
     """Keep circles on the map bare, with centers (n, 2) or more columns; meters."""
     flat = np.round(np.asarray(centers, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
     strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
@@ -209,7 +209,7 @@ class Search:
 
     ground: Terrain
     rules: Rules
-    present: tuple[NDArray[np.float64], NDArray[np.int32]]
+    present: tuple[Floats, Integers32]
     suits: Callable[[], Mapping[int, Suits]]
     erased: tuple[Path, ...]
     species: tuple[str, ...]  # identifiers that placements count through
@@ -285,7 +285,7 @@ def standing(
     depsgraph: bpy.types.Depsgraph,
     without: Collection[bpy.types.Object],
     species: Sequence[str],
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+) -> tuple[Floats, Integers32]:
     """Places (m, 3) and species (m,) of the plants of a scene, those that are objects and those of fields.
 
     Parameters

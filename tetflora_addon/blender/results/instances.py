@@ -21,6 +21,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers32
 from ..attributes import write
 from ..compat import set_node_input
 from ..main_thread import in_main_thread
@@ -48,12 +49,7 @@ Source = bpy.types.Object | bpy.types.Collection
 
 
 def add_instances(
-    results: Results,
-    name: str,
-    source: Source,
-    matrices: NDArray[np.float64],
-    ids: NDArray[np.int32],
-    like: bpy.types.Object | None = None,
+    results: Results, name: str, source: Source, matrices: Floats, ids: Integers32, like: bpy.types.Object | None = None
 ) -> bpy.types.Object:
     """Add one object that shows many instances of an object or a collection.
 
@@ -87,9 +83,9 @@ def add_cluster_instances(
     results: Results,
     name: str,
     objects: Sequence[bpy.types.Object],
-    pick: NDArray[np.int32],
-    matrices: NDArray[np.float64],
-    ids: NDArray[np.int32],
+    pick: Integers32,
+    matrices: Floats,
+    ids: Integers32,
     like: bpy.types.Object | None = None,
 ) -> bpy.types.Object:
     """Add one object that shows instances of many objects, such as those of `add_cluster`.
@@ -184,8 +180,8 @@ def _instancer(
     kind: str,
     source: Source,
     matrices: NDArray[np.floating],
-    ids: NDArray[np.int32],
-    pick: NDArray[np.int32] | None = None,
+    ids: Integers32,
+    pick: Integers32 | None = None,
 ) -> bpy.types.Object:
     """An object in no collection whose nodes show instances of a source."""
     mesh = bpy.data.meshes.new(name)

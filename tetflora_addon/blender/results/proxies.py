@@ -9,8 +9,8 @@ from contextlib import closing
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats32, Integers32
 from ...buffers import MeshBuffers, PointBuffers
 from ...emission.asset_plan import ASSETS
 from ...emission.emitters import Buffers, EmissionInput
@@ -83,12 +83,12 @@ def _light_of_mesh(
     light: BakedLight,
     first: int,
     rounded: bool,
-    offsets: NDArray[np.int32],
-    positions: NDArray[np.float32],
-    corner_verts: NDArray[np.int32],
-    color: NDArray[np.float32],
-    transmission: NDArray[np.float32],
-) -> Mapping[str, tuple[str, NDArray[np.float32]]]:
+    offsets: Integers32,
+    positions: Floats32,
+    corner_verts: Integers32,
+    color: Floats32,
+    transmission: Floats32,
+) -> Mapping[str, tuple[str, Floats32]]:
     """Attributes of a mesh whose faces are the sheets from ``first`` on: its light, at vertices where it is round."""
     faces = len(offsets) - 1
     front, back = np.zeros((2, faces, 3), np.float32)

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats32, Integers32
 from ...assets.mesh_features import mesh_features
 from ...errors import SceneError
 from ...refinement.polygons import Meshes, Surface
@@ -116,11 +116,11 @@ class _Reader:
         self.surfaces: list[Surface] = []
         self.materials: list[list[bpy.types.Material | None]] = []
         self.surface: list[int] = []
-        self.matrices: list[NDArray[np.float64]] = []
+        self.matrices: list[Floats] = []
         self._known: dict[tuple, int | None] = {}
         self._looks = Looks()
 
-    def add(self, obj: bpy.types.Object, matrix: NDArray[np.float64], look: str) -> bool:
+    def add(self, obj: bpy.types.Object, matrix: Floats, look: str) -> bool:
         """Take an evaluated object, or an original that is not evaluated; False if it has no faces."""
         own = tuple(slot.material.name_full for slot in obj.material_slots if slot.link == 'OBJECT' and slot.material)
         key = obj.data.as_pointer(), obj.type, own, obj.original.as_pointer() if obj.type != 'MESH' else 0, look
@@ -183,9 +183,7 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
     )
 
 
-def _attributes(
-    mesh: bpy.types.Mesh, corner_verts: NDArray[np.int32], sizes: NDArray[np.int32]
-) -> Iterator[tuple[str, NDArray[np.float32]]]:
+def _attributes(mesh: bpy.types.Mesh, corner_verts: Integers32, sizes: Integers32) -> Iterator[tuple[str, Floats32]]:
     """Attributes of floating point numbers at corners (c, k), the UV map that renders first."""
     layers = mesh.uv_layers
     first = next((layer.name for layer in layers if layer.active_render), "")

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...emission.light import Sources
 from ...light.sources import World
 from ...refinement.lights import Light
@@ -73,7 +73,7 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer)
     return tuple(found)
 
 
-def _area(data: bpy.types.AreaLight, matrix: NDArray[np.float64], color: NDArray[np.float64], given: dict) -> Light:
+def _area(data: bpy.types.AreaLight, matrix: Floats, color: Floats, given: dict) -> Light:
     ellipse = data.shape in {'DISK', 'ELLIPSE'}
     sides = np.array([data.size, data.size_y if data.shape in {'RECTANGLE', 'ELLIPSE'} else data.size])
     span = matrix[:3, :2].T * sides[:, None] / 2.0
@@ -83,7 +83,7 @@ def _area(data: bpy.types.AreaLight, matrix: NDArray[np.float64], color: NDArray
     return Light('AREA', width=width, color=color / np.pi, span=span, ellipse=ellipse, **given)
 
 
-def _color(data: bpy.types.Light) -> NDArray[np.float64]:
+def _color(data: bpy.types.Light) -> Floats:
     """Linear RGB times energy, nodes and exposure included."""
     color = np.array(data.color[:]) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if getattr(data, "use_temperature", False):
@@ -172,7 +172,7 @@ def _image(node: bpy.types.Node, factor: float, turn: float) -> World:
     rows, columns = len(pixels) // step, pixels.shape[1] // step
     pixels = pixels[: rows * step, : columns * step].reshape(rows, step, columns, step, 3).mean(axis=(1, 3))
 
-    def radiance(toward: NDArray[np.float64]) -> NDArray[np.float64]:
+    def radiance(toward: Floats) -> Floats:
         # As Cycles: u = ½ − φ / 2π, v = ½ + latitude / π, with row 0 lowest.
         longitude = np.arctan2(toward[:, 1], toward[:, 0]) + turn
         column = (0.5 - longitude / (2.0 * np.pi)) % 1.0 * columns
@@ -203,7 +203,7 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
     level = toward * [1.0, 1.0, 0.0]
     level /= max(np.linalg.norm(level), 1e-9)
 
-    def radiance(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def radiance(places: Floats) -> Floats:
         height = places[:, 2:]
         above = mean + rise * (height - 0.5) + ahead * (places @ level)[:, None]
         return np.where(height > 0.0, np.maximum(above, 0.0), below)

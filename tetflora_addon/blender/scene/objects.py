@@ -20,6 +20,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats32, Integers, Integers32, Keys
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
 from ..attributes import evaluated_mesh, members, read, values_of, world_matrix
@@ -82,12 +83,10 @@ _PART = 4_096  # matrices of one product
 class Rows:
     """Instances of one reference: columns of their transforms (n, 4, 4), and their identifiers (n,)."""
 
-    columns: NDArray[np.float32]
-    number: NDArray[np.int64]
+    columns: Floats32
+    number: Integers
 
-    def within(
-        self, matrices: NDArray[np.float64], keys: NDArray[np.uint64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.uint64]]:
+    def within(self, matrices: Floats, keys: Keys) -> tuple[Floats, Keys]:
         """Places (k · n, 4, 4) and keys (k · n,) of the instances in each of k places with their keys."""
         many, own = len(matrices), len(self.number)
         names = child_key(keys[:, None], self.number).reshape(-1)
@@ -131,15 +130,15 @@ def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, 
 
 
 def instanced(
-    geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], keys: NDArray[np.uint64]
-) -> Iterator[tuple[Reference, NDArray[np.float64], NDArray[np.uint64]]]:
+    geometry: bpy.types.GeometrySet, matrices: Floats, keys: Keys
+) -> Iterator[tuple[Reference, Floats, Keys]]:
     """As `references_of`, but originals, with places (k, 4, 4) and keys (k,) of all that stand in some places (n)."""
     for target, rows in references_of(geometry):
         original = target if isinstance(target, bpy.types.GeometrySet) else target.original
         yield original, *rows.within(matrices, keys)
 
 
-def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int64]]:
+def _read_instances(points: bpy.types.PointCloud) -> tuple[Integers32, Floats32, Integers]:
     """Reference, columns of the transform (n, 4, 4) and identifier of each instance."""
     transform = read(points, "instance_transform").reshape(-1, 4, 4)
     own = points.attributes.get("id")
@@ -151,7 +150,7 @@ def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], ND
     )
 
 
-def name_keys(objects: Sequence[bpy.types.Object]) -> NDArray[np.uint64]:
+def name_keys(objects: Sequence[bpy.types.Object]) -> Keys:
     """A key (n,) of each object, which follows from its name."""
     return key_of_seed(np.array([crc32(obj.name_full.encode()) for obj in objects]))
 
@@ -287,8 +286,8 @@ class Copies:
     owner: bpy.types.Object  # the original object that is a plant or a field
     #: None for the object itself; else geometry that its nodes instance, which counts for fields only
     geometry: bpy.types.GeometrySet | None
-    matrices: NDArray[np.float64]  # (n, 4, 4): to world space
-    keys: NDArray[np.uint64]  # (n,): tell individuals apart
+    matrices: Floats  # (n, 4, 4): to world space
+    keys: Keys  # (n,): tell individuals apart
     #: The original object that shows all of them, or another with the same look
     instancer: bpy.types.Object | None = None
 
@@ -368,8 +367,8 @@ def listed_instances(
 
 
 def collected(
-    collection: bpy.types.Collection, matrices: NDArray[np.float64], depsgraph: bpy.types.Depsgraph
-) -> Iterator[tuple[bpy.types.Object, NDArray[np.float64]]]:
+    collection: bpy.types.Collection, matrices: Floats, depsgraph: bpy.types.Depsgraph
+) -> Iterator[tuple[bpy.types.Object, Floats]]:
     """What instances (n, 4, 4) of a collection show in renders, by name: each object with its places (n, 4, 4)."""
     back = np.eye(4)
     back[:3, 3] = -np.array(collection.instance_offset)
@@ -399,7 +398,7 @@ class _Walk:
         self.found: list[Copies] = []
         self._depth = 0
 
-    def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+    def object(self, obj: bpy.types.Object, matrices: Floats, keys: Keys) -> None:
         if obj.hide_render or self._depth == DEEPEST:
             return
         self._depth += 1
@@ -414,16 +413,16 @@ class _Walk:
             self.nodes(obj, matrices, keys)
         self._depth -= 1
 
-    def collection(self, collection: bpy.types.Collection, matrices: NDArray, keys: NDArray[np.uint64]) -> None:
+    def collection(self, collection: bpy.types.Collection, matrices: NDArray, keys: Keys) -> None:
         for n, (obj, places) in enumerate(collected(collection, matrices, self.depsgraph)):
             self.object(obj, places, child_key(keys, n))
 
-    def nodes(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+    def nodes(self, obj: bpy.types.Object, matrices: Floats, keys: Keys) -> None:
         geometry = geometry_of(obj, self.depsgraph)
         if geometry is not None:
             self._instances(obj, geometry, matrices, keys)
 
-    def _instances(self, owner, geometry: bpy.types.GeometrySet, matrices: NDArray, keys: NDArray[np.uint64]) -> None:
+    def _instances(self, owner, geometry: bpy.types.GeometrySet, matrices: NDArray, keys: Keys) -> None:
         for target, places, names in instanced(geometry, matrices, keys):
             if isinstance(target, bpy.types.Collection):
                 self.collection(target, places, names)
@@ -446,7 +445,7 @@ def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgrap
             yield Copies(original, None, np.array(instance.matrix_world, dtype=np.float64)[None], key, instancer)
 
 
-def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """Triangles of an occluder in world space, with its modifiers if it is evaluated."""
     if obj.type != 'MESH':
         raise SceneError(f'"{obj.name}" is not a mesh; {_OCCLUDER_REMEDY}')
@@ -460,7 +459,7 @@ def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray
     return (positions @ matrix[:3, :3].T + matrix[:3, 3])[corners]
 
 
-def read_occluders(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> NDArray[np.float64]:
+def read_occluders(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Floats:
     """Triangles of all occluders of a view layer that render.
 
     Returns

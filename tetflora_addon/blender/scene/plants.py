@@ -15,8 +15,8 @@ from functools import partial
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers, Integers32
 from ...errors import SceneError, TetFloraError
 from ...growth.crown_shapes import crown_shapes
 from ...growth.hashing import child_key, key_of_seed
@@ -176,9 +176,9 @@ class AssetPlants:
     #: The original object that they are, that they are instances of, or whose points they are; several objects of a
     #: plant each, one for each place
     owners: tuple[bpy.types.Object, ...]
-    seed: NDArray[np.int64]  # (n,)
+    seed: Integers  # (n,)
     #: (n, 4, 4): To world space; stretched and mirrored as the objects, points and instances are
-    matrices: NDArray[np.float64]
+    matrices: Floats
 
 
 def read_asset_plants(
@@ -270,7 +270,7 @@ def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
     return _placed(names, tuple(number), species, seeds, matrices)
 
 
-def _copied_plants(copies: Copies) -> tuple[Seeds, NDArray[np.float64] | None, None]:
+def _copied_plants(copies: Copies) -> tuple[Seeds, Floats | None, None]:
     """Instances of a plant, each an individual of its own: its key is added to the seed. And their ages."""
     plant = copies.owner
     seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
@@ -279,13 +279,7 @@ def _copied_plants(copies: Copies) -> tuple[Seeds, NDArray[np.float64] | None, N
     return found, None if age is None else np.repeat(age, len(seeds)), None
 
 
-def _placed(
-    names: list[str],
-    kinds: tuple[str, ...],
-    species: NDArray[np.int32],
-    seeds: NDArray[np.int64],
-    matrices: NDArray[np.float64],
-) -> Seeds:
+def _placed(names: list[str], kinds: tuple[str, ...], species: Integers32, seeds: Integers, matrices: Floats) -> Seeds:
     frame, scale, sound = frames_of(matrices[:, :3, :3])
     sound &= np.isfinite(matrices).all(axis=(1, 2))
     if not sound.all():

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...errors import SceneError, SpeciesError, TetFloraError
 from ...jobs import Progress, part_of
 from ...planting.height_grid import HeightGrid, cell_for, height_grid
@@ -70,7 +71,7 @@ class Soil:
     slope_max: float
 
 
-def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, NDArray[np.float64]]:
+def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
     """The site of a stand, and the place (2,) in the world that its coordinates are counted from.
 
     Raises
@@ -114,7 +115,7 @@ def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, NDArray[np.float
     return site, np.array([grid.west, grid.south])
 
 
-def _grid(triangles: NDArray[np.float64], relief: float) -> tuple[HeightGrid, NDArray[np.float64]]:
+def _grid(triangles: Floats, relief: float) -> tuple[HeightGrid, Floats]:
     """The ground as a grid, and how wet it is (h, w)."""
     if relief > 0.0:
         wet = wet_ground(triangles)
@@ -123,7 +124,7 @@ def _grid(triangles: NDArray[np.float64], relief: float) -> tuple[HeightGrid, ND
     return grid, np.full(grid.height.shape, _LEVEL)
 
 
-def _masks(ground: Terrain, grid: HeightGrid) -> NDArray[np.float64]:
+def _masks(ground: Terrain, grid: HeightGrid) -> Floats:
     """How suitable cells are (h, w), by what is drawn on the ground."""
     rows, columns = grid.height.shape
     x, y = (corner + grid.cell * (np.arange(n) + 0.5) for corner, n in ((grid.west, columns), (grid.south, rows)))
@@ -143,7 +144,7 @@ def _masks(ground: Terrain, grid: HeightGrid) -> NDArray[np.float64]:
     return suitable.reshape(rows, columns)
 
 
-def _whole(height: NDArray[np.float64]) -> NDArray[np.float64]:
+def _whole(height: Floats) -> Floats:
     """Heights (h, w) with what is missing beside the ground going on level."""
     out = height.copy()
     for _ in range(3):
@@ -341,9 +342,7 @@ def _measuring(species: list[Species], records: Records) -> Generator[Progress, 
                     _ = measure_of(kind).flora.samples
 
 
-def _columns(
-    records: Records, site: StandSite, corner: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], Records]:
+def _columns(records: Records, site: StandSite, corner: Floats) -> tuple[Floats, Floats, Records]:
     """Positions (n, 3) in the world and rotations (n, 4) of records."""
     position = records.position.astype(np.float64)
     lean, lying = records.lean.astype(np.float64), records.lying
@@ -360,13 +359,7 @@ def _columns(
     return position, turn / np.linalg.norm(turn, axis=1, keepdims=True), records
 
 
-def _replace(
-    field: bpy.types.Object,
-    names: list[str],
-    position: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    records: Records,
-) -> None:
+def _replace(field: bpy.types.Object, names: list[str], position: Floats, rotation: Floats, records: Records) -> None:
     """Give a field the records in place of its points."""
     given = position, rotation, np.ones(len(records)), records.species, records.seed
     other = write_field(NAME, *given, names)
