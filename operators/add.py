@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Add plants: a single one, one grown on a drawn skeleton, a first forest, or a population on a terrain."""
 
-from collections.abc import Generator
-
 import bpy
 from bpy.props import FloatVectorProperty
 
@@ -21,7 +19,7 @@ from ..tetflora_addon.blender.species.catalog import NO_SPECIES, default_species
 from ..tetflora_addon.blender.species.editor import present_species
 from ..tetflora_addon.blender.species.edits import catalog, unknown_text
 from ..tetflora_addon.errors import SceneError
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Job, Progress
 from ..tetflora_addon.planting.rules import Rules
 from ..tetflora_addon.setting import within
 from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, selected_plants, show_shapes
@@ -170,7 +168,7 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
         options={'SKIP_SAVE', 'HIDDEN'},
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, PlacedPlants]:
+    def steps(self, context: bpy.types.Context) -> Job[PlacedPlants]:
         scene = context.scene
         yield Progress(0.0, "Reading the ground")
         self._complete_from(scene)

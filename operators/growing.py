@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Add layers to a ground: a biome, a cover, a stand and its years. `add` scatters populations."""
 
-from collections.abc import Generator
-
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
@@ -20,7 +18,7 @@ from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.stands.growing import GrownStand, animate, is_stand, keep_year, new_stand_steps
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Job, Progress
 from .base import FileTool, ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
 from .layers import ground_found, grounds_to_plant, selected_grounds, tell_layers
 
@@ -40,7 +38,7 @@ class TETFLORA_OT_add_biome(ModalJob, bpy.types.Operator):
         "Set Season", "Turn on Seasons and go to the day of the year that the biome is made for, if it has one"
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, BiomeResult]:
+    def steps(self, context: bpy.types.Context) -> Job[BiomeResult]:
         yield Progress(0.0, "Reading the biome")
         scene = context.scene
         if not self.properties.is_property_set("biome"):
@@ -106,7 +104,7 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
         True,
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, CoverResult]:
+    def steps(self, context: bpy.types.Context) -> Job[CoverResult]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
         made = yield from cover_steps(scene, depsgraph, covered_population(scene), self.soil)
         if self.fallen and scene.tetflora.year.enabled:
@@ -132,7 +130,7 @@ class TETFLORA_OT_grow_stand(ModalJob, bpy.types.Operator):
     bl_label = "Grow Stand"
     needs = (in_object_mode, ground_found)
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, GrownStand]:
+    def steps(self, context: bpy.types.Context) -> Job[GrownStand]:
         return new_stand_steps(context.scene, context.evaluated_depsgraph_get(), grounds_to_plant(context))
 
     def finish(self, context: bpy.types.Context, result: GrownStand) -> set[str]:

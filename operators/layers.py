@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass
 
@@ -12,11 +11,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..tetflora_addon.blender.biomes.adding import plant_biome_steps, remove_biome
-from ..tetflora_addon.blender.biomes.files import (
-    active_biome,
-    find_biome,
-    saved_populations,
-)
+from ..tetflora_addon.blender.biomes.files import active_biome, find_biome, saved_populations
 from ..tetflora_addon.blender.biomes.files import save_biome as save_biome_file
 from ..tetflora_addon.blender.biomes.ground import lay_biome_soil
 from ..tetflora_addon.blender.biomes.layers import (
@@ -40,7 +35,7 @@ from ..tetflora_addon.blender.settings import BIOME, FIELD, with_identity
 from ..tetflora_addon.blender.stands.growing import GrownStand, again_steps, is_stand
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError, TetFloraError
-from ..tetflora_addon.jobs import Progress, part_of
+from ..tetflora_addon.jobs import Job, part_of
 from .base import ModalJob, Reporting, counted, in_object_mode, need, show_shapes
 
 
@@ -140,7 +135,7 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
                 bpy.ops.ed.undo_push(message=self.bl_label)
         return result
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Updated]:
+    def steps(self, context: bpy.types.Context) -> Job[Updated]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
         active, one = active_layer(scene), self.which == 'ACTIVE'
         if one and active.kind == BIOME and not self.reroll:
@@ -152,9 +147,7 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
             raise SceneError("All layers are up to date")
         return (yield from self._each(scene, depsgraph, uids))
 
-    def _each(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]
-    ) -> Generator[Progress, object, Updated]:
+    def _each(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]) -> Job[Updated]:
         made, bare = [], []
         biomes = {with_identity(scene.tetflora.layers, uid).biome for uid in uids} - {""}
         for number, uid in enumerate(uids):
@@ -178,7 +171,7 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
 
     def _steps_of(
         self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layer: bpy.types.PropertyGroup
-    ) -> Generator[Progress, object, PlacedPlants | GrownStand]:
+    ) -> Job[PlacedPlants | GrownStand]:
         if layer.kind == FIELD:
             if not is_stand(layer.field):
                 raise SceneError(f'"{layer.name}" has no rules to grow again by; use the brush, or edit its points')

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Change, re-roll, select and remove plants, and drop them to the ground."""
 
-from collections.abc import Generator
-
 import bpy
 
 from ..tetflora_addon.blender.biomes.layers import active_layer, children_of, forget_gone
@@ -21,7 +19,7 @@ from ..tetflora_addon.blender.placing.populations import own_objects, recount
 from ..tetflora_addon.blender.scene.fields import fields_of, stored_size
 from ..tetflora_addon.blender.settings import SCATTER
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Job
 from ..tetflora_addon.setting import within
 from .base import LINKED, ModalJob, Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
 
@@ -155,7 +153,7 @@ class TETFLORA_OT_drop_to_ground(ModalJob, bpy.types.Operator):
     bl_label = "Drop Plants to Ground"
     needs = (in_object_mode, plants_or_fields_selected)
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, DropResult]:
+    def steps(self, context: bpy.types.Context) -> Job[DropResult]:
         fields = [field for field in fields_of(context.selected_objects) if editable(field)]
         return drop_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context), fields)
 

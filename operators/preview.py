@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compute the levels that viewports preview, and clear them."""
 
-from collections.abc import Generator
-
 import bpy
 
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.viewport import state
 from ..tetflora_addon.blender.viewport.levels import level_steps
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Job
 from ..tetflora_addon.preview.levels import Levels
 from .base import NO_CAMERA, ModalJob, counted, need
 
@@ -45,12 +43,12 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
         state.forget(context.scene)
         return {'FINISHED'}
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Levels]:
+    def steps(self, context: bpy.types.Context) -> Job[Levels]:
         return level_steps(context.scene, context.evaluated_depsgraph_get())
 
     def finish(self, context: bpy.types.Context, levels: Levels) -> set[str]:
         last = levels.levels[-1]
         context.scene.tetflora.preview.level = last.number
         return self.done(
-            f"{counted(len(levels), 'level')}, {len(last):,} tetrahedra with plants, {levels.nbytes / 1e6:.0f} MB",
+            f"{counted(len(levels), 'level')}, {len(last):,} tetrahedra with plants, {levels.nbytes / 1e6:.0f} MB"
         )

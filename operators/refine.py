@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Refine the scene, clear or keep the results, convert plants to meshes, and clear the cache."""
 
-from collections.abc import Generator
-
 import bpy
 
 from ..tetflora_addon import storage
@@ -22,7 +20,7 @@ from ..tetflora_addon.blender.scene.lights import read_world
 from ..tetflora_addon.blender.viewport import auto
 from ..tetflora_addon.blender.viewport.warnings import cut_off
 from ..tetflora_addon.errors import TetFloraError
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Job
 from ..tetflora_addon.refinement.statistics import Statistics
 from .base import (
     NO_CAMERA,
@@ -50,7 +48,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
 
     keys = "Esc: Cancel   |   Return: Finish Early"
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Statistics]:
+    def steps(self, context: bpy.types.Context) -> Job[Statistics]:
         scene, nothing = context.scene, not has_results(context.scene)
         made_for, expected = auto.results_made_for(scene), forecast(scene, context.view_layer)
         with auto.paused():
@@ -190,7 +188,7 @@ class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
     bl_label = "Convert Plants to Meshes"
     needs = (in_object_mode, plants_selected)
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, list[bpy.types.Object]]:
+    def steps(self, context: bpy.types.Context) -> Job[list[bpy.types.Object]]:
         return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context))
 
     def finish(self, context: bpy.types.Context, made: list[bpy.types.Object]) -> set[str]:

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 from weakref import WeakSet
 
 from .. import parallel
-from ..jobs import Progress, mapped
+from ..jobs import Job, Progress, mapped
 from ..jobs import run_to_end as run
 from ..processes import pool
 
@@ -91,7 +91,7 @@ def in_thread(work: Generator[_Item, Any, _Result], ahead: int = 0) -> Generator
         worker.stop()
 
 
-def steps_in_thread(work: Generator[Progress, Any, _Result], progress: Progress) -> Generator[Progress, Any, _Result]:
+def steps_in_thread(work: Job[_Result], progress: Progress) -> Job[_Result]:
     """As `in_thread`, for work whose items are its progress; the last one, at first a given one, stands meanwhile."""
 
     def shown(item: Progress | None) -> Progress:
@@ -103,9 +103,7 @@ def steps_in_thread(work: Generator[Progress, Any, _Result], progress: Progress)
         return (yield from mapped(items, shown))
 
 
-def call_in_thread(
-    progress: Progress, function: Callable[..., _Result], *given: object
-) -> Generator[Progress, Any, _Result]:
+def call_in_thread(progress: Progress, function: Callable[..., _Result], *given: object) -> Job[_Result]:
     """The result of a function of the engine, which a thread computes."""
     return steps_in_thread(calling(function, *given), progress)
 

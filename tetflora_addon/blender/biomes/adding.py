@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +20,7 @@ import bpy
 
 from ...errors import SceneError, TetFloraError
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress, part_of
+from ...jobs import Job, Progress, part_of
 from ...species.litter import FALLEN
 from ...species.litter import KIND as FALLEN_LEAVES
 from ..placing.cover import fallen_from
@@ -57,7 +57,7 @@ def add_biome_steps(
     biome: Biome,
     grounds: Sequence[bpy.types.Object],
     seed: int = 0,
-) -> Generator[Progress, object, BiomeResult]:
+) -> Job[BiomeResult]:
     """Add a biome to grounds, with all of its plants. Closing the steps, or an error, leaves everything as it was.
 
     Raises
@@ -125,7 +125,7 @@ def _lay_on(population: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Obj
 @job("Planting the biome")
 def plant_biome_steps(
     data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, biome: bpy.types.PropertyGroup
-) -> Generator[Progress, object, BiomeResult]:
+) -> Job[BiomeResult]:
     """Plant all layers of a biome again by their settings, but frozen ones and stands of which a year is kept.
 
     Raises
@@ -141,8 +141,8 @@ def plant_biome_steps(
 
 
 def _grown(
-    names: Sequence[str], grow: Callable[[int], Generator[Progress, object, GrownStand]]
-) -> Generator[Progress, object, tuple[list[tuple[str, int]], list[str]]]:
+    names: Sequence[str], grow: Callable[[int], Job[GrownStand]]
+) -> Job[tuple[list[tuple[str, int]], list[str]]]:
     """Grow stands by their numbers: names and numbers of plants of those that grew, and why others did not."""
     made, bare = [], []
     for number, name in enumerate(names):
@@ -166,7 +166,7 @@ def _plant(
     uid: str,
     stands: Sequence[tuple[str, int]],
     without: Sequence[str] = (),
-) -> Generator[Progress, object, BiomeResult]:
+) -> Job[BiomeResult]:
     """Plants of all layers, one after the other, and the soil under them; ``without`` tells of stands that failed."""
     first = _STANDS if stands else 0.0
     yield Progress(first, "Planting")

@@ -7,7 +7,7 @@ The first import of a scene finds that place, and all later ones lie where they 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -20,7 +20,7 @@ from mathutils import Vector
 from ...arrays import Floats, Mask
 from ...errors import SceneError
 from ...geodata.projection import MapOrigin, System, between, place_about, system_of
-from ...jobs import Progress
+from ...jobs import Job
 from ..runtime import JobData, guarded
 
 #: Custom property of the scene.
@@ -166,7 +166,7 @@ class Imported:
 
 
 #: Of an import.
-Steps = Generator[Progress, Any, Imported]
+Steps = Job[Imported]
 
 
 def importing(steps: Callable[..., Steps]) -> Callable[..., Steps]:

@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -27,7 +25,7 @@ from ...geodata.geotiff import place_of_image, use_zstandard
 from ...geodata.grids import ENDINGS, mosaic, read_grid
 from ...geodata.projection import System, between, chosen_system
 from ...geodata.rasters import MAX_CELLS, Raster, checked_size, in_degrees
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...planting.height_grid import HeightGrid, cell_for, height_grid
 from ..attributes import image_pixels, write
 from ..compat import shader_tree
@@ -52,7 +50,7 @@ _SOIL, _GREEN, _COVERED = (0.06, 0.043, 0.028), (0.05, 0.075, 0.018), 0.8
 _FINEST, _MOST_CELLS = 0.5, 4_000_000  # of the grid that heights are read from: meters
 
 
-def read_raster(order: Import, path: Path | None = None) -> Generator[Progress, Any, Raster]:
+def read_raster(order: Import, path: Path | None = None) -> Job[Raster]:
     """Read the raster of an import, its tiles as one; yields progress.
 
     Parameters
@@ -257,7 +255,7 @@ def _mesh(
     return made
 
 
-def heights_steps(order: Import, progress: Progress) -> Generator[Progress, Any, HeightGrid | None]:
+def heights_steps(order: Import, progress: Progress) -> Job[HeightGrid | None]:
     """Heights of the ground that an import lies on; None where there is none."""
     if not order.grounds:
         return None

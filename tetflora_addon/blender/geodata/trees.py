@@ -5,12 +5,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import tau
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -27,7 +26,7 @@ from ...growth.axes import profile
 from ...growth.growth import trunks
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...growth.seeds import Seeds
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...planting.places import Placement
 from ...planting.rules import species_by_weight
 from ...species.ages import ages_of
@@ -295,7 +294,7 @@ def _plant(
 
 def _fit_steps(
     scene: bpy.types.Scene, placement: Placement, identifiers: list[str], columns: dict[str, Floats32]
-) -> Generator[Progress, Any, Floats32]:
+) -> Job[Floats32]:
     """Factors on height and crown width, (n, 3), that make up for what is random in each plant."""
     none, number = np.zeros((len(placement), 3)), len(placement)
     numbers = (columns.get(name, none[:, 0]).astype(np.float64) for name in NUMBERS)

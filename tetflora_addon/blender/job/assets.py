@@ -8,7 +8,7 @@ found by its digest.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import bpy
@@ -22,7 +22,7 @@ from ...camera.camera import Camera
 from ...emission.asset_costs import AssetCosts
 from ...emission.asset_plan import OriginalPolicy
 from ...errors import SceneError, TetFloraError
-from ...jobs import Progress, mapped, run_to_end
+from ...jobs import Job, Progress, mapped, run_to_end
 from ...refinement.asset_parts import PlacedAssets
 from ..assets.parts import Target, digest_of, read_source_steps
 from ..assets.places import Places
@@ -66,7 +66,7 @@ def is_plain(scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.ty
 
 def bind_steps(
     scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.types.Depsgraph, camera: Camera, left: float
-) -> Generator[Progress, bool | None, SceneAssets | None]:
+) -> Job[SceneAssets | None]:
     """Compile the assets of places, which count from the camera's origin; None where there are none.
 
     Raises
@@ -137,7 +137,7 @@ def _covered(placed: PlacedAssets, camera: Camera) -> Floats:
 
 def _compiled(
     scene: bpy.types.Scene, target: Target, depsgraph: bpy.types.Depsgraph, progress: Progress, warnings: list[str]
-) -> Generator[Progress, bool | None, Asset]:
+) -> Job[Asset]:
     """The compiled asset of a target, known already or made now."""
     hidden = bool(hidden_originals(scene))
     source: AssetSource | None = None

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 
 import bpy
@@ -18,7 +18,7 @@ from ...emission.expansion import coarse_faces
 from ...emission.plants import expanded_blocks
 from ...errors import SceneError
 from ...growth.seeds import Seeds
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...species.species import Species
 from ..attributes import frames_of, world_matrix, write
 from ..results.hiding import artists_flags
@@ -87,7 +87,7 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
 @job("Convert Plants to Meshes")
 def make_plant_mesh_steps(
     data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
-) -> Generator[Progress, object, list[bpy.types.Object]]:
+) -> Job[list[bpy.types.Object]]:
     """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
 
     A step for each plant; closing the generator early removes what was made.

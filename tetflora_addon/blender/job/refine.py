@@ -33,7 +33,7 @@ from ...emission.drawing import drawing
 from ...emission.emitters import EmissionInput
 from ...emission.plants import Block, Transition, expanded_blocks
 from ...emission.polygons import PolygonBlock
-from ...jobs import Progress, mapped
+from ...jobs import Job, Progress, mapped
 from ...processes import pool
 from ...proxies.facet_weights import facet_weights, measuring, unmeasured
 from ...refinement import loop
@@ -136,7 +136,7 @@ def _ids(keys: Keys) -> Integers32:
     return (keys >> np.uint64(33)).astype(np.int32)
 
 
-def write_assets(run: _Run, plan: AssetPlan) -> Generator[Progress, None, None]:
+def write_assets(run: _Run, plan: AssetPlan) -> Job[None]:
     """Write what a plan draws as instances."""
     results, bound, statistics = run.results, run.bound, run.statistics
     alone = left_alone(bound, plan)
@@ -210,7 +210,7 @@ def _write_clusters(
     ids: Integers32,
     kites: bool,
     maker: Callable[[_Run, int], Maker],
-) -> Generator[Progress, None, None]:
+) -> Job[None]:
     """Meshes of the clusters of one asset, each once, and instances of them."""
     results, bound, make = run.results, run.bound, maker(run, target)
     name = bound.targets[target].name + (" kites" if kites else "")
@@ -248,7 +248,7 @@ def read_meshes(target: Target, depsgraph: bpy.types.Depsgraph) -> AssetMeshes:
     return AssetMeshes(surfaces, np.array(numbers, np.int32), np.concatenate(matrices))
 
 
-def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Generator[Progress, None, None]:
+def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Job[None]:
     """Write blocks of plants; progress goes from a given fraction to .95, and the statistics count."""
     materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
 
@@ -286,7 +286,7 @@ def _of_all_ages(run: _Run, blocks: Iterator[Block]) -> Iterator[Block]:
             yield replace(some[-1], buffers=concatenate_buffers([block.buffers for block in some]))
 
 
-def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Generator[Progress, None, None]:
+def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Job[None]:
     """Write polygons of meshes that take part, with their own materials; the statistics count."""
     explicit = run.given.explicit
 
@@ -302,7 +302,7 @@ def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Generator[Prog
 
 def _written(
     blocks: Iterator[_Block], write: Callable[[_Block], Generator[None, None, Progress]], progress: Progress
-) -> Generator[Progress, None, None]:
+) -> Job[None]:
     """Write blocks one by one, while the next is computed."""
     with closing(in_thread(blocks, ahead=1)) as made:
         for block in made:
@@ -318,7 +318,7 @@ def _made(run: _Run, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> 
     run.statistics.memory_mb += buffers.nbytes / 1e6
 
 
-def _bake_light(baking: Baking, refined: EmissionInput) -> Generator[Progress, None, None]:
+def _bake_light(baking: Baking, refined: EmissionInput) -> Job[None]:
     """Compute the light of everything, and write that of meshes."""
     if refined.facet_pixels is not None:
         facets = (Progress(0.9, f"Baking light: {count:,} facets") for count in baking.add_facets(refined))
@@ -343,7 +343,7 @@ def refine_steps(
     given: SceneContents | None = None,
     mark: str = "",
     first_look: bool = False,
-) -> Generator[Progress, bool | None, Statistics]:
+) -> Job[Statistics]:
     """Refine a scene step by step.
 
     Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced at the end. Send True
@@ -385,9 +385,7 @@ def refine_steps(
     return guarded(data, _refine_steps(run, layer, first_look))
 
 
-def _refine_steps(
-    run: _Run, layer: bpy.types.ViewLayer, first_look: bool
-) -> Generator[Progress, bool | None, Statistics]:
+def _refine_steps(run: _Run, layer: bpy.types.ViewLayer, first_look: bool) -> Job[Statistics]:
     results, depsgraph, clock, statistics = run.results, run.depsgraph, run.clock, run.statistics
     scene = results.scene
     use_machine(scene)
@@ -455,7 +453,7 @@ def _refine_steps(
     return statistics
 
 
-def _first_look(run: _Run) -> Generator[Progress, bool | None, None]:
+def _first_look(run: _Run) -> Job[None]:
     """A coarse result in place of earlier ones, without baked light."""
     whole = run.results
     results = Results(whole.scene, whole.purpose, "", run.data)
@@ -524,7 +522,7 @@ def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
     return removed
 
 
-def _run_loop(run: _Run) -> Generator[Progress, bool | None, Refinement]:
+def _run_loop(run: _Run) -> Job[Refinement]:
     """Refine; the statistics get a step for each pass."""
     given, placed = run.given, None if run.bound is None else run.bound.placed
     others = given.occluders, given.polygons, given.lights, placed
@@ -544,7 +542,7 @@ def _run_loop(run: _Run) -> Generator[Progress, bool | None, Refinement]:
     return state
 
 
-def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, EmissionInput]:
+def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
     """Refine, and find out what the proxies depend on."""
     flora, given, bound, camera, statistics = run.flora, run.given, run.bound, run.camera, run.statistics
     form = run.form.emission
@@ -586,7 +584,7 @@ def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, Emissio
     return EmissionInput(flora, refinement, camera, with_all, detail.tolerance, originals, disc)
 
 
-def _write_refined(run: _Run) -> Generator[Progress, bool | None, None]:
+def _write_refined(run: _Run) -> Job[None]:
     """Refine, and make meshes, instances and proxies; objects that scatter what has taken part are replaced as well."""
     scene, given = run.results.scene, run.given
     run.form, left = proxy_kind_of(scene), memory_left(scene, run.camera)

@@ -9,7 +9,7 @@ so that what grows there, and the litter of years before, keep their places.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -22,7 +22,7 @@ from ...arrays import Floats
 from ...errors import SceneError, TetFloraError
 from ...files import is_identifier
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress, mapped, part_of
+from ...jobs import Job, Progress, mapped, part_of
 from ...planting.canopy import Canopy
 from ...planting.cover import FULL, Floor, Habitat, Stratum, covered, tinted
 from ...species.litter import FALLEN, KIND, leaves_page, shed_share
@@ -100,7 +100,7 @@ def cover_steps(
     soil: bool = True,
     grounds: Iterable[bpy.types.Object] | None = None,
     masks: Mapping[str, Any] = MappingProxyType({}),
-) -> Generator[Progress, object, CoverResult]:
+) -> Job[CoverResult]:
     """Cover the ground of a population.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
@@ -152,7 +152,7 @@ def _begun(
     population: bpy.types.PropertyGroup,
     grounds: Iterable[bpy.types.Object] | None = None,
     fallen: bool = False,
-) -> Generator[Progress, object, list[bpy.types.Object]]:
+) -> Job[list[bpy.types.Object]]:
     """See whether a population can have a cover, and measure what stands above; returns its ground, or that given."""
     yield (progress := Progress(0.0, _UNDER))
     found = cover_of(scene, population.uid or ANYBODY, fallen)
@@ -307,7 +307,7 @@ def _strata(
 @job("Strewing leaves")
 def strew_steps(
     data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup
-) -> Generator[Progress, object, PlacedPlants | None]:
+) -> Job[PlacedPlants | None]:
     """Strew the leaves that fall in autumn under a population; None where nothing above sheds its leaves.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the

@@ -17,7 +17,7 @@ from mathutils import Vector
 
 from ...arrays import Floats
 from ...errors import SceneError
-from ...jobs import Progress, mapped
+from ...jobs import Job, Progress, mapped
 from ..attributes import read, write
 from ..materials.nodes import is_ours
 from ..runtime import JobData, job
@@ -160,7 +160,7 @@ def drop_steps(
     depsgraph: bpy.types.Depsgraph,
     plants: Sequence[bpy.types.Object],
     fields: Sequence[bpy.types.Object],
-) -> Generator[Progress, object, DropResult]:
+) -> Job[DropResult]:
     """Move plants vertically to the nearest ground; children move with their parents before they fall themselves.
 
     Parameters

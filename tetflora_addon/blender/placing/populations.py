@@ -10,7 +10,7 @@ the artist's.
 from __future__ import annotations
 
 import uuid
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ import numpy as np
 from ...arrays import Floats32
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...planting.places import Placement, plant_ages
 from ..assets.marks import measure_all
 from ..runtime import JobData, is_there, job
@@ -114,7 +114,7 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
 @job("Placing plants")
 def make_plants_steps(
     data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer
-) -> Generator[Progress, object, PlacedPlants]:
+) -> Job[PlacedPlants]:
     """Place a population's plants by its settings, in place of those that it has.
 
     Closing the steps, or an error, leaves the scene as it was.
@@ -193,7 +193,7 @@ def _new_plants(
     species: tuple[str, ...],
     collection: bpy.types.Collection,
     ages: Floats32 | None,
-) -> Generator[Progress, object, list[bpy.types.Object]]:
+) -> Job[list[bpy.types.Object]]:
     """Plants where none have to go before."""
     steps, made = add_plants_steps(scene, placement, species, collection, ages), []
     try:
@@ -210,7 +210,7 @@ def _new_plants(
 
 def reroll_steps(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer
-) -> Generator[Progress, object, PlacedPlants]:
+) -> Job[PlacedPlants]:
     """Place a population anew with another seed, which follows from the one that it has.
 
     Closing the steps, or an error, leaves the seed as it was as well.

@@ -15,7 +15,7 @@ from ...buffers import MeshBuffers, PointBuffers
 from ...emission.asset_plan import ASSETS
 from ...emission.emitters import Buffers, EmissionInput
 from ...emission.light import BATCH, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...refinement.statistics import Statistics
 from ...species.species import Species
 from ..attributes import face_offsets, read, write
@@ -104,7 +104,7 @@ def _light_of_mesh(
 
 def write_proxies(
     results: Results, form: ProxyKind, refined: EmissionInput, statistics: Statistics, baking: Baking | None = None
-) -> Generator[Progress, None, None]:
+) -> Job[None]:
     """Make the proxies of a refined scene; a thread makes the next block while one is written.
 
     Parameters

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
 from dataclasses import dataclass, fields
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats
 from ...errors import SceneError, SpeciesError, TetFloraError
-from ...jobs import Progress, part_of
+from ...jobs import Job, Progress, part_of
 from ...planting.height_grid import HeightGrid, cell_for, height_grid
 from ...planting.plane import inside_any
 from ...planting.site import lines_of_paths
@@ -227,7 +227,7 @@ def new_stand_steps(
     grounds: Iterable[bpy.types.Object],
     name: str = NAME,
     fill: Callable[[bpy.types.PropertyGroup], None] | None = None,
-) -> Generator[Progress, object, GrownStand]:
+) -> Job[GrownStand]:
     """Grow a stand on meshes, by settings that a function fills in or by those of the scene for new ones.
 
     Closing the steps, or an error, leaves the scene as it was.
@@ -267,7 +267,7 @@ def new_stand_steps(
 @job("Growing the stand")
 def again_steps(
     data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, field: bpy.types.Object
-) -> Generator[Progress, object, GrownStand]:
+) -> Job[GrownStand]:
     """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
     grounds = [e.object for e in field.tetflora.stand.grounds if e.object is not None and scene in e.object.users_scene]
     data.add_objects([*grounds, field])
@@ -280,7 +280,7 @@ def _again_steps(
     depsgraph: bpy.types.Depsgraph,
     field: bpy.types.Object,
     grounds: list[bpy.types.Object],
-) -> Generator[Progress, object, GrownStand]:
+) -> Job[GrownStand]:
     progress = Progress(0.0, "Reading the ground")
     yield progress
     stand = field.tetflora.stand
@@ -327,7 +327,7 @@ def _again_steps(
     return GrownStand(field, len(records.at(last)), len(records), last)
 
 
-def _measuring(species: list[Species], records: Records) -> Generator[Progress, object, None]:
+def _measuring(species: list[Species], records: Records) -> Job[None]:
     """Compile species in the stages that the stand shows, last year first, as far as there is time."""
     end = time.monotonic() + _PATIENCE
     for some in (records.at(records.year.max()), records):
