@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Paint, erase and thin plants with a brush."""
 
-from __future__ import annotations
-
 import time
 
 import bpy

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tools that point at the ground: what they share (pointing, undo, leaving), and placing plants by clicking."""
 
-from __future__ import annotations
-
 from math import radians, tau
 
 import bpy

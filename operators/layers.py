@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The list of layers: update, move, duplicate, remove and select them, change their ground, save them as a biome."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from dataclasses import dataclass
 

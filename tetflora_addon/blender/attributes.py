@@ -7,8 +7,6 @@ Attributes of meshes, point clouds and hair curves are plain memory, read and wr
 empty, it still returns what there was when the mode was entered.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple

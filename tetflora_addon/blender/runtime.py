@@ -7,8 +7,6 @@ Between two steps of a job the artist, a script or another add-on may take away 
 before each step it is asked whether anything was deleted. It then takes back what it has made and says why.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator

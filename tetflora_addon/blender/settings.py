@@ -5,8 +5,6 @@
 Properties are generated from the engine's dataclasses, which hold their names, tooltips and ranges.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import fields
 from datetime import date, timedelta

@@ -8,8 +8,6 @@ blocks are written. What runs here must be the engine's: it never touches bpy. N
 Where nobody looks, `run_to_end` runs all in the caller's thread: a second one would save no time, but take more memory.
 """
 
-from __future__ import annotations
-
 import atexit
 import threading
 import time

@@ -10,8 +10,6 @@ How large they are, and a small picture of them for menus, follow from points on
 is compiled and no renderer is asked. Materials count by their mean color.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from hashlib import blake2b

@@ -5,8 +5,6 @@
 Layers become ordinary populations that know their biome: each can be changed, frozen, updated and painted over.
 """
 
-from __future__ import annotations
-
 import json
 import uuid
 from collections.abc import Callable, Mapping, Sequence

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The ground of biomes: a hectare of land where there is none, and soil in the colors of what stands and lies on it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from math import radians, tan
 from typing import Any

@@ -6,8 +6,6 @@ Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An 
 ``--json`` the last line on stdout is a JSON object, after Blender's own output.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

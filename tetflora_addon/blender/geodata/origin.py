@@ -5,8 +5,6 @@
 The first import of a scene finds that place, and all later ones lie where they are in relation to it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import wraps

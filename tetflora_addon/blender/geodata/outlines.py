@@ -6,8 +6,6 @@ Woods and meadows are closed curves on the ground. Water is flat and filled, bui
 corners, roads are ribbons: a curve that is tilted on its side and extruded.
 """
 
-from __future__ import annotations
-
 from math import pi
 
 import bpy

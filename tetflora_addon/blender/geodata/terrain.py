@@ -6,8 +6,6 @@ The engine reads all but pixels of PNG. Those are Blender's, which divides whole
 as long as the image's color space is Non-Color.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from contextlib import suppress

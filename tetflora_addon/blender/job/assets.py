@@ -6,8 +6,6 @@ Blender's meshes are read here, one asset at a time; the engine compiles each in
 found by its digest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -6,8 +6,6 @@ Plants are counted, some of them looked at, and figures computed a moment after 
 often than a few hundredths of the time allow; never while a panel is drawn.
 """
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -8,8 +8,6 @@ While Blender takes one block of polygons over, the engine makes the next in its
 originals where they are whole, and meshes of clusters where some of them are near.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing

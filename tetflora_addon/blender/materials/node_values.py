@@ -8,8 +8,6 @@ one half. What depends on the direction of a ray, or on which instance it is, co
 Numbers are arrays (p, k), colors (3, p, k); what is the same everywhere is (1, 1) and (3, 1, 1).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

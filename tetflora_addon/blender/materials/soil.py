@@ -7,8 +7,6 @@ The map is an image that is packed into the file. It is laid on the ground from 
 fits meshes of any resolution, with or without UV maps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

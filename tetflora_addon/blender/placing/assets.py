@@ -6,8 +6,6 @@ An asset is an empty like any other plant, so that what is dragged in takes part
 only the open file has are left out: the file into which an asset is dragged would not know them.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

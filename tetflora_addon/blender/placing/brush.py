@@ -5,8 +5,6 @@
 `planting.strokes` decides, in arrays; here the scene is read before a stroke and changed during it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

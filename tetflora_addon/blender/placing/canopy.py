@@ -5,8 +5,6 @@
 Populations that cover the ground of others are left out: they stand under the crowns.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator
 from dataclasses import fields
 from hashlib import blake2b

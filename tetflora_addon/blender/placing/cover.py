@@ -7,8 +7,6 @@ the cover is an ordinary one: it can be changed, updated, frozen and removed. Le
 so that what grows there, and the litter of years before, keep their places.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass

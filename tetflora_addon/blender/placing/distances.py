@@ -5,8 +5,6 @@
 ``min_distance`` is the artist's own, and ``distance_from`` says whether it counts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import bpy

@@ -6,8 +6,6 @@ Whole arrays throughout. A field whose points come from nodes, or that has edges
 modeling and is left alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

@@ -6,8 +6,6 @@ An empty scene, or one as Blender starts with, is used and nothing in it is remo
 scene.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import radians
 

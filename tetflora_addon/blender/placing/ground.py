@@ -5,8 +5,6 @@
 `Scene.ray_cast` would stop at the leaves of a refined forest, and cannot leave objects out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 from math import inf

@@ -7,8 +7,6 @@ A copy made by hand has the number of its original: the oldest with a number bel
 the artist's.
 """
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager

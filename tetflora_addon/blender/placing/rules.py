@@ -6,8 +6,6 @@ Places where the brush has erased plants stay bare. The population stores them a
 a radius and the x and y of the centers of its circles.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ Biomes with limits or a mask come first, in the order of the list; those without
 that is added to a beech forest pushes it back from the water.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from math import inf

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Result collections: what refinement adds to a scene, replaces and clears, and nothing else."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from typing import Any, TypeVar
 

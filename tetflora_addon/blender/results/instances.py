@@ -11,8 +11,6 @@ shows: it has the same data, materials and modifiers, and one more that drops in
 hair. What a simulation made is copied as it is now.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from typing import Any

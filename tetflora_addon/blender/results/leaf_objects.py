@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves and blossoms that are the artist's mesh objects: their polygons and materials."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from dataclasses import replace
 from itertools import pairwise

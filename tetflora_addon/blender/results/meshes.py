@@ -9,8 +9,6 @@ cluster only gathers from them, and its normals are those that the faces had amo
 one ends. Faces of several surfaces, such as leaves on twigs, become one mesh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -9,8 +9,6 @@ is full-grown where that is less, to when the last limbs of a dead plant have fa
 before. The years that pass in a scene are added afterward and change no class.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace

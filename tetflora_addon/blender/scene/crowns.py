@@ -6,8 +6,6 @@ A species is compiled for its crown once in a session, which takes up to a tenth
 must not wait for that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 

@@ -7,8 +7,6 @@ everything else that such an instancer shows, because an instancer can only be h
 whose scatter is refined counts as assets instead.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

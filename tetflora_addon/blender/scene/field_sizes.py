@@ -6,8 +6,6 @@ All names have the prefix ``tf_``: without it, they belong to other tools. Attri
 are 0, say nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 

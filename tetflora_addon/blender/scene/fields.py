@@ -6,8 +6,6 @@ A field is a mesh or point cloud whose object is marked as one. Attributes of it
 wrote them. Nothing here loops over plants.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 

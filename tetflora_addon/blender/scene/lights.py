@@ -6,8 +6,6 @@ World node trees can be arbitrary. Only the background that leads to the output 
 feeds its color. Blender's skies cannot be evaluated outside of a render; a few measured numbers describe them.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

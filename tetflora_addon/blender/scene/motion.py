@@ -6,8 +6,6 @@ Nothing is evaluated and the scene does not change: only curves of actions of ob
 other times; what constraints, drivers, simulations and the NLA do stays as it is now.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial

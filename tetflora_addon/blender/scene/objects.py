@@ -9,8 +9,6 @@ Instances of some objects are refined as assets: of those that are marked, and o
 The mark is a property of the object. Objects that are linked cannot keep one, so the scene has a list of those.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -6,8 +6,6 @@ Plants whose species is an asset do not grow and are read apart, with all of the
 `objects` loop over plants, and only over those that are objects.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -11,8 +11,6 @@ difference in height. What a plant belongs to follows from its whole life and no
 alone is that of the film.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace

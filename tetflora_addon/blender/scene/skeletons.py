@@ -6,8 +6,6 @@ A kind is a text of the species and, if there are any, the skeleton, the age, ye
 plants of one kind are compiled once, and are results of their own.
 """
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from numpy.typing import NDArray

@@ -8,8 +8,6 @@ the file's other scenes. What of their measures plants need, such as the size of
 becomes a species and when plants are placed; panels only read it.
 """
 
-from __future__ import annotations
-
 import base64
 import zlib
 from collections import Counter

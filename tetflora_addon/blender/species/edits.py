@@ -10,8 +10,6 @@ get a page of each species of their plants that is not shipped: edited, made her
 Pages of linked collections are read where they are; those of appended ones become edits of the scene.
 """
 
-from __future__ import annotations
-
 import copy
 import json
 import re

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Grow a stand as a job, and make a field of its records: each point is a plant in one year (`scene.field_sizes`)."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
