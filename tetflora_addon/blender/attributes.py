@@ -204,10 +204,9 @@ def face_offsets(mesh: bpy.types.Mesh) -> Integers32:
 
 
 @contextmanager
-def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Mesh]:
-    """The mesh of an object with its modifiers, while the context lasts; without them if it is not evaluated."""
-    evaluated = obj.evaluated_get(depsgraph)
+def mesh_of(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
+    """The mesh of an object, evaluated or not, while the context lasts."""
     try:
-        yield evaluated.to_mesh()
+        yield obj.to_mesh()
     finally:
-        evaluated.to_mesh_clear()
+        obj.to_mesh_clear()

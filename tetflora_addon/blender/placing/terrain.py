@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Floats, Floats32
 from ...errors import SceneError
 from ...planting.terrain import Path, Terrain
-from ..attributes import image_pixels, members, read, values_of, world_matrix
+from ..attributes import image_pixels, members, mesh_of, read, values_of, world_matrix
 from ..scene.objects import objects_within
 from ..scene.skeletons import spline_chain
 
@@ -74,15 +74,12 @@ def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line
 
 def _from_edges(evaluated: bpy.types.Object) -> list[tuple[Floats, bool]] | None:
     """Splines of a curve that evaluates to nothing but edges; None if it has faces."""
-    mesh = evaluated.to_mesh()
-    try:
+    with mesh_of(evaluated) as mesh:
         if mesh is None or len(mesh.polygons):
             return None
         count = len(mesh.vertices)
         positions = members(mesh.vertices, "co", 3).astype(np.float64)
         ends = np.sort(members(mesh.edges, "vertices", 2, np.int32), axis=1)
-    finally:
-        evaluated.to_mesh_clear()
     if not count:
         return []
     # The points of a spline follow each other, and an edge from the last to the first closes it.
@@ -211,8 +208,7 @@ def _read_mesh(
     if obj.type != 'MESH':
         raise SceneError(f'"{obj.name}" is not a mesh; select a mesh with faces')
     evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
+    with mesh_of(evaluated) as mesh:
         if not len(mesh.polygons):
             raise SceneError(f'"{obj.name}" has no faces; select a mesh with faces')
         mesh.calc_loop_triangles()
@@ -225,8 +221,6 @@ def _read_mesh(
             uv = _uv(mesh, uv_layer, obj.name)[members(mesh.loop_triangles, "loops", 3, np.int32)]
         ends = read(mesh, ".edge_verts")
         faces = np.bincount(read(mesh, ".corner_edge"), minlength=len(ends))
-    finally:
-        evaluated.to_mesh_clear()
     return positions[vertices], weight, uv, positions[ends[faces == 1]]
 
 

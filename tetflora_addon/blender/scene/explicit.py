@@ -17,7 +17,7 @@ from ...arrays import Floats, Floats32, Integers32
 from ...assets.mesh_features import mesh_features
 from ...errors import SceneError
 from ...refinement.polygons import Meshes, Surface
-from ..attributes import face_offsets, members, read, values_of, world_matrix
+from ..attributes import face_offsets, members, mesh_of, read, values_of, world_matrix
 from ..materials.face_looks import Looks
 from ..materials.nodes import is_ours
 from .looks import LayerLooks
@@ -132,14 +132,11 @@ class _Reader:
         return True
 
     def _read(self, obj: bpy.types.Object, look: str) -> int | None:
-        mesh = obj.to_mesh()
-        try:
+        with mesh_of(obj) as mesh:
             if mesh is None or not len(mesh.polygons):
                 return None
             materials = materials_of(obj, mesh)
             self.surfaces.append(replace(_surface(obj.original.name, mesh, materials, self._looks), look=look))
-        finally:
-            obj.to_mesh_clear()
         self.materials.append(materials)
         return len(self.surfaces) - 1
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...arrays import Floats, Floats32, Integers, Integers32, Keys
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
-from ..attributes import evaluated_mesh, members, read, values_of, world_matrix
+from ..attributes import members, mesh_of, read, values_of, world_matrix
 from ..declare import pointer_to
 from ..species.asset_species import asset_of, asset_species
 from .looks import LayerLooks
@@ -447,7 +447,7 @@ def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """Triangles of an occluder in world space, with its modifiers if it is evaluated."""
     if obj.type != 'MESH':
         raise SceneError(f'"{obj.name}" is not a mesh; {_OCCLUDER_REMEDY}')
-    with evaluated_mesh(obj, depsgraph) as mesh:
+    with mesh_of(obj.evaluated_get(depsgraph)) as mesh:
         if not len(mesh.polygons):
             raise SceneError(f'"{obj.name}" has no faces; {_OCCLUDER_REMEDY}')
         mesh.calc_loop_triangles()

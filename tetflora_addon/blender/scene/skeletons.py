@@ -14,7 +14,7 @@ from ...arrays import Floats, Integers
 from ...errors import SpeciesError
 from ...species.curves import Chains, bezier_chains, joined_edges, nurbs_chain, smooth_handles
 from ...species.skeletons import Skeleton, skeleton_from_edges
-from ..attributes import evaluated_mesh, frames_of, members, values_of, world_matrix
+from ..attributes import frames_of, members, mesh_of, values_of, world_matrix
 
 #: Types of objects that can be the skeleton of a plant.
 SKELETON_TYPES = ('CURVE', 'CURVES', 'MESH')
@@ -75,7 +75,7 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
 
 def _of_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, Integers]:
     """Points (p, 4) with radii, 0 where there are none, and edges (e, 2)."""
-    with evaluated_mesh(obj, depsgraph) as mesh:
+    with mesh_of(obj.evaluated_get(depsgraph)) as mesh:
         if not len(mesh.polygons):
             return _mesh_arrays(mesh)
     # A modifier such as Skin adds faces around the edges: the modeled mesh is the skeleton.
