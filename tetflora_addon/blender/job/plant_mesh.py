@@ -83,17 +83,10 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
 
 
 @job("Convert Plants to Meshes")
-def make_plant_mesh_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
-) -> Job[list[bpy.types.Object]]:
+def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> Job[list[bpy.types.Object]]:
     """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
 
     A step for each plant; closing the generator early removes what was made.
-
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-        With edited species and leaf objects.
 
     Returns
     -------
@@ -105,7 +98,7 @@ def make_plant_mesh_steps(
     TetFloraError
         An invalid species or transform, or too many polygons; nothing is made.
     """
-    plants = list(plants)
+    scene, depsgraph, plants = data.scene, data.depsgraph, list(plants)
     data.add_objects([*plants, *leaf_objects(scene).values()])
     world = np.array([world_matrix(p, depsgraph) for p in plants]).reshape(-1, 4, 4)
     frame, scale, sound = frames_of(world[:, :3, :3])

@@ -92,8 +92,6 @@ def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None
 @job("Covering the ground")
 def cover_steps(
     data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
     population: bpy.types.PropertyGroup,
     soil: bool = True,
     grounds: Iterable[bpy.types.Object] | None = None,
@@ -120,9 +118,9 @@ def cover_steps(
     SceneError
         It has no ground or no plants above it, or the cover is frozen; or something was deleted meanwhile.
     """
-    uid = population.uid or ANYBODY
-    grounds = yield from _begun(data, scene, population, grounds)
-    population = _again(data, scene, population, uid)
+    scene, depsgraph, uid = data.scene, data.depsgraph, population.uid or ANYBODY
+    grounds = yield from _begun(data, population, grounds)
+    population = _again(data, population, uid)
     own = {name: getattr(population, name) for name in MASKS} | dict(masks)
     ground = read_ground(grounds, depsgraph, **own)
     canopy, above = canopy_of(scene, depsgraph)
@@ -133,7 +131,7 @@ def cover_steps(
     told = mapped(mapping, lambda done: Progress(0.05 + (_PLANTING - 0.05) * done, _UNDER))
     floor = yield from steps_in_thread(told, progress)
     yield Progress(_PLANTING, "Planting")
-    population = _again(data, scene, population, uid)
+    population = _again(data, population, uid)
     with restored(scene):
         parts = _parts(scene, canopy, above)
         found = cover_of(scene, uid) or _add_cover(scene, population, grounds, masks)
@@ -146,12 +144,12 @@ def cover_steps(
 
 def _begun(
     data: JobData,
-    scene: bpy.types.Scene,
     population: bpy.types.PropertyGroup,
     grounds: Iterable[bpy.types.Object] | None = None,
     fallen: bool = False,
 ) -> Job[list[bpy.types.Object]]:
     """See whether a population can have a cover, and measure what stands above; returns its ground, or that given."""
+    scene = data.scene
     yield (progress := Progress(0.0, _UNDER))
     found = cover_of(scene, population.uid or ANYBODY, fallen)
     if found is not None:
@@ -166,11 +164,9 @@ def _begun(
     return grounds
 
 
-def _again(
-    data: JobData, scene: bpy.types.Scene, population: bpy.types.PropertyGroup, uid: str
-) -> bpy.types.PropertyGroup:
+def _again(data: JobData, population: bpy.types.PropertyGroup, uid: str) -> bpy.types.PropertyGroup:
     """A population, fetched again after others may have been added; settings for new ones stay where they are."""
-    return population if uid == ANYBODY else still_there(data, scene, uid)
+    return population if uid == ANYBODY else still_there(data, uid)
 
 
 def cover_of(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> bpy.types.PropertyGroup | None:
@@ -303,9 +299,7 @@ def _strata(
 
 
 @job("Strewing leaves")
-def strew_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup
-) -> Job[PlacedPlants | None]:
+def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[PlacedPlants | None]:
     """Strew the leaves that fall in autumn under a population; None where nothing above sheds its leaves.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
@@ -316,9 +310,9 @@ def strew_steps(
     SceneError
         It has no ground, or the leaves are frozen; or something was deleted meanwhile.
     """
-    uid = population.uid or ANYBODY
-    grounds = yield from _begun(data, scene, population, fallen=True)
-    population = _again(data, scene, population, uid)
+    scene, depsgraph, uid = data.scene, data.depsgraph, population.uid or ANYBODY
+    grounds = yield from _begun(data, population, fallen=True)
+    population = _again(data, population, uid)
     with restored(scene):
         canopy, above = canopy_of(scene, depsgraph)
         parts = _fallen_leaves(scene, canopy, above)

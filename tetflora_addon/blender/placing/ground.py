@@ -153,18 +153,14 @@ class DropResult:
 
 @job("Dropping plants")
 def drop_steps(
-    data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    plants: Sequence[bpy.types.Object],
-    fields: Sequence[bpy.types.Object],
+    data: JobData, plants: Sequence[bpy.types.Object], fields: Sequence[bpy.types.Object]
 ) -> Job[DropResult]:
     """Move plants vertically to the nearest ground; children move with their parents before they fall themselves.
 
+    What is visible in the view layer is ground.
+
     Parameters
     ----------
-    depsgraph : bpy.types.Depsgraph
-        What is visible in its view layer is ground.
     plants : sequence of bpy.types.Object
         Plants that are objects.
     fields : sequence of bpy.types.Object
@@ -177,9 +173,9 @@ def drop_steps(
     """
     data.add_objects([*plants, *fields])
     yield Progress(0.0, _LOOKING)
-    view_layer = depsgraph.view_layer
+    view_layer = data.depsgraph.view_layer
     view_layer.update()
-    ground = Ground(view_layer, depsgraph)
+    ground = Ground(view_layer, data.depsgraph)
     if not len(ground):
         raise SceneError("No mesh is visible below or above the plants; add a ground mesh, or show it")
     data.add_objects(ground.objects)

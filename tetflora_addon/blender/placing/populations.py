@@ -110,9 +110,7 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
 
 
 @job("Placing plants")
-def make_plants_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer
-) -> Job[PlacedPlants]:
+def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPlants]:
     """Place a population's plants by its settings, in place of those that it has.
 
     Closing the steps, or an error, leaves the scene as it was.
@@ -122,8 +120,8 @@ def make_plants_steps(
     SceneError
         It is frozen, or no plants can be placed by its settings, as the message says; or it was deleted meanwhile.
     """
-    progress, uid = Progress(0.0, "Reading the ground"), population.uid
-    yield progress
+    scene, depsgraph, uid = data.scene, data.depsgraph, population.uid
+    yield (progress := Progress(0.0, "Reading the ground"))
     refuse_frozen(population)
     species = {entry.species for entry in population.mix}
     measure_all(scene, depsgraph, species)
@@ -131,12 +129,12 @@ def make_plants_steps(
     if is_cover(population):
         kinds |= standing(scene)
     yield from crown_steps(progress, scene, kinds)
-    population = still_there(data, scene, uid)
+    population = still_there(data, uid)
     search = read_search(scene, depsgraph, population, set(_sorted_out(scene, population)[0]))
     progress = Progress(0.1, "Looking for places")
     yield progress
     placement = yield from call_in_thread(progress, search.placement)
-    population = still_there(data, scene, uid)
+    population = still_there(data, uid)
     if population.as_field == 'EMPTIES' and len(placement) > MOST_EMPTIES:
         raise SceneError(
             f"{len(placement):,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
@@ -169,9 +167,9 @@ def make_plants_steps(
     return PlacedPlants(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
 
 
-def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraLayer:
+def still_there(data: JobData, uid: str) -> TetFloraLayer:
     """A population, fetched again: adding to the list moves what is in it."""
-    found = with_identity(scene.tetflora.layers, uid)
+    found = with_identity(data.scene.tetflora.layers, uid)
     if found is None:
         data.stop("its population was deleted")
         data.check()

@@ -220,8 +220,6 @@ def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup)
 @job("Growing the stand")
 def new_stand_steps(
     data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
     grounds: Iterable[bpy.types.Object],
     name: str = NAME,
     fill: Callable[[bpy.types.PropertyGroup], None] | None = None,
@@ -235,7 +233,8 @@ def new_stand_steps(
     TetFloraError
         No ground, a species that the catalog does not have, or settings with which nothing grows.
     """
-    data.add_objects(grounds := list(grounds))
+    scene, grounds = data.scene, list(grounds)
+    data.add_objects(grounds)
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
     field = write_field(name, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ())
     mesh, made = field.data, False
@@ -247,7 +246,7 @@ def new_stand_steps(
             fill(stand)
         for obj in grounds:
             stand.grounds.add().object = obj
-        grown = yield from _again_steps(data, scene, depsgraph, field, grounds)
+        grown = yield from _again_steps(data, field, grounds)
         stand = field.tetflora.stand
         stand.is_grown, made = True, True
         field.tetflora.stand_year = float(stand.years)
@@ -263,23 +262,17 @@ def new_stand_steps(
 
 
 @job("Growing the stand")
-def again_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, field: bpy.types.Object
-) -> Job[GrownStand]:
+def again_steps(data: JobData, field: bpy.types.Object) -> Job[GrownStand]:
     """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
-    grounds = [e.object for e in field.tetflora.stand.grounds if e.object is not None and scene in e.object.users_scene]
+    grounds = [
+        e.object for e in field.tetflora.stand.grounds if e.object is not None and data.scene in e.object.users_scene
+    ]
     data.add_objects([*grounds, field])
-    return (yield from _again_steps(data, scene, depsgraph, field, grounds))
+    return (yield from _again_steps(data, field, grounds))
 
 
-def _again_steps(
-    data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    field: bpy.types.Object,
-    grounds: list[bpy.types.Object],
-) -> Job[GrownStand]:
-    progress = Progress(0.0, "Reading the ground")
+def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types.Object]) -> Job[GrownStand]:
+    scene, depsgraph, progress = data.scene, data.depsgraph, Progress(0.0, "Reading the ground")
     yield progress
     stand = field.tetflora.stand
     for group in (stand, *stand.species):

@@ -42,9 +42,7 @@ _SOON = 0.2  # seconds from a change of plants to reading them again
 
 
 @job("Compute Levels")
-def level_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
-) -> Generator[Progress, None, Levels]:
+def level_steps(data: JobData) -> Generator[Progress, None, Levels]:
     """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
 
     Raises
@@ -52,6 +50,7 @@ def level_steps(
     TetFloraError
         As `job.refine_steps`.
     """
+    scene, depsgraph = data.scene, data.depsgraph
     data.add_objects([*taking_part(scene), *([] if scene.camera is None else [scene.camera])])
     yield Progress(0.0, "Reading the scene")
     depsgraph.update()  # reading what was deleted since the last step would crash Blender
