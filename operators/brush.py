@@ -165,7 +165,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
 
     def _begin_stroke(self, context: bpy.types.Context, mode: str) -> Stroke:
         context.view_layer.update()
-        self._stroke = Stroke(context.scene, context.view_layer, context.evaluated_depsgraph_get(), mode)
+        self._stroke = Stroke(context.scene, context.evaluated_depsgraph_get(), mode)
         self._last, self._shown, self._cost = None, time.monotonic(), 0.0
         return self._stroke
 

@@ -128,8 +128,9 @@ class GroundTool(Tool):
         return True
 
     def _look_around(self, context: bpy.types.Context) -> None:
-        self._ground = Ground(context.view_layer, context.evaluated_depsgraph_get())
-        self._data = JobData(self.bl_label, context.scene, context.view_layer)
+        depsgraph = context.evaluated_depsgraph_get()
+        self._ground = Ground(depsgraph)
+        self._data = JobData(self.bl_label, context.scene, depsgraph)
         self._data.add_objects(self._ground.objects)
 
 

@@ -57,7 +57,7 @@ class TETFLORA_OT_look(Reporting, bpy.types.Operator):
                 space.region_3d.view_perspective = 'CAMERA'
             return {'FINISHED'}
         view = space.region_3d.view_matrix.inverted() if space is not None else Matrix.Rotation(_TILT, 4, 'X')
-        ground = Ground(context.view_layer, context.evaluated_depsgraph_get())
+        ground = Ground(context.evaluated_depsgraph_get())
         if self.where != 'VIEW' and not len(ground):
             return self.failed("No mesh is visible to stand on; add a ground mesh, or show it")
         camera = _camera(scene)

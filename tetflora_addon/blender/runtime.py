@@ -175,21 +175,13 @@ class JobData:
     ----------
     job : str
         Its name for the artist.
-    view_layer : bpy.types.ViewLayer, optional
-        Its dependency graph goes with it, and using that would crash Blender.
-    depsgraph : bpy.types.Depsgraph, optional
-        For the job itself.
+    depsgraph : bpy.types.Depsgraph
+        It goes with its view layer, and using it then would crash Blender.
     """
 
-    def __init__(
-        self,
-        job: str,
-        scene: bpy.types.Scene,
-        view_layer: bpy.types.ViewLayer | None = None,
-        depsgraph: bpy.types.Depsgraph | None = None,
-    ) -> None:
+    def __init__(self, job: str, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         self.job, self.scene, self.depsgraph, self._reason = job, scene, depsgraph, ""
-        self._layer = (0, "") if view_layer is None else (view_layer.as_pointer(), view_layer.name)
+        self._layer = depsgraph.view_layer.as_pointer(), depsgraph.view_layer.name
         self._known: list[tuple[bpy.types.ID, str]] = []
         self.add(f'the scene "{scene.name}"', scene)
 
@@ -221,7 +213,7 @@ class JobData:
         if not self._reason:
             lost = next((name for datablock, name in self._known[: 1 if few else None] if not is_there(datablock)), "")
             pointer, layer = self._layer
-            if not lost and pointer and all(pointer != one.as_pointer() for one in self.scene.view_layers):
+            if not lost and all(pointer != one.as_pointer() for one in self.scene.view_layers):
                 lost = f'the view layer "{layer}"'
             self._reason = f"{lost} was deleted" if lost else ""
         if self._reason:
@@ -278,7 +270,7 @@ def job(title: str) -> Callable[[Callable[..., Generator]], Callable[..., Genera
     def decorated(steps: Callable[..., Generator]) -> Callable[..., Generator]:
         @wraps(steps)
         def begin(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, *given: Any, **named: Any) -> Generator:
-            data = JobData(title, scene, depsgraph.view_layer, depsgraph)
+            data = JobData(title, scene, depsgraph)
             return guarded(data, steps(data, *given, **named))
 
         return begin

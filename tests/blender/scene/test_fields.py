@@ -67,7 +67,7 @@ def _instance_on_points(obj, instanced):
 
 
 def _plants():
-    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)[0]
+    return read_plants(bpy.context.scene, depsgraph())[0]
 
 
 def _same(first, second):

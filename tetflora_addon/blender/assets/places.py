@@ -70,9 +70,7 @@ class Places:
         return replace(self, matrices=matrices)
 
 
-def read_places(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> list[Places]:
+def read_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
     """Places of all assets of a view layer that render: first of plants, then of objects that scatter, by name.
 
     Parameters
@@ -86,16 +84,14 @@ def read_places(
         A transform that is not a number, a species whose collection has no object with faces, or a marked object of a
         kind that cannot be read; the message names the object.
     """
-    found = plant_places(scene, depsgraph, view_layer)
-    marked = sorted((o for o in renderable_objects(view_layer) if is_scatter(o)), key=lambda o: o.name_full)
+    found = plant_places(scene, depsgraph)
+    marked = sorted((o for o in renderable_objects(depsgraph.view_layer) if is_scatter(o)), key=lambda o: o.name_full)
     for scatter in read_scatters(marked, depsgraph).values():
         found += scatter.places
     return found
 
 
-def plant_places(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> list[Places]:
+def plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
     """Places of plants whose species is an asset, by the variants of each.
 
     An object stands as it is turned and scaled in the scene, at the place of the plant instead of its own.
@@ -105,7 +101,7 @@ def plant_places(
     SceneError
         As `read_places`.
     """
-    read = read_asset_plants(scene, depsgraph, view_layer)
+    read = read_asset_plants(scene, depsgraph)
     if not read:
         return []
     species = asset_species(scene)

@@ -192,7 +192,7 @@ def _refine(options: argparse.Namespace) -> dict:
             raise SceneError(f"The folder {target.parent} does not exist; create it or choose another")
         if target.is_dir():
             raise SceneError(f"{target} is a folder; add a file name")
-    statistics = refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
+    statistics = refine(scene, bpy.context.evaluated_depsgraph_get())
     if target is not None:
         scene.tetflora.output.save_results = True
         write_blend(target, lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))

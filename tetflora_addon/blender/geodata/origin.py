@@ -179,7 +179,7 @@ def importing(steps: Callable[..., Steps]) -> Callable[..., Steps]:
 
     @wraps(steps)
     def job(order: Import, *others: Any, **named: Any) -> Steps:
-        data = JobData("Importing", order.scene, order.depsgraph.view_layer)
+        data = JobData("Importing", order.scene, order.depsgraph)
         data.add_objects(list(order.selected))
         return guarded(data, read(order, *others, **named))
 

@@ -334,7 +334,6 @@ def refine_steps(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     *,
-    view_layer: bpy.types.ViewLayer | None = None,
     for_render: bool = False,
     beside: Sequence[bpy.types.Collection] = (),
     camera: Camera | None = None,
@@ -351,8 +350,6 @@ def refine_steps(
     ----------
     depsgraph : bpy.types.Depsgraph
         Evaluated for the frame.
-    view_layer : bpy.types.ViewLayer, optional
-        By default the dependency graph's.
     for_render : bool
         Results get a collection of their own beside the artist's, and are refined for the render region.
     beside : sequence of bpy.types.Collection
@@ -372,18 +369,17 @@ def refine_steps(
     TetFloraError
         No camera, nothing to refine, unknown species, unusable plants or meshes; the message says which.
     """
-    layer = view_layer or depsgraph.view_layer
-    data = JobData("Refine", scene, layer)
+    data = JobData("Refine", scene, depsgraph)
     if camera is None and scene.camera is not None:
         data.add_objects([scene.camera])
     data.add_objects(taking_part(scene))
     data.add_objects(leaf_objects(scene).values())
     results = Results(scene, 'RENDER' if for_render else 'VIEW', mark, data)
     run = _Run(depsgraph, camera, given, data, results, beside)
-    return guarded(data, _refine_steps(run, layer, first_look))
+    return guarded(data, _refine_steps(run, first_look))
 
 
-def _refine_steps(run: _Run, layer: bpy.types.ViewLayer, first_look: bool) -> Job[Statistics]:
+def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     results, depsgraph, clock, statistics = run.results, run.depsgraph, run.clock, run.statistics
     scene = results.scene
     use_machine(scene)
@@ -391,7 +387,7 @@ def _refine_steps(run: _Run, layer: bpy.types.ViewLayer, first_look: bool) -> Jo
     if run.camera is None or run.given is None:
         depsgraph.update()  # reading what was deleted since the last step would crash Blender
     camera = run.camera or read_camera(scene, depsgraph, region_only=results.purpose == 'RENDER')
-    given = run.given or read_scene(scene, depsgraph, layer)
+    given = run.given or read_scene(scene, depsgraph)
     camera = camera.local()
     if scene.tetflora.expand_everything:  # for no camera: exports, and others' renderers
         camera = camera.counted_from(origin_near(given.seeds.position))
@@ -494,7 +490,7 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
         As `refine_steps`.
     """
     camera = read_camera(scene, depsgraph).local()
-    given = read_scene(scene, depsgraph, depsgraph.view_layer).counted_from(camera.origin)
+    given = read_scene(scene, depsgraph).counted_from(camera.origin)
     flora = in_wind(scene, compile_for(given.species, scene, depsgraph), camera)
     bound = run_to_end(bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera)))
     settings = refinement_settings(scene)

@@ -140,23 +140,21 @@ class Stroke:
 
     Parameters
     ----------
-    scene, view_layer, depsgraph
+    scene, depsgraph
         As they are now. References to objects are kept until the stroke ends.
     mode : {'PAINT', 'ERASE', 'THIN'}
     """
 
-    def __init__(
-        self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, depsgraph: bpy.types.Depsgraph, mode: str
-    ) -> None:
+    def __init__(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, mode: str) -> None:
         settings = scene.tetflora.brush
         self.scene, self.mode = scene, mode
         self.changed = False  # whether a flush has changed the scene
-        self._data = JobData("Paint Plants", scene, view_layer)
+        self._data = JobData("Paint Plants", scene, depsgraph)
         _, painted = brush_of(scene)  # reports wrong settings before anything changes
         measure_all(scene, depsgraph, painted)
         # Moss neither counts for the density of trees nor keeps them away.
         self.standing = Standing(scene, depsgraph, covers=mode == 'ERASE')
-        self.ground = Ground(view_layer, depsgraph)
+        self.ground = Ground(depsgraph)
         self._data.add_objects(self.ground.objects)
         self.key = strokes.stroke_key(settings.seed, settings.strokes)
         settings.strokes += 1

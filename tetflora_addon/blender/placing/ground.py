@@ -5,7 +5,7 @@
 `Scene.ray_cast` would stop at the leaves of a refined forest, and cannot leave objects out.
 """
 
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -36,19 +36,13 @@ class Ground:
 
     Parameters
     ----------
-    view_layer : bpy.types.ViewLayer
     depsgraph : bpy.types.Depsgraph
-        Decides about modifiers and places.
-    without : iterable of bpy.types.Object, optional
-        Not ground, whatever they are.
+        Decides about modifiers and places; what is visible in its view layer is looked at.
     """
 
-    def __init__(
-        self, view_layer: bpy.types.ViewLayer, depsgraph: bpy.types.Depsgraph, without: Iterable[bpy.types.Object] = ()
-    ) -> None:
+    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
         self.depsgraph = depsgraph
-        left_out = set(without)
-        found = [o for o in view_layer.objects if o.type == 'MESH' and o not in left_out and is_ground(o)]
+        found = [o for o in depsgraph.view_layer.objects if o.type == 'MESH' and is_ground(o)]
         self.objects = [o for o in found if len(o.evaluated_get(depsgraph).data.polygons)]
         places = [np.array(o.evaluated_get(depsgraph).matrix_world, dtype=np.float64) for o in self.objects]
         boxes = [np.array(o.evaluated_get(depsgraph).bound_box, dtype=np.float64) for o in self.objects]
@@ -175,7 +169,7 @@ def drop_steps(
     yield Progress(0.0, _LOOKING)
     view_layer = data.depsgraph.view_layer
     view_layer.update()
-    ground = Ground(view_layer, data.depsgraph)
+    ground = Ground(data.depsgraph)
     if not len(ground):
         raise SceneError("No mesh is visible below or above the plants; add a ground mesh, or show it")
     data.add_objects(ground.objects)

@@ -38,7 +38,7 @@ class Explicit:
     originals: list[bpy.types.Object]  # whose place the refined polygons take
 
 
-def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Explicit | None:
+def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
     """Polygons of all marked objects of a view layer that render, and of their instances; None where there are none.
 
     Raises
@@ -49,12 +49,12 @@ def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLaye
     """
     if not any(o.tetflora.is_explicit for o in bpy.data.objects):
         return None
-    rendered = set(renderable_objects(view_layer))
+    rendered = set(renderable_objects(depsgraph.view_layer))
     marked = {o for o in rendered if o.tetflora.is_explicit}
     wanted = marked | _instancers_of_marked(rendered, depsgraph)
     if not wanted:
         return None
-    reader, looks, found = _Reader(), LayerLooks(view_layer), set()
+    reader, looks, found = _Reader(), LayerLooks(depsgraph.view_layer), set()
     for instance in depsgraph.object_instances:
         owner = instance.parent.original if instance.is_instance else instance.object.original
         if owner not in wanted or not instance.show_self or instance.object.type not in SURFACE_TYPES:

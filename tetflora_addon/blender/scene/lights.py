@@ -35,7 +35,7 @@ _ELEVATIONS = (2.0, 10.0, 30.0, 60.0, 90.0)
 _SKIES: dict[str, list[list[float]]] = json.loads(Path(__file__).with_name("skies.json").read_text(encoding="utf-8"))
 
 
-def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> tuple[Light, ...]:
+def read_lights(depsgraph: bpy.types.Depsgraph) -> tuple[Light, ...]:
     """Lights that render and shine, by name.
 
     Instances of lights and lights with an invalid transform are left out. Light linking, textures and the spread of
@@ -47,7 +47,7 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer)
     of Φ watts sends Φ / 4π W/sr each way, an area Φ / π W/sr ahead.
     """
     found = []
-    for obj in sorted(renderable_objects(view_layer), key=lambda o: o.name_full):
+    for obj in sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full):
         if obj.type != 'LIGHT':
             continue
         data = obj.evaluated_get(depsgraph).data
@@ -213,11 +213,11 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
     return World.of(radiance), suns
 
 
-def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Sources:
+def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Sources:
     """Lights, world, and occluders, which cast shadows and reflect light upward."""
     world = read_world(scene)
-    grounds, looks = (o for o in renderable_objects(view_layer) if o.tetflora.is_occluder), Looks()
+    grounds, looks = (o for o in renderable_objects(depsgraph.view_layer) if o.tetflora.is_occluder), Looks()
     colors = [looks.of(ground.active_material, {}).color for ground in grounds]
     ground = np.mean(colors, axis=0) if colors else np.zeros(3)
-    lights = (*read_lights(depsgraph, view_layer), *world.suns)
-    return Sources(lights, world.world, read_occluders(depsgraph, view_layer), ground)
+    lights = (*read_lights(depsgraph), *world.suns)
+    return Sources(lights, world.world, read_occluders(depsgraph), ground)

@@ -457,7 +457,7 @@ def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     return (positions @ matrix[:3, :3].T + matrix[:3, 3])[corners]
 
 
-def read_occluders(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Floats:
+def read_occluders(depsgraph: bpy.types.Depsgraph) -> Floats:
     """Triangles of all occluders of a view layer that render.
 
     Returns
@@ -470,6 +470,6 @@ def read_occluders(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLay
     SceneError
         One of them has no faces or is no longer a mesh.
     """
-    marked = [o for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
+    marked = [o for o in renderable_objects(depsgraph.view_layer) if o.tetflora.is_occluder]
     marked.sort(key=lambda o: o.name_full)
     return np.concatenate([np.zeros((0, 3, 3)), *(_triangles(o, depsgraph) for o in marked)])

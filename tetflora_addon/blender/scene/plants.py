@@ -55,7 +55,7 @@ class NoPlantsError(SceneError):
 
 
 def read_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
     """Enabled plants of a view layer that render: single ones by name, then instances, then fields.
 
@@ -82,7 +82,7 @@ def read_plants(
         No plant is of a species that the catalog has, or one has a scale of 0, or a transform that is not a number;
         the message names the objects.
     """
-    read = partial(_read_plants, scene, depsgraph, view_layer)
+    read = partial(_read_plants, scene, depsgraph)
     if not (scene.render.use_motion_blur and any(map(moves, filter(may_take_part, bpy.data.objects)))):
         return read()
     first, last = exposure(scene)
@@ -99,17 +99,17 @@ def read_plants(
 
 
 def _read_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
     known, assets = catalog(), {*asset_species(scene), *gone_species(scene)}
     odd: list[tuple[str, str]] = []  # names of objects, each with a species
-    objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
+    objects = sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
     own = [o for o, _ in grouped]
     single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
     odd += [(o.name, o.tetflora.species) for o in single if o.tetflora.species not in known]
-    looks, alike = LayerLooks(view_layer), {}
+    looks, alike = LayerLooks(depsgraph.view_layer), {}
     for obj in single:
         if obj.tetflora.species in known:
             alike.setdefault(looks.of(obj), []).append(obj)
@@ -179,9 +179,7 @@ class AssetPlants:
     matrices: Floats
 
 
-def read_asset_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> list[AssetPlants]:
+def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[AssetPlants]:
     """Enabled plants of a view layer that render and whose species is an asset, in the order of `read_plants`.
 
     Objects that show a collection which is a species count as plants of it, each by itself, seeded by its name.
@@ -194,7 +192,7 @@ def read_asset_plants(
     assets = asset_species(scene)
     if not assets:
         return []
-    objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
+    objects = sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full)
     single: dict[str, list[bpy.types.Object]] = {}
     fields, drops = [], []
     for obj in objects:

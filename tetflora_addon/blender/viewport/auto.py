@@ -129,7 +129,7 @@ def refined(scene: bpy.types.Scene) -> None:
     if scene.tetflora.auto_refine:
         layer = _view_layer(scene)
         layer.update()
-        _done[scene.session_uid] = scene_digest(scene, layer.depsgraph, layer)  # for the scene's camera
+        _done[scene.session_uid] = scene_digest(scene, layer.depsgraph)  # for the scene's camera
 
 
 def tick() -> float | None:
@@ -168,14 +168,14 @@ def _begin(scene: bpy.types.Scene) -> bool:
     layer = _view_layer(scene)
     layer.update()
     camera = view_camera(scene) if scene.tetflora.follow_viewport else None
-    digest = scene_digest(scene, layer.depsgraph, layer, camera)
+    digest = scene_digest(scene, layer.depsgraph, camera)
     if _done.get(scene.session_uid) == digest and has_results(scene):
         _state.message = ""
         redraw()
         return False
     _state.digest, _state.again, _state.waiting = digest, False, False
     _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE)
-    _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer, camera=camera, first_look=True)
+    _state.steps = refine.refine_steps(scene, layer.depsgraph, camera=camera, first_look=True)
     return True
 
 

@@ -99,7 +99,7 @@ def schedule() -> None:
         call_soon(_on_timer, max(_SOON, _state.seconds))
 
 
-def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Dots:
+def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Dots:
     """Dots for the population that the panel shows, without a change to anything.
 
     Raises
@@ -112,7 +112,8 @@ def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: 
         raise TetFloraError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to preview changes')
     grounds = None
     if not population.uid:  # settings for a new population, which would grow on what is selected
-        chosen = [o for o in view_layer.objects if o.select_get(view_layer=view_layer)]
+        layer = depsgraph.view_layer
+        chosen = [o for o in layer.objects if o.select_get(view_layer=layer)]
         grounds = [o for o in chosen if o.type == 'MESH' and not o.tetflora.is_field]
     own = set(own_objects(scene, population))
     placement = read_search(scene, depsgraph, population, own, grounds, MOST_PLACED).placement()
@@ -162,7 +163,7 @@ def _on_timer() -> None:
         return
     begin = time.perf_counter()
     try:
-        dots = dots_of(scene, bpy.context.evaluated_depsgraph_get(), bpy.context.view_layer)
+        dots = dots_of(scene, bpy.context.evaluated_depsgraph_get())
         _state.error = ""
     except TetFloraError as wrong:
         dots, _state.error = None, str(wrong)
