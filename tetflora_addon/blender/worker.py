@@ -11,7 +11,7 @@ Where nobody looks, `run_to_end` runs all in the caller's thread: a second one w
 import atexit
 import threading
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, suppress
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
@@ -104,6 +104,17 @@ def steps_in_thread(work: Job[_Result], progress: Progress) -> Job[_Result]:
 def call_in_thread(progress: Progress, function: Callable[..., _Result], *given: object) -> Job[_Result]:
     """The result of a function of the engine, which a thread computes."""
     return steps_in_thread(calling(function, *given), progress)
+
+
+def written(
+    blocks: Iterable[_Item], write: Callable[[_Item], Generator[None, None, Progress]], progress: Progress
+) -> Job[None]:
+    """Write blocks one by one, while a thread makes the next."""
+    with closing(in_thread((block for block in blocks), ahead=1)) as made:
+        for block in made:
+            if block is not None:
+                progress = yield from progress.during(write(block))
+            yield progress.repeated if block is None else progress
 
 
 def calling(function: Callable[..., _Result], *given: object) -> Generator[Any, Any, _Result]:

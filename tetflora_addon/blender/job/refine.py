@@ -10,11 +10,9 @@ originals where they are whole, and meshes of clusters where some of them are ne
 
 import json
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby
-from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -56,7 +54,7 @@ from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..scene.skeletons import look_of
-from ..worker import call_in_thread, in_thread, nobody_waits, run_to_end, steps_in_thread
+from ..worker import call_in_thread, nobody_waits, run_to_end, steps_in_thread, written
 from .assets import SceneAssets, asset_warnings, bind_steps, is_plain
 from .contents import (
     SceneContents,
@@ -76,8 +74,6 @@ _BATCH = 16
 _LOOP_FRACTION = 0.6
 #: Polygons, were all plants expanded, from which on other processes are started at once.
 _MANY = 1e6
-
-_Block = TypeVar("_Block")
 
 
 @dataclass
@@ -265,7 +261,7 @@ def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Job[None]
         text = f"Making polygons: {run.statistics.polygons_meshed:,}"
         return Progress(start + (0.95 - start) * block.fraction, text)
 
-    yield from _written(_of_all_ages(run, blocks), write, Progress(start, "Making polygons"))
+    yield from written(_of_all_ages(run, blocks), write, Progress(start, "Making polygons"))
 
 
 def _of_all_ages(run: _Run, blocks: Iterator[Block]) -> Iterator[Block]:
@@ -295,18 +291,7 @@ def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Job[None]:
         _made(run, obj, block.buffers, lit=False)
         return Progress(0.95, f"Keeping polygons: {run.statistics.polygons_meshed:,}")
 
-    yield from _written(blocks, write, Progress(0.95, "Keeping polygons"))
-
-
-def _written(
-    blocks: Iterator[_Block], write: Callable[[_Block], Generator[None, None, Progress]], progress: Progress
-) -> Job[None]:
-    """Write blocks one by one, while the next is computed."""
-    with closing(in_thread(blocks, ahead=1)) as made:
-        for block in made:
-            if block is not None:
-                progress = yield from progress.during(write(block))
-            yield progress.repeated if block is None else progress
+    yield from written(blocks, write, Progress(0.95, "Keeping polygons"))
 
 
 def _made(run: _Run, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> None:

@@ -20,11 +20,12 @@ from ..attributes import world_matrix
 from ..runtime import JobData
 from ..scene.fields import fields_of, read_field
 from ..settings import check_limits
+from ..worker import run_to_end
 from .canopy import not_of_covers
 from .distances import SQUARE, distance_of, painted_weights
 from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
-from .plant_objects import PAINTED_MARK, add_field, add_plants, plants_of
+from .plant_objects import PAINTED_MARK, add_field, add_plants_steps, plants_of
 from .populations import own_number, own_objects
 from .properties import MOST_PAINTED_EMPTIES
 from .rules import note_erased
@@ -240,7 +241,7 @@ class Stroke:
         store, number = self.scene.tetflora.brush.store, len(standing.objects) + len(keys)
         if not (store == 'FIELD' or (store == 'AUTOMATIC' and number > MOST_PAINTED_EMPTIES)):
             first = len(standing.objects)
-            standing.objects += add_plants(self.scene, placement, species)
+            standing.objects += run_to_end(add_plants_steps(self.scene, placement, species))
             standing.add(places, _OBJECTS, first)
             return
         number = next((i for i, o in enumerate(standing.fields) if o.get(PAINTED_MARK) and editable(o)), None)

@@ -25,7 +25,7 @@ from ..species.catalog import default_species
 from ..species.edits import catalog
 from ..worker import run_to_end
 from .cover import cover_steps
-from .plant_objects import add_plants
+from .plant_objects import add_plants_steps
 from .terrain import grid_mesh
 
 NAME = "First forest"
@@ -225,7 +225,7 @@ def _plant(scene: bpy.types.Scene, seed: int) -> None:
             seed=(uniform(keys, 3) * 2**31).astype(np.int32),
             wanted=layer.number,
         )
-        add_plants(scene, placement, [layer.species if layer.species in known else default_species()])
+        run_to_end(add_plants_steps(scene, placement, [layer.species if layer.species in known else default_species()]))
 
 
 def _cover(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:

@@ -28,12 +28,11 @@ from ..scene.own_ages import MOST_YEARS
 from ..scene.skeletons import aged_kind
 from ..settings import BIOME, SCATTER, with_identity
 from ..species.edits import revert_species
-from ..worker import call_in_thread
+from ..worker import call_in_thread, run_to_end
 from .canopy import is_cover, standing
 from .plant_objects import (
     POPULATION_MARK,
     add_field,
-    add_plants,
     add_plants_steps,
     plant_collection,
     plants_of,
@@ -155,7 +154,7 @@ def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPla
         if is_cover(population):
             made[0].display_type = 'BOUNDS'  # its points would turn the ground black
     elif own:
-        made = add_plants(scene, placement, search.species, collection, ages)
+        made = run_to_end(add_plants_steps(scene, placement, search.species, collection, ages))
     for number, obj in enumerate(made):
         group = obj.tetflora
         group.population, group.population_number = population.uid, number

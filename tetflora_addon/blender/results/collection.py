@@ -95,31 +95,22 @@ class Results:
         self,
         name: str,
         kind: str,
-        buffers: MeshBuffers,
+        buffers: MeshBuffers | PointBuffers,
         materials: list[bpy.types.Material],
         species: Species | None = None,
         look: str = "",
     ) -> Generator[None, None, bpy.types.Object]:
-        """Write one mesh as an object of the collection, step by step; of one species, or of None, and of a look."""
+        """Write a mesh, or points of one material, as an object of the collection, step by step.
+
+        It is of one species, or of None, and of a look.
+        """
         self.use(materials)
         name = self.name_for(name)
+        if isinstance(buffers, PointBuffers):
+            return self._link(name, point_object(name, buffers, *materials), kind, species, look)
         mesh = yield from mesh_steps(name, buffers, materials)
         self._made.append(mesh)
         return self._link(name, bpy.data.objects.new(name, mesh), kind, species, look)
-
-    def add_points(
-        self,
-        name: str,
-        kind: str,
-        buffers: PointBuffers,
-        materials: list[bpy.types.Material],
-        species: Species | None = None,
-        look: str = "",
-    ) -> bpy.types.Object:
-        """Write one cloud of points, which has one material, as an object of the collection."""
-        self.use(materials)
-        name = self.name_for(name)
-        return self._link(name, point_object(name, buffers, *materials), kind, species, look)
 
     def name_for(self, name: str) -> str:
         """A name that ends in a number, with the mark; shortened so that Blender does not cut off the end."""
