@@ -12,11 +12,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Integers32, Mask
+from ...arrays import Floats, Integers32, Mask, quaternions
 from ...planting.places import new_seeds
 from ..attributes import KINDS, read, values_of, write
 from ..scene.field_sizes import has_history
-from ..scene.fields import FIELD_ATTRIBUTES, field_kinds, quaternions
+from ..scene.fields import FIELD_ATTRIBUTES, field_kinds
 from ..scene.skeletons import kind_of_choice
 
 FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made and may remove

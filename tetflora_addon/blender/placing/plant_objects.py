@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
 
+from ...arrays import quaternions
 from ...errors import SceneError
 from ...jobs import run_to_end
 from ...planting.places import Placement, new_seeds
@@ -17,7 +18,7 @@ from .. import settings
 from ..attributes import world_matrix
 from ..saved_files import VERSION
 from ..scene.ages import plainly_aged, relative_heights
-from ..scene.fields import fields_of, quaternions, read_aged_field, stored_size, write_field
+from ..scene.fields import fields_of, read_aged_field, stored_size, write_field
 from ..scene.own_ages import stored_ages
 from ..scene.plants import single_plants
 from ..scene.skeletons import skeleton_object_of, species_of

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats, Integers, Integers32
-from ...errors import SceneError, TetFloraError
+from ...errors import SceneError, TetFloraError, listed
 from ...growth.crown_shapes import crown_shapes
 from ...growth.hashing import child_key, key_of_seed
 from ...growth.seasons import is_gone
@@ -227,7 +227,7 @@ def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
         if bad.any():
             names = [plants.owners[min(i, len(plants.owners) - 1)].name for i in np.flatnonzero(bad).tolist()[:_NAMED]]
             raise SceneError(
-                f"{_listed(list(dict.fromkeys(names)))}: an invalid position; clear it with Alt S and Alt G"
+                f"{listed(list(dict.fromkeys(names)))}: an invalid position; clear it with Alt S and Alt G"
             )
     return found
 
@@ -236,7 +236,7 @@ def _none_left(off: bool, fields: list[str], hidden: int) -> str:
     if off:
         return "All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar"
     if fields:
-        return f"{_listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
+        return f"{listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
     if hidden:
         return (
             f"No plants to render; {hidden:,} are hidden in renders or excluded from the view layer. Enable them "
@@ -281,7 +281,7 @@ def _placed(names: list[str], kinds: tuple[str, ...], species: Integers32, seeds
     if not sound.all():
         bad = [names[min(i, len(names) - 1)] for i in np.flatnonzero(~sound)[: _NAMED * len(names)].tolist()]
         raise SceneError(
-            f"{_listed(list(dict.fromkeys(bad)))}: zero scale or an invalid position; clear them with Alt S and Alt G"
+            f"{listed(list(dict.fromkeys(bad)))}: zero scale or an invalid position; clear them with Alt S and Alt G"
         )
     return Seeds(kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
 
@@ -315,7 +315,7 @@ def _check_species(plants: list[tuple[str, str]]) -> None:
 def _unknown(odd: list[tuple[str, str]]) -> str:
     """What is said of objects with the species that nobody has, of the first of these."""
     species = odd[0][1]
-    names = _listed([name for name, other in odd if other == species])
+    names = listed([name for name, other in odd if other == species])
     if find_asset(None, species) is not None:
         return (
             f'{names}: "{name_of(species)}", which was used as their species, was deleted; undo that, or choose '
@@ -327,8 +327,3 @@ def _unknown(odd: list[tuple[str, str]]) -> str:
         "another in the TetFlora tab of the sidebar, or add "
         f"{species or 'its file'}{'.json' if species else ''} with Load Species"
     )
-
-
-def _listed(names: list[str]) -> str:
-    text = ", ".join(f'"{name}"' for name in names[:_NAMED])
-    return text if len(names) <= _NAMED else f"{text} and {len(names) - _NAMED} more"

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats
+from ...arrays import Floats, quaternions
 from ...errors import SceneError, SpeciesError, TetFloraError
 from ...jobs import Job, Progress, part_of
 from ...planting.height_grid import HeightGrid, cell_for, height_grid
@@ -45,7 +45,7 @@ from ..scene.field_sizes import (
     read_sizes,
     year_curves,
 )
-from ..scene.fields import field_kinds, quaternions, write_field
+from ..scene.fields import field_kinds, write_field
 from ..scene.own_ages import Sizes
 from ..scene.sizes import kinds_of_sizes, measure_of
 from ..settings import check_limits
