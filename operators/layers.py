@@ -164,7 +164,7 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
         kept = []
         for biome in filter(None, (find_biome(scene, uid) for uid in biomes)):
             depsgraph.update()
-            kept += lay_biome_soil(scene, depsgraph, [e.object for e in biome.grounds if e.object is not None])
+            kept += lay_biome_soil(depsgraph, [e.object for e in biome.grounds if e.object is not None])
         return Updated(made, bare, kept)
 
     def _steps_of(

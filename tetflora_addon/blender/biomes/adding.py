@@ -187,7 +187,7 @@ def _plant(data: JobData, uid: str, stands: Sequence[tuple[str, int]], without: 
     depsgraph.update()
     biome = find_biome(scene, uid)
     grounds = [entry.object for entry in biome.grounds if entry.object is not None] if biome is not None else []
-    kept = lay_biome_soil(scene, depsgraph, grounds) if grounds else []
+    kept = lay_biome_soil(depsgraph, grounds) if grounds else []
     return BiomeResult(biome.name if biome is not None else "", layers, bare, kept)
 
 

@@ -81,9 +81,7 @@ def make_line(scene: bpy.types.Scene, name: str, grounds: Iterable[bpy.types.Obj
     return made
 
 
-def lay_biome_soil(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.Object]
-) -> list[str]:
+def lay_biome_soil(depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.Object]) -> list[str]:
     """Give ground a soil in the colors of the low plants and the litter of all biomes on it.
 
     Returns
@@ -99,7 +97,7 @@ def lay_biome_soil(
     cells = sheet.rows * sheet.columns
     on_it = set(fits)
     # Groups of the artist's own layers have no file, which says what soil is like.
-    found = [b for b in biomes_in(scene) if b.source and on_it & {entry.object for entry in b.grounds}]
+    found = [b for b in biomes_in(depsgraph.scene) if b.source and on_it & {entry.object for entry in b.grounds}]
     if not found:
         return []
     earth, turf, share, here = np.zeros((cells, 3)), np.zeros((cells, 3)), np.zeros(cells), np.full(cells, 1e-9)
@@ -108,7 +106,7 @@ def lay_biome_soil(
         ground = data_of(biome).get("ground", {})
         value = {name: np.array(ground.get(name, GROUND[name][0])) for name in ("earth", "turf", "turf_share")}
         own = np.full(cells, 1e-6)
-        for low, cell, area, colors in _low_plants(scene, depsgraph, biome.uid, sheet):
+        for low, cell, area, colors in _low_plants(depsgraph, biome.uid, sheet):
             own += np.bincount(cell, minlength=cells)
             if low:
                 hidden += np.bincount(cell, area, cells)
@@ -129,9 +127,10 @@ def lay_biome_soil(
 
 
 def _low_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str, sheet: Sheet
+    depsgraph: bpy.types.Depsgraph, uid: str, sheet: Sheet
 ) -> Iterable[tuple[bool, Integers, Floats, Floats]]:
     """Plants of the layers of a biome: whether they are low, their cells, what each hides, m², and its color."""
+    scene = depsgraph.scene
     for population in scene.tetflora.layers:
         if population.biome != uid:
             continue

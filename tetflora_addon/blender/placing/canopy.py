@@ -102,17 +102,13 @@ def floor_steps(canopy: Canopy, triangles: Floats, kinds: int) -> Generator[floa
 
 
 def read_suits(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    population: bpy.types.PropertyGroup,
-    triangles: Floats,
-    species: tuple[str, ...],
+    depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup, triangles: Floats, species: tuple[str, ...]
 ) -> Callable[[], dict[int, Suits]]:
     """What finds, without Blender, how suitable the ground (t, 3, 3) is for those species that do not grow anywhere."""
     wanted = {e.species: e for e in population.mix if e.habitat != 'ANYWHERE' and e.species in species}
     if not wanted:
         return dict
-    canopy, above = canopy_of(scene, depsgraph)
+    canopy, above = canopy_of(depsgraph.scene, depsgraph)
     asked = {
         number: (Habitat[wanted[name].habitat], shedder_of(wanted[name], above), population.seed + number)
         for number, name in enumerate(species)

@@ -267,9 +267,9 @@ def read_search(
         rules = replace(rules, count=min(rules.count, most))
     masks = {name: getattr(population, name) for name in MASKS}
     ground = read_ground(grounds, depsgraph, **masks)
-    suits = read_suits(scene, depsgraph, population, ground.triangles, species)
-    present = standing(scene, depsgraph, own, species)
-    zones = read_zones(scene, depsgraph, population, grounds)
+    suits = read_suits(depsgraph, population, ground.triangles, species)
+    present = standing(depsgraph, own, species)
+    zones = read_zones(depsgraph, population, grounds)
     erased = (  # circles, as lines of one point
         Path(center[None], stroke[0])
         for stroke in _strokes(population)
@@ -279,12 +279,9 @@ def read_search(
 
 
 def standing(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    without: Collection[bpy.types.Object],
-    species: Sequence[str],
+    depsgraph: bpy.types.Depsgraph, without: Collection[bpy.types.Object], species: Sequence[str]
 ) -> tuple[Floats, Integers32]:
-    """Places (m, 3) and species (m,) of the plants of a scene, those that are objects and those of fields.
+    """Places (m, 3) and species (m,) of the plants of the scene, those that are objects and those of fields.
 
     Parameters
     ----------
@@ -295,7 +292,7 @@ def standing(
     """
     numbers = {identifier: number for number, identifier in enumerate(species)}
     # What covers the ground keeps nobody away.
-    objects = [o for o in not_of_covers(scene) if o not in without]
+    objects = [o for o in not_of_covers(depsgraph.scene) if o not in without]
     single = plants_of(objects)
     position = [np.array([o.matrix_world.translation for o in single], dtype=np.float64).reshape(-1, 3)]
     kinds = [np.array([numbers.get(o.tetflora.species, -1) for o in single], dtype=np.int32)]

@@ -287,7 +287,7 @@ def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types
     soil = Soil(**{f.name: getattr(stand, f.name) for f in fields(Soil)})
     settings = StandSettings(**{f.name: getattr(stand, f.name) for f in fields(StandSettings)})
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
-    ground = zoned(scene, depsgraph, stand, grounds, ground)
+    ground = zoned(depsgraph, stand, grounds, ground)
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
     try:
         growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))
