@@ -3,7 +3,6 @@
 """The list of layers: update, move, duplicate, remove and select them, change their ground, save them as a biome."""
 
 from contextlib import closing
-from dataclasses import dataclass
 
 import bpy
 from bpy.props import StringProperty
@@ -85,13 +84,8 @@ def tell_layers(
     return operator.done(text + more)
 
 
-@dataclass(frozen=True)
-class Updated:
-    """What an update made: results of layers, why others have no plants, grounds that keep a material."""
-
-    made: list[PlacedPlants | GrownStand | int]
-    bare: list[str]
-    kept: list[str]
+#: What an update made: results of layers, why others have no plants, grounds that keep a material.
+Updated = tuple[list[PlacedPlants | GrownStand | int], list[str], list[str]]
 
 
 class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
@@ -138,7 +132,7 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
         active, one = active_layer(scene), self.which == 'ACTIVE'
         if one and active.kind == BIOME and not self.reroll:
             added = yield from plant_biome_steps(scene, depsgraph, active)
-            return Updated([number for _, number in added.layers], added.bare, added.kept)
+            return [number for _, number in added.layers], added.bare, added.kept
         uids = [layer.uid for layer in (*children_of(active), active) if layer.kind != BIOME] if one else []
         uids = uids if one else due_layers(scene)
         if not uids:
@@ -165,7 +159,7 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
         for biome in filter(None, (find_biome(scene, uid) for uid in biomes)):
             depsgraph.update()
             kept += lay_biome_soil(depsgraph, [e.object for e in biome.grounds if e.object is not None])
-        return Updated(made, bare, kept)
+        return made, bare, kept
 
     def _steps_of(
         self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layer: bpy.types.PropertyGroup
@@ -186,12 +180,11 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
         points.schedule()
         show_shapes(context.scene)
         context.scene.update_tag()
-        if len(result.made) == 1 and isinstance(result.made[0], PlacedPlants):
-            return tell_placed(self, result.made[0])
-        numbers = [
-            n if isinstance(n, int) else n.number if isinstance(n, PlacedPlants) else n.plants for n in result.made
-        ]
-        return tell_layers(self, "", numbers, result.bare, result.kept)
+        made, *rest = result
+        if len(made) == 1 and isinstance(made[0], PlacedPlants):
+            return tell_placed(self, made[0])
+        numbers = [n if isinstance(n, int) else n.number if isinstance(n, PlacedPlants) else n.plants for n in made]
+        return tell_layers(self, "", numbers, *rest)
 
 
 class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):

@@ -135,10 +135,7 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneC
         except NoPlantsError:
             if explicit is None and not places:
                 raise
-            none = np.zeros(0)
-            frames = none.reshape(0, 3), none.reshape(0, 3, 3)
-            seeds, owners = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none), ()
-            unknown = ""
+            seeds, owners, unknown = replace(Seeds.upright(0), identifiers=()), (), ""
         lights = (*read_lights(depsgraph), *sky_suns(scene))
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph) if baked else None

@@ -36,14 +36,8 @@ _UPRIGHT = np.eye(3)
 
 def single_seed(identifier: str, seed: int, frame: Floats = _UPRIGHT) -> Seeds:
     """One plant at the origin, of scale 1; its frame (3, 3) matters because leaves turn to the sky."""
-    return Seeds(
-        identifiers=(identifier,),
-        species=np.zeros(1, np.int32),
-        seed=np.array([seed], dtype=np.int64),
-        position=np.zeros((1, 3)),
-        frame=np.array(frame)[None],
-        scale=np.ones(1),
-    )
+    own = {"seed": np.array([seed], dtype=np.int64), "frame": np.array(frame)[None]}
+    return replace(Seeds.upright(1), identifiers=(identifier,), **own)
 
 
 #: Polygons of a plant with the same materials: ``'bark'``, ``'leaf'`` or ``'blossom'``; form of leaf; buffers.
