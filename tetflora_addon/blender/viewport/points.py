@@ -6,8 +6,6 @@ Dots belong to the session and are forgotten when a file is loaded. The state ho
 do not outlive undo.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,8 +14,8 @@ import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats32
 from ...camera.camera import origin_near
 from ...errors import TetFloraError
 from .. import compat
@@ -49,12 +47,12 @@ _SOON = 0.08  # seconds from a change to new dots
 class Dots:
     """The dots of a population."""
 
-    position: NDArray[np.float32]  # (n, 3), meters from the origin
-    color: NDArray[np.float32]  # (n, 4)
+    position: Floats32  # (n, 3), meters from the origin
+    color: Floats32  # (n, 4)
     plants: int  # that would be placed; at least, where ``more``
     more: bool
     message: str  # why there are fewer than asked for; empty if there are not
-    origin: NDArray[np.float64]  # (3,), near most of them, meters in world space
+    origin: Floats  # (3,), near most of them, meters in world space
 
 
 @dataclass
@@ -199,17 +197,13 @@ def _clear() -> None:
     redraw()
 
 
-def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
-    schedule()
-
-
 def _on_load_pre(_path: object, _other: object = None) -> None:
     _state.scene = None
     call_off(_on_timer)
     _clear()
 
 
-_HANDLERS = Handlers(undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_pre)
+_HANDLERS = Handlers(undo_post=lambda *_: schedule(), redo_post=lambda *_: schedule(), load_pre=_on_load_pre)
 
 
 def register() -> None:
@@ -241,7 +235,7 @@ class GroundCursor:
     """Line strips in one window, from `start` to `stop`; change ``lines`` and redraw the area."""
 
     def __init__(self) -> None:
-        self.lines: list[tuple[NDArray[np.float64], Color]] = []
+        self.lines: list[tuple[Floats, Color]] = []
         self._window: int | None = None
         self._handle: object | None = None
 
@@ -282,7 +276,7 @@ class GroundCursor:
         gpu.state.blend_set('NONE')
 
 
-def circle(center: Sequence[float], radius: float, sides: int = 32) -> NDArray[np.float64]:
+def circle(center: Sequence[float], radius: float, sides: int = 32) -> Floats:
     """A level circle, (sides + 1, 3) with the first corner twice."""
     angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
     return np.stack([np.cos(angle), np.sin(angle), np.zeros(sides + 1)], axis=1) * radius + np.asarray(center, float)

@@ -7,8 +7,6 @@ runtime data. They change without steps of undo, and undo keeps what is equal in
 datablocks that it frees: Blender would crash. So they are taken away before each undo and made anew after it.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 
