@@ -35,7 +35,7 @@ _CHORD = 0.6
 #: What is seen is lit once and again by all the rest, of which a part is seen too: between the first power of the light
 #: that is scattered once, were only these surfaces to change, and the second, were all to.
 _POWER = 1.5
-#: Light of the sky over that of a lamp on a sheet that faces it, about; and the power of a facet's own light by which it
+#: Light of the sky over that of a lamp on a sheet that faces it, about; and the power of its own light by which a facet
 #: is evened. With 1, what is in the shade differs more than before; FLIP of ``benchmarks exact --cases edge --species
 #: birch --size 480x270 --seeds 2`` over noise is .0201 with 0, .0180 with .5, .0183 with 1.
 _AMBIENT, _EVENED = 0.4, 0.7
