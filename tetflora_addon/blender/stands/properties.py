@@ -30,7 +30,7 @@ class TetFloraStandEntry(bpy.types.PropertyGroup, SpeciesChoice):
         options=set(),
     )
     incoming_seeds: FloatProperty(
-        name="Incoming Seeds",
+        name="Share of Seeds",
         description="Share of this species among the seeds that arrive from outside, relative to the others",
         default=1.0,
         min=0.0,
