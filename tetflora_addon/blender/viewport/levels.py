@@ -93,7 +93,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
 
     What is wrong with a plant is reported by `Preview.message`, for the panel, and the earlier plants stay.
     """
-    begin, preview, form = time.perf_counter(), of(scene), scene.tetflora.preview.plants
+    begin, preview, form = time.thread_time(), of(scene), scene.tetflora.preview.plants
     preview.message, preview.objects, preview.moment = "", len(scene.objects), _moment(scene)
     try:
         if form == 'NONE':
@@ -105,7 +105,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
     except TetFloraError as error:
         preview.message = str(error)
     preview.made += 1
-    preview.seconds = time.perf_counter() - begin
+    preview.seconds = time.thread_time() - begin
     redraw()
     return preview.shapes
 
