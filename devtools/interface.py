@@ -108,16 +108,7 @@ def drawn(cls: type, context: Any, layout: Any) -> bool:
 
 
 class _Nothing:
-    """A layout that costs nothing: what is timed is the panel, and the rows of its lists."""
-
-    def template_list(self, kind: str, _id: str, owner: Any, name: str, *active: Any, **_options: Any) -> None:
-        import bpy
-
-        shown = getattr(bpy.types, kind)
-        for number, item in enumerate(getattr(owner, name)):
-            shown.draw_item(shown, bpy.context, self, owner, item, 0, *active, number, 0)
-        if hasattr(shown, "filter_items"):
-            shown.filter_items(shown, bpy.context, owner, name)
+    """A layout that costs nothing: what is timed is the panel."""
 
     def __getattr__(self, name: str) -> Any:
         return (lambda *_, **__: (self, self)) if name == "panel" else (lambda *_, **__: self)

@@ -72,7 +72,8 @@ class Hand:
         yield from self.ui.picture(f"add_{operator}")
         below = [(x - 60, b) for b in range(y - STEP, 0, -STEP)]  # always in it, or it would close
         yield from self.click(f"ops.tetflora.{operator}(", place=below)
-        self.ui.move(*self.ui.center())
+        yield from self.done()
+        yield from self.key('ESC')  # it stays open while the mouse is in it
 
     def beside_lists(self):
         """Where buttons beside lists are."""
@@ -82,10 +83,7 @@ class Hand:
         """Wait until no job runs."""
         yield 0.5
         yield from self.ui.until(lambda: not self.ui.window.modal_operators, 900, "end of the job")
-        x, y = self.ui.center()
-        for away in (0, 5, 10):  # popovers close when the mouse leaves them, and while nothing else has it
-            self.ui.move(x + away, y)
-            yield 0.3
+        yield 0.5
 
     def render(self, found):
         """F12, small so that it is soon done; how much of the picture is not one color."""
@@ -98,7 +96,7 @@ class Hand:
         yield from self.ui.until(lambda: done, 600, "render")
         yield 1.0
         bpy.app.handlers.render_complete.clear()
-        path = str(self.ui.out_dir / "render.png")
+        path = str(self.ui.out_dir / f"render_{len(self.ui.values)}.png")
         bpy.data.images["Render Result"].save_render(path)
         image = bpy.data.images.load(path)
         pixels = np.zeros(len(image.pixels), dtype=np.float32)
@@ -134,26 +132,22 @@ def own_ground(hand, scene, found):
     scene.tetflora.populate.mix.clear()
     scene.tetflora.quality = 'DRAFT'
     yield from hand.add_layer("populate")
-    yield from hand.done()
     for _ in range(2):
         yield from hand.click("ops.tetflora.edit_list(", place=hand.beside_lists())
     yield from hand.click("ops.tetflora.update_layers(")
     yield from hand.done()
     found["species"] = len({o.tetflora.species for o in bpy.context.scene.objects if o.tetflora.is_plant})
     yield from hand.add_layer("ground_cover")
-    yield from hand.done()
     found["layers"] = len(bpy.context.scene.tetflora.layers)
-    for operator in ("daylight", "look", "refine"):
+    for operator in ("daylight", "look"):
         yield from hand.click(f"ops.tetflora.{operator}(")
-        yield from hand.done()
-    yield from hand.render(found)
+    yield from hand.render(found)  # which refines
 
 
 def biome(hand, scene, found):
     """A biome on a hill."""
     build_ground(scene)
     yield from hand.add_layer("add_biome")
-    yield from hand.done()
     found["layers"] = len(bpy.context.scene.tetflora.layers)
     found["grounds"] = [entry.object.name for entry in bpy.context.scene.tetflora.layers[0].grounds]
 
