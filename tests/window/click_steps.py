@@ -17,11 +17,7 @@ STEP = 12  # pixels between two looks for a button
 
 def steps(ui):
     """See devtools/window_driver.py."""
-    import pathlib
-
     for name, task in TASKS.items():
-        if name not in pathlib.Path("/tmp/click_only").read_text():
-            continue
         bpy.ops.wm.read_homefile(use_empty=False)
         yield 1.0
         yield from ui.show_sidebar("TetFlora")

@@ -41,7 +41,7 @@ from .state import camera_now, find, of
 
 _MANY_KINDS = 12  # more are compiled one by one, and kept
 _SOON = 0.2  # seconds from a change of plants to reading them again
-_AT_ONCE = 0.3  # seconds that reading may take for plants to follow the timeline frame by frame
+_QUICK = 0.3  # seconds that reading may take for plants to follow the timeline frame by frame
 
 
 @job("Compute Levels")
@@ -195,7 +195,7 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
     preview = find(scene)
     if scene.tetflora.preview.plants == 'NONE' or preview is None or preview.moment == _moment(scene):
         return
-    if depsgraph is not None and preview.seconds < _AT_ONCE and on_main_thread():
+    if depsgraph is not None and preview.seconds < _QUICK and on_main_thread():
         read_shapes(scene, depsgraph)
     else:
         schedule()
