@@ -42,9 +42,8 @@ def run(quick: bool) -> dict[str, float]:
     found, seconds = {}, {}
     for name, words in scenes:
         for quality in QUALITIES:
-            case = (*words, "--size", "480x270", "--samples", "1")
-            extra = ("--set",) if "--set" not in words else ()
-            one = measured(FOLDER / "estimates", *case, *extra, f"quality={quality}")
+            last = (f"quality={quality}",) if "--set" in words else ("--set", f"quality={quality}")
+            one = measured(FOLDER / "estimates", words[0], "--size", "480x270", "--samples", "1", *words[1:], *last)
             expected, key = one["expected"], f"{name}_{quality.lower()}"
             found[f"polygons_{key}"] = expected["primitives"] / one["polygons"]
             found[f"memory_{key}"] = expected["memory_mb"] / one["peak_render_mb"]
