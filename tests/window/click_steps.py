@@ -66,7 +66,7 @@ class Hand:
         x, y = yield from self.click("tetflora_points", place=self.beside_lists(), above=148, shift=True)
         yield 0.5
         yield from self.ui.picture(f"add_{operator}")
-        below = [(x - 60, b) for b in range(y - STEP, 0, -STEP)]  # always in it, or it would close
+        below = [(x - 60, b) for b in range(y - 40, 0, -STEP)]  # always in it, or it would close
         yield from self.click(f"ops.tetflora.{operator}(", place=below)
         yield from self.done()
         yield from self.key('ESC')  # it stays open while the mouse is in it
@@ -122,24 +122,6 @@ def first_forest(hand, _scene, found):
     yield from hand.render(found)
 
 
-def own_ground(hand, scene, found):
-    """A wood of three species with ground cover on a ground of the artist's, lit and rendered."""
-    build_ground(scene)
-    scene.tetflora.populate.mix.clear()
-    scene.tetflora.quality = 'DRAFT'
-    yield from hand.add_layer("populate")
-    for _ in range(2):
-        yield from hand.click("ops.tetflora.edit_list(", place=hand.beside_lists())
-    yield from hand.click("ops.tetflora.update_layers(")
-    yield from hand.done()
-    found["species"] = len({o.tetflora.species for o in bpy.context.scene.objects if o.tetflora.is_plant})
-    yield from hand.add_layer("ground_cover")
-    found["layers"] = len(bpy.context.scene.tetflora.layers)
-    for operator in ("daylight", "look"):
-        yield from hand.click(f"ops.tetflora.{operator}(")
-    yield from hand.render(found)  # which refines
-
-
 def biome(hand, scene, found):
     """A biome on a hill."""
     build_ground(scene)
@@ -163,9 +145,8 @@ def own_tree(hand, _scene, found):
 
 
 TASKS = {
+    "biome": biome,
     "autumn": autumn,
     "own_tree": own_tree,
-    "biome": biome,
     "first_forest": first_forest,
-    "own_ground": own_ground,
 }

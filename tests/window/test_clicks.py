@@ -9,12 +9,10 @@ from pathlib import Path
 
 import pytest
 
-STEPS = "click_steps", "clicks", 1800
+STEPS = "click_steps", "clicks", 900
 
 
-@pytest.mark.parametrize(
-    ("task", "most"), [("first_forest", 3), ("own_ground", 12), ("biome", 5), ("autumn", 2), ("own_tree", 4)]
-)
+@pytest.mark.parametrize(("task", "most"), [("first_forest", 3), ("biome", 5), ("autumn", 2), ("own_tree", 4)])
 def test_clicks_are_few(seen: dict, pictures: Path, colors: Callable[[Path], int], task: str, most: int) -> None:
     assert 1 <= seen[task]["clicks"] <= most
     assert colors(pictures / "clicks" / f"{task}.png") > 200
@@ -23,12 +21,6 @@ def test_clicks_are_few(seen: dict, pictures: Path, colors: Callable[[Path], int
 def test_a_first_forest_is_refined_and_rendered(seen: dict) -> None:
     assert seen["first_forest"]["refined"]
     assert seen["first_forest"]["green"] > 0.1
-
-
-def test_own_ground_becomes_a_mixed_wood_with_cover(seen: dict) -> None:
-    assert seen["own_ground"]["species"] == 3
-    assert seen["own_ground"]["layers"] >= 2
-    assert seen["own_ground"]["green"] > 0.1
 
 
 def test_a_biome_grows_on_the_hill(seen: dict) -> None:
