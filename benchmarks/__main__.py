@@ -38,7 +38,9 @@ NAMES = {
     "places": ("results.md#forests-that-grew", "Do real places arrive as they are?"),
     "forms_published": ("species.md#shipped-species-against-published-figures", "Are trees as they are published?"),
     "cover_published": ("results.md#plants-up-close", "Does a birch stand cover as much ground as is published?"),
+    "shapes": ("results.md#light-shapes-in-the-window", "Do light shapes follow the artist, a million of them too?"),
     "endurance": ("results.md#two-hundred-frames", "Does memory or time grow over many frames?"),
+    "estimates": ("results.md#what-refining-will-take", "Does refining take what the panel says?"),
     "limits": ("results.md#the-limit-of-memory", "What is refused rather than tried?"),
     "attack": ("results.md#an-attack", "Does anything break, write elsewhere, or take long?"),
 }

@@ -34,6 +34,7 @@ from tetflora_addon import memory
 from tetflora_addon.blender import worker
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.job.contents import compile_for, in_year, read_scene
+from tetflora_addon.blender.job.forecast import forecast
 from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, single_seed
 from tetflora_addon.blender.placing.first_forest import sky
 from tetflora_addon.compiled.flora import compile_species
@@ -47,7 +48,7 @@ from tetflora_addon.refinement.statistics import Statistics
 from tetflora_addon.species import catalog
 
 from .pictures import timed_render
-from .report import ROOT, Targets, forget_peak, peak_mb, records_of, setting, size_of
+from .report import ROOT, Targets, cpu_s, forget_peak, peak_mb, records_of, setting, size_of
 
 #: Left by a run: what each process has measured.
 FOLDER = ROOT / "out" / "forest"
@@ -174,7 +175,7 @@ def one(given: argparse.Namespace) -> dict:
         planted = build(scene, case, given.size)
     for name, value in given.set:
         set_named(scene.tetflora, name, value)
-    figures = {"case": given.case, "what": given.what, "planted": planted}
+    figures = {"case": given.case, "what": given.what, "planted": planted, "expected": expected(scene)}
     figures |= build_instances(scene) if given.what == "instances" else refined(scene, given.run_to_end)
     if not given.no_render:
         with tempfile.TemporaryDirectory() as folder:
@@ -183,8 +184,18 @@ def one(given: argparse.Namespace) -> dict:
     return figures
 
 
+def expected(scene: bpy.types.Scene) -> dict[str, float]:
+    """What the panel says that refining will take."""
+    bpy.context.view_layer.update()
+    found = forecast(scene, bpy.context.view_layer)
+    return {"primitives": found.primitives, "seconds": found.seconds, "memory_mb": found.memory / 1e6}
+
+
 def set_named(group: object, name: str, value: str) -> None:
-    """Set a property from text."""
+    """Set a property from text; one of a group within it is named with that."""
+    *groups, name = name.split(".")
+    for inner in groups:
+        group = getattr(group, inner)
     kind = type(getattr(group, name))
     setattr(group, name, value == "True" if kind is bool else kind(value))
 
@@ -307,10 +318,11 @@ def refined(scene: bpy.types.Scene, run_to_end: bool = False) -> dict:
     taken: list[tuple[float, str]] = []
     forget_peak()  # of what planted the wood
     with watching(kept.append):
-        start, processor = time.perf_counter(), time.process_time()
+        start, processor, every = time.perf_counter(), time.process_time(), cpu_s()
         steps = _timed(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get()), taken)
         statistics = worker.run_to_end(steps) if run_to_end else worker.run(steps)
         seconds, processor = time.perf_counter() - start, time.process_time() - processor
+        every = cpu_s() - every
     peak = peak_mb()
     found = left_open(kept.pop()) if kept else {}
     memory.give_back()  # as the job has done, but for what was kept here to be counted
@@ -320,6 +332,7 @@ def refined(scene: bpy.types.Scene, run_to_end: bool = False) -> dict:
         "plants": statistics.plants,
         "refine_emit_s": seconds,
         "refine_emit_cpu_s": processor,
+        "refine_emit_all_cpu_s": every,
         "peak_mb": peak,
         "longest_step_s": longest[0][0],
         "steps": len(taken),

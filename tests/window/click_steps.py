@@ -2,9 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist does first, by clicks that are counted; tests/window/test_clicks.py judges them."""
 
-import bpy
+import sys
+from pathlib import Path
 
-STEP = 8  # pixels between two looks for a button
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).resolve().parent))
+
+from forest_steps import build_ground
+
+STEP = 12  # pixels between two looks for a button
 
 
 def steps(ui):
@@ -32,29 +40,94 @@ class Hand:
         self.ui.press(key)
         yield 0.5
 
-    def click(self, said, kind='UI', **keys):
-        """Find a button by what Blender copies of it, and click it."""
-        manager = bpy.context.window_manager
-        for x, y in self._places(kind):
+    def click(self, said, kind='UI', place=None, above=0, **keys):
+        """Find a button by what Blender copies of it, and click it, or what is some pixels above it."""
+        manager, seen = bpy.context.window_manager, set()
+        for x, y in self._places(kind) if place is None else place:
             manager.clipboard = ""
             self.ui.move(x, y)
             yield 0.03
             self.ui.press('C', ctrl=True, **keys)
             yield 0.03
+            seen.add(manager.clipboard)
             if said in manager.clipboard:
                 break
         else:
-            raise LookupError(f"there is no button for {said}")
+            raise LookupError(f"there is no button for {said} among {sorted(seen)}")
+        self.ui.move(x, y + above)
+        yield 0.1
         self.clicks += 1
         self.ui.press('LEFTMOUSE')
         yield 0.5
+        return x, y + above
 
-    def _places(self, kind):
+    def add_layer(self, operator):
+        """The + beside the list of layers, above the dots of the points preview, and a button of what it opens."""
+        x, y = yield from self.click("tetflora_points", place=self.beside_lists(), above=148, shift=True)
+        yield 0.5
+        yield from self.ui.picture(f"add_{operator}")
+        below = [(x - 60, b) for b in range(y - 40, 0, -STEP)]  # always in it, or it would close
+        yield from self.click(f"ops.tetflora.{operator}(", place=below)
+        yield from self.done()
+        yield from self.key('ESC')  # it stays open while the mouse is in it
+
+    def beside_lists(self):
+        """Where buttons beside lists are."""
+        return self._places('UI', (-36, -46))
+
+    def done(self):
+        """Wait until no job runs."""
+        yield 0.5
+        yield from self.ui.until(lambda: not self.ui.window.modal_operators, 900, "end of the job")
+        yield 0.5
+
+    def render(self, found):
+        """F12, small so that it is soon done; how much of the picture is not one color."""
+        scene, done = bpy.context.scene, []
+        scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = 'CYCLES', 1, False
+        scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 160, 90, 100
+        bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
+        self.ui.move(*self.ui.center())
+        yield from self.key('F12')
+        yield from self.ui.until(lambda: done, 600, "render")
+        yield 1.0
+        bpy.app.handlers.render_complete.clear()
+        path = str(self.ui.out_dir / f"render_{len(self.ui.values)}.png")
+        bpy.data.images["Render Result"].save_render(path)
+        image = bpy.data.images.load(path)
+        pixels = np.zeros(len(image.pixels), dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+        bpy.data.images.remove(image)
+        red, green, blue, _ = pixels.reshape(-1, 4).T
+        found["green"] = float(((green > 1.05 * red) & (green > 1.05 * blue)).mean())
+        self.ui.press('ESC')
+        yield 1.0
+
+    def _places(self, kind, across=()):
         area = next(a for a in self.ui.window.screen.areas if a.type == ('VIEW_3D' if kind == 'UI' else kind))
         region = next(r for r in area.regions if r.type == ('UI' if kind == 'UI' else 'WINDOW'))
-        across = (region.width // 3, region.width * 2 // 3)
+        across = [x % region.width for x in across] or (region.width // 3, region.width * 2 // 3)
         down = range(region.y + region.height - STEP, region.y, -STEP)
         return [(region.x + x, y) for x in across for y in down]
+
+
+def first_forest(hand, _scene, found):
+    """First Forest, Refine, F12."""
+    yield from hand.click("ops.tetflora.first_forest(")
+    yield 2.0
+    bpy.context.scene.tetflora.quality = 'DRAFT'  # the machine of the test is slow; an artist would wait
+    yield from hand.click("ops.tetflora.refine(")
+    yield from hand.done()
+    found["refined"] = bpy.context.scene.tetflora.statistics != ""
+    yield from hand.render(found)
+
+
+def biome(hand, scene, found):
+    """A biome on a hill."""
+    build_ground(scene)
+    yield from hand.add_layer("add_biome")
+    found["layers"] = len(bpy.context.scene.tetflora.layers)
+    found["grounds"] = [entry.object.name for entry in bpy.context.scene.tetflora.layers[0].grounds]
 
 
 def autumn(hand, _scene, found):
@@ -66,12 +139,14 @@ def autumn(hand, _scene, found):
 
 
 def own_tree(hand, _scene, found):
-    """The startup's cube as a species, by a button of the Object tab."""
+    """The startup's cube as a species, by a button of the Object tab, then a plant of it in the Add menu's place."""
     yield from hand.click("ops.tetflora.use_as_species(", 'PROPERTIES')
     found["species"] = len(bpy.context.scene.tetflora.asset_species)
 
 
 TASKS = {
+    "biome": biome,
     "autumn": autumn,
     "own_tree": own_tree,
+    "first_forest": first_forest,
 }

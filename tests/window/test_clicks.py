@@ -9,13 +9,23 @@ from pathlib import Path
 
 import pytest
 
-STEPS = "click_steps", "clicks", 240
+STEPS = "click_steps", "clicks", 900
 
 
-@pytest.mark.parametrize(("task", "most"), [("autumn", 2), ("own_tree", 4)])
+@pytest.mark.parametrize(("task", "most"), [("first_forest", 3), ("biome", 5), ("autumn", 2), ("own_tree", 4)])
 def test_clicks_are_few(seen: dict, pictures: Path, colors: Callable[[Path], int], task: str, most: int) -> None:
     assert 1 <= seen[task]["clicks"] <= most
     assert colors(pictures / "clicks" / f"{task}.png") > 200
+
+
+def test_a_first_forest_is_refined_and_rendered(seen: dict) -> None:
+    assert seen["first_forest"]["refined"]
+    assert seen["first_forest"]["green"] > 0.1
+
+
+def test_a_biome_grows_on_the_hill(seen: dict) -> None:
+    assert seen["biome"]["layers"] > 1
+    assert seen["biome"]["grounds"] == ["Hill"]
 
 
 def test_it_is_autumn(seen: dict) -> None:

@@ -207,4 +207,4 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
 
 def as_shown(linear: NDArray[np.floating]) -> Floats32:
     """Linear colors (..., 3) as a screen shows them (IEC 61966-2-1)."""
-    return srgb_of(np.clip(linear, 0.0, 1.0)).astype(np.float32)
+    return srgb_of(np.clip(np.asarray(linear, np.float32), 0.0, 1.0))

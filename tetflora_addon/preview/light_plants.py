@@ -36,6 +36,22 @@ _BELOW, _ABOVE, _WITHIN = 0.03, 0.995, 0.85
 _BARE = 0.45
 #: Direction to the light, and the fraction of light in its shade.
 _SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
+_ANGLE = np.arange(SIDES) * 2.0 * np.pi / SIDES
+_AROUND = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), 0 * _ANGLE], axis=1)
+#: Corners of a plant: the crown's lowest, its rings, its highest, the foot of the trunk, and its middle.
+_LOWER, _UPPER, _FOOT = (slice(first, first + SIDES) for first in (1, 1 + SIDES, 2 + 2 * SIDES))
+_CROWN = slice(_FOOT.start)
+_HEIGHTS = np.array([0.0, *np.repeat(_RINGS, SIDES), 1.0])  # of those of the crown, as fractions of its height
+#: Directions out of a plant at its corners; the middle of the trunk is in the shade.
+_NORMALS = np.concatenate(
+    [
+        [[0.0, 0.0, -1.0]],
+        *((_AROUND + [0.0, 0.0, up]) / np.hypot(1.0, up) for up in (-0.1, 0.5)),
+        [[0.0, 0.0, 1.0]],
+        _AROUND,
+        [[0.0, 0.0, 0.0]],
+    ]
+).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -58,42 +74,36 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     of, origin, trunk = _shown(flora, seeds, most)
     species = flora.rows["species"][trunk.row]
     profile = np.stack([_profile(flora, int(row)) for row in flora.first_row])[species]  # (n, 6)
-    angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
-    around = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
     low, high, *radii = profile.T
     length, low, wider, light = outlines(flora, trunk, low, high)
-    rings = (1.0 + light @ around[:, :2].T)[:, :, None] * around
     wood, leaves = flora.wood_color[trunk.row], flora.leaf_colors(trunk)
     radii = [radius * wider for radius in radii]
     if trunk.year is not None:
         left = np.minimum(flora.day.leaf_share(trunk), 1.0)
         radii = [radius * (_BARE + (1.0 - _BARE) * left) for radius in radii]
         leaves = wood + left[:, None] * (leaves - wood)
-    crown = [np.stack([0 * low, 0 * low, low], axis=1)[:, None]]
-    outward = [np.broadcast_to([0.0, 0.0, -1.0], (len(trunk), 1, 3))]
-    for fraction, radius, up in zip(_RINGS, radii[:2], (-0.1, 0.5), strict=True):
-        height = (low + fraction * (high - low))[:, None, None] * [0.0, 0.0, 1.0]
-        crown.append(radius[:, None, None] * rings + height)
-        outward.append(np.broadcast_to((around + [0.0, 0.0, up]) / np.hypot(1.0, up), (len(trunk), SIDES, 3)))
-    crown.append(np.stack([0 * high, 0 * high, high], axis=1)[:, None])
-    outward.append(np.broadcast_to([0.0, 0.0, 1.0], (len(trunk), 1, 3)))
+    leaves = np.where((flora.leaf_count[trunk.row] > 0)[:, None], leaves, wood)
+    local = np.zeros((len(trunk), len(_NORMALS), 3), np.float32)
+    reach = 1.0 + light @ _AROUND[:, :2].T
+    for ring, radius in zip((_LOWER, _UPPER), radii, strict=True):
+        local[:, ring] = (radius[:, None] * reach)[:, :, None] * _AROUND
     # The wood's own radius would be less than a pixel in the view of a forest.
-    radius = np.maximum(trunk.radius / length, 0.012)[:, None, None]
-    foot = radius * around
-    middle = (low + 0.5 * (high - low))[:, None, None] * np.array([[0.0, 0.0, 1.0]])
-    local = np.concatenate([*crown, foot, middle], axis=1) * length[:, None, None]
-    normals = np.concatenate([*outward, np.broadcast_to(around, foot.shape), 0 * middle], axis=1)
-    positions = np.einsum("nij,nvj->nvi", trunk.frame, local) + trunk.position[:, None]
-    light = np.clip(np.einsum("nij,nvj->nvi", trunk.frame, normals) @ (_SUN / np.linalg.norm(_SUN)), 0.0, 1.0)
-    light = _SHADE + (1.0 - _SHADE) * light
-    leafy = flora.leaf_count[trunk.row] > 0
-    leaves = np.where(leafy[:, None], leaves, wood)
-    corners = 2 * SIDES + 2
-    base = np.repeat(np.stack([leaves, wood], axis=1), (corners, SIDES + 1), axis=1)
+    local[:, _FOOT] = np.maximum(trunk.radius / length, 0.012)[:, None, None] * _AROUND
+    local[:, _CROWN, 2] = low[:, None] + (high - low)[:, None] * _HEIGHTS
+    local[:, -1, 2] = low + 0.5 * (high - low)
+    local *= length[:, None, None].astype(np.float32)
+    # Of single precision, as screens need no more: seasons go by while one looks on.
+    frame = trunk.frame.astype(np.float32)
+    positions = local @ frame.transpose(0, 2, 1)
+    positions += trunk.position[:, None].astype(np.float32)
+    sun = np.einsum("i,nij->nj", (_SUN / np.linalg.norm(_SUN)).astype(np.float32), frame)
+    shone = _SHADE + (1.0 - _SHADE) * np.clip(np.einsum("nj,vj->nv", sun, _NORMALS), 0.0, 1.0)
+    colors = shone[:, :, None] * leaves[:, None].astype(np.float32)
+    colors[:, _FOOT.start :] = shone[:, _FOOT.start :, None] * wood[:, None].astype(np.float32)
     return Shapes(
-        positions.reshape(-1, 3).astype(np.float32),
-        as_shown(base * light[:, :, None]).reshape(-1, 3),
-        _repeated(_faces(), positions.shape[1], len(trunk)),
+        positions.reshape(-1, 3),
+        as_shown(colors).reshape(-1, 3),
+        _repeated(_faces(), len(_NORMALS), len(trunk)),
         len(trunk),
         of,
         origin,

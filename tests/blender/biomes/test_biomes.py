@@ -434,3 +434,22 @@ def test_masks_and_paths_are_saved_by_their_names_and_found_again():
         assert [entry.object for entry in layer.grounds] == own
     add(read, land, hill)  # the layer was on one of them
     assert [entry.object for entry in scene().tetflora.layers[-1].grounds] == [land]
+
+
+def test_the_mask_of_a_biome_itself_is_saved_and_found_again():
+    land, hill, image = add_mesh("land", size=20.0), add_mesh("hill", size=20.0), bpy.data.images.new("where", 4, 4)
+    image.pixels[:] = [1.0] * 64
+    for obj in (land, hill):
+        obj.data.uv_layers.new(name="Map")
+    land.vertex_groups.new(name="meadow").add(range(2), 1.0, 'REPLACE')
+    add(files.checked(SMALL, "small"), land)
+    biome = biomes()[0]
+    biome.vertex_group, biome.invert_group, biome.image = "meadow", True, image
+    scene().tetflora.layers_index = 0
+    read = files.read_biome(files.save_biome(scene(), "Masked", "", False, False))
+    assert read.mask == {"vertex_group": "meadow", "invert_group": True, "image": "where"}
+    for grounds, group in ((land, "meadow"), (hill, "")):
+        add(read, grounds)
+        assert (biomes()[-1].vertex_group, biomes()[-1].image) == (group, image)
+    with pytest.raises(ValueError, match='"mask" has an unknown key'):
+        files.checked(SMALL | {"mask": {"slope": 1.0}}, "small")

@@ -71,8 +71,9 @@ def add_biome_steps(
         made.data = json.dumps({"ground": biome.ground, "season": biome.season}, ensure_ascii=False)
         for obj in grounds:
             made.grounds.add().object = obj
-        for key, value in biome.limits.items():
+        for key, value in (biome.limits | biome.mask).items():
             set_setting(made, key, value)
+        _keep_found(made, grounds)
         made.use_altitude = bool({"altitude_min", "altitude_max"} & biome.limits.keys())
         if "path_max" in biome.limits:
             made.paths = make_line(scene, f"{made.name} line", grounds)
@@ -103,17 +104,19 @@ def add_biome_steps(
 
 
 def _lay_on(population: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object]) -> None:
-    """Let a layer that was read grow on those of the grounds that it names or, without any, on all of them.
-
-    Masks are those of the grounds that it was made for: it keeps what it finds.
-    """
+    """Let a layer that was read grow on those of the grounds that it names or, without any, on all of them."""
     named = {entry.object for entry in population.grounds}
     own = [obj for obj in grounds if obj in named] or grounds
     set_grounds(population, own)
-    if all(population.vertex_group not in obj.vertex_groups for obj in own):
-        population.vertex_group = ""
-    if all(population.uv_layer not in obj.data.uv_layers for obj in own):
-        population.uv_layer = ""
+    _keep_found(population, own)
+
+
+def _keep_found(layer: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object]) -> None:
+    """Of the masks of a layer that was read, which are those of other grounds, keep what these have."""
+    if all(layer.vertex_group not in obj.vertex_groups for obj in grounds):
+        layer.vertex_group = ""
+    if all(layer.uv_layer not in obj.data.uv_layers for obj in grounds):
+        layer.uv_layer = ""
 
 
 @job("Planting the biome")

@@ -36,7 +36,7 @@ from ..placing.population_data import (
 )
 from ..placing.properties import TetFloraLayer
 from ..placing.rules import active_population, grounds_of
-from ..placing.zones import limits_of_zone
+from ..placing.zones import MASK, limits_of_zone
 from ..settings import BIOME, SCATTER, active_in, with_identity
 from ..species.edits import find_edit, new_identifier, species_data
 from ..stands.growing import is_stand
@@ -51,7 +51,7 @@ KINDS = ("population", "cover", "stand")
 #: When a biome is as its picture shows it.
 SEASON = {"day": (1.0, 365.0), "latitude": (-66.0, 66.0)}
 _KEYS = {"format", "version", "name", "layers"}
-_MORE = {"description", "species", "limits", "gives_way", "ground", "season"}
+_MORE = {"description", "species", "limits", "mask", "gives_way", "ground", "season"}
 #: Settings of a species of a stand.
 STAND_ENTRY = ("species", "planted", "incoming_seeds")
 
@@ -68,6 +68,7 @@ class Biome:
     #: ``every_order`` of that
     species: dict[str, dict[str, Any]] = field(default_factory=dict)
     limits: dict[str, float] = field(default_factory=dict)
+    mask: dict[str, Any] = field(default_factory=dict)  # an image by its name
     gives_way: bool = True
     ground: dict[str, Any] = field(default_factory=dict)
     season: dict[str, float] = field(default_factory=dict)
@@ -116,6 +117,8 @@ def checked(data: Any, identifier: str) -> Biome:
     known = {one.name for one in fields(Limits)}
     check_keys('"limits"', data.get("limits", {}), set(), known)
     check_settings('"limits"', data.get("limits", {}), TetFloraLayer, known)
+    check_keys('"mask"', data.get("mask", {}), set(), set(MASK))
+    check_settings('"mask"', data.get("mask", {}), TetFloraLayer, MASK)
     if not isinstance(data.get("gives_way", True), bool):
         raise ValueError(f'"gives_way" is {quoted(data["gives_way"])}; it must be true or false')
     _check_ground(data.get("ground", {}))
@@ -159,6 +162,8 @@ def biome_data(
             if getattr(limits, one.name) not in (one.default, np.float32(one.metadata.get("default", one.default)))
         }
         data |= {"limits": changed} if changed else {}
+        mask = settings_data(biome, MASK, changed=True)
+        data |= {"mask": mask} if mask else {}
         data |= {} if biome.gives_way else {"gives_way": False}
     data["layers"] = [*stands, *layers]
     return data

@@ -159,13 +159,16 @@ def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph:
     return compile_species(load_for(identifiers, scene, depsgraph))
 
 
-def load_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Species]:
-    """The species that `compile_for` compiles, at their ages; it alone needs the scene."""
+def load_for(
+    identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, years: float | None = None
+) -> list[Species]:
+    """The species that `compile_for` compiles, after the scene's years or so many; it alone needs the scene."""
+    years = years_of(scene) if years is None else years
     if not identifiers:
         return [load_species(min(list_species()))]
     # Each species is looked up once, of however many ages there are plants.
     plain = {kind: resolved_species(scene, kind, depsgraph) for kind in {plain_kind(kind) for kind in identifiers}}
-    return [kind_species(plain[plain_kind(kind)], kind, years_of(scene)) for kind in identifiers]
+    return [kind_species(plain[plain_kind(kind)], kind, years) for kind in identifiers]
 
 
 def in_year(scene: bpy.types.Scene, flora: Flora) -> Flora:

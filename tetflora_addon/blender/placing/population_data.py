@@ -56,9 +56,11 @@ def settings_data(
     return data
 
 
-def set_setting(group: bpy.types.PropertyGroup, name: str, value: Any) -> None:
-    """Give a group a setting that is no datablock as a checked file has it."""
+def set_setting(group: bpy.types.PropertyGroup, name: str, value: Any, missing: list[str] | None = None) -> None:
+    """Give a group a setting as a checked file has it; datablocks that are not there are added to ``missing``."""
     prop = group.bl_rna.properties[name]
+    if prop.type == 'POINTER':
+        value = _named(prop.fixed_type.identifier, value, [] if missing is None else missing)
     setattr(group, name, radians(value) if prop.type == 'FLOAT' and prop.subtype == 'ANGLE' else value)
 
 
@@ -110,10 +112,8 @@ def fill_population(
     for prop in simple_settings(population):
         name = prop.identifier
         population.property_unset(name)
-        if prop.type == 'POINTER':
-            setattr(population, name, _named(prop.fixed_type.identifier, entry.get(name), missing))
-        elif name in entry:
-            set_setting(population, name, entry[name])
+        if name in entry:
+            set_setting(population, name, entry[name], missing)
     population.mix.clear()
     for part in entry.get("species", []):
         new = population.mix.add()

@@ -95,7 +95,8 @@ def read_aged_field(
     matrices = matrices.astype(np.float64)  # single precision in some versions of Blender
     world = matrices[:, :3, :3]
     with np.errstate(invalid="ignore", over="ignore"):  # what is no number is refused below
-        place = (position @ world.transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
+        # A library for matrices takes twenty times as long for a million of three numbers.
+        place = (np.einsum("kij,nj->kni", world, position) + matrices[:, None, :3, 3]).reshape(-1, 3)
         frame, scale, sound = placed_frames(world, rotation, own_scale)
         sound &= np.isfinite(place.sum(axis=1))
     refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "zero scale or an invalid position or rotation")

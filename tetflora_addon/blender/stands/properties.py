@@ -29,7 +29,7 @@ class TetFloraStandEntry(bpy.types.PropertyGroup, SpeciesChoice):
         **FIXED,
     )
     incoming_seeds: real(
-        "Incoming Seeds",
+        "Share of Seeds",
         "Share of this species among the seeds that arrive from outside, relative to the others",
         1.0,
         **within(0.0, 10.0, 1e6),

@@ -24,7 +24,9 @@ from ...preview.light_plants import Shapes, bounds_of_plants, joined, light_plan
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
 from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
+from ..main_thread import on_main_thread
 from ..runtime import Handlers, JobData, call_off, call_soon, job, redraw
+from ..scene.ages import crown_kinds, plainly_aged
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
 from ..scene.field_sizes import stand_years
@@ -39,6 +41,7 @@ from .state import camera_now, find, of
 
 _MANY_KINDS = 12  # more are compiled one by one, and kept
 _SOON = 0.2  # seconds from a change of plants to reading them again
+_QUICK = 0.3  # seconds that reading may take for plants to follow the timeline frame by frame
 
 
 @job("Compute Levels")
@@ -89,7 +92,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
 
     What is wrong with a plant is reported by `Preview.message`, for the panel, and the earlier plants stay.
     """
-    begin, preview, form = time.perf_counter(), of(scene), scene.tetflora.preview.plants
+    begin, preview, form = time.thread_time(), of(scene), scene.tetflora.preview.plants
     preview.message, preview.objects, preview.moment = "", len(scene.objects), _moment(scene)
     try:
         if form == 'NONE':
@@ -101,7 +104,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
     except TetFloraError as error:
         preview.message = str(error)
     preview.made += 1
-    preview.seconds = time.perf_counter() - begin
+    preview.seconds = time.thread_time() - begin
     redraw()
     return preview.shapes
 
@@ -128,11 +131,19 @@ def _shapes_of(
 def _grown(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, make: Callable[[Flora, Seeds], Shapes], seeds: Seeds
 ) -> list[Shapes]:
-    """Plants that grow in the form of ``make``; many kinds of them one by one, which are known from other years."""
+    """Plants that grow in the form of ``make``; many kinds of them one by one, which are known from other years.
+
+    As years pass they have the forms of classes of ages, and their own heights: no year has to wait for its species.
+    """
+    years = years_of(scene)
+    if years > 0.0:
+        seeds, ages = plainly_aged(scene, seeds, None, None)
+        kinds, number, taller = crown_kinds(scene, seeds.identifiers, seeds.species, ages)
+        seeds = replace(seeds, identifiers=kinds, species=number, scale=seeds.scale * taller)
     kinds = seeds.identifiers
-    if len(kinds) <= _MANY_KINDS:
+    if years == 0.0 and len(kinds) <= _MANY_KINDS:
         return [make(in_year(scene, compile_for(kinds, scene, depsgraph)), seeds)]
-    loaded, out = load_for(kinds, scene, depsgraph), []
+    loaded, out = load_for(kinds, scene, depsgraph, 0.0), []
     some = thinned(seeds, np.array([species.orders[0].length.mean for species in loaded]))
     for number, species in enumerate(loaded):
         own = some.take(np.flatnonzero(some.species == number))
@@ -179,9 +190,13 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             return
 
 
-def _on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     preview = find(scene)
-    if scene.tetflora.preview.plants != 'NONE' and preview is not None and preview.moment != _moment(scene):
+    if scene.tetflora.preview.plants == 'NONE' or preview is None or preview.moment == _moment(scene):
+        return
+    if depsgraph is not None and preview.seconds < _QUICK and on_main_thread():
+        read_shapes(scene, depsgraph)
+    else:
         schedule()
 
 

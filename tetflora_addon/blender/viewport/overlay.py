@@ -45,10 +45,10 @@ def batch(kind: str, positions: NDArray, colors: NDArray, indices: NDArray) -> g
     """A batch of 'LINES' or 'TRIS' with a color (v, 4) for each corner (v, 3)."""
     layout = gpu.types.GPUVertFormat()
     layout.attr_add(id="pos", comp_type='F32', len=3, fetch_mode='FLOAT')
-    layout.attr_add(id="color", comp_type='F32', len=4, fetch_mode='FLOAT')
+    layout.attr_add(id="color", comp_type='U8', len=4, fetch_mode='INT_TO_FLOAT_UNIT')
     corners = gpu.types.GPUVertBuf(layout, len(positions))
     corners.attr_fill("pos", np.ascontiguousarray(positions, np.float32))
-    corners.attr_fill("color", np.ascontiguousarray(colors, np.float32))
+    corners.attr_fill("color", np.rint(255.0 * colors).astype(np.uint8))
     elements = gpu.types.GPUIndexBuf(type=kind, seq=np.ascontiguousarray(indices, np.int32))
     return gpu.types.GPUBatch(type=kind, buf=corners, elem=elements)
 
@@ -120,7 +120,9 @@ def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]
 
 
 def _opaque(colors: Floats32, alpha: float) -> Floats32:
-    return np.concatenate([colors, np.full((len(colors), 1), alpha, np.float32)], axis=1)
+    out = np.full((len(colors), 4), alpha, np.float32)
+    out[:, :3] = colors
+    return out
 
 
 def view_camera(region: bpy.types.RegionView3D, near: float, origin: Floats) -> Camera:

@@ -46,7 +46,7 @@ class Preview:
     objects: int = 0  # objects of the scene when they were read
     moment: tuple = ()  # its day of the year and years then
     message: str = ""  # why plants cannot be shown; empty if they can
-    seconds: float = 0.0  # what reading them took
+    seconds: float = 0.0  # of the processor that reading them took
     made: int = 0  # counts changes of levels and shapes, to know what the graphics card already has
     cache: dict = field(default_factory=dict)  # what the overlay keeps
 
