@@ -28,7 +28,7 @@ def vertices(flora: Flora, subplant: Branches) -> np.ndarray:
     """All vertices (v, 3) of one sub-plant, and those that its wood has where it is near."""
     tubes, leaves = support.meshes(flora, support.expanded(flora, subplant))
     pixel = subplant.radius[0] / 40.0
-    near = tube_buffers(flora, list(expand(flora, subplant)), Pixels(lambda points, _reach: np.full(len(points), pixel)))
+    near = tube_buffers(flora, list(expand(flora, subplant)), Pixels(lambda points, _: np.full(len(points), pixel)))
     tubes = tubes if near is None else [*tubes, near]
     return np.concatenate([mesh.positions for mesh in (*tubes, *leaves)]).astype(np.float64)
 

@@ -26,8 +26,8 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
 
     ``camera.view_frame`` already knows about lens shift, sensor fit and pixel aspect. A scaled or sheared camera is
     taken without scale and shear, as renderers do. Panoramas other than equirectangular ones count as images of the
-    whole sphere with the same number of pixels per angle, or narrow fisheyes as a part of it. Stereo counts as movement: the view is as wide as both eyes
-    need.
+    whole sphere with the same number of pixels per angle, or narrow fisheyes as a part of it. Stereo counts as
+    movement: the view is as wide as both eyes need.
 
     Parameters
     ----------
