@@ -88,7 +88,10 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
         matrix,
     )
     if camera is None:
-        raise SceneError(f'The camera "{name}" has zero scale or an invalid position; clear them with Alt S and Alt G')
+        raise SceneError(
+            f'The camera "{name}" has zero scale, a scale above 100,000, or an invalid position; '
+            "clear them with Alt S and Alt G"
+        )
     others = (*_while_open(scene, depsgraph, camera, window), *_stereo_views(scene, camera, depsgraph))
     return replace(camera, shutter=others)
 

@@ -291,7 +291,8 @@ def _placed(
     if not sound.all():
         bad = [names[min(i, len(names) - 1)] for i in np.flatnonzero(~sound)[: _NAMED * len(names)].tolist()]
         raise SceneError(
-            f"{_listed(list(dict.fromkeys(bad)))}: zero scale or an invalid position; clear them with Alt S and Alt G"
+            f"{_listed(list(dict.fromkeys(bad)))}: zero scale, a scale above 100,000, or an invalid position; clear "
+            "them with Alt S and Alt G"
         )
     return Seeds(kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
 
