@@ -78,8 +78,8 @@ def _rounds(number: int) -> dict[str, float]:
     from tetflora_addon.processes import pool
 
     scene = bpy.context.scene
-    row80.build(scene, count=6, species="birch")
-    scene.render.resolution_x, scene.render.resolution_y = 480, 270
+    row80.build(scene, count=3, species="birch")
+    scene.render.resolution_x, scene.render.resolution_y = 480, 24
     scene.tetflora.year.enabled = True
     bpy.context.preferences.edit.undo_steps = UNDO_STEPS
     parallel.set_threads(2)
@@ -87,7 +87,7 @@ def _rounds(number: int) -> dict[str, float]:
     left, handles, resident = {"processes": 0, "threads": 0}, [], []
     for round in range(number):
         scene = bpy.context.scene
-        scene.tetflora.year.day = 90 + 30 * (round % DAYS)
+        scene.tetflora.year.day = 85 + 30 * (round % DAYS)
         scene.tetflora.cutoff = 2.0  # so that other processes are worth it
         bpy.ops.ed.undo_push(message="Before")
         if bpy.ops.tetflora.refine() != {'FINISHED'}:

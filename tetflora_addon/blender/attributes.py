@@ -54,7 +54,7 @@ _TYPES = {
     (np.dtype(np.bool_), ()): 'BOOLEAN',
 }
 _TINY = 1e-9  # shortest axis of an object's matrix that is not taken for a scale of 0
-_HUGE = 1e9  # beyond it squares of areas and volumes are no numbers any more
+_HUGE = 1e5  # longest: a fern 100 km long would have millions of polygons in any view
 
 
 def type_for(values: NDArray) -> str | None:

@@ -34,6 +34,7 @@ class LeafDetail:
     flora: Flora
     camera: Camera
     tolerance: float = TOLERANCE  # pixels by which margins may be off; infinite for none but the models of the species
+    beside: float = 0.0  # meters that a pixel spans at least at what is out of view, over the distance from the view
 
     @property
     def wood(self) -> Pixels | None:
@@ -42,7 +43,7 @@ class LeafDetail:
         if not np.isfinite(coarser):
             return None
         slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
-        return Pixels(lambda points: coarser * camera.extent_around(points), coarser * slope)
+        return Pixels(lambda points, reach: coarser * self._extent(points, reach), coarser * slope)
 
     def lengths(self, whole: WholeBranches) -> NDArray[np.float64]:
         """Lengths (n,) of the leaves of branches in tolerances, where they come nearest.
@@ -63,9 +64,9 @@ class LeafDetail:
         if not len(near):
             return out
         knots = whole.lines.knots[near]
-        extent = camera.extent_around(knots.reshape(-1, 3)).reshape(len(near), -1).min(axis=1)
-        between = np.linalg.norm(np.diff(knots, axis=1), axis=2).max(axis=1) / 2.0
-        nearest = self._nearest(extent, between + beside[near])
+        reach = np.linalg.norm(np.diff(knots, axis=1), axis=2).max(axis=1) / 2.0 + beside[near]
+        extent = self._extent(knots.reshape(-1, 3), np.repeat(reach, knots.shape[1])).reshape(len(near), -1).min(axis=1)
+        nearest = self._nearest(extent, reach)
         out[near] = size[near] / np.maximum(nearest, extent / NEARER) / self.tolerance
         return out
 
@@ -73,6 +74,11 @@ class LeafDetail:
         """Largest error (species,) of a species' models."""
         forms = ([f for kind in range(len(LEAF_KINDS)) for f in own[kind]] for own in self.flora.forms)
         return np.array([max((coarse_error(f) for f in own), default=0.0) for own in forms])
+
+    def _extent(self, points: NDArray[np.float64], reach: NDArray[np.float64] | float) -> NDArray[np.float64]:
+        """Meters (n,) that a pixel spans at what reaches so far around points (n, 3), in view or not."""
+        away = self.camera.distance_to_view(points) - reach
+        return np.maximum(self.camera.extent_around(points), self.beside * np.maximum(away, 0.0))
 
     def _nearest(self, extent: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:
         """Meters (n,) that a pixel spans at things up to a distance (n,) nearer than where it spans ``extent`` (n,)."""

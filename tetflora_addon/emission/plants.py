@@ -41,6 +41,8 @@ MIXED = 24.0
 #: Width in pixels up to which real leaves are kites, and the same of those that are solid: a kite that shows as much
 #: on average is half as wide again where it is seen from its front, and has one side, in the light or not.
 KITES, SOLID_KITES = 2.0, 0.8
+#: Meters that a pixel spans at least at leaves and wood out of view, over the distance from it: their shadows are seen.
+BESIDE = 0.02
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class Transition:
     @property
     def detail(self) -> LeafDetail:
         """How finely near leaves are drawn."""
-        return LeafDetail(self.flora, self.camera, self.tolerance)
+        return LeafDetail(self.flora, self.camera, self.tolerance, BESIDE)
 
     def of_branches(self, branches: Branches) -> NDArray[np.float64]:
         """Real fraction (n,) of the leaves of sub-plants: a smooth step in the logarithm of their width."""

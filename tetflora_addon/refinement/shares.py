@@ -36,6 +36,8 @@ from .shared_parts import SharedParts, SharePoints
 PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
 #: The same of leaves that fill a solid, which cannot be opened: there is a point in each square of so many pixels.
 PIXELS_IN_SOLID, FEWEST_IN_SOLID, MOST_IN_SOLID = 3.0, 16, 2048
+#: Points in all of them together, but for the fewest: thousands may lie in front of each other.
+MOST_IN_SOLIDS = 1_000_000
 #: Wood that is wider in the view than this part of the image is looked for where it is, whatever share of its plant it
 #: has: such sub-plants are opened at once, and their branches have points so many widths apart, at most so many.
 THICK, APART, MOST_ALONG = 0.08, 1.0, 96
@@ -77,7 +79,9 @@ def share_points(
     solid = are_solids(flora.rows)[parts.branches.row]
     squares = (pixels[solid] / PIXELS_IN_SOLID) ** 2
     # Cells that are filled are smaller than what cannot be opened: too few points make holes and lumps of it.
-    number[solid] = times**2 * np.ceil(np.clip(squares, FEWEST_IN_SOLID, MOST_IN_SOLID)).astype(np.int64)
+    squares = np.clip(squares, FEWEST_IN_SOLID, MOST_IN_SOLID)
+    squares *= min(MOST_IN_SOLIDS / (times**2 * max(squares.sum(), 1.0)), 1.0)
+    number[solid] = times**2 * np.ceil(np.maximum(squares, FEWEST_IN_SOLID)).astype(np.int64)
     made = []
     for leafy in (True, False):
         area = parts.totals.leaf_area if leafy else parts.totals.wood_area

@@ -71,7 +71,8 @@ def fine_counts(flora: Flora, whole: WholeBranches, fine: Fineness, pixels: Pixe
     n, most = len(branches), lines.frames.shape[1]
     there = np.arange(most) < lines.segments[:, None]
     bent = _curve(flora, whole, fine.weight)
-    pixel = pixels.extent(lines.knots.reshape(-1, 3)).reshape(n, -1)
+    reach = np.repeat(branches.radius * flora.widest[branches.row], most + 1)
+    pixel = pixels.extent(lines.knots.reshape(-1, 3), reach).reshape(n, -1)
     pixel = np.minimum(pixel[:, :-1], pixel[:, 1:])
     out = parts(bent.deviation(), pixel)
     # A flare is e^-s over s: lines between n points of it, as `_stretched` places them, are 1 / (2 n²) off.

@@ -41,7 +41,8 @@ _PLACES = np.array([0.25, 0.5, 0.75])
 class Pixels:
     """How large pixels are."""
 
-    extent: Callable[[Floats], Floats]  # meters (n,) that a pixel spans at points (n, 3)
+    #: Meters (n,) that a pixel spans at what reaches so far, (n,) or a number, around points (n, 3).
+    extent: Callable[[Floats, Floats | float], Floats]
     slope: float = 0.0  # by how much that falls at most with each meter that one comes nearer
 
 
@@ -73,7 +74,7 @@ def fineness(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Fineness:
     branches, sides = whole.branches, flora.rows["sides"][whole.branches.row]
     limit = round_up_to(sides)
     # The base tells of most branches that they are too far away.
-    nearest = pixels.extent(branches.position) - pixels.slope * branches.length
+    nearest = pixels.extent(branches.position, np.inf) - pixels.slope * branches.length
     size = branches.radius * flora.widest[branches.row] / np.maximum(nearest, 1e-9)
     near = np.flatnonzero(size > limit)
     size = np.minimum(size, limit)
@@ -89,7 +90,7 @@ def _largest(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Floats:
     segment, place = index // (len(_PLACES) + 1), np.concatenate([[0.0], _PLACES])[index % (len(_PLACES) + 1)]
     t = np.minimum((segment + place) / whole.lines.segments[owner], 1.0)
     radius = radius_at(flora.rows, whole.branches.take(owner), t)
-    size = radius / np.maximum(pixels.extent(whole.lines.at(owner, t)[0]), 1e-300)
+    size = radius / np.maximum(pixels.extent(whole.lines.at(owner, t)[0], radius), 1e-300)
     return np.maximum.reduceat(size, np.searchsorted(owner, np.arange(len(whole))))
 
 

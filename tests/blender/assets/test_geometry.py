@@ -320,6 +320,7 @@ def test_digest_follows_what_is_seen_and_nothing_else():
     paint = Paint()
     picture = image(np.full((4, 4, 3), 0.5))
     paint.texture(picture)
+    curves = paint.node("RGBCurve").mapping
     obj = cards([paint.material])
     before = _digest(obj)
     assert before == read(obj)[0].digest == _digest(obj)
@@ -345,6 +346,9 @@ def test_digest_follows_what_is_seen_and_nothing_else():
     def node():
         next(n for n in paint.tree.nodes if n.type == 'TEX_IMAGE').extension = 'CLIP'
 
+    def ends():
+        curves.extend = 'HORIZONTAL' if curves.extend == 'EXTRAPOLATED' else 'EXTRAPOLATED'
+
     def link():
         paint.tree.links.remove(paint.tree.links[-1])
 
@@ -352,7 +356,7 @@ def test_digest_follows_what_is_seen_and_nothing_else():
         obj.modifiers.new("twice", 'ARRAY')
 
     seen = {before}
-    for change in (uv, vertex, pixel, socket, node, link, modifier):
+    for change in (uv, vertex, pixel, socket, node, ends, link, modifier):
         change()
         found = _digest(obj)
         assert found not in seen, change.__name__

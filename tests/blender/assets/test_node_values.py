@@ -7,7 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.blender.assets.surfaces import Paint, image, look
+from tests.blender.assets.surfaces import SQUARE, Paint, cards, image, look
+from tetflora_addon.blender.materials.face_looks import FaceReader
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -52,6 +53,27 @@ def test_ramp_and_mix_are_followed():
     paint.link(ramp.outputs["Color"], by_id["A_Color"])
     paint.link(next(s for s in mix.outputs if s.identifier == "Result_Color"), paint.shader.inputs["Base Color"])
     np.testing.assert_allclose(look(paint)[0][0], (0.25, 0, 0.375), atol=0.004)
+
+
+def test_ramps_and_curves_that_change_are_the_new_ones():
+    """One reader serves many steps, between which an artist, or the next frame, has other nodes at these addresses."""
+    paint, reader = Paint(), FaceReader()
+    paint.texture(image(np.tile((0.5, 0.5, 0.5), (4, 4, 1)), space="Non-Color"))
+    curves, ramp = paint.node("RGBCurve"), paint.node("ValToRGB")
+    paint.link(_through(paint, ramp, "Fac").outputs["Color"], curves.inputs["Color"])
+    paint.link(curves.outputs["Color"], paint.shader.inputs["Base Color"])
+    mesh = cards([paint.material], (SQUARE,)).data
+
+    def color():
+        return reader.prepare(mesh, [paint.material]).plans[0].constant[1:4]
+
+    found = [color()]
+    ramp.color_ramp.elements[1].color = (1, 0, 0, 1)
+    found.append(color())
+    curves.mapping.curves[3].points[1].location = (1.0, 0.5)
+    curves.mapping.update()
+    found.append(color())
+    np.testing.assert_allclose(found, [(0.5, 0.5, 0.5), (0.5, 0, 0), (0.25, 0, 0)], atol=0.004)
 
 
 def test_nodes_that_are_switched_off_let_colors_pass():

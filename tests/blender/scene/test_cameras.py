@@ -113,6 +113,33 @@ def test_a_fisheye_is_a_whole_sphere_of_its_density():
     assert camera.pixel_size == pytest.approx(math.pi / 300, rel=1e-3)
 
 
+@pytest.mark.parametrize("kind", ["FISHEYE_EQUIDISTANT", "FISHEYE_EQUISOLID"])
+def test_a_narrow_fisheye_is_no_whole_sphere(kind):
+    """It would be an image of 13,000 columns for one of 200; but a square in its corner is in the part that counts."""
+    scene = bpy.context.scene
+    renders.small_scene(0.8, 4)
+    obj = add_camera(location=(1.0, -2.0, 1.0), rotation=(1.3, 0.2, 0.4))
+    obj.data.type, obj.data.panorama_type = 'PANO', kind
+    obj.data.fisheye_fov, obj.data.fisheye_lens, obj.data.sensor_width = 1.2, 50.0, 40.0
+    scene.render.resolution_x, scene.render.resolution_y = 80, 60
+    square = add_mesh(size=0.1)
+    material = bpy.data.materials.new("black")
+    compat.shader_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (0, 0, 0, 1)
+    square.data.materials.append(material)
+    square.rotation_euler, square.location.z = obj.rotation_euler, -1e3
+    depsgraph().update()
+    camera = _read()
+    assert camera.width == camera.height < 150
+    assert camera.window[1] == -camera.window[0] == camera.window[3] == -camera.window[2] < 0.65
+    bare, half, there = renders.picture(), camera.window[1], []
+    for angle in (0.85 * half, 1.1 * half):
+        toward = np.array([0.8 * math.sin(angle), 0.6 * math.sin(angle), -math.cos(angle)])
+        square.location = camera.position + 4.0 * camera.frame @ toward
+        depsgraph().update()
+        there.append(bool(np.abs(renders.picture() - bare).max() > 0.3))
+    assert there == [True, False]
+
+
 def _around():
     """Bushes around a panorama, and a spot that each longitude shows."""
     scene = bpy.context.scene

@@ -25,7 +25,7 @@ def _refused(says: str) -> None:
 def test_a_plant_of_endless_scale_is_named():
     add_camera()
     add_plant().scale.z = -3.4e38
-    _refused('"plant": zero scale or an invalid position')
+    _refused('"plant": zero scale, a scale above 100,000, or an invalid position')
 
 
 @pytest.mark.parametrize("way", ["scale", "vertex"])

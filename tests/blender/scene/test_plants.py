@@ -231,6 +231,7 @@ def _excluded(plants):
         (lambda: add_plant("Old oak", "quercus"), '"Old oak": unknown species "quercus".*quercus.json'),
         (lambda: add_plant("Old oak", ""), '"Old oak": unknown species ""'),
         (lambda: add_plant("Flat", scale=(1.0, 1.0, 0.0)), '"Flat": zero scale'),
+        (lambda: add_plant("Giant", scale=(1.0, 1e6, 1.0)), '"Giant": zero scale, a scale above 100,000'),
         (lambda: add_plant("Nowhere", location=(0.0, float("nan"), 0.0)), '"Nowhere".*invalid position'),
         (lambda: [add_plant(f"x{i}", "nix") for i in range(5)], '"x0", "x1", "x2" and 2 more: unknown species "nix"'),
     ],

@@ -29,7 +29,10 @@ def vertices(flora: Flora, subplant: Branches) -> np.ndarray:
     """All vertices (v, 3) of one sub-plant, and those that its wood has where it is near."""
     branches = list(expand(flora, subplant))
     pixel = subplant.radius[0] / 40.0
-    tubes = [tube_buffers(flora, branches), tube_buffers(flora, branches, Pixels(lambda p: np.full(len(p), pixel)))]
+    tubes = [
+        tube_buffers(flora, branches),
+        tube_buffers(flora, branches, Pixels(lambda points, _: np.full(len(points), pixel))),
+    ]
     leaves = [leaf.buffers for leaf in leaf_meshes(flora, int(flora.species_of(subplant.row)[0]), branches)]
     meshes = (mesh for mesh in (*tubes, *leaves) if mesh is not None)
     return np.concatenate([mesh.positions for mesh in meshes]).astype(np.float64)

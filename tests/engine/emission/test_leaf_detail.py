@@ -16,7 +16,7 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.leaf_detail import LeafDetail
-from tetflora_addon.emission.plants import expanded_blocks
+from tetflora_addon.emission.plants import Transition, expanded_blocks
 from tetflora_addon.growth.growth import WholeBranches
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.refinement.settings import RefinementSettings
@@ -25,6 +25,7 @@ from tetflora_addon.species.members import expected_polygons
 from tetflora_addon.species.quality import with_quality
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces
+from tetflora_addon.subplants.tubes import tube_faces
 
 
 @cache
@@ -120,6 +121,20 @@ def test_lengths_are_those_in_the_image() -> None:
     assert (lengths[some] < 1.5 * seen[some]).mean() > 0.8
     errors = LeafDetail(flora, camera)._errors()[0]
     assert (seen[~some] * errors <= 1.0).all()
+
+
+def test_what_is_out_of_view_is_coarse() -> None:
+    """Of giants beside a small picture, millions of polygons were made: only shadows of what is beside it are seen."""
+    flora, camera, _, pieces = near(25.0, pixels=6000)
+    whole = support.whole_of(flora, pieces)
+    aside = support.camera(camera.eye, camera.eye + [0.0, -1.0, 0.0], pixels=6000, view=0.6)
+    here, there = (Transition(flora, of, 1.0).detail for of in (camera, aside))
+    fine, coarse = here.lengths(whole), there.lengths(whole)
+    some = fine > 0
+    assert some.any()
+    assert (coarse[some] < fine[some]).all()
+    least = tube_faces(flora, whole)
+    assert tube_faces(flora, whole, there.wood) - least < 0.2 * (tube_faces(flora, whole, here.wood) - least)
 
 
 def test_limits_hold_up_close() -> None:

@@ -24,7 +24,7 @@ from tetflora_addon.subplants.wood_detail import DEVIATION, MOST_SIDES, Pixels, 
 
 def even(pixel: float) -> Pixels:
     """The same number of meters to a pixel everywhere."""
-    return Pixels(lambda points: np.full(len(points), pixel))
+    return Pixels(lambda points, _reach: np.full(len(points), pixel))
 
 
 def grown(flora: Flora, species: int = 0, seed: int = 1) -> list[WholeBranches]:

@@ -26,6 +26,7 @@ from ...jobs import mapped
 from ..attributes import image_pixels, members, read, values_of, world_matrix
 from ..compat import tree_in_use
 from ..materials.face_looks import FaceReader
+from ..materials.node_values import settings_of
 from ..materials.nodes import is_ours
 from ..scene.objects import (
     SURFACE_TYPES,
@@ -109,11 +110,8 @@ def _add(content: hashlib._Hash, name: str, value: Any) -> None:
         content.update(name.encode())
         _add_tree(content, value)
         return
-    elif isinstance(value, bpy.types.ColorRamp):
-        parts = [(e.position, *e.color) for e in value.elements]
-        value = (value.interpolation, value.color_mode, value.hue_interpolation, parts)
-    elif isinstance(value, bpy.types.CurveMapping):
-        value = [[(*p.location, p.handle_type) for p in curve.points] for curve in value.curves]
+    elif isinstance(value, bpy.types.ColorRamp | bpy.types.CurveMapping):
+        value = settings_of(value)
     elif isinstance(value, bpy.types.ID):
         value = value.name_full
     elif isinstance(value, bpy.types.bpy_struct):

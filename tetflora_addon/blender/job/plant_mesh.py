@@ -98,7 +98,10 @@ def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> 
     frame, scale, sound = frames_of(world[:, :3, :3])
     for plant, good in zip(plants, sound, strict=True):
         if not good:
-            raise SceneError(f'"{plant.name}": zero scale or an invalid position; clear them with Alt S and Alt G')
+            raise SceneError(
+                f'"{plant.name}": zero scale, a scale above 100,000, or an invalid position; '
+                "clear them with Alt S and Alt G"
+            )
     ages = stored_ages(plants)
     seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
     each = [None] * len(plants) if ages is None else ages.reshape(-1, 1)

@@ -440,7 +440,7 @@ class FaceReader:
 
     def __init__(self, most: int = MOST_TEXELS) -> None:
         self.warnings: list[str] = []  # what the artist should know, each once
-        self.curves: dict[int, Floats32] = {}  # tables of ramps, see `NodeValues`
+        self.curves: dict[str, Floats32] = {}  # tables of ramps, see `NodeValues`
         self._most = most
         self._pyramids: dict[tuple[bpy.types.Image, bool], Pyramid | None] = {}
 

@@ -8,7 +8,7 @@ one half. What depends on the direction of a ray, or on which instance it is, co
 Numbers are arrays (p, k), colors (3, p, k); what is the same everywhere is (1, 1) and (3, 1, 1).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import bpy
@@ -21,6 +21,16 @@ from .nodes import SNOW, find_socket
 
 Values = NDArray[np.float32]
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+
+
+def settings_of(table: bpy.types.ColorRamp | bpy.types.CurveMapping) -> tuple:
+    """All that the values of a ramp or of curves follow from."""
+    if isinstance(table, bpy.types.ColorRamp):
+        parts = [(e.position, *e.color) for e in table.elements]
+        return table.interpolation, table.color_mode, table.hue_interpolation, parts
+    ends = table.clip_min_x, table.clip_min_y, table.clip_max_x, table.clip_max_y
+    points = [[(*p.location, p.handle_type) for p in curve.points] for curve in table.curves]
+    return table.extend, table.use_clip, ends, points
 
 
 def luminance(color: Values) -> Values:
@@ -219,10 +229,10 @@ class NodeValues:
     points : face_looks.Plan
         Of the material: its one point that stands for all, or points (p, k) of k triangles.
     curves : dict
-        Ramps and curves as tables; kept from one call to the next.
+        Ramps and curves as tables, by `settings_of`; kept from one call to the next.
     """
 
-    def __init__(self, points: Any, curves: dict[int, Floats32]) -> None:
+    def __init__(self, points: Any, curves: dict[str, Floats32]) -> None:
         self._points, self._curves = points, curves
         self._images: dict[tuple[int, ...], tuple[Values, Values]] = {}
         self._scale, self._size = 1.0, np.zeros((1, 1), np.float32)
@@ -449,7 +459,7 @@ class NodeValues:
 
     def _of_valtorgb(self, node, socket, stack) -> Values:
         self._points.mark_uneven()
-        table = self._table(node, lambda x: node.color_ramp.evaluate(x))
+        table = self._table(node.color_ramp, node.color_ramp.evaluate)
         made = _looked_up(table, self.number(node, "Fac", stack))
         return made[3] if socket.identifier == "Alpha" else made[:3]
 
@@ -460,16 +470,20 @@ class NodeValues:
         # The last curve of colors is for all of them, and comes first.
         curves = list(mapping.curves)
         if single:
-            table = self._table(node, lambda x: [mapping.evaluate(curves[0], x)])
+            table = self._table(mapping, lambda x: [mapping.evaluate(curves[0], x)])
             value, factor = self.number(node, "Value", stack), self.number(node, "Factor", stack)
             return value + factor * (_looked_up(table, value)[0] - value)
-        table = self._table(node, lambda x: [mapping.evaluate(c, mapping.evaluate(curves[3], x)) for c in curves[:3]])
+        table = self._table(
+            mapping, lambda x: [mapping.evaluate(c, mapping.evaluate(curves[3], x)) for c in curves[:3]]
+        )
         color, factor = self.color(node, "Color", stack), self.number(node, "Fac", stack)
         made = np.stack([_looked_up(table[:, i : i + 1], color[i])[0] for i in range(3)])
         return color + factor * (made - color)
 
-    def _table(self, node: bpy.types.Node, value: Callable[[float], list[float]]) -> Floats32:
-        key = node.as_pointer()
+    def _table(
+        self, of: bpy.types.ColorRamp | bpy.types.CurveMapping, value: Callable[[float], Sequence[float]]
+    ) -> Floats32:
+        key = repr(settings_of(of))  # between two steps a node may change, or another may have its address
         if key not in self._curves:
             self._curves[key] = np.array([list(value(x)) for x in np.linspace(0, 1, _CURVE).tolist()], np.float32)
         return self._curves[key]

@@ -15,6 +15,8 @@ from ..attributes import frames_of, world_matrix
 from .motion import exposure, moment, moves
 
 _NARROW = 1e-9  # of windows that single precision turns into nothing
+#: Half of the angle of view below which a fisheye is no whole sphere, radians.
+_NARROW_FISHEYE = math.pi / 4.0
 
 
 def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_only: bool = False) -> Camera:
@@ -22,8 +24,8 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
 
     ``camera.view_frame`` already knows about lens shift, sensor fit and pixel aspect. A scaled or sheared camera is
     taken without scale and shear, as renderers do. Panoramas other than equirectangular ones count as images of the
-    whole sphere with the same number of pixels per angle. Stereo counts as movement: the view is as wide as both eyes
-    need.
+    whole sphere with the same number of pixels per angle, or narrow fisheyes as a part of it. Stereo counts as
+    movement: the view is as wide as both eyes need.
 
     Parameters
     ----------
@@ -84,7 +86,10 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
         matrix,
     )
     if camera is None:
-        raise SceneError(f'The camera "{name}" has zero scale or an invalid position; clear them with Alt S and Alt G')
+        raise SceneError(
+            f'The camera "{name}" has zero scale, a scale above 100,000, or an invalid position; '
+            "clear them with Alt S and Alt G"
+        )
     others = (*_while_open(scene, depsgraph, camera, window), *_stereo_views(scene, camera, depsgraph))
     return replace(camera, shutter=others)
 
@@ -126,16 +131,22 @@ def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[fl
         right = min(max(right, left + 1e-3), left + 2.0 * math.pi)
         bottom, top = max(bottom, -math.pi / 2.0), min(max(top, bottom + 1e-3), math.pi / 2.0)
         return (left, right, bottom, top), width, height
+    half = data.fisheye_fov / 2.0  # between the axis and what is farthest from it in the image
     if data.panorama_type == 'FISHEYE_EQUIDISTANT':
         angle = data.fisheye_fov / max(min(width, height), 1)
     elif data.panorama_type == 'FISHEYE_EQUISOLID':
         # r = 2 f sin(θ / 2): in the middle a pixel spans its size on the sensor over the focal length.
         angle = data.sensor_width / max(width, height) / max(data.fisheye_lens, 1e-3)
+        half = min(half, 2.0 * math.asin(min(angle * math.hypot(width, height) / 4.0, 1.0)))
     else:
-        angle = 2.0 * math.pi / max(width, 2 * height)
-    if not angle > 0.0:  # nan as well
+        half, angle = math.pi, 2.0 * math.pi / max(width, 2 * height)
+    if not (angle > 0.0 and half > 0.0):  # nan as well
         return (0.0, 0.0, 0.0, 0.0), width, height
-    pixels = max(round(math.pi / max(angle, 1e-5)), 1)
+    if half < _NARROW_FISHEYE:  # the whole sphere would have as many more pixels as the view is narrow
+        pixels = max(math.ceil(2.0 * half / angle), 1)
+        half = pixels * angle / 2.0
+        return (-half, half, -half, half), pixels, pixels
+    pixels = max(round(math.pi / angle), 1)
     return (-math.pi, math.pi, -math.pi / 2.0, math.pi / 2.0), 2 * pixels, pixels
 
 

@@ -99,7 +99,11 @@ def read_aged_field(
         place = (np.einsum("kij,nj->kni", world, position) + matrices[:, None, :3, 3]).reshape(-1, 3)
         frame, scale, sound = placed_frames(world, rotation, own_scale)
         sound &= np.isfinite(place.sum(axis=1))
-    refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "zero scale or an invalid position or rotation")
+    refuse(
+        obj,
+        ~sound.reshape(len(matrices), -1).all(axis=0),
+        "zero scale, a scale above 100,000, or an invalid position or rotation",
+    )
     species = np.tile(points.species.astype(np.int32), len(matrices))
     ages = None if points.age is None else np.tile(points.age, len(matrices))
     seeds = Seeds(kinds, species, points.seeds(keys), place, frame, scale)

@@ -281,7 +281,8 @@ def _placed(names: list[str], kinds: tuple[str, ...], species: Integers32, seeds
     if not sound.all():
         bad = [names[min(i, len(names) - 1)] for i in np.flatnonzero(~sound)[: _NAMED * len(names)].tolist()]
         raise SceneError(
-            f"{listed(list(dict.fromkeys(bad)))}: zero scale or an invalid position; clear them with Alt S and Alt G"
+            f"{listed(list(dict.fromkeys(bad)))}: zero scale, a scale above 100,000, or an invalid position; clear "
+            "them with Alt S and Alt G"
         )
     return Seeds(kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
 
