@@ -72,7 +72,7 @@ class Subject:
         from tetflora_addon.growth.growth import WholeBranches, trunks
         from tetflora_addon.leaves.needles import Needles
         from tetflora_addon.species import catalog
-        from tetflora_addon.species.habit import with_habit
+        from tetflora_addon.species.ages import with_habit
 
         habit = _AMONG_OTHERS.get(identifier, 0.0)
         species = replace(catalog.load_species(identifier), habit=habit)

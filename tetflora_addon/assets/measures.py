@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, column, spread
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .asset import AssetKites, AssetSource, SurfaceSamples
-from .clusters import Hierarchy
 from .kites import kites_of
-from .patches import Patches
+from .patches import Hierarchy, Patches
 
 #: Triangles of which all is looked at at a time.
 BATCH = 60_000

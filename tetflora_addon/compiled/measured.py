@@ -18,7 +18,6 @@ from ..arrays import Floats, Floats32, Integers, Integers32, Mask, Table, spread
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.crown_effects import MOST_LEANING, are_stools, bare_part, child_factors, lateral_fractions, length_factors
-from ..growth.crown_shapes import BASE, LEAST, MOST, PLAIN, WIDTH
 from ..growth.foliage import leaf_keys, leaf_places, place_leaves, settled
 from ..growth.grown_rows import FADES, lengths
 from ..growth.growth import (
@@ -32,7 +31,7 @@ from ..growth.growth import (
 )
 from ..growth.hashing import Draw, uniform
 from ..growth.rows import FORK, LATERAL
-from ..growth.seeds import Seeds
+from ..growth.seeds import BASE, LEAST, MOST, PLAIN, WIDTH, Seeds
 from ..parallel import each_on_all_cores
 from ..species.growing import faded
 from .flora import Flora

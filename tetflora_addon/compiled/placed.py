@@ -23,9 +23,9 @@ from ..growth.crown_effects import (
     length_factors,
     trunk_length_factors,
 )
-from ..growth.crown_shapes import BASE, WIDTH
 from ..growth.grown_rows import lengths
 from ..growth.rows import FORK, LATERAL
+from ..growth.seeds import BASE, WIDTH
 from .flora import Flora
 from .samples import LIMB, STEM, STEM_LIMB, Limbs, Points, Shares
 

@@ -22,8 +22,7 @@ import numpy as np
 from ..arrays import Arrays, Floats, Integers, Keys, Mask, Table, smoothstep
 from ..errors import TetFloraError
 from ..setting import FACTOR, setting
-from ..species.species import LEAF_KINDS, Species
-from ..species.year import DAYS, MAX_AUTUMN, LeafYear
+from ..species.species import DAYS, LEAF_KINDS, MAX_AUTUMN, LeafYear, Species
 from .hashing import Draw, mix_draw, uniform
 from .rows import with_columns
 

@@ -17,9 +17,8 @@ import numpy as np
 
 from ..arrays import Floats, Floats32, Integers
 from ..optics import needle_color
-from .blades import blade_surface
+from .blades import Compound, blade_surface, compound_surface
 from .bodies import closed_parts, rounded, spined
-from .compounds import Compound, compound_surface
 from .models import LeafModel, mean_silhouette
 from .needles import FLAT, SPARSE, Needles, needle_surface
 from .outlines import Blade, distance_to_links

@@ -18,7 +18,7 @@ from ..arrays import GOLDEN_ANGLE, Floats, Floats32, Integers, Integers32, perpe
 from ..errors import SpeciesError
 from ..files import beside
 from ..parameters import limited
-from .compounds import Compound
+from .blades import Compound
 from .needles import Needles
 from .outlines import Blade
 from .surfaces import next_corners

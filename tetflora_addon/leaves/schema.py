@@ -11,9 +11,8 @@ import numpy as np
 
 from ..errors import SpeciesError, quoted
 from ..parameters import FileReader
-from .blades import check_outline
+from .blades import Compound, check_outline
 from .bodies import closed_parts
-from .compounds import Compound
 from .levels import TOLERANCES, fitted, shown_area, surface_of
 from .models import LEAF_MODELS, OUTLINES, LeafModel, Spines, leaf_model
 from .needles import Needles

@@ -12,8 +12,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ...errors import SceneError
-from ...geodata.inventories import preview
-from ...geodata.titles import FIELDS
+from ...geodata.inventories import FIELDS, preview
 
 _UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
 

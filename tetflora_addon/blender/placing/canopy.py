@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...growth.crown_shapes import BASE, WIDTH
+from ...growth.seeds import BASE, WIDTH
 from ...planting.canopy import Canopy, Sheet
 from ...planting.cover import Floor, Habitat, Suits, mapping
 from ..attributes import world_matrix

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...arrays import connected
 from ...errors import SpeciesError
-from ...leaves.compounds import Compound
+from ...leaves.blades import Compound
 from ...leaves.models import LeafModel, leaf_model
 from ...leaves.needles import Needles
 from ...leaves.outlines import Blade
