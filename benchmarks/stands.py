@@ -81,7 +81,7 @@ def stand(species: str) -> tuple[list[Figure], tuple[float, float]]:
             )
         )
         if year + 1 in YEARS and year < _OLD * ages_of(member.species).lifespan:
-            leaves = float(plants.leaf_area(traits).sum())
+            leaves = float((plants.crowns(traits).leaves / traits.extinction[plants.species]).sum())
             trees = Trees(diameter, plants.height, plants.base, 2.0 * plants.radius, area, leaves)
             found += figures(species, year + 1, trees)
             stands.append(trees)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays import GOLDEN_ANGLE, GOLDEN_TURN, Arrays, Floats, Integers, column, spiral
-from ..growth.envelopes import envelope_reach
+from ..growth.foliage import envelope_reach
 from ..growth.growth import trunks
 from ..growth.seeds import Seeds
 from ..leaves.levels import level_errors

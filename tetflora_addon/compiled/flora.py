@@ -18,8 +18,7 @@ import numpy as np
 from ..arrays import Floats, Integers, Table
 from ..errors import SpeciesError
 from ..growth.branches import Branches
-from ..growth.envelopes import envelope_reach
-from ..growth.foliage import YOUTH
+from ..growth.foliage import YOUTH, envelope_reach
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
 from ..growth.seasons import Season

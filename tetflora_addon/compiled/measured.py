@@ -22,11 +22,10 @@ from ..growth.foliage import leaf_keys, leaf_places, place_leaves, settled
 from ..growth.grown_rows import FADES, lengths
 from ..growth.growth import (
     branch_counts,
-    children,
     chosen_children,
-    drawn_children,
     leaf_counts,
     living_nodes,
+    open_branches,
     trunks,
 )
 from ..growth.hashing import Draw, uniform
@@ -398,13 +397,10 @@ def _all_extremes(rows: Table, base: Branches, ways: Floats) -> Floats:
 
     grown = replace(base, plant=np.arange(len(base), dtype=np.int32))
     while len(grown):
-        bodies = grown
-        if rows["phantom"][grown.row].any():
-            bodies, _ = drawn_children(rows, grown)
-        lines = axes(rows, bodies)
+        whole, _, grown, _ = open_branches(rows, grown)
+        bodies, lines = whole.branches, whole.lines
         for s in range(lines.knots.shape[1]):
             meet(bodies.plant, lines.knots[:, s])
         owner, tip = _leaf_tips(rows, bodies, lines)
         meet(bodies.plant[owner], tip)
-        grown, _ = children(rows, bodies, lines)
     return out

@@ -24,7 +24,7 @@ from ..compiled.crowns import LEVEL, Crown, CrownParts
 from ..leaves.levels import chosen_polygons
 from ..refinement.decisions import explicit_fraction
 from ..refinement.settings import RefinementSettings
-from ..subplants.buds import BUD_RINGS, bud_sides
+from ..subplants.rings import BUD_RINGS, bud_sides
 from ..subplants.wood_detail import finer, round_up_to
 from .budget import A_PIXEL, BYTES_PER_POLYGON, BYTES_PER_TRIANGLE, FINEST, NEVER_TOO_MANY
 from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, OUTSIDE_A_PIXEL

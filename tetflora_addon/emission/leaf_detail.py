@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..growth.envelopes import envelope_reach
+from ..growth.foliage import envelope_reach
 from ..growth.growth import WholeBranches
 from ..leaves.levels import coarse_error
 from ..species.species import LEAF_KINDS

@@ -32,10 +32,6 @@ class Axes(Arrays):
     skies: Floats | None = None  # (n, S, 3): in the wind: `branches.Branches.sky` along each segment
     later: Axes | None = None  # the same lines a moment later, where it is asked how plants move
 
-    @staticmethod
-    def _rows(own: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:
-        return own.take(index) if isinstance(own, Arrays) else _selected(own, index)
-
     def at(self, branch: Integers, t: Floats) -> tuple[NDArray, NDArray]:
         """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
         number = self.segments[branch]
@@ -70,24 +66,12 @@ class Axes(Arrays):
         return _picked(self.frames, branch, segment)
 
 
-def _selected(array: NDArray, index: NDArray | slice) -> NDArray:
-    """``array[index]`` of an array whose first axis is the last in memory and whose second the one before."""
-    if isinstance(index, slice) or array.ndim == 1:
-        return array[index]
-    return _to_front(np.take(_to_back(array), index, axis=-1))
-
-
 def _picked(array: NDArray, first: Integers, second: Integers) -> NDArray:
     """``array[first, second]`` of an array whose first axis is the last in memory and whose second the one before."""
-    flat = _to_back(array)
+    flat = array.transpose(*range(2, array.ndim), 1, 0)  # (..., S, n), as it lies in memory
     flat = flat.reshape(*flat.shape[:-2], -1)
     picked = np.take(flat, second * len(array) + first, axis=-1)
     return picked.transpose(-1, *range(picked.ndim - 1))
-
-
-def _to_back(array: NDArray) -> NDArray:
-    """(n, S, ...) to (..., S, n), as it lies in memory."""
-    return array.transpose(*range(2, array.ndim), 1, 0)
 
 
 def _to_front(array: NDArray) -> NDArray:

@@ -114,6 +114,7 @@ LATERAL, FORK, SPUR, DEAD = range(4)
 """Sorts of children, the axis of ``next``, ``count``, ``start`` and ``fraction``."""
 
 SPUR_ORDER, DEAD_ORDER = 100, 101
+BOX = LEAF_ENVELOPES.index("box")
 _RANGES = (
     "length", "thickness", "taper", "curvature", "attraction", "angle", "azimuth",
     "leaves", "leaf_start", "leaf_size", "leaf_angle", "leaf_azimuth", "leaf_light",

@@ -63,11 +63,6 @@ class Sheet:
         columns, rows = (int(n) for n in np.ceil(size / cell))
         return Sheet(low, cell, columns, rows)
 
-    def middles(self) -> Floats:
-        """Middles of all cells, (rows · columns, 2), row by row."""
-        row, column = np.divmod(np.arange(self.rows * self.columns), self.columns)
-        return self.low + (np.stack([column, row], axis=1) + 0.5) * self.cell
-
     def at(self, values: Floats, points: Floats) -> Floats:
         """Values (n,) of cells (rows · columns,) at points (n, 2), linear between the middles."""
         return bilinear(values.reshape(self.rows, self.columns), (points - self.low) / self.cell - 0.5)

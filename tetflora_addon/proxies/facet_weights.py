@@ -37,7 +37,7 @@ from ..compiled.clumping import fingerprint
 from ..compiled.flora import Flora, compile_species
 from ..compiled.rays import PlantElements, basis, elements_of
 from ..growth.branches import Branches
-from ..growth.envelopes import are_solids
+from ..growth.foliage import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
 from ..growth.seeds import Seeds

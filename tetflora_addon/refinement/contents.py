@@ -24,7 +24,7 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds, extents
 from ..growth.branches import Branches
-from ..growth.envelopes import are_solids, envelope_reach
+from ..growth.foliage import are_solids, envelope_reach
 from ..growth.growth import fullness
 from ..growth.seasons import AREA, PRESENT
 from ..subplants.pieces import Pieces, chunks, leaf_fraction, piece_leaf_integrals, wood_areas
@@ -254,20 +254,6 @@ def bounding_capsules(flora: Flora, subplants: Branches) -> Floats:
     out[6], out[7] = bound[0], (bound[2] - bound[1]) / 2
     out[8] = pad
     return out
-
-
-def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDArray, NDArray]:
-    """Cylinders about the sub-plants' branches that hold all of their vertices, whatever the seed.
-
-    Returns
-    -------
-    center : (n, 3) float64
-        Meters, world space.
-    radius, half_height : (n,) float64
-        Across and along the branch's axis, meters.
-    """
-    capsules = bounding_capsules(flora, subplants)
-    return capsules[:3].T, capsules[6] + capsules[8], capsules[7] + capsules[8]
 
 
 def bounding_box(flora: Flora, subplants: Branches) -> Floats:

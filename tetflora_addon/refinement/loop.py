@@ -43,8 +43,7 @@ from .settings import RefinementSettings
 from .shared_parts import SharedParts
 from .shares import SharedPlants
 from .statistics import Step, Stopwatch
-from .views import PanoramaBuffers, is_anchored, pixels_of_buffer, widened_for
-from .visibility import AlphaBuffer, Buffers
+from .visibility import AlphaBuffer, Buffers, is_anchored, pixels_of_buffer, widened_for
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight parts.
 GENERATIONS = 3
@@ -167,8 +166,7 @@ def refine(
     clock.lap("update")
     shadowed = bool(lights) and settings.shadow_cutoff > 0.0
     ground = seen_ground(camera, occluders, _height(seeds, polygons, placed)) if shadowed else None
-    kind = PanoramaBuffers if camera.kind == "PANO" else Buffers
-    buffers = kind(camera, settings.visibility_resolution, occluders)
+    buffers = Buffers(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
     cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, shared, cell_polygons, np.ones(len(tree), bool)))

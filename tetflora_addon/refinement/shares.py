@@ -23,12 +23,11 @@ from ..compiled.placed import placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
-from ..growth.envelopes import are_solids, leaf_sites, leaf_start
-from ..growth.foliage import leaf_keys
-from ..growth.growth import radius_at, trunks
+from ..growth.foliage import are_solids, leaf_keys, leaf_sites, leaf_start
+from ..growth.growth import open_branches, radius_at, trunks
 from ..growth.hashing import uniform
 from ..growth.seeds import Seeds
-from ..subplants.pieces import Pieces, open_branches
+from ..subplants.pieces import Pieces
 from .contents import InCells, PlantParts, as_pieces
 from .shared_parts import SharedParts, SharePoints
 
@@ -145,7 +144,7 @@ def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, Intege
     for number in np.flatnonzero(np.bincount(segments)):  # bending takes as long for all as for the most
         some = np.flatnonzero(segments == number)
         for chosen in np.split(some, np.arange(OPEN_BATCH, len(some), OPEN_BATCH)):
-            whole, body, grown, parent = open_branches(flora, parts.branches.take(chosen))
+            whole, body, grown, parent = open_branches(flora.rows, parts.branches.take(chosen))
             yield PlantParts.of_branches(flora, whole.branches), chosen[body], whole.lines
             if len(grown):
                 yield PlantParts.of_subplants(flora, grown), chosen[body[parent]], None

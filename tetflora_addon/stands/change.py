@@ -142,9 +142,8 @@ def _increment(one: Plants, wood: NDArray, lit: NDArray, traits: StandTraits) ->
     return np.minimum(wood / np.maximum(more, 1e-9), most)
 
 
-def dying(plants: Plants, traits: StandTraits, year: int, block: slice) -> Mask:
-    """Which of some plants die in a year."""
-    one = plants.take(block)
+def dying(one: Plants, traits: StandTraits, year: int) -> Mask:
+    """Which plants (n,) die in a year."""
     species = one.species
     weak = np.take(_WEAK[0] + (_WEAK[1] - _WEAK[0]) / 5.0 * traits.shade, species)
     stressed = _DIES * np.maximum(1.0 - one.vigor / weak, 0.0)

@@ -154,7 +154,7 @@ class GrowingStand:
 
         def changed(block: slice) -> tuple[Plants, Mask]:
             after = grown(plants, crowns, taken, self.light, self.traits, block)
-            return after, dying(after, self.traits, year, slice(None))
+            return after, dying(after, self.traits, year)
 
         parts = list(on_all_cores(changed, blocks(len(plants), _BLOCK)))
         new = Plants.empty()

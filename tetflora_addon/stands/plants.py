@@ -134,10 +134,6 @@ class Plants(Arrays):
         y = self.y + _BESIDE * self.radius * self.north
         return Crowns(x, y, self.radius, self.base, self.height, leaves, np.take(traits.crown_conicity, self.species))
 
-    def leaf_area(self, traits: StandTraits) -> Floats:
-        """Leaf area (n,), m²."""
-        return self.crowns(traits).leaves / np.take(traits.extinction, self.species)
-
     def records(self, year: float, traits: StandTraits, site: StandSite) -> Records:
         """What they are now; ``plant`` is their number still."""
         diameter, offset = traits.diameters(self.species, self.basal), np.stack([self.east, self.north], axis=1)

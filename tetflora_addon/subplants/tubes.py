@@ -17,11 +17,14 @@ from ..growth.branches import Branches
 from ..growth.colors import branch_colors
 from ..growth.growth import WholeBranches
 from ..growth.wind import moment
-from .buds import BUD_RINGS, bud_numbers, bud_rings, bud_sides
 from .pieces import chunks
 from .rings import (
+    BUD_RINGS,
     PLACES,
     Rings,
+    bud_numbers,
+    bud_rings,
+    bud_sides,
     fine_counts,
     fine_numbers,
     fine_rings,

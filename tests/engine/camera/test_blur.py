@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.camera.camera import MOST, blur_margins, circle_of_confusion
-from tetflora_addon.refinement.views import widened_for
+from tetflora_addon.refinement.visibility import widened_for
 
 CAMERA = support.camera((0, 0, 0), (0, 10, 0), pixels=1000, view=1.0, near=0.05)
 SPHERES = np.array([[0.0, 4.0, 0.0], [0.0, 40.0, 3.0], [1.0, 200.0, 0.0]]), np.array([1.0, 5.0, 20.0])

@@ -27,7 +27,7 @@ from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, area_fractions
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.views import widened_for
+from tetflora_addon.refinement.visibility import widened_for
 from tetflora_addon.tetrahedra.roots import view_root
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 

@@ -178,7 +178,7 @@ def test_dense_stands_thin_themselves() -> None:
         thinned.append((len(plants), (traits.mass_factor[plants.species] * plants.basal**2 * plants.height).mean()))
     number, mass = np.log(np.array(thinned)[25:]).T
     assert -1.8 < np.polyfit(number, mass, 1)[0] < -1.2
-    leaves = plants.leaf_area(traits).sum() / 3600.0
+    leaves = (plants.crowns(traits).leaves / traits.extinction[plants.species]).sum() / 3600.0
     assert 4.5 < leaves < 8.0
 
 

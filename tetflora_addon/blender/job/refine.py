@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import memory
-from ...assets.kites import kite_mesh
+from ...assets.measures import kite_mesh
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
