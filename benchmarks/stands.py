@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetflora_addon.compiled.crowns import crown_of
+from tetflora_addon.compiled.sizes import crown_of
 from tetflora_addon.growth.hashing import key_of_seed, uniform
 from tetflora_addon.species.ages import ages_of, with_age
 from tetflora_addon.species.catalog import load_species

@@ -66,8 +66,8 @@ class Subject:
 
     def __init__(self, identifier: str) -> None:
         from tetflora_addon.blender.job.plant_mesh import single_seed
-        from tetflora_addon.compiled.crowns import crown_of
         from tetflora_addon.compiled.flora import compile_species
+        from tetflora_addon.compiled.sizes import crown_of
         from tetflora_addon.growth.axes import axes
         from tetflora_addon.growth.growth import WholeBranches, trunks
         from tetflora_addon.leaves.needles import Needles

@@ -19,7 +19,7 @@ from ..growth.foliage import envelope_reach
 from ..growth.growth import WholeBranches
 from ..leaves.levels import coarse_error
 from ..species.species import LEAF_KINDS
-from ..subplants.wood_detail import Pixels
+from ..subplants.rings import Pixels
 
 #: Pixels by which the margin of a leaf may be off.
 TOLERANCE = 0.5

@@ -29,12 +29,11 @@ from ..proxies.microsurfaces import Facets, piece_facets, subplant_facets
 from ..refinement.contents import PlantParts, as_pieces
 from ..refinement.decisions import explicit_fraction
 from ..refinement.lights import Light
-from ..refinement.shares import opened
+from ..refinement.shared_parts import opened
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import Pieces, Thin, whole_pieces
-from ..subplants.tubes import tube_buffers
-from ..subplants.twigs import twig_buffers
+from ..subplants.tubes import tube_buffers, twig_buffers
 from .coverage import Coverage, Footprints
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
 from .plants import Transition

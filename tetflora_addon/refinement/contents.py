@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Contents of tetrahedra: sub-plants, branches and explicit polygons, with their totals (paper, section 6.5).
 
-Plants are shared among tetrahedra, see `shares`. Polygons come from meshes that were modeled elsewhere; each is in one
-tetrahedron. Totals are what decisions need: areas, numbers of polygons, and the width of features.
+Plants are shared among tetrahedra, see `shared_parts`. Polygons come from meshes that were modeled elsewhere; each is
+in one tetrahedron. Totals are what decisions need: areas, numbers of polygons, and the width of features.
 
 Polygons of divided tetrahedra are handed on to the children. What lies on one side of a plane goes there whole, what
 crosses it is clipped. Nothing smaller than a pixel of the alpha buffer shows in the image: what reaches beyond a plane

@@ -22,7 +22,6 @@ from ..growth.seeds import Seeds
 from ..tetrahedra.geometry import squared_edges
 from ..tetrahedra.roots import view_root, world_root
 from ..tetrahedra.tree import TetrahedralTree
-from .asset_parts import PlacedAssets, SharedAssets
 from .contents import (
     Contents,
     InCells,
@@ -40,8 +39,7 @@ from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .outliers import Outliers, outliers_of
 from .polygons import Polygons
 from .settings import RefinementSettings
-from .shared_parts import SharedParts
-from .shares import SharedPlants
+from .shared_parts import PlacedAssets, SharedAssets, SharedParts, SharedPlants
 from .statistics import Step, Stopwatch
 from .visibility import AlphaBuffer, Buffers, is_anchored, pixels_of_buffer, widened_for
 

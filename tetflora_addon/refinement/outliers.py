@@ -17,9 +17,9 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.growth import trunks
 from ..growth.seeds import Seeds
-from .asset_parts import PlacedAssets
 from .contents import PlantParts
 from .polygons import Polygons
+from .shared_parts import PlacedAssets
 
 #: Outliers are so many times as far from the camera as all others, or as so many meters if these are nearer.
 GAP, NEAR = 16.0, 1000.0

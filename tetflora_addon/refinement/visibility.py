@@ -25,11 +25,11 @@ from ..camera.camera import LEAST_COSINE, Camera, blur_margins
 from ..camera.silhouette import silhouette_pixels
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
-from .asset_parts import AssetParts
 from .contents import bounding_capsules
 from .polygons import Polygons
 from .rasterize import buffer_size, occluder_depth, pixel_rays, tetrahedron_fragments
 from .settings import RefinementSettings
+from .shared_parts import AssetParts
 
 #: Optical depth of one fragment at most. e^−60 is no light at all, and larger or infinite numbers would cost the
 #: cumulative sum over the whole image its precision.

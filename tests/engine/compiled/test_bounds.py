@@ -18,8 +18,8 @@ from tetflora_addon.growth.branches import Branches
 from tetflora_addon.refinement.contents import bounding_capsules
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 from tetflora_addon.subplants.pieces import expand, open_subplants
+from tetflora_addon.subplants.rings import Pixels
 from tetflora_addon.subplants.tubes import tube_buffers
-from tetflora_addon.subplants.wood_detail import Pixels
 
 _FLOAT32 = 1e-6  # relative rounding of vertices
 

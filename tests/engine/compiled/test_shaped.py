@@ -28,8 +28,8 @@ from tests.engine.support import (
 )
 from tetflora_addon.arrays import spread
 from tetflora_addon.compiled.flora import Flora, compile_species
-from tetflora_addon.compiled.measured import fitted, measured
 from tetflora_addon.compiled.placed import extents, placed_samples
+from tetflora_addon.compiled.sizes import fitted, measured
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import leaf_counts, trunks
 from tetflora_addon.growth.seasons import Season

@@ -25,7 +25,7 @@ from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves, 
 from tetflora_addon.growth.growth import leaf_counts, trunks
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies.facet_weights import facet_weights, fitting
-from tetflora_addon.refinement.shares import SharedPlants
+from tetflora_addon.refinement.shared_parts import SharedPlants
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 
 SOLIDS, RADIUS, BARE = LEAF_ENVELOPES[1:], 0.3, 0.2

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import TetFloraError
-from tetflora_addon.growth.colors import leaf_colors_at
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.growth.seasons import (
     AREA,
     PRESENT,
     Season,
     expected,
+    leaf_colors_at,
     leaf_stages,
     leaf_table,
     plant_years,

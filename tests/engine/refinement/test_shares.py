@@ -24,8 +24,7 @@ from tetflora_addon.growth.wind import Wind
 from tetflora_addon.refinement.contents import PlantParts, Totals, bounding_box, subplant_totals, sums
 from tetflora_addon.refinement.loop import refine, step_of
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.shared_parts import LARGE
-from tetflora_addon.refinement.shares import SharedPlants, opened, share_points
+from tetflora_addon.refinement.shared_parts import LARGE, SharedPlants, opened, share_points
 from tetflora_addon.subplants.pieces import expand
 from tetflora_addon.tetrahedra.geometry import squared_edges, volume
 from tetflora_addon.tetrahedra.roots import view_root

@@ -15,8 +15,7 @@ from tetflora_addon.growth.growth import radius_at
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.subplants.leaf_meshes import LeafCopies, LeafMesh, leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, wood_areas
-from tetflora_addon.subplants.tubes import tube_buffers
-from tetflora_addon.subplants.twigs import twig_buffers
+from tetflora_addon.subplants.tubes import tube_buffers, twig_buffers
 
 
 def check_topology(mesh: MeshBuffers) -> None:

@@ -16,8 +16,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled.crowns import crown_of
 from ...compiled.flora import compile_species
+from ...compiled.sizes import crown_of
 from ...errors import SceneError, SpeciesError
 from ...geodata.canopy import checked_canopy, find_trees, heights_above, without_areas
 from ...geodata.inventories import Inventory, read_inventory

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import memory
-from ...compiled.crowns import Crown
+from ...compiled.sizes import Crown
 from ...emission.estimate import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of

@@ -13,7 +13,7 @@ from contextlib import suppress
 
 import bpy
 
-from ...compiled.crowns import Crown, crown_of, known_crown, prepare
+from ...compiled.sizes import Crown, crown_of, known_crown, prepare
 from ...errors import SpeciesError
 from ...jobs import Progress
 from ...species.species import Species

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled.flora import compile_species
-from ...compiled.measured import fitted, measured
+from ...compiled.sizes import fitted, measured
 from ...errors import SpeciesError
 from ...growth.growth import radius_at, trunks
 from ...growth.seeds import PLAIN, THICKNESS, Seeds, crown_shapes

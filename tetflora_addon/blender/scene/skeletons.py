@@ -13,8 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SpeciesError
-from ...species.curves import Chains, bezier_chains, joined_edges, nurbs_chain, smooth_handles
-from ...species.skeletons import Skeleton, skeleton_from_edges
+from ...species.skeletons import (
+    Chains,
+    Skeleton,
+    bezier_chains,
+    joined_edges,
+    nurbs_chain,
+    skeleton_from_edges,
+    smooth_handles,
+)
 from ..attributes import evaluated_mesh, frames_of, members, values_of, world_matrix
 
 #: Types of objects that can be the skeleton of a plant.
