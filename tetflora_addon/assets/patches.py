@@ -11,7 +11,6 @@ eight children.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,22 +119,17 @@ def _places(positions: Floats32) -> Integers32:
 def _features(surface: AssetSurface, triangle: Integers32, island: Integers32) -> tuple[Mask, Floats32]:
     """Whether triangles (t,), sorted by island, are of solids, and how wide what they are of is."""
     solid, width = np.zeros(len(triangle), bool), np.zeros(len(triangle), np.float32)
-    for run in _whole_runs(island):
+    # Whole islands of about `BATCH` triangles at a time.
+    first = np.flatnonzero(np.diff(island, prepend=-1))
+    starts = first[np.flatnonzero(np.diff(first // BATCH, prepend=-1))].tolist()
+    for start, stop in zip(starts, [*starts[1:], len(island)], strict=True):
+        run = slice(start, stop)
         corners = surface.triangles[triangle[run]]
         used, vertex = np.unique(corners, return_inverse=True)
         offsets = np.arange(0, corners.size + 1, 3)
         positions = surface.positions[used].astype(np.float64)
         solid[run], _, width[run] = classified(positions, vertex.reshape(-1).astype(np.int32), offsets)
     return solid, width
-
-
-def _whole_runs(island: Integers32) -> Iterator[slice]:
-    """Slices of triangles, sorted by island (t,), with whole islands and about `BATCH` triangles."""
-    first = np.flatnonzero(np.diff(island, prepend=-1))
-    block = first // BATCH
-    starts = first[np.flatnonzero(np.diff(block, prepend=-1))]
-    for start, stop in zip(starts, [*starts[1:], len(island)], strict=True):
-        yield slice(int(start), int(stop))
 
 
 def _along_a_curve(

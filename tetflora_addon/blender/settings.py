@@ -39,7 +39,7 @@ MONTHS = (
 
 
 def properties_of(settings: type, **common: Any) -> SimpleNamespace:
-    """A property for each field of a dataclass that is declared with `setting.setting`.
+    """A property for each field of a dataclass that is declared with `parameters.setting`.
 
     Parameters
     ----------

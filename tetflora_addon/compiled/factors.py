@@ -255,22 +255,17 @@ class DayTotals:
         """
         out = summer.copy()
         for one in self.kinds:
-            factor, added = self._mixture(branches, int(one))
+            left, none = self.left(branches, int(one), *_SEEN), np.zeros((len(branches), 3))
+            added = _mixed(none, np.ones(len(branches)), left, self.years[branches.row, one], branches.year[:, 1])
+            every = np.where(left[0] > 0, left[0], 1.0)
+            factor = np.where(left[0] > 0, (left[0] - left[1] - left[2] - left[3]) / every, 1.0)
+            added = added / every[:, None]
             if owner is not None and (kind == one).all():
                 return gathered(factor, owner)[:, None] * summer + gathered(added, owner)
             some = np.flatnonzero(kind == one)
             which = some if owner is None else owner[some]
             out[some] = factor[which, None] * summer[some] + added[which]
         return out
-
-    def _mixture(self, branches: Branches, kind: int) -> tuple[Floats, Floats]:
-        """Factor (n,) on the mean color of leaves in summer on the day of branches, and what is added to it (n, 3)."""
-        left = self.left(branches, kind, *_SEEN)
-        one, none = np.ones(len(branches)), np.zeros((len(branches), 3))
-        added = _mixed(none, one, left, self.years[branches.row, kind], branches.year[:, 1])
-        some = left[0] > 0
-        every = np.where(some, left[0], 1.0)
-        return np.where(some, (left[0] - left[1] - left[2] - left[3]) / every, 1.0), added / every[:, None]
 
     def widths(self, subplants: Branches, leaf: Floats, bare: Floats) -> Floats:
         """Widths (n,) between those of leaves in summer (n,) and of what bears them (n,), by number and by growth."""

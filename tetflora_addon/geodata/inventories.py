@@ -545,9 +545,8 @@ class _Reading:
         away[good] = np.nan_to_num(np.abs(local).max(axis=1), nan=np.inf)
         far = (away >= MOST_AWAY) & (away > _STRAY * np.median(away[good]))
         if 2 * far[good].sum() < len(good):
-            self._refuse(
-                far, column, lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} is {_away(away[i])} most other trees"
-            )
+            apart = [f"{one / 1000.0:,.0f} km from" if math.isfinite(one) else "too far from" for one in away.tolist()]
+            self._refuse(far, column, lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} is {apart[i]} most other trees")
 
     def _places(self) -> tuple[Floats, int]:
         """Coordinates that stand in one column, and the EPSG code that stands there too, or 0."""
@@ -609,8 +608,3 @@ def _no_tree(text: str, condition: bool) -> str:
     """What stands in place of a tree, if a cell of its condition or of its species says so."""
     what = said_of(text)
     return what if what in ("vacant", "stump", "planned", "removed") and (condition or not species_named(text)) else ""
-
-
-def _away(meters: float) -> str:
-    """How far a row is from others, for messages."""
-    return f"{meters / 1000.0:,.0f} km from" if math.isfinite(meters) else "too far from"

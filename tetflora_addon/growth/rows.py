@@ -220,7 +220,10 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
             if order.spurs.high > 0 and one.spur is not None:
                 row["next"][SPUR] = spur
             if one.dead is not None and drawn is None and o <= 1:
-                _bear_dead(row, one.dead, order, o, dead)
+                number_dead = one.dead.on_limbs if o else one.dead.number
+                if number_dead.high > 0:
+                    row["next"][DEAD], row["count"][DEAD] = dead, number_dead
+                    row["start"][DEAD] = one.dead.part(order.branch_start.mean)
             row = _part(row, order, p, low, high, cuts[o][p - 1] if p else 0.0)
             if order.growing is not None:
                 _grow(row, order, p, one.dead if o <= 1 else None)
@@ -250,15 +253,6 @@ def _dead_rows(dead: Dead, species: int, first: int) -> list[np.void]:
             row["next"][LATERAL] = first + o + 1
         out.append(row)
     return out
-
-
-def _bear_dead(row: np.void, dead: Dead, order: Order, o: int, first: int) -> None:
-    """Dead branches on the trunk or on limbs, orders 0 and 1: of the row ``first``."""
-    number = dead.on_limbs if o else dead.number
-    if number.high > 0:
-        row["next"][DEAD] = first
-        row["count"][DEAD] = number
-        row["start"][DEAD] = dead.part(order.branch_start.mean)
 
 
 def _drawn_rows(one: Species, drawn: DrawnLines, number: int, first: int, begin: Integers, spur: int) -> list[np.void]:

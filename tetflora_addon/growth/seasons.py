@@ -21,7 +21,7 @@ import numpy as np
 
 from ..arrays import Arrays, Floats, Integers, Keys, Mask, Table, gathered, smoothstep
 from ..errors import TetFloraError
-from ..setting import FACTOR, setting
+from ..parameters import FACTOR, setting
 from ..species.species import DAYS, LEAF_KINDS, MAX_AUTUMN, LeafYear, Species
 from .hashing import Draw, mix_draw, signed, uniform
 from .rows import with_columns

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Floats32, Integers, Keys, Table, cross, dot
 from ..errors import TetFloraError
-from ..setting import FACTOR, setting, within
+from ..parameters import FACTOR, setting, within
 from .branches import Branches
 from .hashing import Draw, uniform
 from .rows import SPUR_ORDER, with_columns

@@ -14,7 +14,7 @@ from math import inf, pi, radians
 import numpy as np
 
 from ..arrays import Floats, Floats32, Integers
-from ..setting import meters, setting
+from ..parameters import meters, setting
 from .plane import Lines, lines_along
 from .rules import GroundLimits
 from .terrain import sampled

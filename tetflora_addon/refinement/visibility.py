@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Integers, Mask
-from ..camera.camera import LEAST_COSINE, Camera, blur_margins
-from ..camera.silhouette import silhouette_pixels
+from ..camera.camera import LEAST_COSINE, Camera, blur_margins, silhouette_pixels
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from .contents import bounding_capsules
@@ -167,18 +166,14 @@ class AlphaBuffer:
         # Only where something has come or gone is there anything to sort again.
         some = np.flatnonzero(self._changed[self._pixel])
         self._changed[:] = False
-        self._before[some] = np.exp(-self._depth_before(some, rank))
-        return np.bincount(self._cell, self._fraction * self._before, len(rank))
-
-    def _depth_before(self, some: Integers, rank: Integers) -> Floats:
-        """Optical depth in front of some fragments (n,), which are all of their pixels."""
         pixel, depth = np.take(self._pixel, some), np.take(self._depth, some)
         # One number to sort by is several times as fast as two.
         key = pixel.astype(np.int64) * (int(rank.max(initial=0)) + 1) + np.take(rank, np.take(self._cell, some))
         order = np.argsort(key)
         before = np.zeros_like(depth)
         before[order] = depth_in_front(np.take(pixel, order), np.take(depth, order))[1]
-        return before
+        self._before[some] = np.exp(-before)
+        return np.bincount(self._cell, self._fraction * self._before, len(rank))
 
 
 def hiding(camera: Camera) -> Camera:

@@ -17,10 +17,9 @@ from ..arrays import Mask
 from ..errors import TetFloraError
 from ..jobs import Progress
 from ..parallel import blocks, on_all_cores
-from ..setting import script_setting, setting, within
-from .change import MOST_PLANTS, SeedDispersal, dying, fallen, grown, planted
+from ..parameters import script_setting, setting, within
+from .change import MOST_PLANTS, DeadPlants, Plants, Records, SeedDispersal, dying, fallen, grown, in_order, planted
 from .light import LightGrid
-from .plants import DeadPlants, Plants, Records, in_order
 from .site import StandSite
 from .traits import StandSpecies, StandTraits
 

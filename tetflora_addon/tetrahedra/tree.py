@@ -21,6 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats, Integers, Integers32, Mask
 from .geometry import EDGES, plane_distance, plane_through, quality, signed_volume, squared_edges
 
 #: Squared lengths that differ by less than this fraction count as equal, so that the choice of the edge does not depend
@@ -28,7 +29,7 @@ from .geometry import EDGES, plane_distance, plane_through, quality, signed_volu
 TIE = 1e-9
 
 
-def longest_edge(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
+def longest_edge(vertices: Floats) -> Integers:
     """Index into `geometry.EDGES` of the longest edge; the first of those that are equally long.
 
     Parameters
@@ -44,7 +45,7 @@ def longest_edge(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.argmax(squared >= np.max(squared, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
 
 
-def bisect(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def bisect(vertices: Floats) -> tuple[Floats, Floats]:
     """Cut tetrahedra in two at the midpoint of their longest edges.
 
     Parameters
@@ -84,7 +85,7 @@ _NAMES = tuple((EDGES[k][0], EDGES[5 - k][0], EDGES[k][1], EDGES[5 - k][1]) for 
 COMPACT, HANDICAP = 0.5, 1.15
 
 
-def _tables() -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _tables() -> tuple[Integers, Integers]:
     """Points of the children ``(3, 8, 4)`` and of the planes, with one on side 0, ``(3, 7, 4)``, for each diagonal.
 
     Points 0 to 3 are the vertices, 4 + i is the middle of edge ``i``.
@@ -109,7 +110,7 @@ def _tables() -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 _CHILDREN, _PLANES = _tables()
 
 
-def best_diagonal(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
+def best_diagonal(vertices: Floats) -> Integers:
     """Diagonal along which the worst of the inner tetrahedra has the best quality.
 
     Parameters
@@ -138,9 +139,7 @@ def best_diagonal(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.argmax(spared >= np.max(spared, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
 
 
-def divide_in_eight(
-    vertices: NDArray[np.float64], diagonal: NDArray[np.intp] | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple[Floats, Floats]:
     """Divide tetrahedra into eight of the same volume.
 
     Parameters
@@ -168,8 +167,8 @@ def divide_in_eight(
 
 
 def divide_by_shape(
-    vertices: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    vertices: Floats,
+) -> tuple[Floats, Floats, Mask]:
     """Divide tetrahedra into eight in the way that keeps them in better shape, so that no slivers arise.
 
     Both ways give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on the
@@ -203,7 +202,7 @@ def divide_by_shape(
     return planes, children, chosen
 
 
-def bisect_thrice(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def bisect_thrice(vertices: Floats) -> tuple[Floats, Floats]:
     """Longest-edge bisection of tetrahedra ``(n, 4, 3)`` three times; planes and children as `divide_in_eight`."""
     planes, pieces = [], vertices
     for cuts in (1, 2, 4):
@@ -242,7 +241,7 @@ class TetrahedralTree:
             "inside": np.zeros(0, np.bool_),
             "vertices": np.zeros((0, 4, 3)),
         }
-        self._inner_by_level: tuple[int, list[NDArray[np.intp]]] = (-1, [])
+        self._inner_by_level: tuple[int, list[Integers]] = (-1, [])
         self._append(np.full(1, -1, np.int32), np.zeros(1, np.int16), np.zeros(1, np.bool_))
         if vertices is not None:
             self.place(np.zeros(1, np.intp), np.asarray(vertices, np.float64)[None])
@@ -251,12 +250,12 @@ class TetrahedralTree:
         return self._size
 
     @property
-    def children(self) -> NDArray[np.int32]:
+    def children(self) -> Integers32:
         """Node numbers ``(len, 2)`` of the children on sides 0 and 1; −1 where the node is terminal."""
         return self._rows["children"][: self._size]
 
     @property
-    def parent(self) -> NDArray[np.int32]:
+    def parent(self) -> Integers32:
         """Parent ``(len,)`` of each node; −1 for the root."""
         return self._rows["parent"][: self._size]
 
@@ -266,7 +265,7 @@ class TetrahedralTree:
         return self._rows["level"][: self._size]
 
     @property
-    def inside(self) -> NDArray[np.bool_]:
+    def inside(self) -> Mask:
         """Whether each node ``(len,)`` lies within the view for which the root was made."""
         return self._rows["inside"][: self._size]
 
@@ -285,19 +284,19 @@ class TetrahedralTree:
         """Bytes that the arrays take, spare rows included."""
         return sum(rows.nbytes for rows in self._rows.values())
 
-    def vertices(self, nodes: ArrayLike) -> NDArray[np.float64]:
+    def vertices(self, nodes: ArrayLike) -> Floats:
         """Tetrahedra ``(n, 4, 3)`` float64 of nodes ``(n,)``, meters; NaN for regions without one."""
         return np.take(self._rows["vertices"][: self._size], nodes, axis=0)
 
-    def planes(self, nodes: ArrayLike) -> NDArray[np.float64]:
+    def planes(self, nodes: ArrayLike) -> Floats:
         """Cutting planes ``(n, 4)`` float64 of nodes ``(n,)``; zeros where the node is terminal."""
         return np.take(self._rows["plane"][: self._size], nodes, axis=0)
 
-    def terminals(self) -> NDArray[np.intp]:
+    def terminals(self) -> Integers:
         """Numbers ``(t,)`` of the nodes that are not divided, ascending."""
         return np.flatnonzero(self.children[:, 0] < 0)
 
-    def split(self, nodes: ArrayLike) -> NDArray[np.int32]:
+    def split(self, nodes: ArrayLike) -> Integers32:
         """Divide terminal tetrahedra by longest-edge bisection.
 
         Parameters
@@ -321,7 +320,7 @@ class TetrahedralTree:
         self.place(children.ravel(), halves.reshape(-1, 4, 3))
         return children
 
-    def split_by_shape(self, nodes: ArrayLike) -> NDArray[np.int32]:
+    def split_by_shape(self, nodes: ArrayLike) -> Integers32:
         """Divide terminal tetrahedra into eight as suits their shape: the canonical eight, or three bisections.
 
         Parameters
@@ -341,9 +340,12 @@ class TetrahedralTree:
         """
         nodes = np.asarray(nodes, np.intp)
         planes, pieces, _ = divide_by_shape(self._tetrahedra(nodes))
-        return self._divide_thrice(nodes, planes, pieces)
+        for first, end in ((0, 1), (1, 3), (3, 7)):  # planes are in the order of a heap
+            nodes = self.divide(nodes, planes[:, first:end].reshape(-1, 4)).reshape(-1)
+        self.place(nodes, pieces.reshape(-1, 4, 3))
+        return nodes.reshape(-1, 8)
 
-    def divide(self, nodes: ArrayLike, planes: ArrayLike) -> NDArray[np.int32]:
+    def divide(self, nodes: ArrayLike, planes: ArrayLike) -> Integers32:
         """Divide terminal nodes by given planes; the children have no tetrahedra until `place` gives them some.
 
         Parameters
@@ -388,7 +390,7 @@ class TetrahedralTree:
 
     def order(
         self, eye: ArrayLike | None = None, direction: ArrayLike | None = None, back_to_front: bool = False
-    ) -> NDArray[np.int32]:
+    ) -> Integers32:
         """Front-to-back rank of each terminal; exact for any eye, as in a BSP tree (paper, section 4).
 
         At every plane the eye's side comes first. Ranks are offsets in that traversal, found without walking it:
@@ -434,7 +436,7 @@ class TetrahedralTree:
         place[children[:, 0] >= 0] = -1
         return place
 
-    def locate(self, points: ArrayLike) -> NDArray[np.int32]:
+    def locate(self, points: ArrayLike) -> Integers32:
         """Terminal that holds each point; points outside the root go to the one on their side of all planes.
 
         Parameters
@@ -454,23 +456,13 @@ class TetrahedralTree:
             found[part] = self._descend(points[part])
         return found
 
-    def _divide_thrice(
-        self, nodes: NDArray[np.intp], planes: NDArray[np.float64], pieces: NDArray[np.float64]
-    ) -> NDArray[np.int32]:
-        """Divide nodes by seven planes each, in the order of a heap, and place the eight pieces."""
-        regions = nodes
-        for first, end in ((0, 1), (1, 3), (3, 7)):
-            regions = self.divide(regions, planes[:, first:end].reshape(-1, 4)).reshape(-1)
-        self.place(regions, pieces.reshape(-1, 4, 3))
-        return regions.reshape(-1, 8)
-
-    def _tetrahedra(self, nodes: NDArray[np.intp]) -> NDArray[np.float64]:
+    def _tetrahedra(self, nodes: Integers) -> Floats:
         vertices = self.vertices(nodes)
         if np.isnan(vertices[:, 0, 0]).any():
             raise ValueError("only nodes with a tetrahedron can be bisected; split regions by a plane instead")
         return vertices
 
-    def _descend(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
+    def _descend(self, points: Floats) -> Integers32:
         node = np.zeros(len(points), np.int32)
         moving = np.arange(len(points) if self.children[0, 0] >= 0 else 0)
         while len(moving):
@@ -480,7 +472,7 @@ class TetrahedralTree:
             moving = moving[self.children[at, 0] >= 0]
         return node
 
-    def _levels_of_inner(self) -> list[NDArray[np.intp]]:
+    def _levels_of_inner(self) -> list[Integers]:
         """Inner nodes of each level that has some, from the root down; kept until the tree grows."""
         if self._inner_by_level[0] != self._size:
             inner = np.flatnonzero(self.children[:, 0] >= 0)
@@ -491,7 +483,7 @@ class TetrahedralTree:
             self._inner_by_level = (self._size, groups)
         return self._inner_by_level[1]
 
-    def _append(self, parent: NDArray[np.int32], level: NDArray[np.int16], inside: NDArray[np.bool_]) -> None:
+    def _append(self, parent: Integers32, level: NDArray[np.int16], inside: Mask) -> None:
         """Add terminal nodes without tetrahedra; capacity doubles, so that each row is copied twice on average."""
         start, end = self._size, self._size + len(parent)
         if end > len(self._rows["parent"]):

@@ -10,8 +10,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.jobs import run_to_end
-from tetflora_addon.planting.canopy import CLUSTERED, DIRECTIONS, FACING, Canopy, Sheet, fallen_on, light_on
-from tetflora_addon.planting.cover import FULL, Floor, Habitat, Stratum, covered, mapping, tinted
+from tetflora_addon.planting.cover import (
+    CLUSTERED,
+    DIRECTIONS,
+    FACING,
+    FULL,
+    Canopy,
+    Floor,
+    Habitat,
+    Sheet,
+    Stratum,
+    covered,
+    fallen_on,
+    light_on,
+    mapping,
+    tinted,
+)
 from tetflora_addon.planting.places import place
 from tetflora_addon.planting.rules import Rules
 from tetflora_addon.planting.terrain import Path, Terrain

@@ -12,7 +12,7 @@ import pytest
 from tests.engine import support
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.refinement.outliers import FRACTION, MOST, NEAR, far_off, outliers_of
+from tetflora_addon.refinement.loop import FRACTION, MOST, NEAR, far_off, outliers_of
 from tetflora_addon.refinement.shared_parts import PlacedAssets
 
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from tests.engine import support
 from tests.engine.refinement.test_loop import check, run
-from tetflora_addon.camera.camera import Camera
-from tetflora_addon.camera.silhouette import expected_pixels
+from tetflora_addon.camera.camera import Camera, expected_pixels
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.rasterize import pixel_rays
 from tetflora_addon.refinement.settings import RefinementSettings

@@ -14,7 +14,7 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ...growth.hashing import key_of_seed
-from ...planting.canopy import Sheet
+from ...planting.cover import Sheet
 from ...planting.plane import gradient_noise
 from ..attributes import world_matrix
 from ..materials.soil import SHADED, lay_soil, may_have_soil

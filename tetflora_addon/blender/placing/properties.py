@@ -15,10 +15,10 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...parameters import LENGTH
 from ...planting.rules import Companion, Rules
 from ...planting.strokes import Brush
 from ...planting.zones import Limits
-from ...setting import LENGTH
 from ..runtime import Listeners
 from ..scene.own_ages import AGE_PROPERTY
 from ..settings import BIOME, FIELD, SCATTER, properties_of, settings_in
