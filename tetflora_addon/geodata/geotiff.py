@@ -26,8 +26,7 @@ from ..arrays import Floats, Integers, Mask, spread, top
 from ..errors import SceneError, quoted
 from ..jobs import Progress
 from . import table
-from .prj import described, system_in, utm_zone
-from .projection import Definition, Ellipsoid, System, known_systems
+from .projection import Definition, Ellipsoid, System, described, known_systems, system_in, utm_zone
 from .rasters import Raster, check_regular, checked_size, system_beside, without_nodata, world_file
 
 _CLEAR, _END, _ZSTANDARD = 256, 257, 50000
