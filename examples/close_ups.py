@@ -70,7 +70,7 @@ class Subject:
         from tetflora_addon.compiled.sizes import crown_of
         from tetflora_addon.growth.axes import axes
         from tetflora_addon.growth.growth import WholeBranches, trunks
-        from tetflora_addon.leaves.needles import Needles
+        from tetflora_addon.leaves.surfaces import Needles
         from tetflora_addon.species import catalog
         from tetflora_addon.species.ages import with_habit
 

@@ -20,10 +20,9 @@ from tetflora_addon.emission.drawing import drawing
 from tetflora_addon.emission.emitters import EmissionInput
 from tetflora_addon.emission.plants import Block, Transition
 from tetflora_addon.growth.axes import axes
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts, trunks
-from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.growth.seeds import Branches, Seeds
 from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights, facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.primitives import joined

@@ -224,8 +224,8 @@ def _divided(
 ) -> tuple[Integers, Integers, Integers, Integers]:
     """Divide runs (r,) of the order in two where they are large; new order, runs, and where each comes from."""
     size = high - low
-    owner = np.repeat(np.arange(len(low)), size)
-    at = np.arange(len(owner)) - (np.cumsum(size) - size - low)[owner]
+    owner, within = spread(size)
+    at = low[owner] + within
     patch = order[at]
     weight = triangles[patch].astype(np.float64)
     begin = np.cumsum(size) - size

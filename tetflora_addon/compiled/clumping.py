@@ -25,10 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import GOLDEN_TURN, Floats, Mask, Table, spiral
-from ..growth.branches import Branches
 from ..growth.growth import open_branches, trunks
 from ..growth.hashing import key_of_seed, mix, uniform
-from ..growth.seeds import Seeds
+from ..growth.seeds import Branches, Seeds
 from ..leaves.models import LeafModel
 from ..storage import cached
 from .rays import WIDEST, PlantElements, basis, cell_numbers, elements_of, path_lengths

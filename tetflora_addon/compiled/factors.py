@@ -20,7 +20,6 @@ import numpy as np
 
 from ..arrays import Floats, Integers, Mask, Table, gathered
 from ..growth import seasons
-from ..growth.branches import Branches
 from ..growth.crown_effects import (
     LIGHT,
     are_stools,
@@ -32,7 +31,7 @@ from ..growth.crown_effects import (
 )
 from ..growth.grown_rows import NOW, fullness_of, living, spread_children
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
-from ..growth.seeds import BASE, MOST, WIDTH
+from ..growth.seeds import BASE, MOST, WIDTH, Branches
 from ..species.growing import EVEN
 from ..species.species import LEAF_KINDS, Species
 from .averages import Averages, RowLeaves, average, children_sums, quadratic, side_branches
@@ -40,11 +39,11 @@ from .averages import Averages, RowLeaves, average, children_sums, quadratic, si
 _BASES = np.linspace(0.0, MOST[BASE], 39)
 _GAUSS = np.polynomial.legendre.leggauss(5)[0]
 _MEANS = np.polynomial.legendre.leggauss(5)[1] / 2
-_KINDS = len(LEAF_KINDS)
+KINDS = len(LEAF_KINDS)
 #: Columns of totals: area and faces of leaves of each kind, faces and surface of branches, and what of that is of short
 #: shoots.
-_AREA, _LEAF_FACES, _LEAVES = slice(_KINDS), slice(_KINDS, 2 * _KINDS), slice(2 * _KINDS)
-_FACES, _WOOD, _SPURS, _TOTALS = range(2 * _KINDS, 2 * _KINDS + 4)
+_AREA, _LEAF_FACES, _LEAVES = slice(KINDS), slice(KINDS, 2 * KINDS), slice(2 * KINDS)
+_FACES, _WOOD, _SPURS, _TOTALS = range(2 * KINDS, 2 * KINDS + 4)
 _OF_WOOD = ("fixed_faces", "full_faces", "fixed_wood", "full_wood", "spur_wood")
 
 
@@ -105,7 +104,7 @@ def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTota
     solid = rows["phantom"] | rows["drawn"] | (rows["envelope"] > 0)
     shaped = (rows["order"] == 0) & bearing & ~solid & ~are_stools(rows, every)
     power = np.zeros((len(rows), len(_BASES), 3, _TOTALS))
-    kinds = np.arange(_KINDS) == rows["leaf_kind"][:, None]
+    kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]
     all_leaves = np.concatenate([totals.leaf_area[:, 1] @ kinds, (totals.leaves * polygons) @ kinds], axis=1)
     exact = rows.copy()
     exact["taper"][:, 1] = 0
@@ -185,7 +184,6 @@ def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:
     return number, *(number * mean for mean in means)
 
 
-KINDS = len(LEAF_KINDS)
 _SEEN = (seasons.AREA, seasons.FRESH, seasons.AUTUMN, seasons.DRY)
 
 

@@ -17,11 +17,11 @@ import numpy as np
 
 from ..arrays import Floats, Integers, Table
 from ..errors import SpeciesError
-from ..growth.branches import Branches
 from ..growth.foliage import YOUTH, envelope_reach
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
 from ..growth.seasons import Season
+from ..growth.seeds import Branches
 from ..growth.wind import Wind, is_windy, widest_sway, windy_rows
 from ..leaves.models import LeafModel
 from ..species.ages import with_habit

@@ -19,7 +19,6 @@ import numpy as np
 
 from ..arrays import GOLDEN_ANGLE, Floats, Integers, Table, columns, cross, perpendicular, spiral
 from ..growth.axes import Axes, axes
-from ..growth.branches import Branches
 from ..growth.foliage import (
     axis_places,
     leaf_frames,
@@ -33,6 +32,7 @@ from ..growth.foliage import (
 from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
 from ..growth.hashing import Draw, key_of_seed, mix, thinned, uniform
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR, ranged
+from ..growth.seeds import Branches
 from ..leaves.models import LeafModel
 from .averages import NODES, quadratic
 

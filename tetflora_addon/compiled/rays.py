@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask, Table, spread
 from ..growth.axes import Axes
-from ..growth.branches import Branches
 from ..growth.foliage import leaf_forms, leaf_keys, leaf_places, place_leaves, settled
 from ..growth.growth import leaf_counts, open_branches, radius_at
+from ..growth.seeds import Branches
 from ..leaves.models import LeafModel
 from .averages import tube_perimeter
 

@@ -30,7 +30,6 @@ from ..arrays import (
     spread,
 )
 from ..growth.axes import Axes, axes
-from ..growth.branches import Branches
 from ..growth.crown_effects import MOST_LEANING, are_stools, bare_part, child_factors, lateral_fractions, length_factors
 from ..growth.foliage import envelope_reach, leaf_keys, leaf_places, place_leaves, settled
 from ..growth.grown_rows import FADES, lengths
@@ -44,7 +43,7 @@ from ..growth.growth import (
 )
 from ..growth.hashing import Draw, uniform
 from ..growth.rows import FORK, LATERAL
-from ..growth.seeds import BASE, LEAST, MOST, PLAIN, WIDTH, Seeds
+from ..growth.seeds import BASE, LEAST, MOST, PLAIN, WIDTH, Branches, Seeds
 from ..leaves.levels import level_errors
 from ..leaves.models import LeafModel
 from ..parallel import each_on_all_cores

@@ -20,9 +20,9 @@ from ..compiled.bounds import own_leaf_reaches
 from ..compiled.flora import Flora
 from ..compiled.placed import extents
 from ..growth.axes import Axes, axes
-from ..growth.branches import Branches
 from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, uniform
+from ..growth.seeds import Branches
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.hotspots import light_ratios
 from ..proxies.microsurfaces import Facets, piece_facets, subplant_facets

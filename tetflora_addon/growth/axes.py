@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Keys, Table, by_component, columns, cross, gathered
-from .branches import Branches
 from .hashing import Draw, signed
 from .rows import ranged, varied
+from .seeds import Branches
 from .wind import axis_and_angle, is_windy, leaned, moment, sway, turned_by, turned_vectors
 
 
@@ -29,7 +29,7 @@ class Axes(Arrays):
     knots: Floats  # (n, S + 1, 3): ends of the segments; a branch with fewer than S segments repeats its last knot
     frames: Floats  # (n, S, 3, 3): local axes along each segment
     segments: Integers  # (n,): number of segments
-    skies: Floats | None = None  # (n, S, 3): in the wind: `branches.Branches.sky` along each segment
+    skies: Floats | None = None  # (n, S, 3): in the wind: `seeds.Branches.sky` along each segment
     later: Axes | None = None  # the same lines a moment later, where it is asked how plants move
 
     def at(self, branch: Integers, t: Floats) -> tuple[NDArray, NDArray]:

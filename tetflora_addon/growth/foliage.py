@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, Mask, Table, cross, dot, gathered
 from ..species.species import LEAF_INCLINATIONS
 from .axes import Axes
-from .branches import Branches
 from .growth import level_azimuth
 from .hashing import Draw, child_key, signed, uniform
 from .rows import BOX, ranged
 from .seasons import Stages, leaf_stages, may_change
+from .seeds import Branches
 from .wind import fluttered, gusts, is_windy
 
 #: Leaves of a solid are displaced along it so far, in distances between them, that they lie evenly.

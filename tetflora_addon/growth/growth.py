@@ -18,12 +18,11 @@ from ..species.growing import faded
 from ..species.members import dead_vigor
 from . import crown_effects
 from .axes import Axes, axes, profile
-from .branches import Branches, Pose
 from .grown_rows import FADES, NOW, Grown, child_number, fullness_of, grown_nodes, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .rows import BOX, DEAD, FLARE_RINGS, FORK, LATERAL, SPUR, ranged, varied
 from .seasons import plant_years
-from .seeds import BASE, Seeds
+from .seeds import BASE, Branches, Pose, Seeds
 from .wind import axis_and_angle, is_windy, moment, turned_by, turned_vectors
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent

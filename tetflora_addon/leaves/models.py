@@ -19,9 +19,8 @@ from ..errors import SpeciesError
 from ..files import beside
 from ..parameters import limited
 from .blades import Compound
-from .needles import Needles
 from .outlines import Blade
-from .surfaces import next_corners
+from .surfaces import Needles, next_corners
 
 MAX_LEAF_POLYGONS = 2000
 MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices

@@ -15,8 +15,8 @@ from .blades import Compound, check_outline
 from .bodies import closed_parts
 from .levels import TOLERANCES, fitted, shown_area, surface_of
 from .models import LEAF_MODELS, OUTLINES, LeafModel, Spines, leaf_model
-from .needles import Needles
 from .outlines import Blade
+from .surfaces import Needles
 
 #: Most forms of a leaf.
 MAX_FORMS = 8

@@ -19,11 +19,9 @@ from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, Mask
 from ..errors import SceneError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .cover import Suits
-from .plane import NO_DISTANCE, Neighbors, Spacing
+from .plane import NO_DISTANCE, Neighbors, Path, Spacing, Terrain
 from .rules import MOST_PLANTS, Companion, Rules, check_rules, species_by_weight
-from .site import REMEDIES, Sample, Site, SiteDraw, lines_of_paths
-from .terrain import Path, Terrain
-from .zones import Zone
+from .site import REMEDIES, Sample, Site, SiteDraw, Zone, lines_of_paths
 
 _FOUNDERS = 0.1  # of the plants that seek each other
 

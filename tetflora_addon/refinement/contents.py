@@ -23,10 +23,10 @@ from ..arrays import Arrays, Chunks, Floats, Integers, Integers32, Mask, column,
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds, extents
-from ..growth.branches import Branches
 from ..growth.foliage import are_solids, envelope_reach
 from ..growth.growth import fullness
 from ..growth.seasons import AREA, PRESENT
+from ..growth.seeds import Branches
 from ..subplants.pieces import Pieces, chunks, leaf_fraction, piece_leaf_integrals, wood_areas
 from ..tetrahedra.tree import TetrahedralTree
 from .polygons import Polygons, area_fractions

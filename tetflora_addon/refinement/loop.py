@@ -20,15 +20,13 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Integers, Integers32, Mask
 from ..camera.camera import Camera, expected_pixels
 from ..compiled.flora import Flora
-from ..growth.branches import Branches
 from ..growth.growth import trunks
-from ..growth.seeds import Seeds
+from ..growth.seeds import Branches, Seeds
 from ..tetrahedra.geometry import squared_edges
 from ..tetrahedra.roots import view_root, world_root
 from ..tetrahedra.tree import TetrahedralTree
 from .contents import (
     Contents,
-    InCells,
     PlantParts,
     PolygonsByCell,
     Slack,
@@ -67,17 +65,15 @@ class Outliers:
     instances: Integers = field(default_factory=lambda: _NONE)
     away: Floats = field(default_factory=lambda: np.zeros(0))  # (k + l + m,): how far they are from the camera, meters
 
-    def others(
-        self, seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets
-    ) -> tuple[Seeds, Polygons | None, PlacedAssets]:
-        """What is left of plants, polygons and instances of assets; None where no polygon is."""
+    def others(self, seeds: Seeds, polygons: Polygons, placed: PlacedAssets) -> tuple[Seeds, Polygons, PlacedAssets]:
+        """What is left of plants, polygons and instances of assets."""
         if len(self.plants):
             seeds = seeds.take(np.delete(np.arange(len(seeds)), self.plants))
         if len(self.instances):
             polygons = polygons.take(np.flatnonzero(~np.isin(polygons.instance, self.instances)))
         if len(self.assets):
             placed = placed.take(np.delete(np.arange(len(placed)), self.assets))
-        return seeds, polygons if polygons is not None and len(polygons) else None, placed
+        return seeds, polygons, placed
 
 
 def outliers_of(
@@ -236,6 +232,7 @@ def refine(
     """
     clock = Stopwatch()
     placed = PlacedAssets.none() if placed is None else placed
+    polygons = Polygons.empty() if polygons is None else polygons
     outliers = outliers_of(flora, seeds, camera, polygons, placed)
     seeds, polygons, placed = outliers.others(seeds, polygons, placed)
     filled = bool(np.isfinite(settings.proxy_block))
@@ -243,10 +240,9 @@ def refine(
     settings = _on_day(settings, flora, plants.parts.branches)
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
-    own = InCells.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
+    own = in_the_root(polygons, large_polygons(polygons, camera))
     bounds = _bounds(flora, plants, assets, polygons)
     tree = world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
-    whole = Polygons.empty() if polygons is None else polygons
     cell_polygons, most = PolygonsByCell(sort_into_children(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
     divided = np.arange(len(tree)) == 0
     shared = plants, assets
@@ -287,7 +283,7 @@ def refine(
             splitting &= ~barred
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
-        found = cells, transmittance, decision, ranks, passes, not limited, seconds, outliers, lights, whole
+        found = cells, transmittance, decision, ranks, passes, not limited, seconds, outliers, lights, polygons
         state = Refinement(tree, plants, assets, cell_polygons, *found)
         if not splitting.any():
             return state
@@ -315,18 +311,17 @@ def refine(
         clock.lap("visibility")
 
 
-def _height(seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets) -> float:
+def _height(seeds: Seeds, polygons: Polygons, placed: PlacedAssets) -> float:
     """Median height of what there is, meters."""
-    heights = [seeds.position[:, 2], placed.instances.position[:, 2]]
-    heights += [] if polygons is None else [polygons.center[:, 2]]
-    return float(np.median(np.concatenate(heights)))
+    every = np.concatenate([seeds.position, placed.instances.position, polygons.center])
+    return float(np.median(every[:, 2]))
 
 
-def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons | None) -> Floats:
+def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons) -> Floats:
     """Axis-aligned box (2, 3) of all that is there, meters."""
     boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
     boxes += [assets.parts.bounding_box()] if len(assets.parts) else []
-    boxes += [] if polygons is None else [polygons.bounding_box()]
+    boxes += [polygons.bounding_box()] if len(polygons) else []
     return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
 
 

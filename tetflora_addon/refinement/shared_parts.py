@@ -42,11 +42,10 @@ from ..compiled.flora import Flora
 from ..compiled.placed import placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import Axes, axes
-from ..growth.branches import Branches
 from ..growth.foliage import are_solids, leaf_keys, leaf_sites, leaf_start
 from ..growth.growth import open_branches, radius_at, trunks
 from ..growth.hashing import child_key, uniform
-from ..growth.seeds import Seeds
+from ..growth.seeds import Branches, Seeds
 from ..parallel import blocks, each_on_all_cores
 from ..subplants.pieces import Pieces
 from ..tetrahedra.tree import TetrahedralTree
@@ -127,10 +126,12 @@ class SharedParts(Generic[Parts]):
     Parameters
     ----------
     camera : Camera
+    filled : bool
+        Whether proxies fill their tetrahedra, so that small ones without points would be holes.
     """
 
-    def __init__(self, camera: Camera) -> None:
-        self.camera = camera
+    def __init__(self, camera: Camera, filled: bool) -> None:
+        self.camera, self._times = camera, FILLED if filled else 1
 
     def can_open(self, parts: Parts) -> Mask:
         """Parts (n,) that consist of others."""
@@ -375,20 +376,11 @@ def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, Intege
 
 
 class SharedPlants(SharedParts[PlantParts]):
-    """All plants of a refinement, as parts and the points on them.
-
-    Parameters
-    ----------
-    flora : Flora
-    seeds : Seeds
-    camera : Camera
-    filled : bool
-        Whether proxies fill their tetrahedra, so that small ones without points would be holes.
-    """
+    """All plants of a refinement, as parts and the points on them."""
 
     def __init__(self, flora: Flora, seeds: Seeds, camera: Camera, filled: bool = False) -> None:
-        super().__init__(camera)
-        self.flora, self._times = flora, FILLED if filled else 1
+        super().__init__(camera, filled)
+        self.flora = flora
         parts = PlantParts.of_subplants(flora, trunks(flora.rows, seeds)) if len(seeds) else PlantParts.empty()
         self.hold(parts, self.points_on(parts, None) if len(seeds) else SharePoints.empty())
         while (near := self.thick(self.parts) & self.parts.can_open(flora)).any():
@@ -574,19 +566,11 @@ class PlacedAssets:
 
 
 class SharedAssets(SharedParts[AssetParts]):
-    """All instances of assets of a refinement, as clusters and the points on them.
-
-    Parameters
-    ----------
-    placed : PlacedAssets
-    camera : Camera
-    filled : bool
-        Whether proxies fill their tetrahedra, so that small ones without points would be holes.
-    """
+    """All instances of assets of a refinement, as clusters and the points on them."""
 
     def __init__(self, placed: PlacedAssets, camera: Camera, filled: bool = False) -> None:
-        super().__init__(camera)
-        self.placed, self._times = placed, FILLED if filled else 1
+        super().__init__(camera, filled)
+        self.placed = placed
         parts = placed.wholes()
         self.hold(parts, self.points_on(parts, None))
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Floats, Integers, Mask
 from ..camera.camera import LEAST_COSINE, Camera, blur_margins, silhouette_pixels
 from ..compiled.flora import Flora
-from ..growth.branches import Branches
+from ..growth.seeds import Branches
 from .contents import bounding_capsules
 from .polygons import Polygons
 from .rasterize import buffer_size, occluder_depth, pixel_rays, tetrahedron_fragments

@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Floats, Integers, Integers32, Mask, connected, top
+from ..arrays import Floats, Integers, Integers32, Mask, connected, spread, top
 from ..errors import SpeciesError
 
 _JOINED_WITHIN = 0.01  # of the size: a start that is drawn by eye, not snapped
@@ -77,8 +77,8 @@ def bezier_chains(control: Chains, left: Floats, right: Floats, steps: Integers)
     following = np.where(last, control.first[owner], np.arange(len(owner)) + 1)
     # An open spline ends with its last control point; all others begin a piece.
     pieces = np.where(last & ~control.cyclic[owner], 1, np.maximum(steps, 1)[owner])
-    a = np.repeat(np.arange(len(owner)), pieces)
-    t = ((np.arange(len(a)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[a])[:, None]
+    a, within = spread(pieces)
+    t = (within / pieces[a])[:, None]
     b, s = following[a], 1 - t
     points = np.zeros((len(a), 4))
     ends = control.points

@@ -16,9 +16,9 @@ from ..arrays import Arrays, Floats, Integers, Keys, Table, column, gathered, ne
 from ..compiled.averages import own_leaf_integrals, tube_perimeter
 from ..compiled.flora import Flora
 from ..growth.axes import profile_integral
-from ..growth.branches import Branches
 from ..growth.foliage import leaf_start, outwardness
 from ..growth.growth import WholeBranches, open_branches
+from ..growth.seeds import Branches
 
 #: What of leaves or facets is worth making, before it is made. Given keys (m,), places (m, 3), how far they may be from
 #: there and their own radii (m,), meters: which (k,) are made, and how many times as large the area (k,) of each is.

@@ -28,11 +28,11 @@ from ..compiled.averages import tube_perimeter
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds
 from ..growth.axes import Axes
-from ..growth.branches import Branches
 from ..growth.foliage import leaf_keys, leaf_places, place_leaves
 from ..growth.growth import WholeBranches, branch_counts, leaf_counts, radius_at
 from ..growth.hashing import Draw, child_key, uniform
 from ..growth.rows import FORK, ranged
+from ..growth.seeds import Branches
 
 #: Pixels by which a tube may be off the round and bent branch that it stands for.
 DEVIATION = 0.5

@@ -19,10 +19,10 @@ from ..arrays import Floats, Floats32, Integers, Integers32, spread, unit
 from ..buffers import MeshBuffers, concatenate_buffers
 from ..compiled.flora import Flora
 from ..growth.axes import Axes
-from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, radius_at
 from ..growth.hashing import Draw, uniform
 from ..growth.seasons import branch_colors
+from ..growth.seeds import Branches
 from ..growth.wind import moment
 from .pieces import Pieces, chunks, wood_areas
 from .rings import (

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.compiled.bounds import ring_stretch, unit_bounds, widest_radii
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.growth.branches import Branches
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import bounding_capsules
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 from tetflora_addon.subplants.pieces import expand, open_subplants

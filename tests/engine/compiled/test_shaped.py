@@ -30,10 +30,9 @@ from tetflora_addon.arrays import spread
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.compiled.placed import extents, placed_samples
 from tetflora_addon.compiled.sizes import fitted, measured
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import leaf_counts, trunks
 from tetflora_addon.growth.seasons import Season
-from tetflora_addon.growth.seeds import LEAST, MOST, PLAIN, WIDTH, Seeds, crown_shapes
+from tetflora_addon.growth.seeds import LEAST, MOST, PLAIN, WIDTH, Branches, Seeds, crown_shapes
 from tetflora_addon.species.ages import with_age
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.quality import with_quality

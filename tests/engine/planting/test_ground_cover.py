@@ -27,8 +27,8 @@ from tetflora_addon.planting.cover import (
     tinted,
 )
 from tetflora_addon.planting.places import place
+from tetflora_addon.planting.plane import Path, Terrain
 from tetflora_addon.planting.rules import Rules
-from tetflora_addon.planting.terrain import Path, Terrain
 
 SIDE = 40.0
 SQUARE = SIDE * np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=float)

@@ -13,8 +13,8 @@ from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.optics import GLOSS
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, STRETCH, subplant_facets
 from tetflora_addon.proxies.primitives import facet_mesh

@@ -18,7 +18,7 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.polygons import PolygonBlock, kept_polygons, mended, polygon_blocks, polygon_buffers
 from tetflora_addon.emission.shells import proxy_shells
-from tetflora_addon.growth.branches import Branches
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.summaries import summarize
 from tetflora_addon.refinement.contents import Contents, InCells, cut, in_the_root, sort_into_children

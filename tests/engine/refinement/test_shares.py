@@ -17,9 +17,8 @@ from tests.engine.growth.test_drawn import flora as drawn_flora
 from tetflora_addon.arrays import Arrays
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.growth.seeds import Branches, Seeds
 from tetflora_addon.growth.wind import Wind
 from tetflora_addon.refinement.contents import PlantParts, Totals, bounding_box, subplant_totals, sums
 from tetflora_addon.refinement.loop import refine, step_of

@@ -114,7 +114,7 @@ def cover_steps(
     grounds : iterable of bpy.types.Object, optional
         Other ground than the population's.
     masks : mapping, optional
-        Other values of some of `terrain.MASKS` than the population's, for a cover that is new.
+        Other values of some of `plane.MASKS` than the population's, for a cover that is new.
 
     Raises
     ------

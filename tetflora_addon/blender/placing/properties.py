@@ -17,8 +17,8 @@ from bpy.props import (
 
 from ...parameters import LENGTH
 from ...planting.rules import Companion, Rules
+from ...planting.site import Limits
 from ...planting.strokes import Brush
-from ...planting.zones import Limits
 from ..runtime import Listeners
 from ..scene.own_ages import AGE_PROPERTY
 from ..settings import BIOME, FIELD, SCATTER, properties_of, settings_in

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...planting.terrain import Path, Terrain
+from ...planting.plane import Path, Terrain
 from ..attributes import image_pixels, members, read, values_of, world_matrix
 from ..scene.objects import objects_within
 from ..scene.skeletons import spline_chain

@@ -17,8 +17,8 @@ from ...arrays import connected
 from ...errors import SpeciesError
 from ...leaves.blades import Compound
 from ...leaves.models import LeafModel, leaf_model
-from ...leaves.needles import Needles
 from ...leaves.outlines import Blade
+from ...leaves.surfaces import Needles
 from ...species.species import LEAF_KINDS, Species
 from ..attributes import evaluated_mesh
 from ..materials.materials import bark_material, bark_steps, leaf_material

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError, SpeciesError, TetFloraError
 from ...jobs import Progress, part_of
-from ...planting.plane import inside_any
+from ...planting.plane import Terrain, inside_any
 from ...planting.site import lines_of_paths
-from ...planting.terrain import Terrain
 from ...planting.wetness import HeightGrid, cell_for, height_grid, wet_ground
 from ...species.species import Species
 from ...stands.change import Records
