@@ -6,6 +6,7 @@
     python -m benchmarks exact --cases edge --species birch,spruce --size 960x540 --samples 16
     python -m benchmarks exact --cases eye --seasons summer bare snow --set max_memory=2
     python -m benchmarks exact --cases edge --size 1920x1080 --window 640x360
+    python -m benchmarks exact --sheet             # docs/images/exact.jpg of the windows that are there
 
 Plants have one of `SEEDS` seeds a species, by their places, so that the truth is so many expanded meshes a species as
 instances. Each picture is made in a process of its own, so that the largest memory is its own. Truths are kept in
@@ -288,6 +289,9 @@ def run(given: argparse.Namespace) -> dict[str, float] | None:
     if given.one:
         print(json.dumps(measure(json.loads(given.one))), flush=True)
         return None
+    if given.sheet:
+        _show(given.out.resolve(), ROOT / "docs" / "images" / "exact.jpg")
+        return None
     if given.cases:
         for spec in _specs(given):
             found = measured(spec, given.out.resolve(), given.set, True, not given.no_render, given.keep, given.threads)
@@ -409,6 +413,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--set", type=setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")
     add("--threads", type=int, default=0)
     add("--keep", action=argparse.BooleanOptionalAction, default=True, help="use truths that an earlier run has left")
+    add("--sheet", action="store_true", help="truth beside refined, of the windows that are there")
     add("--no-render", action="store_true", help="refine and count only")
     add("--out", type=Path, default=FOLDER, metavar="FOLDER", help="for pictures")
 
@@ -618,15 +623,26 @@ def compared(folder: Path, kept: Path, covered: NDArray[np.float32]) -> dict[str
     }
 
 
-def _save(path: Path, picture: NDArray[np.floating]) -> None:
+def _show(folder: Path, path: Path) -> None:
+    """Truth and refined of all windows of full HD, one below the other."""
+    rows = []
+    for found in sorted(folder.glob("*-window-*/sheet.png")):
+        picture = read_picture(found)[:, :, :3]
+        rows.append(picture[:, : picture.shape[1] * 2 // 3])
+    if not rows:
+        raise SystemExit("No windows there: run exact with --size 1920x1080 --window 640x360 first")
+    _save(path, np.concatenate(rows), 'JPEG')
+
+
+def _save(path: Path, picture: NDArray[np.floating], form: str = 'PNG') -> None:
     """Write an image (height, width, 3) as it is stored, top row first."""
     height, width = picture.shape[:2]
     image = bpy.data.images.new("sheet", width, height)
     pixels = np.ones((height, width, 4), np.float32)
     pixels[:, :, :3] = picture[::-1]
     image.pixels.foreach_set(pixels.ravel())
-    image.filepath_raw, image.file_format = str(path), 'PNG'
-    image.save()
+    image.filepath_raw, image.file_format = str(path), form
+    image.save(quality=80)
     bpy.data.images.remove(image)
 
 

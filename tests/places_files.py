@@ -195,13 +195,13 @@ def xyz(values: NDArray) -> str:
     return "".join(f"{EAST + i} {NORTH + j} {v:.2f}\n" for j, row in enumerate(values) for i, v in enumerate(row))
 
 
-def usgs(values: NDArray) -> bytes:
-    """An elevation model of the USGS in a zone of UTM, cells of 10 m."""
+def usgs(values: NDArray, north: float = 10.0) -> bytes:
+    """An elevation model of the USGS in a zone of UTM, cells of 10 m from west to east, and of so many to the north."""
     h, w = values.shape
     head = bytearray(b" " * 1024)
     for at, text in ((144, f"{1:6}{1:6}{1:6}{17:6}"), (528, f"{2:6}{2:6}{4:6}"), (852, f"{1:6}{w:6}")):
         head[at : at + len(text)] = text.encode()
-    head[816:852] = b"".join(f"{v:12.5E}".encode() for v in (10.0, 10.0, 1.0))
+    head[816:852] = b"".join(f"{v:12.5E}".encode() for v in (10.0, north, 1.0))
     out = bytes(head)
     for i in range(w):
         column = np.rint(values[::-1, i]).astype(int)

@@ -24,7 +24,7 @@ from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Branches
 from ..proxies.facet_weights import FacetWeights
-from ..proxies.hotspots import light_ratios
+from ..proxies.hotspots import LightRatios, light_ratios
 from ..proxies.microsurfaces import Facets, piece_facets, subplant_facets
 from ..refinement.contents import PlantParts, as_pieces
 from ..refinement.decisions import explicit_fraction
@@ -178,8 +178,8 @@ class GrownPlants(FrontierKind):
     ) -> Facets:
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_subplants(branches.row, count, self._share(branches))
-        hotspot_factor = None if thin is None else self._once(branches, leaf)
-        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, hotspot_factor, thin)
+        lit = None if thin is None else self._lit(branches, leaf)
+        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, lit, thin)
 
     def _draw_branches(self, canvas: Canvas, branches: Branches, side: NDArray[np.float64]) -> None:
         """Branches alone: leaves that are large are real, wood is tubes or thin triangles, the rest is facets."""
@@ -249,8 +249,8 @@ class GrownPlants(FrontierKind):
         weight = self.weights.of_pieces(branches.row, count, self._share(branches))
         if whole is None:
             return piece_facets(flora, pieces, leaf, side, weight, explicit)
-        own = (of[whole[1]] for of in (leaf, side, weight, explicit, self._once(branches, leaf)))
-        return piece_facets(flora, pieces, *own, thin, whole)
+        own = (of[whole[1]] for of in (leaf, side, weight, explicit))
+        return piece_facets(flora, pieces, *own, self._lit(branches, leaf).take(whole[1]), thin, whole)
 
     def _optical(self, branches: Branches) -> NDArray[np.float64]:
         return self.flora.leaf_areas(branches) + self.flora.wood_areas(branches) / 2
@@ -259,6 +259,6 @@ class GrownPlants(FrontierKind):
         """Part (n,) of their leaves that branches have on the day; None in summer."""
         return None if branches.year is None else self.flora.day.leaf_share(branches)
 
-    def _once(self, branches: Branches, side: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Light (n,) that leaves of branches send to the eye once over what facets do."""
+    def _lit(self, branches: Branches, side: NDArray[np.float64]) -> LightRatios:
+        """Light on facets of sides (n,) over that on the leaves of branches."""
         return light_ratios(self.flora, branches, side, self.camera, self.lights)

@@ -33,7 +33,7 @@ from ..growth.wind import moment
 from ..optics import GLOSS, cluster_color
 from ..refinement.contents import piece_leaves
 from ..subplants.pieces import Pieces, Thin, wood_areas
-from .hotspots import balanced_colors
+from .hotspots import LightRatios
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
 _WOOD_PATH = 1 << 41
@@ -83,7 +83,7 @@ def subplant_facets(
     wood_side: Floats | None = None,
     weight: Floats | None = None,
     explicit: Floats | None = None,
-    hotspot_factor: Floats | None = None,
+    lit: LightRatios | None = None,
     thin: Thin | None = None,
 ) -> Facets:
     """Facets of sub-plants.
@@ -99,13 +99,12 @@ def subplant_facets(
         Fraction of their area that facets get, see `facet_weights`.
     explicit : (n,) float64, optional
         Fraction of each sub-plant that is drawn as it is; as many of its facets are left out at random.
-    hotspot_factor : (n,) float64, optional
-        Light that leaves send to the eye once over what facets do, see `hotspots`.
+    lit : LightRatios of n, optional
     thin : Thin, optional
     """
     part = np.ones(len(subplants)) if weight is None else weight
     wood_side = leaf_side if wood_side is None else wood_side
-    leaves = _leaves_of_subplants(flora, subplants, leaf_side, part, explicit, hotspot_factor, thin)
+    leaves = _leaves_of_subplants(flora, subplants, leaf_side, part, explicit, lit, thin)
     made = _joined([leaves, _wood_of_subplants(flora, subplants, wood_side, part, explicit, thin)])
     return made if subplants.crown is None else made.take(np.flatnonzero(made.side > 0))
 
@@ -117,7 +116,7 @@ def piece_facets(
     wood_side: Floats | None = None,
     weight: Floats | None = None,
     explicit: Floats | None = None,
-    hotspot_factor: Floats | None = None,
+    lit: LightRatios | None = None,
     thin: Thin | None = None,
     whole: tuple[WholeBranches, Integers] | None = None,
 ) -> Facets:
@@ -127,7 +126,7 @@ def piece_facets(
     wood is drawn as it is.
     """
     part = np.ones(len(pieces)) if weight is None else weight
-    made = [_leaves_of_pieces(flora, pieces, leaf_side, part, explicit, hotspot_factor, thin, whole)]
+    made = [_leaves_of_pieces(flora, pieces, leaf_side, part, explicit, lit, thin, whole)]
     if whole is None:
         made.append(_wood_of_pieces(flora, pieces, leaf_side if wood_side is None else wood_side, part))
     return _joined(made)
@@ -235,7 +234,7 @@ def _leaves_of_subplants(
     side: NDArray,
     weight: NDArray,
     explicit: NDArray | None,
-    hotspot_factor: NDArray | None,
+    lit: LightRatios | None,
     thin: Thin | None,
 ) -> Facets:
     rows, points = flora.rows, flora.samples.leaves
@@ -259,15 +258,16 @@ def _leaves_of_subplants(
     day = None if subplants.year is None else (subplants, owner)
     color = leaf_colors_of_facets(flora, leaf_row, key, many, outward, points.young[pick], day)
     of_day = None if day is None else _of_kinds(flora, subplants, owner, rows["leaf_kind"][leaf_row])
+    color = facet_albedo(color, owner, weight, _gloss(flora, leaf_row))
     made = Facets(
         center,
         across,
         along,
         np.sqrt(area * weight[owner] if of_day is None else area * weight[owner] * of_day),
-        facet_albedo(color, owner, weight, hotspot_factor, _gloss(flora, leaf_row)),
+        color if lit is None else lit.colors(color, owner, np.cross(across, along), many),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, center),
-        dull=_dull(flora, leaf_row, owner, weight, hotspot_factor),
+        dull=_dull(flora, leaf_row, owner, weight, lit),
     )
     return made if of_day is None else made.take(np.flatnonzero(of_day > 0))
 
@@ -290,7 +290,7 @@ def _leaves_of_pieces(
     side: NDArray,
     weight: NDArray,
     explicit: NDArray | None,
-    hotspot_factor: NDArray | None,
+    lit: LightRatios | None,
     thin: Thin | None,
     whole: tuple[WholeBranches, Integers] | None,
 ) -> Facets:
@@ -325,13 +325,15 @@ def _leaves_of_pieces(
     color = leaf_colors_of_facets(
         flora, row[owner], key, many, *places, None if branches.year is None else (branches, owner)
     )
-    color = facet_albedo(color, owner, weight, hotspot_factor, _gloss(flora, row[owner]))
+    color = facet_albedo(color, owner, weight, _gloss(flora, row[owner]))
+    if lit is not None:
+        color = lit.colors(color, owner, np.cross(across, along), many)
     transmission = flora.leaf.transmission[row[owner]]
     velocity = None
     if own.later is not None:
         there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
         velocity = (there.position - leaves.position) / moment(rows)
-    side, dull = np.sqrt(area * weight[owner]), _dull(flora, row[owner], owner, weight, hotspot_factor)
+    side, dull = np.sqrt(area * weight[owner]), _dull(flora, row[owner], owner, weight, lit)
     return Facets(center, across, along, side, color, transmission, velocity, dull=dull)
 
 
@@ -349,7 +351,7 @@ def _wood_of_subplants(
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     color = flora.rows["branch_color"][points.row[pick], 0]
     velocity = _carried(flora, subplants, owner, center)
-    return _strips(center, axis, key, np.sqrt(area * weight[owner]), facet_albedo(color, owner, weight, None), velocity)
+    return _strips(center, axis, key, np.sqrt(area * weight[owner]), facet_albedo(color, owner, weight), velocity)
 
 
 def _reach(area: Floats) -> Floats:
@@ -372,7 +374,7 @@ def _wood_of_pieces(flora: Flora, pieces: Pieces, side: NDArray, weight: NDArray
     if pieces.branches.later is not None:
         lines = axes(flora.rows, pieces.branches)
         velocity = (lines.later.at(owner, t)[0] - lines.at(owner, t)[0]) / moment(flora.rows)
-    return _strips(center, axis, key, np.sqrt(area * weight[owner]), facet_albedo(color, owner, weight, None), velocity)
+    return _strips(center, axis, key, np.sqrt(area * weight[owner]), facet_albedo(color, owner, weight), velocity)
 
 
 def _strips(
@@ -448,21 +450,17 @@ def leaf_colors_of_facets(
     return np.clip(mean + gathered(flora.rows["leaf_color"][:, 1], row) * deviation[:, None], 0, 1)
 
 
-def facet_albedo(
-    color: NDArray, owner: NDArray, weight: NDArray, hotspot_factor: NDArray | None, gloss: Floats | None = None
-) -> Floats:
-    """Colors (m, 3) of facets of owners (m,), by the weights of these (n,) and what light and eye share of them.
+def facet_albedo(color: NDArray, owner: NDArray, weight: NDArray, gloss: Floats | None = None) -> Floats:
+    """Colors (m, 3) of facets of owners (m,), by the weights of these (n,).
 
     ``gloss`` (m,) is that of leaves; wood has none.
     """
-    gloss = np.zeros(len(owner)) if gloss is None else gloss
-    color = cluster_color(color, gloss, weight[owner])
-    return color if hotspot_factor is None else balanced_colors(color, hotspot_factor[owner])
+    return cluster_color(color, np.zeros(len(owner)) if gloss is None else gloss, weight[owner])
 
 
-def _dull(flora: Flora, row: NDArray, owner: NDArray, weight: NDArray, hotspot_factor: NDArray | None) -> Floats:
+def _dull(flora: Flora, row: NDArray, owner: NDArray, weight: NDArray, lit: LightRatios | None) -> Floats:
     """Part (m,) of the gloss of leaves that facets lack: what is mirrored and meets another leaf is lost as such."""
-    left = np.minimum(weight if hotspot_factor is None else weight * hotspot_factor, 1.0)
+    left = np.minimum(weight if lit is None else weight * lit.hotspot, 1.0)
     return 1.0 - left[owner] * (1.0 - flora.leaf.dull[row])
 
 

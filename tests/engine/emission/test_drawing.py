@@ -19,13 +19,15 @@ from tetflora_addon.emission import drawing as subject
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.coverage import MARGIN, Coverage
 from tetflora_addon.emission.emitters import as_triangles, facet_blocks
+from tetflora_addon.emission.frontier import Frontier
 from tetflora_addon.emission.plant_parts import GrownPlants
 from tetflora_addon.emission.plants import Transition, expanded_blocks
 from tetflora_addon.emission.shade import Shade
+from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.primitives import triangle_corners
-from tetflora_addon.refinement.contents import PlantParts
+from tetflora_addon.refinement.contents import PlantParts, subplant_totals
 from tetflora_addon.refinement.lights import Light
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.shared_parts import SharePoints
@@ -308,6 +310,21 @@ def test_quarters_are_the_facet_divided() -> None:
         own = parts[k * len(facets) : (k + 1) * len(facets)]
         away = np.linalg.norm(own[:, :, None] - known[:, None], axis=3).min(axis=2)
         assert (away < 1e-3 * facets.side[:, None] + 1e-5).all()
+
+
+def test_every_part_is_decided_once() -> None:
+    """Drawn, hidden or outside: nothing twice, and nothing is lost, whatever it consists of."""
+    flora, seeds, camera, result = wood()
+    given = support.refined(flora, result, camera, 1.2, 0.6).drawing
+    frontier = Frontier(given.kinds, Coverage(camera), given.facet)
+    parts = given.kinds[0].opened(given.parts[0])[0]
+    drawn = [slabs[0] for slabs in frontier.slabs([parts])]
+    assert all(map(len, (drawn, frontier.hidden[0], frontier.outside[0])))
+    every = PlantParts.concatenate([pool.parts for pool in (*drawn, *frontier.hidden[0], *frontier.outside[0])])
+    assert len(np.unique(every.branches.key + every.branch_only.astype(np.uint64))) == len(every)
+    assert set(every.branches.plant.tolist()) == set(range(len(seeds)))
+    area, whole = every.totals.optical_area.sum(), subplant_totals(flora, trunks(flora.rows, seeds)).optical_area.sum()
+    assert area == pytest.approx(whole, rel=0.05)  # plants differ in leaves
 
 
 def test_nothing_to_draw() -> None:

@@ -125,13 +125,14 @@ def test_lists_of_places(tmp_path, form, head):
         run_to_end(read_grid(path))
 
 
-def test_a_model_of_the_usgs(tmp_path):
+@pytest.mark.parametrize("north", [10.0, 20.0])
+def test_a_model_of_the_usgs(tmp_path, north):
     path = tmp_path / "a.dem"
-    path.write_bytes(files.usgs(files.hills(8)))
+    path.write_bytes(files.usgs(files.hills(8), north))
     raster = run_to_end(read_grid(path))
     np.testing.assert_array_equal(raster.values, np.rint(files.hills(8)))
     assert raster.system.epsg == 26717
-    assert raster.corner.tolist() == [files.EAST, files.NORTH + 70.0]
+    assert raster.corner.tolist() == [files.EAST, files.NORTH + 7.0 * north]
 
 
 def _raster(values, west=0.0, north=0.0, system=_ZONE, cell=1.0):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.proxies.hotspots import balance, balanced_colors, light_ratios, mean_overlap, overlap
+from tetflora_addon.proxies.hotspots import LightRatios, balance, balanced_colors, light_ratios, mean_overlap, overlap
 from tetflora_addon.refinement.lights import Light
 
 EXTINCTION = st.floats(0.01, 20.0)
@@ -90,6 +90,26 @@ def test_the_eye_counts_and_not_where_a_camera_of_several_stands() -> None:
     back = replace(eye, position=eye.position + 3.0 * eye.frame[:, 2], setback=3.0, cell_radius=0.1)
     assert back.eye == pytest.approx(eye.eye)
     sun = Light("SUN", np.zeros(3), np.array([0.1, 1.0, -0.2]) / np.linalg.norm([0.1, 1.0, -0.2]))
-    ratios = [light_ratios(flora, plants, np.full(2, 0.3), view, (sun,)) for view in (eye, back)]
+    ratios = [light_ratios(flora, plants, np.full(2, 0.3), view, (sun,)).hotspot for view in (eye, back)]
     assert ratios[1] == pytest.approx(ratios[0], rel=1e-9)
     assert (ratios[0] != 1.0).all()
+
+
+@given(st.floats(1.0, 100.0), st.floats(0.0, 1.0))
+def test_facets_are_evened_and_send_as_much_light(leaves: float, part: float) -> None:
+    cosine = (np.arange(4000) + 0.5) / 4000
+    normal = np.stack([np.sqrt(1.0 - cosine**2), 0.0 * cosine, cosine], axis=1)
+    lit = LightRatios(np.ones(1), np.array([[0.0, 0.0, 1.0]]), np.array([part]))
+    number, color = np.full(len(cosine), leaves), np.full((len(cosine), 3), 0.3)
+    ratio = lit.colors(color, np.zeros(len(cosine), np.int64), normal, number)[:, 1] / 0.3
+    alone, together = 0.4 + cosine, (0.4 + cosine) * ratio
+    assert together.mean() == pytest.approx(alone.mean(), rel=1e-3)
+    assert together.std() <= alone.std() * (1.0 - 0.5 * part * (1.0 - 1.0 / leaves)) + 1e-9
+    assert (np.diff(together) > 0.0).all()  # what faces the lamp stays the brightest
+
+
+def test_leaves_and_facets_without_a_lamp_are_not_evened() -> None:
+    normal, number = np.eye(3), np.array([1.0, 50.0, 50.0])
+    none = LightRatios(np.ones(2), np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]), np.array([1.0, 0.0]))
+    color = np.full((3, 3), 0.3)
+    assert none.colors(color, np.array([0, 1, 1]), normal, number) == pytest.approx(color)

@@ -10,11 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.engine import support
+from tetflora_addon.growth.branches import Branches
 from tetflora_addon.refinement.contents import (
     PlantParts,
     Totals,
     as_pieces,
     bounding_box,
+    piece_leaves,
     piece_totals,
     subplant_totals,
     sums,
@@ -45,6 +47,11 @@ def test_totals_of_a_branch_alone_are_those_of_its_pieces() -> None:
     for name in ("leaf_area", "wood_area"):
         one, other = sum(getattr(t, name).sum() for t in alone), getattr(piece_totals(flora, pieces), name).sum()
         assert one == pytest.approx(other, rel=1e-9)
+    pieces = as_pieces(Branches.concatenate(whole))
+    row, number = pieces.branches.row, piece_leaves(flora, pieces)[0]
+    expected = number * flora.leaf.polygons[row] + flora.rows["sides"][row]
+    assert piece_totals(flora, pieces).polygons == pytest.approx(expected)
+    assert (number * (flora.leaf.polygons[row] - 1.0) > 1.0).any()
     ends = as_pieces(whole[0])
     np.testing.assert_allclose(np.linalg.norm(ends.end - ends.start, axis=1), whole[0].length)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import BSpline
 
 from tetflora_addon.species.skeletons import (
     Chains,
@@ -59,6 +60,17 @@ def test_nurbs_move_with_their_points_and_stay_among_them(
     assert (made.points >= control.min(axis=0) - 1e-9).all() and (made.points <= control.max(axis=0) + 1e-9).all()
     if endpoint and not cyclic:
         np.testing.assert_allclose(made.points[[0, -1]], control[[0, -1]], atol=1e-12)
+
+
+@pytest.mark.parametrize("order", [2, 3, 4, 5])
+def test_nurbs_that_end_at_their_points_are_those_of_scipy(order: int) -> None:
+    control, weights = _random(7, 9), np.random.default_rng(7).uniform(0.2, 3, 9)
+    spans = np.arange(9 - order + 2)
+    knots = np.concatenate([np.zeros(order - 1), spans, np.full(order - 1, spans[-1])])
+    at = np.linspace(0.0, spans[-1], 5 * spans[-1] + 1)
+    above, below = (BSpline(knots, of, order - 1)(at) for of in (control * weights[:, None], weights[:, None]))
+    made = nurbs_chain(control, weights, order, 5, endpoint=True)
+    np.testing.assert_allclose(made.points, above / below, atol=1e-9)
 
 
 def test_a_nurbs_circle_is_round() -> None:

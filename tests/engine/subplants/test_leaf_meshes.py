@@ -259,6 +259,12 @@ def test_ribbons_follow_twigs_that_bend() -> None:
     middles = (ribbons.positions[-2 * (parts + 1)[bent].sum() :].reshape(-1, 2, 3)).mean(axis=1)
     away = np.linalg.norm(ends[np.tile(bent, 2)][:, None] - middles[None], axis=2).min(axis=1)
     np.testing.assert_allclose(away, 0.0, atol=1e-5)
+    # Bark runs as far up as on a triangle, as fast everywhere.
+    alone = twig_buffers(flora, whole.take(bent)).attributes["UVMap"][1].reshape(-1, 3, 2)[:, 2, 1]
+    up = ribbons.attributes["UVMap"][1][-4 * parts[bent].sum() :].reshape(-1, 4, 2)[:, :, 1]
+    part = np.concatenate([np.arange(number) for number in parts[bent]])
+    expected = np.stack([part, part, part + 1, part + 1], axis=1) * np.repeat(alone / parts[bent], parts[bent])[:, None]
+    np.testing.assert_allclose(up, expected, rtol=1e-5)
 
 
 def test_wood_says_how_thick_it_is_at_its_base() -> None:
