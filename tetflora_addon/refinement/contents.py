@@ -197,11 +197,10 @@ class Contents:
     polygons: InCells[Polygons] = field(default_factory=lambda: InCells.none(Polygons))
 
 
-def in_the_root(polygons: Polygons, large: Mask | None = None) -> InCells[Polygons]:
+def in_the_root(polygons: Polygons, large: Mask | bool = False) -> InCells[Polygons]:
     """Polygons (n,), all in the root; ``large`` ones (n,) stay polygons whatever is decided about their cells."""
     totals = polygon_totals(polygons)
-    if large is not None:
-        totals = replace(totals, width=np.where(large, np.inf, totals.width))
+    totals = replace(totals, width=np.where(large, np.inf, totals.width))
     return InCells(polygons, np.zeros(len(polygons), np.int32), totals)
 
 
@@ -317,7 +316,7 @@ def cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tupl
     return np.concatenate([owner[stays], owner[from_]]), np.concatenate([larger, side]), parts
 
 
-def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Slack | None = None) -> InCells[Polygons]:
+def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Slack) -> InCells[Polygons]:
     """Hand polygons of divided nodes on until all lie in terminal ones.
 
     What reaches no further than ``slack`` beyond a plane stays whole. Nothing is lost or held twice.
@@ -329,13 +328,12 @@ def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Sl
             cells[some], crosses[some] = _lowered(tree, polygons.take(some), cells[some], slack)
         placed.append(replace(held, cell=cells).take(~crosses))
         polygons, cells, width = polygons.take(crosses), cells[crosses], held.totals.width[crosses]
-        loose = 0.0 if slack is None else slack(polygons.center)
-        owner, side, polygons = cut(polygons, tree.planes(cells), loose)
+        owner, side, polygons = cut(polygons, tree.planes(cells), slack(polygons.center))
         held = InCells(polygons, tree.children[cells[owner], side], polygon_totals(polygons, width[owner]))
     return InCells.concatenate(placed)
 
 
-def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack | None) -> tuple[Integers32, Mask]:
+def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack) -> tuple[Integers32, Mask]:
     """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""
     cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
     center, reach, touching = polygons.center, polygons.reach, polygons.touching()
@@ -347,7 +345,7 @@ def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: S
         # The sphere is a first guess; slack and corners are computed only for what it leaves open.
         unclear = np.flatnonzero(~whole)
         some = moving[unclear]
-        loose = touching[some] if slack is None else np.maximum(touching[some], slack(center[some]))
+        loose = np.maximum(touching[some], slack(center[some]))
         whole[unclear] = np.abs(distance[unclear]) > reach[some] - loose
         left = np.flatnonzero(~whole[unclear])
         if len(left):

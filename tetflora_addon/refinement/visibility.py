@@ -337,8 +337,8 @@ def widened_for(
     margin: float,
     flora: Flora,
     subplants: Branches,
-    polygons: Polygons | None = None,
-    assets: AssetParts | None = None,
+    polygons: Polygons,
+    assets: AssetParts,
 ) -> Camera:
     """The camera with a margin, in fractions of the image, and what depth of field and motion blur add to it.
 
@@ -347,11 +347,9 @@ def widened_for(
     if not (camera.lens_radius > 0.0 or camera.shutter):
         return camera.widened(margin)
     capsules = bounding_capsules(flora, subplants)
-    center, reach = capsules[:3].T, np.hypot(capsules[6] + capsules[8], capsules[7] + capsules[8])
-    if polygons is not None:
-        center, reach = np.concatenate([center, polygons.center]), np.append(reach, np.zeros(len(polygons)))
-    if assets is not None:
-        center, reach = np.concatenate([center, assets.center]), np.append(reach, assets.reach)
+    reach = np.hypot(capsules[6] + capsules[8], capsules[7] + capsules[8])
+    reach = np.concatenate([reach, np.zeros(len(polygons)), assets.reach])
+    center = np.concatenate([capsules[:3].T, polygons.center, assets.center])
     across, up = blur_margins(camera, center, reach)
     return camera.widened(margin + across, margin + up)
 

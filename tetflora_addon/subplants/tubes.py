@@ -280,9 +280,7 @@ def _interleaved(*columns: NDArray) -> NDArray:
     return np.stack(columns, axis=1).reshape(-1)
 
 
-def twig_buffers(
-    flora: Flora, whole: WholeBranches, wider: Floats | None = None, parts: Integers | None = None
-) -> MeshBuffers | None:
+def twig_buffers(flora: Flora, whole: WholeBranches, wider: Floats, parts: Integers) -> MeshBuffers | None:
     """Triangles and ribbons in the place of tubes.
 
     Parameters
@@ -290,19 +288,17 @@ def twig_buffers(
     flora : Flora
     whole : WholeBranches of n
         Of any rows.
-    wider : (n,) float64, optional
+    wider : (n,) float64
         How many times as wide each is: it stands for so many twigs.
-    parts : (n,) int64, optional
-        Quadrilaterals that ribbons consist of; 1, or without it, for triangles.
+    parts : (n,) int64
+        Quadrilaterals that ribbons consist of; 1 for triangles.
 
     Returns
     -------
     MeshBuffers or None
         Attributes as of `tubes.tube_buffers`; None without branches.
     """
-    wider = np.ones(len(whole)) if wider is None else wider
-    bent = np.zeros(len(whole), bool) if parts is None else parts > 1
-    straight, some = np.flatnonzero(~bent), np.flatnonzero(bent)
+    straight, some = np.flatnonzero(parts <= 1), np.flatnonzero(parts > 1)
     made = [_triangles(flora, whole.take(straight), wider[straight])] if len(straight) else []
     if len(some):
         made.append(_ribbons(flora, whole.take(some), wider[some], parts[some]))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tetflora_addon.growth.branches import Branches
 
 from tests.engine import support
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import (
     PlantParts,
     Totals,
