@@ -59,10 +59,10 @@ HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.3, 0.2
 #: So many of each are never too many.
 NEVER_TOO_MANY = 50_000.0
 #: Pixels down to which shadows that fall into the view are refined where nobody asks for finer ones, the optical depth
-#: in the shade up to which they are, and leaves that a facet stands for there at least. As many as are made of all else
-#: out of view are made for them: without, crowns beside the image were too dense, and its borders in the shade (twice
-#: as many pixels were off beside the truth in ``benchmarks exact --cases edge --species birch --size 480x270``).
-SHADOW, LIT, LIT_LEAVES = 4.0, 1.5, 3.0
+#: in the shade up to which they are, leaves that a facet stands for there at least, and how many times as many there may
+#: be as of all else out of view. Without, crowns beside the image were too dense, and its borders in the shade (twice as
+#: many pixels were off beside the truth in ``benchmarks exact --cases edge --species birch --size 480x270``).
+SHADOW, LIT, LIT_LEAVES, LIT_TIMES = 4.0, 1.5, 3.0, 3.0
 #: How many times as many facets there may be for shadows where somebody asks for finer ones.
 SHADOWS = 6.0
 #: Meters from which on shadows are the coarser the farther they fall: most of what they reach lies in other shade.
@@ -460,7 +460,7 @@ class _Tile:
         fine, pools = map(list, zip(*map(self._for_shadows, self.given.kinds, pools), strict=True))
         extents = [self._shadow * self.given.camera.extent_around(pool.center) for pool in fine]
         sides = list(map(np.minimum, map(self._sides_outside, fine), extents))
-        times, leaves = (SHADOWS, 1.0) if self.given.shadow else (1.0, LIT_LEAVES)
+        times, leaves = (SHADOWS, 1.0) if self.given.shadow else (LIT_TIMES, LIT_LEAVES)
         self._draw_unseen(fine, sides, times * most, add, leaves)
         self._draw_unseen(pools, list(map(self._sides_outside, pools)), most, add)
 
