@@ -90,7 +90,8 @@ def _leaf(rng: random.Random) -> Any:
     flat = rng.choice([0.0, 1.0])
     vertices = [[size * float(np.cos(t)), flat * size * float(np.sin(t)), 0.0] for t in turn]
     face = list(range(corners))
-    faces = [face] * rng.choice([1, 1, 20, 3000])
+    # Beyond a million corners, far above what a leaf may have, there is only more text to write and read.
+    faces = [face] * min(rng.choice([1, 1, 20, 3000]), 1 + 10**6 // corners)
     return {"vertices": vertices, "faces": faces}
 
 

@@ -11,11 +11,16 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
+
+from tetflora_addon.blender.biomes import library
+from tetflora_addon.blender.species import catalog
+from tetflora_addon.blender.species.edits import looked_at_once
 
 #: Properties that are not what a file says: where things lie in memory, what is evaluated, what is drawn.
 PASSING = frozenset(
@@ -76,9 +81,22 @@ _FIELDS = ("value", "vector", "color")
 
 def everything() -> dict[str, dict[str, Any]]:
     """All datablocks of the file by kind and name: nested tuples and dictionaries of plain values."""
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _libraries_at_rest():
         warnings.simplefilter("ignore")  # of what Blender means to drop, as long as it has it
         return _everything()
+
+
+@contextmanager
+def _libraries_at_rest() -> Iterator[None]:
+    """Species, biomes and their pictures are looked for once: each enumeration of them would, whenever it is read."""
+    library.look_again()
+    before = catalog._TRUSTED, library._TRUSTED
+    catalog._TRUSTED = library._TRUSTED = float("inf")
+    try:
+        with looked_at_once():
+            yield
+    finally:
+        catalog._TRUSTED, library._TRUSTED = before
 
 
 def these(datablocks: Iterable[bpy.types.ID]) -> dict[str, dict[str, Any]]:

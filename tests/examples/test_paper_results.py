@@ -15,6 +15,7 @@ import pytest
 from PIL import Image as image  # noqa: N813 (a module)
 
 from devtools import session
+from examples import stage
 from examples.haze import add_haze
 from examples.paper import figure8, figure9, tables
 from examples.paper.__main__ import IMAGES, PAGE
@@ -23,9 +24,16 @@ from tetflora_addon.blender import compat
 
 
 @pytest.fixture
-def make(clean_file, tmp_path):
+def make(clean_file, tmp_path, monkeypatch):
     """Makes a figure, tiny; gives what it measured."""
     (tmp_path / "images").mkdir()
+    whole = stage.daylight
+
+    def daylight(scene, **angles):
+        whole(scene, **angles)
+        renders.few_directions(scene.world)
+
+    monkeypatch.setattr(stage, "daylight", daylight)
 
     def make_figure(name: str) -> dict[str, float]:
         return importlib.import_module(f"examples.paper.{name}").make(tmp_path, tmp_path / "images", small=True)

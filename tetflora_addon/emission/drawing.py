@@ -59,9 +59,9 @@ HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.3, 0.2
 #: So many of each are never too many.
 NEVER_TOO_MANY = 50_000.0
 #: Pixels down to which shadows that fall into the view are refined where nobody asks for finer ones, the optical depth
-#: in the shade up to which they are, leaves that a facet stands for there at least, and how many times as many there may
-#: be as of all else out of view. Without, crowns beside the image were too dense, and its borders in the shade (twice as
-#: many pixels were off beside the truth in ``benchmarks exact --cases edge --species birch --size 480x270``).
+#: in the shade up to which they are, leaves that a facet stands for there at least, and how many times as many there
+#: may be as of all else out of view. Without, crowns beside the image were too dense, and its borders in the shade
+#: (twice as many pixels were off beside the truth in ``benchmarks exact --cases edge --species birch --size 480x270``).
 SHADOW, LIT, LIT_LEAVES, LIT_TIMES = 4.0, 1.5, 3.0, 3.0
 #: How many times as many facets there may be for shadows where somebody asks for finer ones.
 SHADOWS = 6.0

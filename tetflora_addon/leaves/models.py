@@ -174,11 +174,13 @@ def mean_silhouette(model: LeafModel) -> float:
         least = np.ceil(flat.min(axis=0)).astype(np.int64).clip(0, _CELLS)
         wide = np.maximum(np.floor(flat.max(axis=0)).astype(np.int64).clip(-1, _CELLS - 1) - least + 1, 0)
         owner, index = spread(wide.prod(axis=1))
-        cell = least[owner] + np.stack(np.divmod(index, np.maximum(wide[owner, 1], 1)), axis=1)
-        a, b, c = flat[:, owner] - cell
-        sides = np.stack([u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] for u, v in ((a, b), (b, c), (c, a))])
-        covered = cell[(sides >= 0.0).all(axis=0) | (sides <= 0.0).all(axis=0)]
-        total += len(np.unique(covered @ [_CELLS, 1])) / _CELLS**2 * np.prod(high - low)
+        x, y = (least[owner, i] + step for i, step in enumerate(np.divmod(index, np.maximum(wide[owner, 1], 1))))
+        a, b, c = ((corner[owner, 0] - x, corner[owner, 1] - y) for corner in flat)
+        one, two, three = (u[0] * v[1] - u[1] * v[0] for u, v in ((a, b), (b, c), (c, a)))
+        inside = ((one >= 0.0) & (two >= 0.0) & (three >= 0.0)) | ((one <= 0.0) & (two <= 0.0) & (three <= 0.0))
+        covered = np.zeros((_CELLS, _CELLS), np.bool_)
+        covered[x[inside], y[inside]] = True
+        total += np.count_nonzero(covered) / _CELLS**2 * np.prod(high - low)
     return float(total / _DIRECTIONS)
 
 

@@ -154,7 +154,7 @@ def _around_pyramid(window: tuple[float, float, float, float], low: Floats, high
         triangle = np.array([eye, far_corners[first], far_corners[second]])
         on_wall = triangle.copy()
         on_wall[:, 1] = wall
-        return _best_prism(np.concatenate([on_wall, triangle]))[1]
+        return _best_prisms(np.concatenate([on_wall, triangle])[None])[0][1]
 
     one = np.array([eye, far_corners[0], far_corners[1], far_corners[2]])
     two = np.array([eye, far_corners[0], far_corners[2], far_corners[3]])
@@ -186,35 +186,37 @@ def _around_box(window: tuple[float, float, float, float], low: Floats, high: Fl
 
 def _hexahedron(corners: Floats) -> _Piece:
     """Two quadrilaterals ``(8, 3)``, one shifted against the other, as two prisms, cut at the better diagonal."""
-    halves = [
-        (
-            turn,
-            [
-                _best_prism(corners[[i + 4 * end for end in (0, 1) for i in triangle]])
-                for triangle in ((turn, turn + 1, turn + 2), (turn, turn + 2, (turn + 3) % 4))
-            ],
-        )
-        for turn in (0, 1)
+    triangles = [(0, 1, 2), (0, 2, 3), (1, 2, 3), (1, 3, 0)]  # on either side of a diagonal, then of the other
+    found = _best_prisms(corners[[[*triangle, *(i + 4 for i in triangle)] for triangle in triangles]])
+    first, second = (min(found[i][0], found[i + 1][0]) for i in (0, 2))
+    turn = int(second > first)
+    return _Cut(corners[[turn, turn + 2, turn + 4]], found[2 * turn][1], found[2 * turn + 1][1])
+
+
+#: Twelve ways (12, 3, 4) to divide a prism into three tetrahedra, by its corners; the last two share a face.
+_WAYS = np.array(
+    [
+        [(*a, b[0]), (b[0], a[1], a[2], b[2]), (b[0], a[1], b[2], b[1])]
+        for turn in permutations(range(3))
+        for a, b in (([lower + i for i in turn], [3 - lower + i for i in turn]) for lower in (0, 3))
     ]
-    turn, ((_, one), (_, two)) = max(halves, key=lambda half: min(half[1][0][0], half[1][1][0]))
-    return _Cut(corners[[turn, turn + 2, turn + 4]], one, two)
+)
 
 
-def _best_prism(corners: Floats) -> tuple[float, _Piece]:
-    """Prism between two triangles ``(6, 3)`` as three tetrahedra, of the twelve ways the one of best quality.
+def _best_prisms(corners: Floats) -> list[tuple[float, _Piece]]:
+    """Prisms between two triangles ``(n, 6, 3)`` as three tetrahedra, of the twelve ways the one of best quality.
 
     The paper as well "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra".
     """
-    best: tuple[float, _Piece] = (-1.0, corners[:4])
-    for turn in permutations(range(3)):
-        for lower, upper in ((0, 3), (3, 0)):
-            a, b = corners[[lower + i for i in turn]], corners[[upper + i for i in turn]]
-            three = np.array([(*a, b[0]), (b[0], a[1], a[2], b[2]), (b[0], a[1], b[2], b[1])])
-            worst = float(quality(three).min())
-            if worst > best[0] * (1.0 + 1e-9):
-                rest = _Cut(np.array([b[0], a[1], b[2]]), three[1], three[2])
-                best = (worst, _Cut(np.array([b[0], a[1], a[2]]), three[0], rest))
-    return best
+    found = []
+    for one, qualities in zip(corners, quality(corners[:, _WAYS]).min(axis=2).tolist(), strict=True):
+        best, way = -1.0, 0
+        for i, worst in enumerate(qualities):
+            if worst > best * (1.0 + 1e-9):
+                best, way = worst, i
+        first, second, third = one[_WAYS[way]]
+        found.append((best, _Cut(second[:3], first, _Cut(third[:3], second, third))))
+    return found
 
 
 def _hang(tree: TetrahedralTree, node: int, piece: _Piece, camera: ViewingCamera) -> None:

@@ -30,7 +30,7 @@ def scene() -> bpy.types.Scene:
     """A plant to become polygons, some to become proxies, a mesh of the artist's, ground and lights."""
     session.clean_file()
     scene = bpy.context.scene
-    scene.render.resolution_x, scene.render.resolution_y = 160, 120
+    scene.render.resolution_x, scene.render.resolution_y = 80, 60
     add_camera(location=(0.0, -8.0, 1.5))
     for n, place in enumerate([(0, 0, 0), (2.5, 9, 0), (-4, 22, 0), (6, 40, 0), (-9, 60, 0)]):
         add_plant(f"plant {n}", seed=n, location=place)

@@ -53,25 +53,26 @@ def made(monkeypatch):
     return frames
 
 
-def results(scene):
-    """What a frame is rendered with, datablock by datablock."""
+def go(scene, frame):
+    """Go to a frame as a render does; gives what is rendered."""
+    scene.frame_set(frame)
+    render.on_render_pre(scene)
+    assert render.render_errors() == []
     (collection,) = result_collections(scene, 'RENDER')
+    assert len(collection.objects)
+    return collection
+
+
+def at(scene, frame):
+    """What a frame is rendered with, datablock by datablock."""
+    collection = go(scene, frame)
     bpy.context.view_layer.update()
     objects = collection.objects
     found = {"objects": these(objects)}
     found["meshes"] = these(o.data for o in objects if o.type == 'MESH')
     found["pointclouds"] = these(o.data for o in objects if o.type == 'POINTCLOUD')
     found["materials"] = these({m for o in objects if o.data for m in o.data.materials if m})
-    assert found["objects"]
     return collection.name, found
-
-
-def at(scene, frame):
-    """Go to a frame as a render does."""
-    scene.frame_set(frame)
-    render.on_render_pre(scene)
-    assert render.render_errors() == []
-    return results(scene)
 
 
 def alone(scene, frame):
@@ -97,7 +98,7 @@ def test_neighboring_frames_share_and_each_is_the_frame_alone(animation, made):
 
 def test_what_is_seen_again_comes_back_without_being_made_again(animation, made):
     first = at(animation, 1)
-    at(animation, FRAMES)
+    go(animation, FRAMES)
     count = len(made)
     assert at(animation, 1) == first
     assert len(made) == count
@@ -108,7 +109,7 @@ def test_without_memory_only_the_frame_itself_is_there_and_comes_back_identical(
     first = at(animation, 1)
     before = {kind: len(names) for kind, names in datablocks().items()}
     for n in (FRAMES, 1, FRAMES):
-        at(animation, n)
+        go(animation, n)
     assert {kind: len(names) for kind, names in datablocks().items()}["collections"] == before["collections"]
     assert len(made) == 4
     assert at(animation, 1) == first
@@ -117,32 +118,32 @@ def test_without_memory_only_the_frame_itself_is_there_and_comes_back_identical(
 def test_what_was_not_seen_for_longest_goes_first(animation, made, keep_memory):
     sizes = []
     for n in (1, FRAMES // 2, FRAMES):
-        at(animation, n)
+        go(animation, n)
         sizes.append(sum(entry.megabytes for entry in frame_cache._entries.values()))
     render.on_render_end(animation)
     made.clear()
     keep_memory((sizes[-1] - sizes[0] / 2.0) / 1e3)  # room for two of three
     for n in (1, FRAMES // 2, 1, FRAMES):  # the one in the middle is the oldest now
-        at(animation, n)
+        go(animation, n)
     assert made == [1, FRAMES // 2, FRAMES]
-    at(animation, 1)
+    go(animation, 1)
     assert made == [1, FRAMES // 2, FRAMES]
-    at(animation, FRAMES // 2)
+    go(animation, FRAMES // 2)
     assert made[3:] == [FRAMES // 2]
 
 
 def test_nothing_is_left_when_the_render_ends(animation):
     before = datablocks()
     for n in range(1, FRAMES + 1):
-        at(animation, n)
+        go(animation, n)
     render.on_render_end(animation)
     assert datablocks() == before
     assert frame_cache._entries == {}
 
 
 def test_nothing_that_is_kept_goes_into_a_file(animation, tmp_path):
-    at(animation, 1)
-    at(animation, FRAMES)
+    go(animation, 1)
+    go(animation, FRAMES)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "animation.blend"), copy=True)
     with bpy.data.libraries.load(str(tmp_path / "animation.blend")) as (inside, _):
         assert not [name for name in (*inside.collections, *inside.meshes) if "TetFlora" in name or "leaf" in name]
@@ -157,8 +158,8 @@ def test_what_changes_is_noticed(animation, made, change):
     ground.tetflora.is_occluder = True
     animation.tetflora.output.species.add().species = "fern"
     depsgraph()
-    at(animation, 1)
-    at(animation, 1)
+    go(animation, 1)
+    go(animation, 1)
     assert made == [1]
     if change == "plant":
         bpy.data.objects["one"].location.x += 0.01
@@ -188,7 +189,7 @@ def test_what_changes_is_noticed(animation, made, change):
     elif change == "engine":  # which draws points in another size
         animation.render.engine = 'CYCLES' if animation.render.engine != 'CYCLES' else compat.eevee_engine()
     depsgraph()
-    at(animation, 1)
+    go(animation, 1)
     assert made == [1, 1]
 
 
@@ -199,7 +200,7 @@ def test_animated_lenses_share_while_they_change_little(animation, made):
         data.lens = lens
         data.keyframe_insert("lens", frame=frame)
     for n in range(1, FRAMES + 1):
-        at(animation, n)
+        go(animation, n)
     assert 2 <= len(made) <= 4
 
 
@@ -212,7 +213,7 @@ def test_a_camera_that_stands_still_is_refined_for_exactly(animation, made):
     assert shared.position.tolist() == exact.position.tolist()
     assert (shared.window, shared.width, shared.setback) == (exact.window, exact.width, 0.0)
     for n in (1, 2, 3):
-        at(animation, n)
+        go(animation, n)
     assert made == [1]  # nothing changes, so nothing is made again
 
 
@@ -239,7 +240,7 @@ def test_whatever_moves_the_camera_counts_as_animation(animation, mover):
 
 def test_switched_off_each_frame_is_refined_for_its_own_camera(animation, made):
     animation.tetflora.share_frames = False
-    names = {at(animation, n)[0] for n in (1, 2, 3)}
+    names = {go(animation, n).name for n in (1, 2, 3)}
     assert made == [1, 2, 3]
     assert len(names) == 3
 
@@ -249,7 +250,7 @@ def test_explicit_objects_are_hidden_for_what_is_shown_and_shown_at_the_end(anim
     bush.tetflora.is_explicit = True
     depsgraph()
     for n in (1, FRAMES, 1, 2):
-        at(animation, n)
+        go(animation, n)
         assert bush.hide_render
     render.on_render_end(animation)
     assert not bush.hide_render
@@ -281,14 +282,14 @@ def test_what_changes_of_explicit_objects_is_noticed(animation, made, change):
     foreign.data.materials.append(bpy.data.materials.new("one"))
     foreign.tetflora.is_explicit = True
     depsgraph()
-    at(animation, 1)
+    go(animation, 1)
     if change == "attribute":
         tint.data[count // 2].value = 1.0
         foreign.data.update()
     else:
         foreign.data.materials[0] = bpy.data.materials.new("two")
     depsgraph()
-    at(animation, 1)
+    go(animation, 1)
     assert made == [1, 1]
 
 
@@ -300,7 +301,7 @@ def test_materials_of_leaf_objects_are_noticed(animation, made):
     entry = animation.tetflora.leaf_objects.add()
     entry.species, entry.leaf = "bush", leaf
     depsgraph()
-    at(animation, 1)
+    go(animation, 1)
     leaf.data.materials[0] = bpy.data.materials.new("two")
     depsgraph()
     assert "two" in at(animation, 1)[1]["materials"]
@@ -393,7 +394,7 @@ def test_scenes_that_are_rendered_within_a_render_leave_its_results_alone(animat
 def test_names_that_are_too_long_still_tell_cells_apart(animation, made):
     add_mesh("x" * 60, size=0.5).tetflora.is_explicit = True
     depsgraph()
-    at(animation, 1)
+    go(animation, 1)
     _, last = at(animation, FRAMES)
     assert len(made) == 2
     assert last == alone(animation, FRAMES)[1]

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.renders import picture, small_scene
+from tests.blender.renders import few_directions, picture, small_scene
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.materials import blade, materials, nodes
 from tetflora_addon.blender.results import meshes
@@ -26,8 +26,7 @@ WIDTH = 2.0
 def half_sky(below):
     """Light of radiance 1 from above only, or from below only."""
     world = bpy.context.scene.world
-    # Half a sky is known from few points; by itself Cycles looks at half a million, for longer than it renders.
-    world.cycles.sampling_method, world.cycles.sample_map_resolution = 'MANUAL', 64
+    few_directions(world)
     graph = nodes.Graph(compat.shader_tree(world))
     up = graph.node("ShaderNodeSeparateXYZ", {"Vector": graph.node("ShaderNodeTexCoord").outputs["Generated"]})
     lit = graph.math('LESS_THAN' if below else 'GREATER_THAN', up.outputs["Z"], 0.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.renders import picture, small_scene
+from tests.blender.renders import few_directions, picture, small_scene
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.materials import microsphere
 
@@ -62,6 +62,7 @@ def test_light_that_is_sampled_counts_as_light_that_is_hit(plane, transmission):
     """The same sky with a texture of which all colors are one: Cycles then also picks directions in the sky."""
     small_scene(sky=1.0, samples=256, size=8, width=0.5)
     place(0.9, Plane=plane, s=0.0, Transmission=transmission, Normal=(0.3, 0.2, 0.9))
+    few_directions(bpy.context.scene.world)
     tree = bpy.context.scene.world.node_tree
     texture, where = tree.nodes.new("ShaderNodeTexChecker"), tree.nodes.new("ShaderNodeTexCoord")
     texture.inputs["Color1"].default_value = texture.inputs["Color2"].default_value = (1.0, 1.0, 1.0, 1.0)

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.renders import picture, small_scene
+from tests.blender.renders import few_directions, picture, small_scene
 from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
@@ -107,6 +107,7 @@ def test_an_image_is_the_right_way_round(tilt, broken):
     pixels[13, 3, 1] += broken  # as the sun is in some pictures of skies
     image.pixels.foreach_set(pixels.ravel())
     feed_background("ShaderNodeTexEnvironment").image = image
+    few_directions(bpy.context.scene.world)
     plane, camera = white_plane(), bpy.context.scene.camera
     plane.rotation_euler = camera.rotation_euler = (0.0, radians(tilt), 0.0)
     normal = np.array([[np.sin(radians(tilt)), 0.0, np.cos(radians(tilt))]])
@@ -178,7 +179,7 @@ FORMS = ['MICROSURFACES', 'SHELLS', 'MICROSPHERES']
 def bush_before_the_sky(engine='CYCLES', samples=16):
     """A bush that is proxies for the most part, in sun and skylight, 48 pixels wide; gives the scene."""
     samples = samples if engine == 'CYCLES' else 4  # of half a second each, without a GPU
-    small_scene(sky=0.4, samples=samples, sun=40.0, size=48, width=3.6)
+    small_scene(sky=0.4, samples=samples, sun=40.0, size=48, width=3.6, shadows=True)
     scene = bpy.context.scene
     scene.render.engine = engine if engine == 'CYCLES' else compat.eevee_engine()
     scene.cycles.transparent_max_bounces = scene.cycles.min_transparent_bounces = 256

@@ -228,7 +228,7 @@ def forest():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_results_and_a_stand_in_look_like_the_scatterer(clean_file, engine):
-    small_scene(0.6, 16, 40.0, 48, engine, 3.0)
+    small_scene(0.6, 16, 40.0, 48, engine, 3.0, shadows=True)
     ground, tree = forest()
     scattered(ground, tree)
     expected = picture()

@@ -80,11 +80,11 @@ def placed(every):
 def pictures_of(make, engine):
     """A picture of the instances that a function makes, and one of the same faces as a plain mesh."""
     if engine not in _expected:
-        small_scene(0.7, same_samples(engine), 40.0, 32, engine, 3.0)
+        small_scene(0.7, same_samples(engine), 40.0, 32, engine, 3.0, shadows=True)
         add("truth", mesh_of("truth", placed(matrices())))
         _expected[engine] = picture()
         session.clean_file()
-    small_scene(0.7, same_samples(engine), 40.0, 32, engine, 3.0)
+    small_scene(0.7, same_samples(engine), 40.0, 32, engine, 3.0, shadows=True)
     make()
     return picture(), _expected[engine]
 

@@ -25,7 +25,7 @@ def scene(clean_file):
     for i in range(3):
         add_plant(f"tree {i}", seed=i, location=(4.0 * i - 4.0, 0.0, 0.0))
     scene = bpy.context.scene
-    scene.render.resolution_x, scene.render.resolution_y = 120, 90
+    scene.render.resolution_x, scene.render.resolution_y = 48, 36
     bpy.context.view_layer.update()
     yield scene
     scene.tetflora.auto_refine = False

@@ -17,6 +17,7 @@ from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import bounding_capsules
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
+from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import expand, open_subplants
 from tetflora_addon.subplants.rings import Pixels
 from tetflora_addon.subplants.tubes import tube_buffers
@@ -26,11 +27,12 @@ _FLOAT32 = 1e-6  # relative rounding of vertices
 
 def vertices(flora: Flora, subplant: Branches) -> np.ndarray:
     """All vertices (v, 3) of one sub-plant, and those that its wood has where it is near."""
-    tubes, leaves = support.meshes(flora, support.expanded(flora, subplant))
+    branches = list(expand(flora, subplant))
     pixel = subplant.radius[0] / 40.0
-    near = tube_buffers(flora, list(expand(flora, subplant)), Pixels(lambda points: np.full(len(points), pixel)))
-    tubes = tubes if near is None else [*tubes, near]
-    return np.concatenate([mesh.positions for mesh in (*tubes, *leaves)]).astype(np.float64)
+    tubes = [tube_buffers(flora, branches), tube_buffers(flora, branches, Pixels(lambda p: np.full(len(p), pixel)))]
+    leaves = [leaf.buffers for leaf in leaf_meshes(flora, int(flora.species_of(subplant.row)[0]), branches)]
+    meshes = (mesh for mesh in (*tubes, *leaves) if mesh is not None)
+    return np.concatenate([mesh.positions for mesh in meshes]).astype(np.float64)
 
 
 def outside(flora: Flora, subplants: Branches) -> float:
