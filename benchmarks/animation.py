@@ -107,7 +107,7 @@ def _flight() -> dict[str, int]:
     for frame in (1, FRAMES):
         camera.location.y += FLIGHT_SPEED * (frame - 1) / fly_through.RATE
         camera.keyframe_insert("location", frame=frame)
-    given = contents.read_scene(scene, layer.depsgraph, layer)
+    given = contents.read_scene(scene, layer.depsgraph)
     found = {}
     for name, near in (("flight_refinements", given), ("flight_refinements_small_cells", None)):
         eyes = []

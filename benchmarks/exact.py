@@ -462,7 +462,7 @@ def build(scene: bpy.types.Scene, spec: dict) -> int:
 def _clearing(scene: bpy.types.Scene) -> NDArray[np.float64]:
     """The place (2,) near the middle of a wood that is farthest from all plants."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    plants = read_scene(scene, depsgraph, depsgraph.view_layer).seeds.position[:, :2]
+    plants = read_scene(scene, depsgraph).seeds.position[:, :2]
     along = np.arange(-20.0, 20.0, 0.5)
     places = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
     near = plants[(np.abs(plants) < 40.0).all(axis=1)]

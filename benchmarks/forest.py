@@ -417,7 +417,7 @@ def build_instances(scene: bpy.types.Scene, of_each: int = 0, own: bool = False)
     """
     start = time.perf_counter()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    seeds = read_scene(scene, depsgraph, depsgraph.view_layer).seeds
+    seeds = read_scene(scene, depsgraph).seeds
     variants = bpy.data.collections.new(_NAME)  # of no scene: only the instances are rendered
     polygons, each = 0, of_each or -(-VARIANTS // len(seeds.identifiers))
     for number, kind in enumerate(seeds.identifiers):

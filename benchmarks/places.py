@@ -85,7 +85,7 @@ def grown() -> tuple[Any, Seeds]:
     scene, layer = bpy.context.scene, bpy.context.view_layer
     layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    seeds = read_scene(scene, depsgraph, layer).seeds
+    seeds = read_scene(scene, depsgraph).seeds
     return compile_for(seeds.identifiers, scene, depsgraph), seeds
 
 

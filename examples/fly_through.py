@@ -76,7 +76,7 @@ def _ground(scene: bpy.types.Scene, places: NDArray[np.float64]) -> NDArray[np.f
 def _lane(scene: bpy.types.Scene, length: float) -> NDArray[np.float64]:
     """Where a walk along +y begins that keeps farther from all plants than others near the middle, (2,)."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    plants = read_plants(scene, depsgraph, depsgraph.view_layer)[0].position[:, :2]
+    plants = read_plants(scene, depsgraph)[0].position[:, :2]
     begin = np.linspace(-_ASIDE, _ASIDE, 481) + scene.camera.location.x
     beyond = np.maximum(np.maximum(_BEGIN - plants[:, 1], plants[:, 1] - _BEGIN - length), 0.0)
     nearest = [np.hypot(plants[:, 0] - x, beyond).min() for x in begin]

@@ -42,7 +42,7 @@ def render_top_view(scene: bpy.types.Scene, path: Path, width: int = 1600, sampl
     decision = decisions.Decision
     drawing = bpy.data.scenes.new("Top view")
     try:
-        plants = read_plants(scene, depsgraph, depsgraph.view_layer)[0]
+        plants = read_plants(scene, depsgraph)[0]
         far = np.linalg.norm(plants.position[:, :2] - camera.position[:2], axis=1).max() + 20
         center_line = plants.position[:, :2].mean(axis=0) - camera.position[:2]
         center_line /= np.linalg.norm(center_line)

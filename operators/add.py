@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Add plants: a single one, one grown on a drawn skeleton, a first forest, or a population on a terrain."""
 
-from collections.abc import Generator
-
 import bpy
-from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import FloatVectorProperty
 
 from ..tetflora_addon.blender.attributes import world_matrix
+from ..tetflora_addon.blender.declare import choice, once, real
 from ..tetflora_addon.blender.placing.distances import distance_of, follows_species
 from ..tetflora_addon.blender.placing.first_forest import build
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
@@ -20,7 +19,8 @@ from ..tetflora_addon.blender.species.catalog import NO_SPECIES, default_species
 from ..tetflora_addon.blender.species.editor import present_species
 from ..tetflora_addon.blender.species.edits import catalog, unknown_text
 from ..tetflora_addon.errors import SceneError
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Job, Progress
+from ..tetflora_addon.parameters import within
 from ..tetflora_addon.planting.rules import Rules
 from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, selected_plants, show_shapes
 from .layers import ground_found, grounds_to_plant, tell_placed
@@ -35,12 +35,8 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
     bl_label = "Add Plant"
     needs = (in_object_mode,)
 
-    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
-    seed: IntProperty(
-        name="Seed",
-        description="Individual of the species; random for each plant if not set",
-        options={'SKIP_SAVE'},
-    )
+    species: choice("Species", "Species from the catalog", operator_items)
+    seed: once.integer("Seed", "Individual of the species; random for each plant if not set")
     location: FloatVectorProperty(
         name="Location",
         description="Base of the trunk in world space; the 3D cursor if not set",
@@ -48,17 +44,8 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
         unit='LENGTH',
         options={'SKIP_SAVE'},
     )
-    azimuth: FloatProperty(
-        name="Azimuth", description="Rotation around the vertical axis", subtype='ANGLE', options={'SKIP_SAVE'}
-    )
-    scale: FloatProperty(
-        name="Scale",
-        description="Scale of the plant; 1 is the size in the species file",
-        default=1.0,
-        min=0.01,
-        soft_max=4.0,
-        options={'SKIP_SAVE'},
-    )
+    azimuth: once.real("Azimuth", "Rotation around the vertical axis", subtype='ANGLE')
+    scale: once.real("Scale", "Scale of the plant; 1 is the size in the species file", 1.0, **within(0.01, 4.0))
 
     def run(self, context: bpy.types.Context) -> set[str]:
         properties = self.properties
@@ -122,7 +109,7 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
     bl_label = "First Forest"
     needs = (in_object_mode,)
 
-    seed: IntProperty(name="Seed", description="A different seed gives a different forest", options={'SKIP_SAVE'})
+    seed: once.integer("Seed", "A different seed gives a different forest")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene, note = build(context, self.seed)
@@ -165,25 +152,23 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
 
     by_density: _RULES.by_density
     count: _RULES.count
-    as_field: EnumProperty(**CREATE_AS, options={'SKIP_SAVE'})
+    as_field: CREATE_AS(options={'SKIP_SAVE'})
     seed: _RULES.seed
     slope_max: _RULES.slope_max
     min_distance: _RULES.min_distance
     scale_min: _RULES.scale_min
     scale_max: _RULES.scale_max
-    species: StringProperty(
-        name="Species",
-        description="Comma-separated identifiers of species with optional weights: broadleaf_tree:3, bush:1",
-        options={'SKIP_SAVE'},
+    species: once.string(
+        "Species", "Comma-separated identifiers of species with optional weights: broadleaf_tree:3, bush:1"
     )
-    suited: FloatProperty(
-        name="Suited Distance",
-        description="Min Distance that followed from the species; another one was given",
-        default=-1.0,
+    suited: real(
+        "Suited Distance",
+        "Min Distance that followed from the species; another one was given",
+        -1.0,
         options={'SKIP_SAVE', 'HIDDEN'},
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, PlacedPlants]:
+    def steps(self, context: bpy.types.Context) -> Job[PlacedPlants]:
         scene = context.scene
         yield Progress(0.0, "Reading the ground")
         self._complete_from(scene)

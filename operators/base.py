@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators share: tooltips, conditions, reports, the selection, and work in steps between redraws."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from ..tetflora_addon.blender.placing.plant_objects import plants_of
 from ..tetflora_addon.blender.runtime import remember
 from ..tetflora_addon.blender.worker import run_to_end
 from ..tetflora_addon.errors import TetFloraError, readable
-from ..tetflora_addon.jobs import Pace, Progress
+from ..tetflora_addon.jobs import Job, Pace, Progress
 
 LINKED = (
     "The plants are linked from another file; use Object > Relations > Make Local, or Object > Library Override > Make"
@@ -178,11 +178,11 @@ class ModalJob(Reporting):
     cancelled = "Cancelled; the scene is unchanged"
     keys = "Esc: Cancel"
 
-    _steps: Generator[Progress, bool | None, Any] | None = None
+    _steps: Job[Any] | None = None
     _timer: bpy.types.Timer | None = None
     _enough = False
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Any]:
+    def steps(self, context: bpy.types.Context) -> Job[Any]:
         """The work; True is sent to it when the artist presses Return."""
         raise NotImplementedError
 

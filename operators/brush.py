@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Paint, erase and thin plants with a brush."""
 
-from __future__ import annotations
-
 import time
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, StringProperty
 
+from ..tetflora_addon.blender.declare import once, string
 from ..tetflora_addon.blender.placing.brush import Stroke, draped_circle
 from ..tetflora_addon.blender.placing.plant_objects import remove_empty_collections
 from ..tetflora_addon.blender.placing.properties import MODES
@@ -41,18 +39,11 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
 
     bl_label = "Paint Plants"
 
-    mode: EnumProperty(
-        name="Mode",
-        description="Brush mode; that of the panel if not set",
-        items=MODES,
-        options={'SKIP_SAVE'},
-    )
-    stroke: StringProperty(
-        name="Stroke",
-        description=(
-            "For scripts: path of the brush on the ground in world space, three numbers per point, for example 0 "
-            "0 0, 5 2.5 0"
-        ),
+    mode: once.choice("Mode", "Brush mode; that of the panel if not set", MODES)
+    stroke: string(
+        "Stroke",
+        "For scripts: path of the brush on the ground in world space, three numbers per point, for example 0 "
+        "0 0, 5 2.5 0",
         options={'SKIP_SAVE', 'HIDDEN'},
     )
 
@@ -174,7 +165,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
 
     def _begin_stroke(self, context: bpy.types.Context, mode: str) -> Stroke:
         context.view_layer.update()
-        self._stroke = Stroke(context.scene, context.view_layer, context.evaluated_depsgraph_get(), mode)
+        self._stroke = Stroke(context.scene, context.evaluated_depsgraph_get(), mode)
         self._last, self._shown, self._cost = None, time.monotonic(), 0.0
         return self._stroke
 

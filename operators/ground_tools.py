@@ -2,15 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tools that point at the ground: what they share (pointing, undo, leaving), and placing plants by clicking."""
 
-from __future__ import annotations
-
 from math import radians, tau
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty
 from bpy_extras import view3d_utils
 
+from ..tetflora_addon.blender.declare import choice
 from ..tetflora_addon.blender.placing.ground import Ground, Hit
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.runtime import GoneError, JobData, redraw
@@ -130,8 +128,9 @@ class GroundTool(Tool):
         return True
 
     def _look_around(self, context: bpy.types.Context) -> None:
-        self._ground = Ground(context.view_layer, context.evaluated_depsgraph_get())
-        self._data = JobData(self.bl_label, context.scene, context.view_layer)
+        depsgraph = context.evaluated_depsgraph_get()
+        self._ground = Ground(depsgraph)
+        self._data = JobData(self.bl_label, context.scene, depsgraph)
         self._data.add_objects(self._ground.objects)
 
 
@@ -171,7 +170,7 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
 
     bl_label = "Place Plants by Clicking"
 
-    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
+    species: choice("Species", "Species from the catalog", operator_items)
 
     _turn = 0.0
     _scale = 1.0

@@ -2,17 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Add layers to a ground: a biome, a cover, a stand and its years. `add` scatters populations."""
 
-from collections.abc import Generator
-
 import bpy
-from bpy.props import BoolProperty, IntProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ..tetflora_addon.blender.biomes.adding import BiomeResult, add_biome_steps
 from ..tetflora_addon.blender.biomes.files import import_biome, read_biome
 from ..tetflora_addon.blender.biomes.ground import make_land
 from ..tetflora_addon.blender.biomes.layers import active_layer
-from ..tetflora_addon.blender.biomes.library import NO_BIOME, biome_property, biomes
+from ..tetflora_addon.blender.biomes.library import BIOMES, NO_BIOME, biomes
+from ..tetflora_addon.blender.declare import boolean, once
 from ..tetflora_addon.blender.placing.cover import CoverResult, cover_steps, covered_population, strew_steps
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.placing.rules import active_population
@@ -20,7 +18,7 @@ from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.stands.growing import GrownStand, animate, is_stand, keep_year, new_stand_steps
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Job, Progress
 from .base import FileTool, ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
 from .layers import ground_found, grounds_to_plant, selected_grounds, tell_layers
 
@@ -34,15 +32,13 @@ class TETFLORA_OT_add_biome(ModalJob, bpy.types.Operator):
     bl_label = "Add Biome"
     needs = (in_object_mode,)
 
-    biome: biome_property(options={'SKIP_SAVE'})
-    seed: IntProperty(name="Seed", description="A different seed gives a different arrangement", options={'SKIP_SAVE'})
-    season: BoolProperty(
-        name="Set Season",
-        description="Turn on Seasons and go to the day of the year that the biome is made for, if it has one",
-        options={'SKIP_SAVE'},
+    biome: BIOMES()
+    seed: once.integer("Seed", "A different seed gives a different arrangement")
+    season: once.boolean(
+        "Set Season", "Turn on Seasons and go to the day of the year that the biome is made for, if it has one"
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, BiomeResult]:
+    def steps(self, context: bpy.types.Context) -> Job[BiomeResult]:
         yield Progress(0.0, "Reading the biome")
         scene = context.scene
         if not self.properties.is_property_set("biome"):
@@ -97,20 +93,18 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
         need(lambda context: active_population(context.scene), "Add a layer first; its ground is then covered"),
     )
 
-    soil: BoolProperty(
-        name="Soil",
-        description="Give the ground a material in the colors of what lies there, unless it has one of yours",
-        default=True,
+    soil: boolean(
+        "Soil", "Give the ground a material in the colors of what lies there, unless it has one of yours", True
     )
 
-    fallen: BoolProperty(
-        name="Fallen Leaves",
-        description="With Seasons on, strew in a layer of their own the leaves that the plants above shed in autumn, "
+    fallen: boolean(
+        "Fallen Leaves",
+        "With Seasons on, strew in a layer of their own the leaves that the plants above shed in autumn, "
         "as many as are no longer on them",
-        default=True,
+        True,
     )
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, CoverResult]:
+    def steps(self, context: bpy.types.Context) -> Job[CoverResult]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
         made = yield from cover_steps(scene, depsgraph, covered_population(scene), self.soil)
         if self.fallen and scene.tetflora.year.enabled:
@@ -136,7 +130,7 @@ class TETFLORA_OT_grow_stand(ModalJob, bpy.types.Operator):
     bl_label = "Grow Stand"
     needs = (in_object_mode, ground_found)
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, GrownStand]:
+    def steps(self, context: bpy.types.Context) -> Job[GrownStand]:
         return new_stand_steps(context.scene, context.evaluated_depsgraph_get(), grounds_to_plant(context))
 
     def finish(self, context: bpy.types.Context, result: GrownStand) -> set[str]:
@@ -169,12 +163,8 @@ class TETFLORA_OT_animate_growth(Reporting, bpy.types.Operator):
     bl_label = "Animate Growth"
     needs = _ACTIVE
 
-    first: IntProperty(
-        name="First Frame", description="Frame of the first year; that of the scene if not set", options={'SKIP_SAVE'}
-    )
-    last: IntProperty(
-        name="Last Frame", description="Frame of the last year; that of the scene if not set", options={'SKIP_SAVE'}
-    )
+    first: once.integer("First Frame", "Frame of the first year; that of the scene if not set")
+    last: once.integer("Last Frame", "Frame of the last year; that of the scene if not set")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene, properties = context.scene, self.properties
@@ -215,9 +205,7 @@ class TETFLORA_OT_import_biome(FileTool, bpy.types.Operator, ImportHelper):
     bl_label = "Import Biome"
     bl_options = {'REGISTER'}
 
-    replace: BoolProperty(
-        name="Replace", description="Replace your own biome of the same file name", options={'SKIP_SAVE'}
-    )
+    replace: once.boolean("Replace", "Replace your own biome of the same file name")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         identifier = import_biome(self.path, self.replace)

@@ -2,21 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The list of layers: update, move, duplicate, remove and select them, change their ground, save them as a biome."""
 
-from __future__ import annotations
-
-from collections.abc import Generator
 from contextlib import closing
-from dataclasses import dataclass
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import StringProperty
 
 from ..tetflora_addon.blender.biomes.adding import plant_biome_steps, remove_biome
-from ..tetflora_addon.blender.biomes.files import (
-    active_biome,
-    find_biome,
-    saved_populations,
-)
+from ..tetflora_addon.blender.biomes.files import active_biome, find_biome, saved_populations
 from ..tetflora_addon.blender.biomes.files import save_biome as save_biome_file
 from ..tetflora_addon.blender.biomes.ground import lay_biome_soil
 from ..tetflora_addon.blender.biomes.layers import (
@@ -32,6 +24,7 @@ from ..tetflora_addon.blender.biomes.layers import (
     sort_layers,
     ungroup_layer,
 )
+from ..tetflora_addon.blender.declare import boolean, choice, once, string
 from ..tetflora_addon.blender.placing.cover import cover_with_snow, covered_population
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
 from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, set_grounds
@@ -39,7 +32,7 @@ from ..tetflora_addon.blender.settings import BIOME, FIELD, with_identity
 from ..tetflora_addon.blender.stands.growing import GrownStand, again_steps, is_stand
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError, TetFloraError
-from ..tetflora_addon.jobs import Progress, part_of
+from ..tetflora_addon.jobs import Job, part_of
 from .base import ModalJob, Reporting, counted, in_object_mode, need, show_shapes
 
 
@@ -91,13 +84,8 @@ def tell_layers(
     return operator.done(text + more)
 
 
-@dataclass(frozen=True)
-class Updated:
-    """What an update made: results of layers, why others have no plants, grounds that keep a material."""
-
-    made: list[PlacedPlants | GrownStand | int]
-    bare: list[str]
-    kept: list[str]
+#: What an update made: results of layers, why others have no plants, grounds that keep a material.
+Updated = tuple[list[PlacedPlants | GrownStand | int], list[str], list[str]]
 
 
 class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
@@ -111,21 +99,16 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
     needs = _ACTIVE
     cancelled = "Stopped; layers that were done already keep their new plants"
 
-    which: EnumProperty(
-        name="Layers",
-        description="Which layers to grow again",
-        items=(
+    which: once.choice(
+        "Layers",
+        "Which layers to grow again",
+        (
             ('DUE', "All That Are Due", "All whose settings have changed, and those without plants"),
             ('ACTIVE', "Active", "The active layer, a biome with all of its layers and its soil, whatever has changed"),
         ),
-        options={'SKIP_SAVE'},
     )
-    reroll: BoolProperty(name="Re-roll", description="With a new seed, for another arrangement", options={'SKIP_SAVE'})
-    forget_erased: BoolProperty(
-        name="Clear Erased Places",
-        description="Let plants grow again where you erased with the brush",
-        options={'SKIP_SAVE'},
-    )
+    reroll: once.boolean("Re-roll", "With a new seed, for another arrangement")
+    forget_erased: once.boolean("Clear Erased Places", "Let plants grow again where you erased with the brush")
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
@@ -144,21 +127,19 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
                 bpy.ops.ed.undo_push(message=self.bl_label)
         return result
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Updated]:
+    def steps(self, context: bpy.types.Context) -> Job[Updated]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
         active, one = active_layer(scene), self.which == 'ACTIVE'
         if one and active.kind == BIOME and not self.reroll:
             added = yield from plant_biome_steps(scene, depsgraph, active)
-            return Updated([number for _, number in added.layers], added.bare, added.kept)
+            return [number for _, number in added.layers], added.bare, added.kept
         uids = [layer.uid for layer in (*children_of(active), active) if layer.kind != BIOME] if one else []
         uids = uids if one else due_layers(scene)
         if not uids:
             raise SceneError("All layers are up to date")
         return (yield from self._each(scene, depsgraph, uids))
 
-    def _each(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]
-    ) -> Generator[Progress, object, Updated]:
+    def _each(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]) -> Job[Updated]:
         made, bare = [], []
         biomes = {with_identity(scene.tetflora.layers, uid).biome for uid in uids} - {""}
         for number, uid in enumerate(uids):
@@ -177,12 +158,12 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
         kept = []
         for biome in filter(None, (find_biome(scene, uid) for uid in biomes)):
             depsgraph.update()
-            kept += lay_biome_soil(scene, depsgraph, [e.object for e in biome.grounds if e.object is not None])
-        return Updated(made, bare, kept)
+            kept += lay_biome_soil(depsgraph, [e.object for e in biome.grounds if e.object is not None])
+        return made, bare, kept
 
     def _steps_of(
         self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layer: bpy.types.PropertyGroup
-    ) -> Generator[Progress, object, PlacedPlants | GrownStand]:
+    ) -> Job[PlacedPlants | GrownStand]:
         if layer.kind == FIELD:
             if not is_stand(layer.field):
                 raise SceneError(f'"{layer.name}" has no rules to grow again by; use the brush, or edit its points')
@@ -199,12 +180,11 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
         points.schedule()
         show_shapes(context.scene)
         context.scene.update_tag()
-        if len(result.made) == 1 and isinstance(result.made[0], PlacedPlants):
-            return tell_placed(self, result.made[0])
-        numbers = [
-            n if isinstance(n, int) else n.number if isinstance(n, PlacedPlants) else n.plants for n in result.made
-        ]
-        return tell_layers(self, "", numbers, result.bare, result.kept)
+        made, *rest = result
+        if len(made) == 1 and isinstance(made[0], PlacedPlants):
+            return tell_placed(self, made[0])
+        numbers = [n if isinstance(n, int) else n.number if isinstance(n, PlacedPlants) else n.plants for n in made]
+        return tell_layers(self, "", numbers, *rest)
 
 
 class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
@@ -216,10 +196,10 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
     told = "direction"
     needs = (layer_exists,)
 
-    direction: EnumProperty(
-        name="Direction",
-        description="Where to move it",
-        items=(
+    direction: choice(
+        "Direction",
+        "Where to move it",
+        (
             ('UP', "Up", "Before the layer above"),
             ('DOWN', "Down", "After the layer below"),
             ('DRAG', "Drag", "Move it with the mouse; click to drop it, Esc to put it back"),
@@ -272,10 +252,8 @@ class TETFLORA_OT_duplicate_layer(Reporting, bpy.types.Operator):
     bl_label = "Duplicate Layer"
     needs = _ACTIVE
 
-    to_selected: BoolProperty(
-        name="To Selected Meshes",
-        description="Let the copy grow on the selected meshes instead of the same ground",
-        options={'SKIP_SAVE'},
+    to_selected: once.boolean(
+        "To Selected Meshes", "Let the copy grow on the selected meshes instead of the same ground"
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
@@ -295,11 +273,7 @@ class TETFLORA_OT_remove_layer(Reporting, bpy.types.Operator):
     bl_label = "Remove Layer"
     needs = _ACTIVE
 
-    keep_plants: BoolProperty(
-        name="Keep Plants",
-        description="Remove only the layer, and keep its plants as plants of your own",
-        options={'SKIP_SAVE'},
-    )
+    keep_plants: once.boolean("Keep Plants", "Remove only the layer, and keep its plants as plants of your own")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene, layer = context.scene, active_layer(context.scene)
@@ -356,12 +330,10 @@ class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
     needs = (need(lambda context: saved_populations(context.scene), "Add a layer with plants first"),)
     bl_options = {'REGISTER'}
 
-    name: StringProperty(name="Name", description="Name of the biome, from which that of its file follows")
-    description: StringProperty(name="Description", description="What grows there, for the tooltip in menus")
-    picture: BoolProperty(name="Last Render", description="Use the last render as the picture of the biome")
-    replace: BoolProperty(
-        name="Replace", description="Replace your own biome of the same file name", options={'SKIP_SAVE'}
-    )
+    name: string("Name", "Name of the biome, from which that of its file follows")
+    description: string("Description", "What grows there, for the tooltip in menus")
+    picture: boolean("Last Render", "Use the last render as the picture of the biome")
+    replace: once.boolean("Replace", "Replace your own biome of the same file name")
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         biome = active_biome(context.scene)

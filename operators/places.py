@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Import real places: terrain, trees that were measured or seen from above, and outlines of a map."""
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
+from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.geodata.columns import (
     TetFloraInventoryColumn,
     chosen_columns,
@@ -26,16 +26,12 @@ from ..tetflora_addon.geodata.inventories import IMPERIAL, METRIC
 from ..tetflora_addon.geodata.layers import ENDINGS
 from ..tetflora_addon.geodata.outlines import KINDS
 from ..tetflora_addon.geodata.projection import PLAIN
+from ..tetflora_addon.parameters import within
 from .add import mix_in, parse_weights
 from .base import ModalJob, in_object_mode, select_only
 from .layers import selected_grounds
 
 _LAYERS = ";".join(f"*{ending}" for ending in ENDINGS)
-#: Settings that the next import does not begin with.
-_Bool, _Enum, _Float, _Int, _String = (
-    partial(kind, options={'SKIP_SAVE'})
-    for kind in (BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty)
-)
 
 
 def _file(text: str) -> Path | None:
@@ -57,47 +53,31 @@ class _Importing(ModalJob, ImportHelper):
 
     needs = (in_object_mode,)
 
-    epsg: _Int(
-        name="Coordinate System",
-        description=(
-            "EPSG code of the coordinates in the file, such as 4326 for longitude and latitude, or 25832 for a zone of "
-            "UTM. 0 uses what the file says"
-        ),
-        default=0,
-        min=0,
-        max=999_999,
+    epsg: once.integer(
+        "Coordinate System",
+        "EPSG code of the coordinates in the file, such as 4326 for longitude and latitude, or 25832 for a zone of "
+        "UTM. 0 uses what the file says",
+        **within(0, high=999_999),
     )
-    plain: _Bool(
-        name="Plain Meters",
-        description="Take coordinates for meters of a plane, whatever the file says of its coordinate system",
+    plain: once.boolean(
+        "Plain Meters", "Take coordinates for meters of a plane, whatever the file says of its coordinate system"
     )
-    new_origin: _Bool(
-        name="New Origin",
-        description=(
-            "Put the middle of this file at the world origin. Otherwise it lies where it is in relation to what was "
-            "imported before"
-        ),
+    new_origin: once.boolean(
+        "New Origin",
+        "Put the middle of this file at the world origin. Otherwise it lies where it is in relation to what was "
+        "imported before",
     )
 
-    crop: _Enum(
-        name="Crop",
-        description="What to leave out of a large area",
-        items=(
+    crop: once.choice(
+        "Crop",
+        "What to leave out of a large area",
+        (
             (WHOLE, "Nothing", "All of the file"),
             (MIDDLE, "To Its Middle", "A square around the middle"),
             (EXISTING, "To the Scene", "The selected meshes or imported terrain, or else all that the scene has"),
         ),
-        default=WHOLE,
     )
-    crop_size: _Float(
-        name="Side",
-        description="Side of the square",
-        default=2000.0,
-        min=1.0,
-        soft_max=20_000.0,
-        max=500_000.0,
-        unit='LENGTH',
-    )
+    crop_size: once.real("Side", "Side of the square", 2000.0, **within(1.0, 20_000.0, 500_000.0), unit='LENGTH')
     chosen: BoolProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
     _browsing = False
@@ -146,22 +126,15 @@ class _Raster(_Importing):
     filter_glob: StringProperty(default=PATTERN, options={'HIDDEN'})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
-    scale: _Float(
-        name="Meters per Value",
-        description="Factor on the values of the file: 0.3048 for feet, 0.1 for decimeters",
-        default=1.0,
-        min=1e-6,
-        soft_max=10.0,
-        max=1e6,
+    scale: once.real(
+        "Meters per Value",
+        "Factor on the values of the file: 0.3048 for feet, 0.1 for decimeters",
+        1.0,
+        **within(1e-6, 10.0, 1e6),
         precision=4,
     )
-    offset: _Float(
-        name="Height Offset",
-        description="What is added to all values, meters",
-        default=0.0,
-        min=-20_000.0,
-        max=20_000.0,
-        unit='LENGTH',
+    offset: once.real(
+        "Height Offset", "What is added to all values, meters", **within(-20_000.0, high=20_000.0), unit='LENGTH'
     )
 
     def order(self, context: bpy.types.Context, **others: Any) -> Import:
@@ -182,19 +155,15 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
 
     bl_label = "Import Terrain"
 
-    max_faces: _Int(
-        name="Max Faces",
-        description="Number of faces at most; a finer raster is averaged in blocks",
-        default=500_000,
-        min=100,
-        soft_max=4_000_000,
-        max=20_000_000,
+    max_faces: once.integer(
+        "Max Faces",
+        "Number of faces at most; a finer raster is averaged in blocks",
+        500_000,
+        **within(100, 4_000_000, 20_000_000),
     )
-    image: _String(
-        name="Orthophoto",
-        description=(
-            "Image of the same place that becomes the color of the ground: GeoTIFF, or JPEG or PNG with a world file"
-        ),
+    image: once.string(
+        "Orthophoto",
+        "Image of the same place that becomes the color of the ground: GeoTIFF, or JPEG or PNG with a world file",
         subtype='FILE_PATH',
     )
 
@@ -211,36 +180,30 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
     bl_label = "Import Tree Inventory"
 
     filter_glob: StringProperty(default=f"*.csv;*.tsv;*.txt;{_LAYERS}", options={'HIDDEN'})
-    units: _Enum(
-        name="Units",
-        description="Units of columns that do not name theirs",
-        items=(
+    units: once.choice(
+        "Units",
+        "Units of columns that do not name theirs",
+        (
             (METRIC, "Metric", "Meters; trunks in centimeters, unless they are too thin for that"),
             (IMPERIAL, "Imperial", "Feet; trunks in inches"),
         ),
-        default=METRIC,
     )
-    unknown: _Enum(
-        name="Unknown Species",
-        description="What stands for trees whose species is not known here",
-        items=(
+    unknown: once.choice(
+        "Unknown Species",
+        "What stands for trees whose species is not known here",
+        (
             (GENERIC, "Generic Tree", "A conifer where the name tells that it is one, else a broadleaf tree"),
             ('SPECIES', "Species", "The species below"),
             (LEFT_OUT, "Leave Out", "No tree"),
         ),
-        default=GENERIC,
     )
-    species: _Enum(name="Species", description="Species that stands for unknown ones", items=operator_items)
-    skip: _Bool(
-        name="Skip Broken Rows", description="Leave out rows with values that cannot be, instead of refusing the file"
-    )
+    species: once.choice("Species", "Species that stands for unknown ones", operator_items)
+    skip: once.boolean("Skip Broken Rows", "Leave out rows with values that cannot be, instead of refusing the file")
 
-    columns: _String(
-        name="Columns",
-        description=(
-            "JSON object of what columns hold, for those whose titles and values do not tell it: "
-            '{"Hoogte dm": "height", "X1": "crown_width ft", "X2": ""}'
-        ),
+    columns: once.string(
+        "Columns",
+        "JSON object of what columns hold, for those whose titles and values do not tell it: "
+        '{"Hoogte dm": "height", "X1": "crown_width ft", "X2": ""}',
     )
     table: CollectionProperty(type=TetFloraInventoryColumn, options={'HIDDEN', 'SKIP_SAVE'})
     active: IntProperty(options={'HIDDEN', 'SKIP_SAVE'})
@@ -288,25 +251,15 @@ class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
 
     bl_label = "Import Canopy Height"
 
-    species: _String(
-        name="Species",
-        description=(
-            "Comma-separated identifiers of species with optional weights: beech:3, spruce. Empty for the species of "
-            "new layers"
-        ),
+    species: once.string(
+        "Species",
+        "Comma-separated identifiers of species with optional weights: beech:3, spruce. Empty for the species of "
+        "new layers",
     )
-    min_height: _Float(
-        name="Min Height",
-        description="Lower canopy is left out",
-        default=3.0,
-        min=0.5,
-        soft_max=10.0,
-        max=100.0,
-        unit='LENGTH',
-    )
-    below: _String(
-        name="Ground Below",
-        description="Raster of the elevations of the ground, to subtract from those of a surface model; empty for none",
+    min_height: once.real("Min Height", "Lower canopy is left out", 3.0, **within(0.5, 10.0, 100.0), unit='LENGTH')
+    below: once.string(
+        "Ground Below",
+        "Raster of the elevations of the ground, to subtract from those of a surface model; empty for none",
         subtype='FILE_PATH',
     )
 
@@ -324,14 +277,13 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
     bl_label = "Import Outlines"
 
     filter_glob: StringProperty(default=_LAYERS, options={'HIDDEN'})
-    kind: _Enum(
-        name="Take All As",
-        description="What all areas and lines of the file are",
-        items=(
+    kind: once.choice(
+        "Take All As",
+        "What all areas and lines of the file are",
+        (
             ('KEYS', "Told by Their Keys", "What each says that it is, by the keys of OpenStreetMap or others"),
             *((kind.upper(), kind, f"All are {kind.lower()}") for kind in KINDS),
         ),
-        default='KEYS',
     )
 
     def steps(self, context: bpy.types.Context) -> Steps:

@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Change, re-roll, select and remove plants, and drop them to the ground."""
 
-from collections.abc import Generator
-
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..tetflora_addon.blender.biomes.layers import active_layer, children_of, forget_gone
+from ..tetflora_addon.blender.declare import choice, once
 from ..tetflora_addon.blender.placing.field_edits import assign_field_species, editable, reseed_field
 from ..tetflora_addon.blender.placing.ground import DropResult, drop_steps
 from ..tetflora_addon.blender.placing.plant_objects import (
@@ -21,7 +19,8 @@ from ..tetflora_addon.blender.placing.populations import own_objects, recount
 from ..tetflora_addon.blender.scene.fields import fields_of, stored_size
 from ..tetflora_addon.blender.settings import SCATTER
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Job
+from ..tetflora_addon.parameters import within
 from .base import LINKED, ModalJob, Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
 
 
@@ -34,7 +33,7 @@ class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
     bl_label = "Change Species"
     needs = (plants_or_fields_selected,)
 
-    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
+    species: choice("Species", "Species from the catalog", operator_items)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         if self.species in {"", NO_SPECIES}:
@@ -55,9 +54,7 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
     bl_label = "Re-roll Seeds"
     needs = (plants_or_fields_selected,)
 
-    roll: IntProperty(
-        name="Roll", description="A different number gives different plants", min=0, soft_max=100, options={'SKIP_SAVE'}
-    )
+    roll: once.integer("Roll", "A different number gives different plants", **within(0, 100))
 
     def run(self, context: bpy.types.Context) -> set[str]:
         number = reseed(selected_plants(context), self.roll)
@@ -74,13 +71,11 @@ class TETFLORA_OT_select_plants(Reporting, bpy.types.Operator):
     bl_label = "Select Plants"
     needs = (in_object_mode,)
 
-    species: StringProperty(
-        name="Species",
-        description="Identifier of the species, which need not be in the catalog; that of the active plant if not set",
-        options={'SKIP_SAVE'},
+    species: once.string(
+        "Species", "Identifier of the species, which need not be in the catalog; that of the active plant if not set"
     )
-    layer: BoolProperty(name="Of Layer", description="Those of the active layer, or its fields", options={'SKIP_SAVE'})
-    extend: BoolProperty(name="Extend", description="Extend the current selection", options={'SKIP_SAVE'})
+    layer: once.boolean("Of Layer", "Those of the active layer, or its fields")
+    extend: once.boolean("Extend", "Extend the current selection")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         if self.layer:
@@ -118,17 +113,16 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
     told = "which"
     needs = (in_object_mode,)
 
-    which: EnumProperty(
-        name="Which",
-        description="Plants to remove",
-        items=(
+    which: choice(
+        "Which",
+        "Plants to remove",
+        (
             ('SELECTED', "Selected", "Delete the selected plants; other selected objects stay"),
             ('SPECIES', "Species", "Delete all plants of one species in the scene"),
             ('ALL', "All", "Delete all plants in the scene"),
         ),
-        default='SELECTED',
     )
-    species: StringProperty(name="Species", description="Identifier of the species to remove", options={'SKIP_SAVE'})
+    species: once.string("Species", "Identifier of the species to remove")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
@@ -159,7 +153,7 @@ class TETFLORA_OT_drop_to_ground(ModalJob, bpy.types.Operator):
     bl_label = "Drop Plants to Ground"
     needs = (in_object_mode, plants_or_fields_selected)
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, DropResult]:
+    def steps(self, context: bpy.types.Context) -> Job[DropResult]:
         fields = [field for field in fields_of(context.selected_objects) if editable(field)]
         return drop_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context), fields)
 

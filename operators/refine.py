@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine the scene, clear or keep the results, convert plants to meshes, and clear the cache."""
-
-from collections.abc import Generator
+"""Refine the scene or only the levels of viewports, clear or keep results, convert plants, and clear the cache."""
 
 import bpy
 
 from ..tetflora_addon import storage
 from ..tetflora_addon.assets import asset_cache
+from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.job import refine
 from ..tetflora_addon.blender.job.assets import asset_warnings
 from ..tetflora_addon.blender.job.forecast import forecast, learn
@@ -19,10 +18,12 @@ from ..tetflora_addon.blender.results.hiding import keep_results
 from ..tetflora_addon.blender.results.proxy_kinds import few_bounces
 from ..tetflora_addon.blender.runtime import failed_frames, is_there, redraw, stop_jobs
 from ..tetflora_addon.blender.scene.lights import read_world
-from ..tetflora_addon.blender.viewport import auto
+from ..tetflora_addon.blender.viewport import auto, state
+from ..tetflora_addon.blender.viewport.levels import level_steps
 from ..tetflora_addon.blender.viewport.warnings import cut_off
 from ..tetflora_addon.errors import TetFloraError
-from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.jobs import Job
+from ..tetflora_addon.preview.levels import Levels
 from ..tetflora_addon.refinement.statistics import Statistics
 from .base import (
     NO_CAMERA,
@@ -50,12 +51,12 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
 
     keys = "Esc: Cancel   |   Return: Finish Early"
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Statistics]:
+    def steps(self, context: bpy.types.Context) -> Job[Statistics]:
         scene, nothing = context.scene, not has_results(context.scene)
         made_for, expected = auto.results_made_for(scene), forecast(scene, context.view_layer)
         with auto.paused():
             depsgraph = context.evaluated_depsgraph_get()
-            job = refine.refine_steps(scene, depsgraph, view_layer=context.view_layer, first_look=nothing)
+            job = refine.refine_steps(scene, depsgraph, first_look=nothing)
             try:
                 statistics = yield from job
                 auto.note_results(scene, made_for)
@@ -190,7 +191,7 @@ class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
     bl_label = "Convert Plants to Meshes"
     needs = (in_object_mode, plants_selected)
 
-    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, list[bpy.types.Object]]:
+    def steps(self, context: bpy.types.Context) -> Job[list[bpy.types.Object]]:
         return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context))
 
     def finish(self, context: bpy.types.Context, made: list[bpy.types.Object]) -> set[str]:
@@ -210,4 +211,47 @@ class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
     def run(self, _context: bpy.types.Context) -> set[str]:
         return self.done(
             f"{counted(storage.clear() + asset_cache.clear(), 'file')} deleted from {storage.current_folder()}"
+        )
+
+
+_camera_found = need(
+    lambda context: context.scene.camera is not None or getattr(state.find(context.scene), "frozen", None) is not None,
+    NO_CAMERA,
+)
+
+
+class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
+    """Refine for the scene camera, or the frozen one, without creating meshes, and keep every level to step through in
+    viewports.
+
+    Takes as long as the first part of Refine; Esc cancels and keeps the previous levels.
+    """
+
+    bl_label = "Compute Levels"
+    needs = (_camera_found,)
+    bl_options = {'REGISTER'}  # nothing in the file changes but the level that is shown
+
+    cancelled = "Cancelled; the levels are unchanged"
+
+    clear: once.boolean("Clear Levels", "Remove the levels from viewports and memory instead. The file does not change")
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self.execute(context) if self.clear else super().invoke(context, event)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        if not self.clear:
+            return super().run(context)
+        if getattr(state.find(context.scene), "levels", None) is None:
+            return self.refused("No levels to clear; click Compute Levels first")
+        state.forget(context.scene)
+        return {'FINISHED'}
+
+    def steps(self, context: bpy.types.Context) -> Job[Levels]:
+        return level_steps(context.scene, context.evaluated_depsgraph_get())
+
+    def finish(self, context: bpy.types.Context, levels: Levels) -> set[str]:
+        last = levels.levels[-1]
+        context.scene.tetflora.preview.level = last.number
+        return self.done(
+            f"{counted(len(levels), 'level')}, {len(last):,} tetrahedra with plants, {levels.nbytes / 1e6:.0f} MB"
         )

@@ -6,10 +6,11 @@ import copy
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..tetflora_addon.blender.biomes import library
+from ..tetflora_addon.blender.declare import choice, once, string
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
 from ..tetflora_addon.blender.placing.plant_objects import assign_species
 from ..tetflora_addon.blender.species.catalog import (
@@ -47,16 +48,8 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
     bl_label = "Duplicate as New Species"
     needs = (species_shown,)
 
-    name: StringProperty(
-        name="Name",
-        description="Name of the new species; the old name with a number if empty",
-        options={'SKIP_SAVE'},
-    )
-    assign: BoolProperty(
-        name="Assign to Selected Plants",
-        description="Assign the new species to the selected plants",
-        options={'SKIP_SAVE'},
-    )
+    name: once.string("Name", "Name of the new species; the old name with a number if empty")
+    assign: once.boolean("Assign to Selected Plants", "Assign the new species to the selected plants")
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if not self.name:
@@ -110,10 +103,10 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
     told = "action"
     needs = (species_shown,)
 
-    action: EnumProperty(
-        name="Action",
-        description="Change to make",
-        items=(
+    action: choice(
+        "Action",
+        "Change to make",
+        (
             ('ADD', "Add", "Add an order with three branches on each branch of the last order, half as long"),
             ('REMOVE', "Remove", "Remove the last order and its branches"),
             ('SPUR', "Short Shoots", "Add or remove short shoots with blossoms, fruit or leaves"),
@@ -183,9 +176,7 @@ class TETFLORA_OT_load_species(FileTool, bpy.types.Operator, ImportHelper):
 
     bl_label = "Load Species"
 
-    replace: BoolProperty(
-        name="Replace", description="Replace your own species of the same file name", options={'SKIP_SAVE'}
-    )
+    replace: once.boolean("Replace", "Replace your own species of the same file name")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         identifier = load_species_file(self.path, self.replace)
@@ -218,7 +209,7 @@ class TETFLORA_OT_delete_file(Reporting, bpy.types.Operator):
     bl_label = "Delete from My Files"
     bl_options = {'REGISTER'}
 
-    biome: BoolProperty(name="Biome", description="The chosen biome instead of the species", options={'SKIP_SAVE'})
+    biome: once.boolean("Biome", "The chosen biome instead of the species")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_confirm(self, event)
@@ -237,14 +228,9 @@ class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
     bl_label = "Create Asset Library"
     bl_options = {'REGISTER'}
 
-    directory: StringProperty(name="Folder", description="Folder of the library", subtype='DIR_PATH')
+    directory: string("Folder", "Folder of the library", subtype='DIR_PATH')
     filter_folder: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
-    add_library: BoolProperty(
-        name="Add to Asset Libraries",
-        description="Add the folder to Preferences > File Paths > Asset Libraries",
-        default=False,
-        options={'SKIP_SAVE'},
-    )
+    add_library: once.boolean("Add to Asset Libraries", "Add the folder to Preferences > File Paths > Asset Libraries")
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)

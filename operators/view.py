@@ -6,14 +6,15 @@ from math import cos, exp, radians, sin
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, FloatProperty, StringProperty
 from mathutils import Matrix, Vector
 
+from ..tetflora_addon.blender.declare import choice, real, string
 from ..tetflora_addon.blender.placing.first_forest import EYE_HEIGHT, sky
 from ..tetflora_addon.blender.placing.ground import Ground
 from ..tetflora_addon.blender.viewport import state
 from ..tetflora_addon.blender.viewport.warnings import mend, open_place
 from ..tetflora_addon.camera.camera import Camera
+from ..tetflora_addon.parameters import FACTOR, within
 from .base import NO_CAMERA, Reporting, in_object_mode
 
 #: Extent of a viewport's longer side at distance 1, times its focal length in millimeters.
@@ -33,10 +34,10 @@ class TETFLORA_OT_look(Reporting, bpy.types.Operator):
     bl_label = "Look from Here"
     needs = (in_object_mode,)
 
-    where: EnumProperty(
-        name="Where",
-        description="Where the camera goes",
-        items=(
+    where: choice(
+        "Where",
+        "Where the camera goes",
+        (
             ('EYE', "At Eye Height", "On the ground, 1.7 m above it, in the direction of the view"),
             ('ABOVE', "Over the Ground", "Above all ground, which fills the picture"),
             ('VIEW', "As the View Is", "Exactly where the view is"),
@@ -56,7 +57,7 @@ class TETFLORA_OT_look(Reporting, bpy.types.Operator):
                 space.region_3d.view_perspective = 'CAMERA'
             return {'FINISHED'}
         view = space.region_3d.view_matrix.inverted() if space is not None else Matrix.Rotation(_TILT, 4, 'X')
-        ground = Ground(context.view_layer, context.evaluated_depsgraph_get())
+        ground = Ground(context.evaluated_depsgraph_get())
         if self.where != 'VIEW' and not len(ground):
             return self.failed("No mesh is visible to stand on; add a ground mesh, or show it")
         camera = _camera(scene)
@@ -157,24 +158,9 @@ class TETFLORA_OT_daylight(Reporting, bpy.types.Operator):
 
     bl_label = "Daylight"
 
-    hour: FloatProperty(
-        name="Hour",
-        description="Hour of the day by the sun, which is in the south at 12",
-        default=15.0,
-        min=0.0,
-        max=24.0,
-    )
-    clouds: FloatProperty(
-        name="Clouds",
-        description="How much of the sky is covered: at 1 there are no shadows",
-        default=0.0,
-        min=0.0,
-        max=1.0,
-        subtype='FACTOR',
-    )
-    haze: FloatProperty(
-        name="Haze", description="How milky the air is", default=0.2, min=0.0, max=1.0, subtype='FACTOR'
-    )
+    hour: real("Hour", "Hour of the day by the sun, which is in the south at 12", 15.0, **within(0.0, high=24.0))
+    clouds: real("Clouds", "How much of the sky is covered: at 1 there are no shadows", **FACTOR)
+    haze: real("Haze", "How milky the air is", 0.2, **FACTOR)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
@@ -260,7 +246,7 @@ class TETFLORA_OT_mend(Reporting, bpy.types.Operator):
     bl_label = "Mend"
     bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
 
-    what: StringProperty(name="What", description="What to mend, as the panel names it")
+    what: string("What", "What to mend, as the panel names it")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         if self.what == "light":

@@ -173,22 +173,6 @@ def draw_buttons(layout: bpy.types.UILayout, *buttons: Button | None) -> None:
             button.draw(layout)
 
 
-def draw_list(
-    layout: bpy.types.UILayout,
-    kind: type[bpy.types.UIList],
-    owner: bpy.types.PropertyGroup,
-    entries: str,
-    *buttons: Button,
-    rows: int = 2,
-) -> bpy.types.UILayout:
-    """Draw a list of an owner, with buttons beside it; returns the column of these."""
-    row = layout.row()
-    row.template_list(kind.__name__, "", owner, entries, owner, f"{entries}_index", rows=rows)
-    column = row.column(align=True)
-    draw_buttons(column, *buttons)
-    return column
-
-
 class TETFLORA_UL_species(bpy.types.UIList):
     """Species of a list, each with another property beside it; of fields, with its number."""
 
@@ -220,4 +204,6 @@ def draw_species(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, ent
         place = f'blend_data.objects["{bpy.utils.escape_identifier(owner.id_data.name)}"]'
     given = {"owner": f"{place}.{owner.path_from_id()}", "entries": entries}
     buttons = (Button("edit_list", action, "", {**given, "action": action}) for action in ('ADD', 'REMOVE'))
-    draw_list(layout, TETFLORA_UL_species, owner, entries, *buttons)
+    row = layout.row()
+    row.template_list(TETFLORA_UL_species.__name__, "", owner, entries, owner, f"{entries}_index", rows=2)
+    draw_buttons(row.column(align=True), *buttons)

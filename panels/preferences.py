@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page in Preferences > Add-ons > TetFlora, and the keys: few, and free in Blender's own keymaps."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 

@@ -408,3 +408,22 @@ class Chunks(Generic[Rows]):
             self._chunks, self._there, self._number, self.marked = [], [], 0, 0
             self.append(one)
         return self._chunks[0]
+
+
+def quaternions(frame: Floats) -> Floats:
+    """Unit quaternions, (n, 4) with w first, of rotations, (n, 3, 3).
+
+    Each of the four ways to write it down is exact where its own component is large; the one with the largest is taken
+    (Shepperd, Journal of Guidance and Control, 1978).
+    """
+    r = frame
+    trace = np.trace(r, axis1=1, axis2=2)
+    w = np.stack(
+        [1 + r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2], *(1.0 + 2.0 * r[:, i, i] - trace for i in range(3))], axis=1
+    )
+    a, b, c = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
+    d, e, f = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
+    rows = ((w[:, 0], a, b, c), (a, w[:, 1], d, e), (b, d, w[:, 2], f), (c, e, f, w[:, 3]))
+    ways = np.stack([np.stack(row, axis=1) for row in rows], axis=1)
+    best = ways[np.arange(len(r)), np.argmax(w, axis=1)]
+    return best / np.linalg.norm(best, axis=1, keepdims=True)

@@ -9,10 +9,12 @@ told.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 #: Most characters of a message, of a name in menus, and of a value within a message.
 MESSAGE, NAME, VALUE = 2000, 100, 60
+_NAMED = 3  # things that a message names before it only counts
 
 #: Control characters, marks that turn the direction of writing, and halves of surrogate pairs.
 _UNREADABLE = re.compile("[\0-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufeff]+")
@@ -31,6 +33,12 @@ def quoted(value: Any) -> str:
     except (RecursionError, ValueError):  # nested too deep, or an integer of thousands of digits
         return f"a {type(value).__name__} too large to show"
     return readable(text, VALUE)
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first names, quoted, and how many more there are."""
+    text = ", ".join(f'"{name}"' for name in names[:_NAMED])
+    return text if len(names) <= _NAMED else f"{text} and {len(names) - _NAMED:,} more"
 
 
 class TetFloraError(Exception):

@@ -34,6 +34,10 @@ class Progress:
         return mapped(steps, lambda _: self)
 
 
+#: What yields its progress and returns a result.
+Job = Generator[Progress, Any, _Result]
+
+
 def mapped(steps: Generator[_Item, Any, _Result], change: Callable[[_Item], _Step]) -> Generator[_Step, Any, _Result]:
     """The steps of a part of a job as those of the whole; the part gets what is sent, and its result is returned."""
     sent = None

@@ -61,7 +61,7 @@ def test_first_frame_of_the_row_is_its_still(clean_file):
 
 def test_walk_through_the_landscape_is_clear_of_plants(clean_file):
     places = _walked(25, "landscape")
-    plants = read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)[0].position
+    plants = read_plants(bpy.context.scene, depsgraph())[0].position
     away = np.linalg.norm(plants[None, :, :2] - places[:, None, :2], axis=2).min()
 
     tree = KDTree(len(plants))

@@ -19,7 +19,7 @@ def test_forest_stands_as_it_is_described(clean_file, tmp_path):
     assert made["polygons"] + made["facets"] > 0
     assert (tmp_path / "forest.png").is_file()
     scene = bpy.context.scene
-    seeds = plants.read_plants(scene, depsgraph(), bpy.context.view_layer)[0]
+    seeds = plants.read_plants(scene, depsgraph())[0]
     conifers = np.isin(np.array(seeds.identifiers)[seeds.species], ["spruce", "conifer"])
     ground = scene.objects["Ground"]
     below = [ground.ray_cast((x, y, 1e4), (0, 0, -1))[1].z for x, y, _ in seeds.position.tolist()]

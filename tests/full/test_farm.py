@@ -55,9 +55,9 @@ def expected(seeds: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = bpy.context.scene
     scene.tetflora.refine_at_render = False
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    given = read_scene(scene, depsgraph, bpy.context.view_layer)
+    given = read_scene(scene, depsgraph)
     camera = frame_cache.shared_camera(scene, depsgraph, given)
-    refine.refine(scene, depsgraph, view_layer=bpy.context.view_layer, camera=camera)
+    refine.refine(scene, depsgraph, camera=camera)
     path = tmp_path_factory.mktemp("expected") / "expected.png"
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)

@@ -7,8 +7,6 @@ Attributes of meshes, point clouds and hair curves are plain memory, read and wr
 empty, it still returns what there was when the mode was entered.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -17,7 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..arrays import linear_of
+from ..arrays import Floats, Floats32, Integers32, Mask, linear_of
 
 Geometry = bpy.types.Mesh | bpy.types.PointCloud | bpy.types.Curves
 
@@ -121,16 +119,16 @@ def _empty(kind: Kind, size: int) -> NDArray:
 
 #: While somebody asks for another moment: matrices (4, 4) that take objects from where they are now to where they are
 #: then, see `scene.motion`.
-elsewhere: Callable[[bpy.types.Object, bpy.types.Depsgraph], NDArray[np.float64]] | None = None
+elsewhere: Callable[[bpy.types.Object, bpy.types.Depsgraph], Floats] | None = None
 
 
-def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """As `matrix_now`, or at another moment while somebody asks for that."""
     matrix = matrix_now(obj, depsgraph)
     return matrix if elsewhere is None else elsewhere(obj, depsgraph) @ matrix
 
 
-def matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+def matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """An object's evaluated matrix in world space, (4, 4); float32 in some versions of Blender.
 
     Objects that are disabled in viewports but render are not evaluated, and their stored matrix may be old. Then it
@@ -145,7 +143,7 @@ def matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray
     return matrix_now(obj.parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
 
 
-def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+def frames_of(linear: Floats) -> tuple[Floats, Floats, Mask]:
     """Rotations and uniform scales of linear maps.
 
     Parameters
@@ -178,7 +176,7 @@ def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
     return frame, lengths.mean(axis=1), sound
 
 
-def image_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
+def image_pixels(image: bpy.types.Image) -> Floats32:
     """Pixels (height, width, channels) of an image that has some, row 0 lowest, in its own color space.
 
     Pixels with a channel that is not finite, such as the sun in an EXR, are black and transparent, as in Cycles.
@@ -200,16 +198,15 @@ def linear_rgb(image: bpy.types.Image, pixels: NDArray[np.floating]) -> NDArray[
     return color
 
 
-def face_offsets(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+def face_offsets(mesh: bpy.types.Mesh) -> Integers32:
     """First corner of each face, and the number of corners: (faces + 1,)."""
     return np.append(members(mesh.polygons, "loop_start", dtype=np.int32), np.int32(len(mesh.loops)))
 
 
 @contextmanager
-def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Mesh]:
-    """The mesh of an object with its modifiers, while the context lasts; without them if it is not evaluated."""
-    evaluated = obj.evaluated_get(depsgraph)
+def mesh_of(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
+    """The mesh of an object, evaluated or not, while the context lasts."""
     try:
-        yield evaluated.to_mesh()
+        yield obj.to_mesh()
     finally:
-        evaluated.to_mesh_clear()
+        obj.to_mesh_clear()

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The only place that knows which Blender this is; every branch asks for a feature, none for a version number."""
 
-from __future__ import annotations
-
 from math import pi
 
 import bpy

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Libraries of species and of biomes: the user's own files, how they are written, and pictures in menus."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable, Iterable

@@ -15,8 +15,6 @@ Blender's timers are a list without a lock, so only the main thread may touch th
 as the extension is, looks at a queue.
 """
 
-from __future__ import annotations
-
 import threading
 import traceback
 from collections import deque

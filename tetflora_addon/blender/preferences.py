@@ -6,10 +6,11 @@ import os
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import storage
 from ..errors import SpeciesError
+from ..parameters import within
+from .declare import boolean, choice, integer, real, string
 
 # Blender stores preferences under the name of the extension's root package, two levels above this one.
 ROOT_PACKAGE = __package__.rsplit(".", 2)[0]
@@ -37,72 +38,52 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
 
     bl_idname = ROOT_PACKAGE
 
-    species_folder: StringProperty(
-        name="Species Folder",
-        description=(
-            "Folder of your own species files (*.json); if empty, a folder beside your Blender settings. A file here "
-            "replaces a built-in species of the same file name. Scenes store only the names of species: everyone who "
-            "renders a scene needs the same files"
-        ),
+    species_folder: string(
+        "Species Folder",
+        "Folder of your own species files (*.json); if empty, a folder beside your Blender settings. A file here "
+        "replaces a built-in species of the same file name. Scenes store only the names of species: everyone who "
+        "renders a scene needs the same files",
         subtype='DIR_PATH',
-        default="",
     )
-    new_quality: EnumProperty(
-        name="Quality of New Scenes",
-        description="Refinement quality that a scene gets with its first plant; it can be changed in the sidebar",
-        items=QUALITY_ITEMS,
+    new_quality: choice(
+        "Quality of New Scenes",
+        "Refinement quality that a scene gets with its first plant; it can be changed in the sidebar",
+        QUALITY_ITEMS,
         default='FINAL',
     )
-    max_memory: FloatProperty(
-        name="Max Memory",
-        description=(
-            "Gigabytes that Blender may take to refine plants and render them. Plants that would not fit become "
-            "coarser. 0 is automatic: half of the machine's memory"
-        ),
-        default=0.0,
-        min=0.0,
-        soft_max=64.0,
+    max_memory: real(
+        "Max Memory",
+        "Gigabytes that Blender may take to refine plants and render them. Plants that would not fit become "
+        "coarser. 0 is automatic: half of the machine's memory",
+        **within(0.0, 64.0),
         precision=1,
     )
-    kept_memory: FloatProperty(
-        name="Frame Cache",
-        description=(
-            "Maximum size of the frame cache in gigabytes. A render keeps meshes for frames in which the camera "
-            "returns; the least recently used go first. The current frame itself is not limited"
-        ),
-        default=1.0,
-        min=0.0,
-        soft_max=64.0,
+    kept_memory: real(
+        "Frame Cache",
+        "Maximum size of the frame cache in gigabytes. A render keeps meshes for frames in which the camera "
+        "returns; the least recently used go first. The current frame itself is not limited",
+        1.0,
+        **within(0.0, 64.0),
         precision=1,
     )
-    threads: IntProperty(
-        name="Threads",
-        description=(
-            "Number of processor cores that refine plants. 0 follows the scene's render settings: Threads in the "
-            "Performance panel. Results are the same with any number; each core takes some memory of its own"
-        ),
-        default=0,
-        min=0,
-        soft_max=16,
-        max=64,
+    threads: integer(
+        "Threads",
+        "Number of processor cores that refine plants. 0 follows the scene's render settings: Threads in the "
+        "Performance panel. Results are the same with any number; each core takes some memory of its own",
+        **within(0, 16, 64),
     )
-    use_cache: BoolProperty(
-        name="Cache Species Analysis",
-        description=(
-            "Store the analysis of your own species on disk, so that it runs once instead of in every session. Results "
-            "are the same without the cache"
-        ),
-        default=True,
+    use_cache: boolean(
+        "Cache Species Analysis",
+        "Store the analysis of your own species on disk, so that it runs once instead of in every session. Results "
+        "are the same without the cache",
+        True,
         update=_use_cache,
     )
-    cache_folder: StringProperty(
-        name="Cache Folder",
-        description=(
-            "Folder of the cache, up to 64 MB; if empty, a folder beside your Blender settings. Several Blender "
-            "instances can share it"
-        ),
+    cache_folder: string(
+        "Cache Folder",
+        "Folder of the cache, up to 64 MB; if empty, a folder beside your Blender settings. Several Blender "
+        "instances can share it",
         subtype='DIR_PATH',
-        default="",
         update=_use_cache,
     )
 

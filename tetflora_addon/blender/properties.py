@@ -2,29 +2,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What TetFlora stores in a file: ``Object.tetflora`` on plants, fields and occluders, ``Scene.tetflora`` otherwise."""
 
-import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from functools import partial
 
+import bpy
+
+from ..parameters import within
 from . import settings
 from .biomes import library
+from .declare import FIXED, HIDDEN, boolean, choice, integer, list_of, pointer_to, real, string
 from .geodata import columns
 from .placing import properties
 from .placing.plant_objects import show_age
 from .results import collection
 from .results.proxy_kinds import proxy_kind_property
-from .runtime import Listeners
+from .runtime import Listeners, classes_in
 from .scene import objects
-from .scene.explicit import EXPLICIT_PROPERTY
-from .scene.field_sizes import STAND_SMOOTH, STAND_YEAR, stored_now
-from .scene.own_ages import AGE_PROPERTY
+from .scene.field_sizes import stored_now
 from .scene.skeletons import SKELETON_TYPES
 from .settings import AnimationProperties, RefinementProperties
 from .species import asset_species, editor, edits
@@ -35,15 +28,14 @@ from .viewport import state
 #: Notified with a scene when Refine Automatically is switched on or off there.
 auto_refine_switched = Listeners()
 
-_SKELETON = {
-    "name": "Skeleton",
-    "description": (
-        "Curve, hair curves or edge mesh that defines this plant's trunk, and optionally its limbs; the species grows "
-        "the rest on them. Without one, the species grows the whole plant"
-    ),
-    "type": bpy.types.Object,
-    "poll": lambda _group, candidate: candidate.type in SKELETON_TYPES,
-}
+_SKELETON = partial(
+    pointer_to,
+    bpy.types.Object,
+    "Skeleton",
+    "Curve, hair curves or edge mesh that defines this plant's trunk, and optionally its limbs; the species grows "
+    "the rest on them. Without one, the species grows the whole plant",
+    poll=lambda _group, candidate: candidate.type in SKELETON_TYPES,
+)
 
 #: What overrides of linked objects may change; otherwise Blender forgets the change when the file is opened again.
 _OVERRIDES = {'LIBRARY_OVERRIDABLE'}
@@ -67,7 +59,7 @@ def _on_year(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
 class TetFloraFieldEntry(bpy.types.PropertyGroup, SpeciesChoice):
     """One kind of plant of a field; the attribute ``species`` of its points is an index into these."""
 
-    skeleton: PointerProperty(**_SKELETON)
+    skeleton: _SKELETON()
 
 
 class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
@@ -76,59 +68,73 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
     A field is an object whose points are plants.
     """
 
-    version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
-    is_plant: BoolProperty(
-        name="Plant",
-        description="This object is a plant: its species and seed define how it grows, its transform where",
-        options={'HIDDEN'},
+    version: integer("Version", "Layout of these properties", **HIDDEN)
+    is_plant: boolean(
+        "Plant", "This object is a plant: its species and seed define how it grows, its transform where", **HIDDEN
     )
-    seed: IntProperty(
-        name="Seed",
-        description="Each seed is a different individual of the species; the same seed always gives the same plant",
+    seed: integer(
+        "Seed",
+        "Each seed is a different individual of the species; the same seed always gives the same plant",
         override=_OVERRIDES,
     )
-    enabled: BoolProperty(
-        name="Enabled",
-        description="Include the plant in refinement and renders",
-        default=True,
+    enabled: boolean("Enabled", "Include the plant in refinement and renders", True, override=_OVERRIDES)
+    skeleton: _SKELETON(override=_OVERRIDES)
+    age: properties.AGE(override=_OVERRIDES, update=_on_age)
+    is_field: boolean(
+        "Field of Plants",
+        "Each point of this mesh or point cloud is a plant, defined by the attributes species, seed, rotation, "
+        "scale and age of the points. The attribute species is an index into the list of species",
+        **HIDDEN,
+    )
+    field_species: list_of(
+        TetFloraFieldEntry,
+        "Field Species",
+        "Species that the attribute species of a field's points refers to, starting at 0",
+    )
+    field_species_index: integer("Active Field Species", options={'HIDDEN', 'SKIP_SAVE'})
+    stand_year: real(
+        "Stand Year",
+        "Year of the stand's growth that is shown. Animate it to let the stand grow",
+        100.0,
+        **within(0.0, 200.0, 10_000.0),
+        step=100,
+        precision=1,
+        override=_OVERRIDES,
+        update=_on_year,
+    )
+    stand_smooth: boolean(
+        "Smooth Growth",
+        "Let plants grow without jumps from frame to frame, for animations. Each frame then takes longer to prepare. "
+        "Off, each plant has the form that is nearest to its size, which is best for stills",
+        **HIDDEN,
+        override=_OVERRIDES,
+        update=_on_year,
+    )
+    stand: pointer_to(stand_properties.TetFloraStand)
+    is_occluder: boolean(
+        "Occluder",
+        "Plants behind this mesh count as hidden and cost next to nothing. Use it for terrain and buildings, not "
+        "for transparent or very thin objects",
+        **FIXED,
         override=_OVERRIDES,
     )
-    skeleton: PointerProperty(**_SKELETON, override=_OVERRIDES)
-    age: FloatProperty(**AGE_PROPERTY, override=_OVERRIDES, update=_on_age)
-    is_field: BoolProperty(
-        name="Field of Plants",
-        description=(
-            "Each point of this mesh or point cloud is a plant, defined by the attributes species, seed, rotation, "
-            "scale and age of the points. The attribute species is an index into the list of species"
-        ),
-        options={'HIDDEN'},
-    )
-    field_species: CollectionProperty(
-        name="Field Species",
-        description="Species that the attribute species of a field's points refers to, starting at 0",
-        type=TetFloraFieldEntry,
-    )
-    field_species_index: IntProperty(name="Active Field Species", options={'HIDDEN', 'SKIP_SAVE'})
-    stand_year: FloatProperty(**STAND_YEAR, override=_OVERRIDES, update=_on_year)
-    stand_smooth: BoolProperty(**STAND_SMOOTH, override=_OVERRIDES, update=_on_year)
-    stand: PointerProperty(type=stand_properties.TetFloraStand)
-    is_occluder: BoolProperty(
-        name="Occluder",
-        description=(
-            "Plants behind this mesh count as hidden and cost next to nothing. Use it for terrain and buildings, not "
-            "for transparent or very thin objects"
-        ),
-        options=set(),
+    is_explicit: boolean(
+        "Refine This Mesh",
+        "Refine the object's own polygons with the plants: kept where they are near, drawn as proxies where they are "
+        "far or hidden. Use it for trees from other sources, rocks and scans, and for objects that instance them",
+        **FIXED,
         override=_OVERRIDES,
     )
-    is_explicit: BoolProperty(**EXPLICIT_PROPERTY, override=_OVERRIDES)
-    is_scatter: BoolProperty(**objects.SCATTER_PROPERTY, override=_OVERRIDES)
-    population: StringProperty(
-        name="Population", description="Identity of the population that created this", options={'HIDDEN'}
+    is_scatter: boolean(
+        "Refine Scatter",
+        "Refine what the object's modifiers or particles scatter: instances stay as they are where they are near, and "
+        "become proxies where they are far or hidden. The object goes on scattering by its own rules, and its own "
+        "surface stays as it is",
+        **FIXED,
+        override=_OVERRIDES,
     )
-    population_number: IntProperty(
-        name="Number in the Population", description="Copies made by hand share it", options={'HIDDEN'}
-    )
+    population: string("Population", "Identity of the population that created this", **HIDDEN)
+    population_number: integer("Number in the Population", "Copies made by hand share it", **HIDDEN)
 
 
 class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
@@ -136,13 +142,11 @@ class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
 
     takes_assets = False  # they have no leaves of their own
 
-    leaf: PointerProperty(
-        name="Leaf",
-        description=(
-            "Mesh object used as the leaf of the species: one unit long, stalk at the origin, along +Y, upper side "
-            "toward +Z. Every leaf has all its polygons, so keep it simple"
-        ),
-        type=bpy.types.Object,
+    leaf: pointer_to(
+        bpy.types.Object,
+        "Leaf",
+        "Mesh object used as the leaf of the species: one unit long, stalk at the origin, along +Y, upper side "
+        "toward +Z. Every leaf has all its polygons, so keep it simple",
         poll=lambda _group, candidate: candidate.type == 'MESH',
     )
 
@@ -154,16 +158,14 @@ def _notify_auto_refine(self: bpy.types.PropertyGroup, _context: bpy.types.Conte
 class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoice, bpy.types.PropertyGroup):
     """Settings of a scene."""
 
-    version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
+    version: integer("Version", "Layout of these properties", **HIDDEN)
 
     proxy_kind: proxy_kind_property()
-    baked_light: EnumProperty(
-        name="Lighting",
-        description=(
-            "How plants are lit in renders. Baked lighting is computed during Refine. It is noise-free and fast to "
-            "render, but fixed: refine again after moving a light or changing the world"
-        ),
-        items=(
+    baked_light: choice(
+        "Lighting",
+        "How plants are lit in renders. Baked lighting is computed during Refine. It is noise-free and fast to "
+        "render, but fixed: refine again after moving a light or changing the world",
+        (
             ('OFF', "Scene", "The renderer lights everything", 'LIGHT_SUN', 0),
             (
                 'PROXIES',
@@ -181,41 +183,32 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
                 2,
             ),
         ),
-        default='OFF',
     )
-    refine_at_render: BoolProperty(
-        name="Refine at Render",
-        description=(
-            "Refine for the camera of every rendered frame, also in background renders, and remove the result "
-            "afterward. Meshes made by Refine are left out of these renders. Blender's interface is locked while "
-            "rendering (Render > Lock Interface), which TetFlora enables when plants are added"
-        ),
-        default=True,
+    refine_at_render: boolean(
+        "Refine at Render",
+        "Refine for the camera of every rendered frame, also in background renders, and remove the result "
+        "afterward. Meshes made by Refine are left out of these renders. Blender's interface is locked while "
+        "rendering (Render > Lock Interface), which TetFlora enables when plants are added",
+        True,
     )
-    auto_refine: BoolProperty(
-        name="Refine Automatically",
-        description=(
-            "Refine shortly after the camera, plants or settings change, without blocking Blender. A further change "
-            "restarts the work. Large forests keep the processor busy"
-        ),
-        default=False,
+    auto_refine: boolean(
+        "Refine Automatically",
+        "Refine shortly after the camera, plants or settings change, without blocking Blender. A further change "
+        "restarts the work. Large forests keep the processor busy",
         update=_notify_auto_refine,
-        options=set(),
+        **FIXED,
     )
-    follow_viewport: BoolProperty(
-        name="Follow Viewport",
-        description=(
-            "Refine for what the 3D viewport shows instead of the scene camera: for the viewport with Rendered shading "
-            "if there is one, else the largest. A viewport that looks through the camera shows what the camera sees"
-        ),
-        default=False,
+    follow_viewport: boolean(
+        "Follow Viewport",
+        "Refine for what the 3D viewport shows instead of the scene camera: for the viewport with Rendered shading "
+        "if there is one, else the largest. A viewport that looks through the camera shows what the camera sees",
         update=_notify_auto_refine,
-        options=set(),
+        **FIXED,
     )
-    asset_detail: EnumProperty(
-        name="Asset Detail",
-        description="When instances of assets are refined",
-        items=(
+    asset_detail: choice(
+        "Asset Detail",
+        "When instances of assets are refined",
+        (
             (
                 'AUTO',
                 "Automatic",
@@ -224,60 +217,46 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
             ),
             ('REFINE', "Always Refine", "Refine instances whatever they cost"),
         ),
-        default='AUTO',
     )
-    expand_everything: BoolProperty(
-        name="Expand Everything",
-        description=(
-            "Create every polygon of every plant, for comparison. Eighty trees have about 4 million polygons; a forest "
-            "does not fit into memory"
-        ),
+    expand_everything: boolean(
+        "Expand Everything",
+        "Create every polygon of every plant, for comparison. Eighty trees have about 4 million polygons; a forest "
+        "does not fit into memory",
         options={'HIDDEN', 'ANIMATABLE'},
     )
 
-    populate: PointerProperty(type=properties.TetFloraLayer)
-    layers: CollectionProperty(
-        name="Layers",
-        description="What grows on the grounds of the scene, each with the rules to grow it again",
-        type=properties.TetFloraLayer,
+    populate: pointer_to(properties.TetFloraLayer)
+    layers: list_of(
+        properties.TetFloraLayer,
+        "Layers",
+        "What grows on the grounds of the scene, each with the rules to grow it again",
     )
-    layers_index: IntProperty(name="Active Layer", options={'HIDDEN', 'SKIP_SAVE'})
-    stand: PointerProperty(type=stand_properties.TetFloraStand)
-    output: PointerProperty(type=collection.TetFloraOutput)
-    brush: PointerProperty(type=properties.TetFloraBrush)
-    wind: PointerProperty(type=settings.TetFloraWind)
-    year: PointerProperty(type=settings.TetFloraYear)
-    preview: PointerProperty(type=state.TetFloraPreview)
-    leaf_objects: CollectionProperty(
-        name="Leaf Objects",
-        description="Your own meshes in place of a species' leaf",
-        type=TetFloraLeafObject,
+    layers_index: integer("Active Layer", options={'HIDDEN', 'SKIP_SAVE'})
+    stand: pointer_to(stand_properties.TetFloraStand)
+    output: pointer_to(collection.TetFloraOutput)
+    brush: pointer_to(properties.TetFloraBrush)
+    wind: pointer_to(settings.TetFloraWind)
+    year: pointer_to(settings.TetFloraYear)
+    preview: pointer_to(state.TetFloraPreview)
+    leaf_objects: list_of(TetFloraLeafObject, "Leaf Objects", "Your own meshes in place of a species' leaf")
+    leaf_objects_index: integer("Active Leaf Object", options={'HIDDEN', 'SKIP_SAVE'})
+    species_edits: list_of(
+        edits.TetFloraSpeciesEdit,
+        "Species Edits",
+        "Species edited in this file, as JSON; they replace those of the catalog",
+        **HIDDEN,
     )
-    leaf_objects_index: IntProperty(name="Active Leaf Object", options={'HIDDEN', 'SKIP_SAVE'})
-    species_edits: CollectionProperty(
-        name="Species Edits",
-        description="Species edited in this file, as JSON; they replace those of the catalog",
-        type=edits.TetFloraSpeciesEdit,
-        options={'HIDDEN'},
+    asset_species: list_of(
+        asset_species.TetFloraAssetSpecies,
+        "Asset Species",
+        "Objects and collections of this file that are species",
+        **HIDDEN,
     )
-    asset_species: CollectionProperty(
-        name="Asset Species",
-        description="Objects and collections of this file that are species",
-        type=asset_species.TetFloraAssetSpecies,
-        options={'HIDDEN'},
+    linked_scatters: list_of(
+        objects.TetFloraLinkedScatter, "Linked Scatterers", "Linked objects whose scatter is refined", **HIDDEN
     )
-    linked_scatters: CollectionProperty(
-        name="Linked Scatterers",
-        description="Linked objects whose scatter is refined",
-        type=objects.TetFloraLinkedScatter,
-        options={'HIDDEN'},
-    )
-    species_editor: PointerProperty(name="Species Editor", type=editor.TetFloraSpeciesEditor, options={'HIDDEN'})
-    statistics: StringProperty(
-        name="Statistics",
-        description="Statistics of the last refinement, as JSON",
-        options={'HIDDEN'},
-    )
+    species_editor: pointer_to(editor.TetFloraSpeciesEditor, "Species Editor", **HIDDEN)
+    statistics: string("Statistics", "Statistics of the last refinement, as JSON", **HIDDEN)
 
 
 _MODULES = (
@@ -285,11 +264,8 @@ _MODULES = (
     *(editor, edits, asset_species, objects, settings, columns),
 )
 CLASSES = (
-    *(cls for module in _MODULES for cls in module.CLASSES),
-    TetFloraFieldEntry,
-    TetFloraLeafObject,
-    TetFloraObject,
-    TetFloraScene,
+    *classes_in(_MODULES, bpy.types.PropertyGroup),
+    *(TetFloraFieldEntry, TetFloraLeafObject, TetFloraObject, TetFloraScene),
 )
 
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
@@ -297,12 +273,11 @@ _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 def register() -> None:
     """Register the property groups and add them to Blender's types."""
-    TetFloraScene.__annotations__["proxy_kind"] = (
-        proxy_kind_property()
-    )  # forms may have come while it was not registered
+    # Forms may have come while it was not registered.
+    TetFloraScene.__annotations__["proxy_kind"] = proxy_kind_property()
     _register()
-    bpy.types.Object.tetflora = PointerProperty(type=TetFloraObject, override=_OVERRIDES)
-    bpy.types.Scene.tetflora = PointerProperty(type=TetFloraScene)
+    bpy.types.Object.tetflora = pointer_to(TetFloraObject, override=_OVERRIDES)
+    bpy.types.Scene.tetflora = pointer_to(TetFloraScene)
 
 
 def unregister() -> None:

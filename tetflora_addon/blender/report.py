@@ -5,8 +5,6 @@
 No name of an object, file, folder or user is in it: texts in quotes and paths are left out.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import re

@@ -7,8 +7,6 @@ Between two steps of a job the artist, a script or another add-on may take away 
 before each step it is asked whether anything was deleted. It then takes back what it has made and says why.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -177,14 +175,13 @@ class JobData:
     ----------
     job : str
         Its name for the artist.
-    view_layer : bpy.types.ViewLayer, optional
-        Its dependency graph goes with it, and using that would crash Blender.
+    depsgraph : bpy.types.Depsgraph
+        It goes with its view layer, and using it then would crash Blender.
     """
 
-    def __init__(self, job: str, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer | None = None) -> None:
-        self.job, self._reason = job, ""
-        self._scene = scene
-        self._layer = (0, "") if view_layer is None else (view_layer.as_pointer(), view_layer.name)
+    def __init__(self, job: str, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        self.job, self.scene, self.depsgraph, self._reason = job, scene, depsgraph, ""
+        self._layer = depsgraph.view_layer.as_pointer(), depsgraph.view_layer.name
         self._known: list[tuple[bpy.types.ID, str]] = []
         self.add(f'the scene "{scene.name}"', scene)
 
@@ -216,7 +213,7 @@ class JobData:
         if not self._reason:
             lost = next((name for datablock, name in self._known[: 1 if few else None] if not is_there(datablock)), "")
             pointer, layer = self._layer
-            if not lost and pointer and all(pointer != one.as_pointer() for one in self._scene.view_layers):
+            if not lost and all(pointer != one.as_pointer() for one in self.scene.view_layers):
                 lost = f'the view layer "{layer}"'
             self._reason = f"{lost} was deleted" if lost else ""
         if self._reason:
@@ -266,15 +263,15 @@ def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any
 def job(title: str) -> Callable[[Callable[..., Generator]], Callable[..., Generator]]:
     """Make a job of a generator function: callers give the scene, the dependency graph and what else there is.
 
-    It gets what it needs from its first step to its last before these, as `JobData`, and is `guarded`. Closing the
-    steps, or an error, has to leave everything as it was.
+    It gets `JobData` in place of the first two, and is `guarded`. Closing the steps, or an error, has to leave
+    everything as it was.
     """
 
     def decorated(steps: Callable[..., Generator]) -> Callable[..., Generator]:
         @wraps(steps)
         def begin(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, *given: Any, **named: Any) -> Generator:
-            data = JobData(title, scene, depsgraph.view_layer)
-            return guarded(data, steps(data, scene, depsgraph, *given, **named))
+            data = JobData(title, scene, depsgraph)
+            return guarded(data, steps(data, *given, **named))
 
         return begin
 

@@ -9,8 +9,6 @@ Source: Zstandard seekable format (github.com/facebook/zstd, contrib/seekable_fo
 ends with the magic number of the table of its frames.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import uuid

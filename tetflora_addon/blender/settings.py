@@ -5,8 +5,6 @@
 Properties are generated from the engine's dataclasses, which hold their names, tooltips and ranges.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import fields
 from datetime import date, timedelta
@@ -22,7 +20,9 @@ from ..camera.view_cells import ViewCells
 from ..errors import SceneError, quoted, readable
 from ..growth.seasons import DAYS, Season
 from ..growth.wind import Wind
+from ..parameters import within
 from ..refinement.settings import QUALITIES, RefinementSettings
+from .declare import FIXED, boolean, choice, integer, once, real
 from .preferences import QUALITY_ITEMS, preferences
 
 _MAKERS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
@@ -240,10 +240,10 @@ def set_quality(group: bpy.types.PropertyGroup, number: int) -> None:
 class RefinementProperties(settings_in(RefinementSettings)):
     """Refinement settings of a scene: the engine's, quality, and the look of shells."""
 
-    quality: EnumProperty(
-        name="Quality",
-        description="How fine the result is: Cutoff, and the sizes of leaves and facets that go with it",
-        items=(
+    quality: choice(
+        "Quality",
+        "How fine the result is: Cutoff, and the sizes of leaves and facets that go with it",
+        (
             *QUALITY_ITEMS,
             ('CUSTOM', "Custom", "Your own values"),
             (
@@ -259,23 +259,21 @@ class RefinementProperties(settings_in(RefinementSettings)):
     # The paper's shading of shells (section 7), for scripts: the fraction of light that they scatter evenly (p), that
     # which those of coplanar leaves reflect as a highlight (s), the exponent of that (spear), how round contents are
     # shaded, and random variation of brightness.
-    shell_diffuse: FloatProperty(name="Shell Diffuse", default=1.0, **_SHELL)
-    shell_gloss: FloatProperty(name="Shell Gloss", default=0.04, **_SHELL)
-    shell_spear: FloatProperty(name="Shell Spear", default=7.5, **{**_SHELL, "max": 1000.0})
-    shell_roundness: FloatProperty(name="Shell Roundness", default=1.0, **_SHELL)
-    shell_variation: FloatProperty(name="Shell Variation", default=0.05, **_SHELL)
+    shell_diffuse: real("Shell Diffuse", "", 1.0, **_SHELL)
+    shell_gloss: real("Shell Gloss", "", 0.04, **_SHELL)
+    shell_spear: real("Shell Spear", "", 7.5, **{**_SHELL, "max": 1000.0})
+    shell_roundness: real("Shell Roundness", "", 1.0, **_SHELL)
+    shell_variation: real("Shell Variation", "", 0.05, **_SHELL)
 
 
 class AnimationProperties:
     """Animation settings of a scene: what frames share, and the size of the frame cache."""
 
-    share_frames: BoolProperty(
-        name="Share Between Frames",
-        description=(
-            "Where the camera is animated, refine once for all frames with similar cameras, slightly finer and wider "
-            "than a single one needs. A frame looks the same whichever frames are rendered before it"
-        ),
-        default=True,
+    share_frames: boolean(
+        "Share Between Frames",
+        "Where the camera is animated, refine once for all frames with similar cameras, slightly finer and wider "
+        "than a single one needs. A frame looks the same whichever frames are rendered before it",
+        True,
     )
     cell_length: _CELLS.length
     cell_turn: _CELLS.turn
@@ -284,24 +282,17 @@ class AnimationProperties:
 class TetFloraWind(bpy.types.PropertyGroup):
     """Settings of the wind; all but the switch and the loop can be animated."""
 
-    enabled: BoolProperty(
-        name="Wind",
-        description=(
-            "Bend and sway plants, and flutter their leaves, as they are at the refined frame. Results of Refine do "
-            "not move; with Refine at Render, each frame of an animation has its own"
-        ),
-        options=set(),
+    enabled: boolean(
+        "Wind",
+        "Bend and sway plants, and flutter their leaves, as they are at the refined frame. Results of Refine do "
+        "not move; with Refine at Render, each frame of an animation has its own",
+        **FIXED,
     )
     speed: _WIND.speed
     direction: _WIND.direction
     gusts: _WIND.gusts
-    loop: IntProperty(
-        name="Loop",
-        description="Number of frames after which all movement repeats exactly; 0 for never",
-        default=0,
-        min=0,
-        soft_max=1000,
-        options=set(),
+    loop: integer(
+        "Loop", "Number of frames after which all movement repeats exactly; 0 for never", **within(0, 1000), **FIXED
     )
 
 
@@ -328,10 +319,6 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
 _MIDDLES, _HALF = (20.0, 125.0, 196.0, 293.0), 182.0
 
 
-def _season_number(year: bpy.types.PropertyGroup) -> int:
-    return SEASONS.index(season_name(Season(year.day % DAYS, year.latitude)))
-
-
 def _go_to_season(year: bpy.types.PropertyGroup, number: int) -> None:
     day = _MIDDLES[number] + (0.0 if year.latitude >= 0.0 else _HALF)
     year.enabled, year.day = True, (day - 1.0) % 365.0 + 1.0
@@ -341,41 +328,33 @@ def _go_to_season(year: bpy.types.PropertyGroup, number: int) -> None:
 class TetFloraYear(bpy.types.PropertyGroup):
     """The day of the year, and the years that have passed; all but the switch can be animated."""
 
-    enabled: BoolProperty(
-        name="Seasons",
-        description=(
-            "Show plants as they are on a day of the year: leaves appear, grow, turn and fall. Off, it is summer. "
-            "Results of Refine do not follow the day; with Refine at Render, each frame of an animation has its own"
-        ),
-        options=set(),
+    enabled: boolean(
+        "Seasons",
+        "Show plants as they are on a day of the year: leaves appear, grow, turn and fall. Off, it is summer. "
+        "Results of Refine do not follow the day; with Refine at Render, each frame of an animation has its own",
+        **FIXED,
     )
-    season: EnumProperty(
-        name="Season",
-        description="Go to the middle of a season at the latitude of the scene, and turn on Seasons",
-        items=(
+    season: once.choice(
+        "Season",
+        "Go to the middle of a season at the latitude of the scene, and turn on Seasons",
+        (
             ('WINTER', "Winter", "Bare branches of January"),
             ('SPRING', "Spring", "Fresh leaves of early May, some still growing"),
             ('SUMMER', "Summer", "Full leaves of July"),
             ('AUTUMN', "Autumn", "Leaves of late October, most of them turned"),
         ),
-        get=_season_number,
+        get=lambda year: SEASONS.index(season_name(Season(year.day % DAYS, year.latitude))),
         set=_go_to_season,
-        options={'SKIP_SAVE'},
     )
     day: _SEASON.day
     latitude: _SEASON.latitude
     spread: _SEASON.spread
     snow: _SEASON.snow
-    years: FloatProperty(
-        name="Years",
-        description=(
-            "Years since planting, added to the age of every plant. Animate it to let plants grow. At 0, plants "
-            "without an age of their own are full-grown"
-        ),
-        default=0.0,
-        min=0.0,
-        soft_max=200.0,
-        max=10_000.0,
+    years: real(
+        "Years",
+        "Years since planting, added to the age of every plant. Animate it to let plants grow. At 0, plants "
+        "without an age of their own are full-grown",
+        **within(0.0, 200.0, 10_000.0),
         step=100,
         precision=2,
     )
@@ -421,6 +400,3 @@ def begin(scene: bpy.types.Scene) -> None:
     values = QUALITIES[chosen.new_quality]
     if not any(group.is_property_set(name) for name in values):
         set_quality(group, list(QUALITIES).index(chosen.new_quality))
-
-
-CLASSES = (TetFloraWind, TetFloraYear)

@@ -6,8 +6,6 @@ A file maps English texts to translations, those of operators under "Operator" a
 contexts. What is missing stays English.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -8,19 +8,17 @@ blocks are written. What runs here must be the engine's: it never touches bpy. N
 Where nobody looks, `run_to_end` runs all in the caller's thread: a second one would save no time, but take more memory.
 """
 
-from __future__ import annotations
-
 import atexit
 import threading
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, suppress
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 from weakref import WeakSet
 
 from .. import parallel
-from ..jobs import Progress, mapped
+from ..jobs import Job, Progress, mapped
 from ..jobs import run_to_end as run
 from ..processes import pool
 
@@ -91,7 +89,7 @@ def in_thread(work: Generator[_Item, Any, _Result], ahead: int = 0) -> Generator
         worker.stop()
 
 
-def steps_in_thread(work: Generator[Progress, Any, _Result], progress: Progress) -> Generator[Progress, Any, _Result]:
+def steps_in_thread(work: Job[_Result], progress: Progress) -> Job[_Result]:
     """As `in_thread`, for work whose items are its progress; the last one, at first a given one, stands meanwhile."""
 
     def shown(item: Progress | None) -> Progress:
@@ -103,11 +101,20 @@ def steps_in_thread(work: Generator[Progress, Any, _Result], progress: Progress)
         return (yield from mapped(items, shown))
 
 
-def call_in_thread(
-    progress: Progress, function: Callable[..., _Result], *given: object
-) -> Generator[Progress, Any, _Result]:
+def call_in_thread(progress: Progress, function: Callable[..., _Result], *given: object) -> Job[_Result]:
     """The result of a function of the engine, which a thread computes."""
     return steps_in_thread(calling(function, *given), progress)
+
+
+def written(
+    blocks: Iterable[_Item], write: Callable[[_Item], Generator[None, None, Progress]], progress: Progress
+) -> Job[None]:
+    """Write blocks one by one, while a thread makes the next."""
+    with closing(in_thread((block for block in blocks), ahead=1)) as made:
+        for block in made:
+            if block is not None:
+                progress = yield from progress.during(write(block))
+            yield progress.repeated if block is None else progress
 
 
 def calling(function: Callable[..., _Result], *given: object) -> Generator[Any, Any, _Result]:

@@ -19,7 +19,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, quaternions
 from ..parameters import script_setting, setting
 from .camera import Camera
 
@@ -91,7 +91,7 @@ class _Turns:
     @classmethod
     def around(cls, frame: Floats, turn: float) -> _Turns:
         """The cell in which a rotation (3, 3) is; cells are ``turn`` radians wide."""
-        largest = int(np.argmax(np.abs(_product(_BEFORE, _quaternion(frame)))))
+        largest = int(np.argmax(np.abs(_product(_BEFORE, quaternions(frame[None])[0]))))
         step = turn / 2.0  # an angle is twice that between quaternions
         return cls(largest, _middle(_projected(frame, largest), step), step)
 
@@ -244,26 +244,8 @@ def _middle(place: NDArray | float, step: NDArray | float) -> Floats:
 
 def _projected(frame: Floats, largest: int) -> Floats:
     """The other three parts (3,) of the quaternion of a rotation (3, 3), scaled so that one of the four is 1."""
-    quaternion = _product(_BEFORE, _quaternion(frame))
+    quaternion = _product(_BEFORE, quaternions(frame[None])[0])
     return np.delete(quaternion, largest) / quaternion[largest]
-
-
-def _quaternion(frame: Floats) -> Floats:
-    """Unit quaternion (w, x, y, z) of a rotation (3, 3), of either sign.
-
-    Notes
-    -----
-    The eigenvector of I. Y. Bar-Itzhack, "New method for extracting the quaternion from a rotation matrix", Journal of
-    Guidance, Control, and Dynamics 23 (6), 2000.
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = frame
-    k = [
-        [xx + yy + zz, zy - yz, xz - zx, yx - xy],
-        [zy - yz, xx - yy - zz, yx + xy, xz + zx],
-        [xz - zx, yx + xy, yy - xx - zz, zy + yz],
-        [yx - xy, xz + zx, zy + yz, zz - xx - yy],
-    ]
-    return np.linalg.eigh(np.array(k))[1][:, -1]
 
 
 def _product(p: Floats, q: Floats) -> Floats:

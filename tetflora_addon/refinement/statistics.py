@@ -7,8 +7,7 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass, field
 
-_NAMED = 3  # objects that a message names before it only counts
-
+from ..errors import listed
 
 #: How much coarser than asked for facets are before somebody is told.
 COARSER = 1.5
@@ -73,10 +72,8 @@ class Statistics:
         """A warning about what is unknown, or about outliers; empty where there are none."""
         if not self.outliers or self.unknown:
             return self.unknown
-        names = ", ".join(f'"{name}"' for name in sorted(self.outliers)[:_NAMED])
-        more = f" and {len(self.outliers) - _NAMED:,} more" if len(self.outliers) > _NAMED else ""
-        away = f"{min(self.outliers.values()) / 1e3:,.0f} km from the camera, far beyond all else"
-        return f"Left out, because too far to be seen: {names}{more}, {away}; move it closer or delete it"
+        far = f"{listed(sorted(self.outliers))}, {min(self.outliers.values()) / 1e3:,.0f} km from the camera"
+        return f"Left out, because too far to be seen: {far}, far beyond all else; move it closer or delete it"
 
     @property
     def coarser(self) -> str:

@@ -15,7 +15,7 @@ def scene():
 
 
 def read():
-    return places.read_places(scene(), depsgraph(), bpy.context.view_layer)
+    return places.read_places(scene(), depsgraph())
 
 
 def tree(name="tree", faces=((0, 1, 2, 3),)):

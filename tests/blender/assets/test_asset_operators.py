@@ -71,7 +71,7 @@ def test_instances_of_a_scatterer_are_not_explicit_as_well():
     add_camera()
 
     def instances():
-        return len(read_explicit(depsgraph(), bpy.context.view_layer).meshes.surface)
+        return len(read_explicit(depsgraph()).meshes.surface)
 
     assert instances() >= 4
     ground.tetflora.is_scatter = True
@@ -152,11 +152,11 @@ def test_refine_automatically_hears_of_assets_and_scatters():
     assert has_contents(scene()) and ground in taking_part(scene())
     own = species(rock)
     assert rock in taking_part(scene())
-    digests = {frame_cache.scene_digest(scene(), depsgraph(), bpy.context.view_layer)}
+    digests = {frame_cache.scene_digest(scene(), depsgraph())}
     plant = add_plant(species=own)
-    digests.add(frame_cache.scene_digest(scene(), depsgraph(), bpy.context.view_layer))
+    digests.add(frame_cache.scene_digest(scene(), depsgraph()))
     plant.location.x = 1.0
-    digests.add(frame_cache.scene_digest(scene(), depsgraph(), bpy.context.view_layer))
+    digests.add(frame_cache.scene_digest(scene(), depsgraph()))
     assert len(digests) == 3
 
 

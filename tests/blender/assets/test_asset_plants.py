@@ -32,8 +32,8 @@ def test_a_plant_is_the_asset_as_it_stands_stretched_and_mirrored_as_the_plant()
     assert found.matrices[0, :3, :3] == pytest.approx(np.diag([-1.0, 1.0, 5.0]) @ turned, abs=1e-6)
     assert found.matrices[0, :3, 3] == pytest.approx([1.0, 2.0, 3.0])
     with pytest.raises(plants.NoPlantsError):
-        plants.read_plants(scene(), depsgraph(), bpy.context.view_layer)[0]
-    given = contents.read_scene(scene(), depsgraph(), bpy.context.view_layer)
+        plants.read_plants(scene(), depsgraph())[0]
+    given = contents.read_scene(scene(), depsgraph())
     assert len(given.seeds) == 0 and len(given.places) == 1
 
 
@@ -42,7 +42,7 @@ def test_grown_plants_and_assets_stand_side_by_side():
     add_plant("bush", species="bush")
     held = [add_plant(f"asset {n}", species=own, seed=n, location=(n, 0.0, 0.0)) for n in range(3)]
     held[2].tetflora.enabled = False
-    given = contents.read_scene(scene(), depsgraph(), bpy.context.view_layer)
+    given = contents.read_scene(scene(), depsgraph())
     assert given.species == ("bush",) and given.owners == (("bush", 1),)
     (found,) = given.places
     assert found.owners == tuple(held[:2]) and found.matrices[:, 0, 3].tolist() == [0.0, 1.0]
@@ -56,7 +56,7 @@ def test_a_field_may_hold_both_and_keeps_rotation_and_scale():
     field = write_field("field", position, turn, np.full(4, 2.0), kinds, seeds, ["bush", own])
     scene().collection.objects.link(field)
     field.scale = (1.0, 1.0, 3.0)
-    assert len(plants.read_plants(scene(), depsgraph(), bpy.context.view_layer)[0]) == 2
+    assert len(plants.read_plants(scene(), depsgraph())[0]) == 2
     (found,) = read()
     assert found.owner == field and len(found) == 2
     assert found.matrices[:, 0, 3] == pytest.approx([1.0, 2.0])
@@ -125,12 +125,12 @@ def test_a_deleted_asset_is_named_and_comes_back():
     select(asset)
     bpy.ops.object.delete()
     with pytest.raises(SceneError, match=r'"plant 0", "plant 1", "plant 2" and 2 more: "tree".*was deleted; undo that'):
-        contents.read_scene(scene(), depsgraph(), bpy.context.view_layer)
+        contents.read_scene(scene(), depsgraph())
     scene().collection.objects.link(asset)
     assert len(read()[0]) == 5
     bpy.data.objects.remove(asset)
     with pytest.raises(SceneError, match=r'"tree".*was deleted'):
-        contents.read_scene(scene(), depsgraph(), bpy.context.view_layer)
+        contents.read_scene(scene(), depsgraph())
     assert find_asset(scene(), own) is not None and len(scene().objects) == 5
 
 

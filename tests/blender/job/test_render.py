@@ -47,7 +47,7 @@ class _Stub:
         if self.error is not None:
             raise self.error
         camera = read_camera(scene, depsgraph)
-        seeds = plants.read_plants(scene, depsgraph, view_layer)[0]
+        seeds = plants.read_plants(scene, depsgraph)[0]
         self.cameras.append(camera.position.round(4).tolist())
         self.plants.append(seeds.position.round(4).tolist())
         x, y, _ = camera.position

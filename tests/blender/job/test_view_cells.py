@@ -55,7 +55,7 @@ def rooms(scene):
     found = []
     for frame in range(1, FRAMES + 1):
         scene.frame_set(frame)
-        given = contents.read_scene(scene, depsgraph(), depsgraph().view_layer)
+        given = contents.read_scene(scene, depsgraph())
         found.append(frame_cache.shared_camera(scene, depsgraph(), given).cell_radius)
     return found
 

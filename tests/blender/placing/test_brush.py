@@ -206,7 +206,7 @@ def test_plants_and_results_are_no_ground():
 def test_rays_find_the_nearest_ground_of_many():
     for i in range(12):
         add_mesh(f"step {i}", size=1.0, z=float(i)).location = (3.0 * i, 0.0, 0.0)
-    surface = ground.Ground(bpy.context.view_layer, depsgraph())
+    surface = ground.Ground(depsgraph())
     assert len(surface) == 12
     places = np.array([[3.0 * i, 0.2] for i in range(12)] + [[1.5, 0.0]])
     heights = surface.heights(places, 100.0, -100.0)
@@ -214,7 +214,7 @@ def test_rays_find_the_nearest_ground_of_many():
     assert np.isnan(heights[12])
     bent = bpy.data.objects["step 3"]
     bent.scale, bent.rotation_euler = (1.0, 3.0, 2.0), (0.0, 0.5, 0.0)
-    surface = ground.Ground(bpy.context.view_layer, depsgraph())
+    surface = ground.Ground(depsgraph())
 
     place, normal = surface.cast(Vector((9.0 + 6.0 * np.sin(0.5), 0.0, 50.0)), Vector((0.0, 0.0, -2.0)))
     assert normal.z > 0.8
@@ -257,8 +257,7 @@ def test_a_stroke_whose_plants_or_ground_go_ends_with_a_message(removal, mode):
         add_plant(f"bush {n}", location=(n - 2.0, 0.0, 0.0))
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="Planted")
-    scene, layer = bpy.context.scene, bpy.context.view_layer
-    stroke = brush.Stroke(scene, layer, depsgraph(), mode)
+    stroke = brush.Stroke(bpy.context.scene, depsgraph(), mode)
     stroke.dab((0.0, 0.0, 0.0))
     REMOVALS[removal]()
     before = sorted(o.name for o in bpy.data.objects)

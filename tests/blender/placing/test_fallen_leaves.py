@@ -72,7 +72,7 @@ def test_fallen_leaves_are_there_from_autumn_to_spring_only():
     scene, year = bpy.context.scene, _group().year
 
     def species():
-        return set(plants.read_plants(scene, depsgraph(), bpy.context.view_layer)[0].identifiers)
+        return set(plants.read_plants(scene, depsgraph())[0].identifiers)
 
     without = species()
     year.enabled, year.day = True, 196.0

@@ -236,7 +236,7 @@ def _populated(**options):
     bpy.ops.tetflora.populate(count=60, seed=3, min_distance=1.0, species="bush:2, conifer", **options)
     bpy.context.view_layer.update()
     graph = bpy.context.evaluated_depsgraph_get()
-    read = read_plants(bpy.context.scene, graph, bpy.context.view_layer)[0]
+    read = read_plants(bpy.context.scene, graph)[0]
     order = np.lexsort(np.round(read.position.T, 3))
     return read.identifiers, read.species[order], read.seed[order], read.position[order], read.frame[order]
 

@@ -47,7 +47,7 @@ def add_light(kind, location=(0.3, 0.2, 3.0), turn=(0.0, 0.0, 0.0), **properties
 
 def irradiance_of_lights():
     """W/m² at the origin on level ground, by the engine."""
-    found = lights.read_lights(depsgraph(), bpy.context.view_layer)
+    found = lights.read_lights(depsgraph())
     total = np.zeros(3)
     for light in sources.split_areas(found):
         toward, arriving = sources.arriving(light, np.zeros((1, 3)))

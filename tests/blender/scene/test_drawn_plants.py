@@ -55,7 +55,7 @@ def test_plants_of_one_species_with_and_without_a_form():
     add_camera()
     add_plant("grown", "bush", 1, (0.0, 5.0, 0.0))
     add_plant("drawn", "bush", 1, (3.0, 5.0, 0.0)).tetflora.skeleton = _form()
-    seeds = plants.read_plants(scene, depsgraph(), bpy.context.view_layer)[0]
+    seeds = plants.read_plants(scene, depsgraph())[0]
     assert len(seeds.identifiers) == 2
     statistics = refine.refine(scene, depsgraph())
     assert statistics.plants == 2

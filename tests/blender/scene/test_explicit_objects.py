@@ -78,7 +78,7 @@ def _area(objects):
 
 
 def _read():
-    return read_explicit(depsgraph(), bpy.context.view_layer)
+    return read_explicit(depsgraph())
 
 
 def test_near_meshes_come_out_as_they_are_without_any_plant():

@@ -48,7 +48,7 @@ def field_of(number, kinds=("birch",), places=None, **attributes):
 
 
 def plants():
-    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)[0]
+    return read_plants(bpy.context.scene, depsgraph())[0]
 
 
 def compiled(kind):
@@ -110,7 +110,7 @@ def test_assets_are_stretched_to_their_recorded_sizes():
     assert bpy.ops.tetflora.use_as_species() == {'FINISHED'}
     (asset,) = asset_species(bpy.context.scene).values()
     field_of(2, (asset.identifier,), tf_height=('FLOAT', [5.0, 0.0]), tf_crown_width=('FLOAT', [4.0, 4.0]))
-    (found,) = read_asset_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+    (found,) = read_asset_plants(bpy.context.scene, depsgraph())
     sizes = np.linalg.norm(found.matrices[:, :3, :3], axis=1)
     wide, tall = 2.0 / asset.radius, 5.0 / asset.height
     np.testing.assert_allclose(sizes, [[wide, wide, tall], [1.0, 1.0, 1.0]], rtol=1e-5)

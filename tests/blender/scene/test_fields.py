@@ -16,8 +16,9 @@ from mathutils import Euler, Matrix, Vector
 from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import errors
+from tetflora_addon.arrays import quaternions
 from tetflora_addon.blender.job import contents
-from tetflora_addon.blender.scene import field_points, fields, objects
+from tetflora_addon.blender.scene import field_points, objects
 from tetflora_addon.blender.scene.plants import NoPlantsError, read_plants
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -67,7 +68,7 @@ def _instance_on_points(obj, instanced):
 
 
 def _plants():
-    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)[0]
+    return read_plants(bpy.context.scene, depsgraph())[0]
 
 
 def _same(first, second):
@@ -382,5 +383,5 @@ def test_rotations_to_quaternions_and_back():
     frames = np.linalg.qr(np.random.default_rng(3).normal(size=(200, 3, 3)))[0]
     frames *= np.sign(np.linalg.det(frames))[:, None, None]
     frames = np.concatenate([frames, [np.diag(d) for d in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]])
-    back = field_points._from_quaternions(np.ascontiguousarray(fields.quaternions(frames).T))
+    back = field_points._from_quaternions(np.ascontiguousarray(quaternions(frames).T))
     assert np.allclose(back.transpose(2, 0, 1), frames, atol=1e-9)

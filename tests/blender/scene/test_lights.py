@@ -25,7 +25,7 @@ def _add(name, kind, **properties):
 
 
 def _read():
-    return read_lights(depsgraph(), bpy.context.view_layer)
+    return read_lights(depsgraph())
 
 
 def test_every_kind_of_light_is_read_by_name():

@@ -88,7 +88,7 @@ WAYS = (directly, by_a_parent, in_a_field, as_a_collection_instance, within_a_co
 def test_plants_have_the_motion_of_what_moves_them(scene, way, position):
     scene.render.motion_blur_position = position
     way(scene)
-    seeds = read_plants(scene, depsgraph(), bpy.context.view_layer)[0]
+    seeds = read_plants(scene, depsgraph())[0]
     assert seeds.motion == pytest.approx(np.array([[PACE * RATE, 0, 0, 0, 0, 0]]), abs=1e-3)
     middle = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}[position]
     assert seeds.position == pytest.approx(np.array([[PACE * middle, 0, 0]]), abs=1e-4)
@@ -97,7 +97,7 @@ def test_plants_have_the_motion_of_what_moves_them(scene, way, position):
 def test_a_plant_that_turns_about_its_parent_has_both_motions(scene):
     by_a_parent(scene, path="rotation_euler", index=2, step=TURN)
     bpy.data.objects["plant"].location.x = 3.0
-    seeds = read_plants(scene, depsgraph(), bpy.context.view_layer)[0]
+    seeds = read_plants(scene, depsgraph())[0]
     assert seeds.motion[0, 5] == pytest.approx(TURN * RATE, rel=1e-5)
     chord = 3.0 * 2 * np.sin(TURN / 2) * RATE
     assert seeds.motion[0, :3] == pytest.approx([0.0, chord, 0.0], abs=1e-3)
@@ -111,7 +111,7 @@ def test_plants_without_motion_have_none(scene, off, value):
     if off != "curves":
         animated(bpy.data.objects["plant"])
         (scene.render if off == "render" else bpy.data.objects["plant"].cycles).use_motion_blur = value
-    assert read_plants(scene, depsgraph(), bpy.context.view_layer)[0].motion is None
+    assert read_plants(scene, depsgraph())[0].motion is None
 
 
 def test_every_part_of_a_plant_that_turns_has_the_velocity_of_its_place(scene):

@@ -37,7 +37,7 @@ def scene(clean_file):
 
 def seeds(scene):
     graph = depsgraph()
-    return read_plants(scene, graph, graph.view_layer)[0]
+    return read_plants(scene, graph)[0]
 
 
 def row_of_plants(plants_ages, species=SPECIES):
@@ -263,9 +263,9 @@ def test_young_plants_are_small_in_all_that_knows_them(scene):
 def test_an_age_counts_for_what_is_kept(scene):
     (plant,) = row_of_plants([0.0])
     graph = depsgraph()
-    before = frame_cache.scene_digest(scene, graph, graph.view_layer)
+    before = frame_cache.scene_digest(scene, graph)
     plant.tetflora.age = 5.0
-    assert frame_cache.scene_digest(scene, depsgraph(), graph.view_layer) != before
+    assert frame_cache.scene_digest(scene, depsgraph()) != before
 
 
 def test_the_panel_tells_the_stage(scene):

@@ -27,11 +27,11 @@ def _camera():
 
 
 def _plants():
-    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)[0]
+    return read_plants(bpy.context.scene, depsgraph())[0]
 
 
 def _occluders():
-    return objects.read_occluders(depsgraph(), bpy.context.view_layer)
+    return objects.read_occluders(depsgraph())
 
 
 @settings(

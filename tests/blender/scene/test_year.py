@@ -169,13 +169,13 @@ def test_frames_of_one_day_share_and_others_do_not(scene):
 @pytest.mark.parametrize("name", ["day", "latitude", "spread", "snow", "years"])
 def test_every_setting_of_the_year_counts_for_what_is_kept(scene, name):
     graph = depsgraph()
-    before = frame_cache.scene_digest(scene, graph, graph.view_layer)
+    before = frame_cache.scene_digest(scene, graph)
     value = getattr(scene.tetflora.year, name)
     setattr(scene.tetflora.year, name, value / 2 + 0.25)
     graph = depsgraph()
-    assert frame_cache.scene_digest(scene, graph, graph.view_layer) != before
+    assert frame_cache.scene_digest(scene, graph) != before
     setattr(scene.tetflora.year, name, value)
-    assert frame_cache.scene_digest(scene, depsgraph(), graph.view_layer) == before
+    assert frame_cache.scene_digest(scene, depsgraph()) == before
 
 
 def test_refine_automatically_looks_again_on_other_days(scene, monkeypatch):

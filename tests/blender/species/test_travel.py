@@ -66,7 +66,7 @@ def small_picture():
 
 
 def species_seen():
-    seeds = read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)[0]
+    seeds = read_plants(bpy.context.scene, depsgraph())[0]
     return [seeds.identifiers[i] for i in np.sort(seeds.species)]
 
 

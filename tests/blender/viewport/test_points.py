@@ -29,7 +29,7 @@ def _populate(count, **options):
 
 
 def _dots():
-    return points.dots_of(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+    return points.dots_of(bpy.context.scene, depsgraph())
 
 
 def test_dots_stand_where_plants_will():

@@ -10,8 +10,6 @@ How large they are, and a small picture of them for menus, follow from points on
 is compiled and no renderer is asked. Materials count by their mean color.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -20,7 +18,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import srgb_of
+from ...arrays import Floats, srgb_of
 from ...errors import SceneError
 from ..attributes import members, read
 from ..materials.face_looks import GRAY, Looks
@@ -70,13 +68,13 @@ class _Mesh:
     ``faces`` and ``leaves``, the area of leaves, are those of one place.
     """
 
-    places: NDArray[np.float64]
-    corners: NDArray[np.float64]
-    area: NDArray[np.float64]
-    color: NDArray[np.float64]
-    coverage: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    places: Floats
+    corners: Floats
+    area: Floats
+    color: Floats
+    coverage: Floats
+    low: Floats
+    high: Floats
     faces: int
     leaves: float
 
@@ -86,20 +84,7 @@ class _Mesh:
         return float((np.abs(np.linalg.det(self.places[:, :3, :3])) ** (2.0 / 3.0)).sum())
 
 
-def _meshes_of(
-    target: Target, matrix: NDArray[np.float64], depsgraph: bpy.types.Depsgraph, looks: Looks
-) -> list[_Mesh]:
-    found = []
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                found.append(_read_one(*opened, matrix @ part.matrices, looks))
-    return found
-
-
-def _read_one(
-    mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], places: NDArray[np.float64], looks: Looks
-) -> _Mesh:
+def _read_one(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], places: Floats, looks: Looks) -> _Mesh:
     mesh.calc_loop_triangles()
     positions = np.nan_to_num(read(mesh, "position").astype(np.float64))
     triangles = members(mesh.loop_triangles, "loops", 3, np.int32)
@@ -129,7 +114,7 @@ def _read_one(
     )
 
 
-def measure(variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: bpy.types.Depsgraph) -> Measures | None:
+def measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> Measures | None:
     """Means over the variants of a species, and a picture of the first.
 
     Parameters
@@ -149,7 +134,7 @@ def measure(variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: b
     """
     found, looks = [], Looks()
     for target, matrix in variants:
-        meshes = _meshes_of(target, matrix, depsgraph, looks)
+        meshes = [_read_one(*one, matrix @ part.matrices, looks) for part, *one in target.meshes(depsgraph)]
         if meshes:
             found.append(_measured(meshes, picture=not found))
     if not found:
@@ -159,9 +144,7 @@ def measure(variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: b
     return Measures(*numbers, color, found[0].picture)
 
 
-def size_of(
-    variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: bpy.types.Depsgraph
-) -> tuple[float, float]:
+def size_of(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
     """Radius and height alone, as `measure` finds them, at a fraction of the cost; zeros where nothing has a face."""
     found = []
     for target, matrix in variants:
@@ -186,20 +169,18 @@ def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
 
 def _boxes(target: Target, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
     """Extent of each mesh of a target, and its places."""
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                positions = np.nan_to_num(read(opened[0], "position"))
-                yield positions.min(axis=0), positions.max(axis=0), part.matrices
+    for part, mesh, _ in target.meshes(depsgraph):
+        positions = np.nan_to_num(read(mesh, "position"))
+        yield positions.min(axis=0), positions.max(axis=0), part.matrices
 
 
-def _extent(low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[float, float]:
+def _extent(low: Floats, high: Floats) -> tuple[float, float]:
     """Radius and height of a plant that fills a box."""
     height = float(high[2] if high[2] > 0.0 else high[2] - low[2])
     return max(0.5 * float((high - low)[:2].max()), _LEAST), max(height, _LEAST)
 
 
-def _corners(low: NDArray, high: NDArray, places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _corners(low: NDArray, high: NDArray, places: Floats) -> Floats:
     """Corners (k, 8, 3) of a box in some places."""
     corner = np.array(np.meshgrid(*zip(low, high, strict=True)), np.float64).reshape(3, -1).T
     return corner @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]
@@ -224,7 +205,7 @@ def _measured(meshes: list[_Mesh], picture: bool) -> Measures:
     )
 
 
-def _sampled(meshes: list[_Mesh]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _sampled(meshes: list[_Mesh]) -> tuple[Floats, Floats, Floats]:
     """Points evenly on what covers, with the normals and colors there, (n, 3) each."""
     total = sum(mesh.sizes * float(mesh.area.sum()) for mesh in meshes)
     draw = np.random.default_rng(1)
@@ -252,13 +233,7 @@ def _sampled(meshes: list[_Mesh]) -> tuple[NDArray[np.float64], NDArray[np.float
     return position, normal / np.maximum(length, 1e-12)[:, None], color
 
 
-def _drawn(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    colors: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-) -> NDArray[np.uint8]:
+def _drawn(points: Floats, normals: Floats, colors: Floats, low: Floats, high: Floats) -> NDArray[np.uint8]:
     """Points as a picture, each hiding what is behind it."""
     side = PICTURE_SIDE * _FINER
     middle, extent = 0.5 * (low + high), max(float((high - low).max()), 1e-9)

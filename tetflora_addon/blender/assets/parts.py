@@ -18,8 +18,8 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers32
 from ...assets.asset import AssetSource, AssetSurface
 from ...errors import SceneError
 from ...jobs import mapped
@@ -153,10 +153,10 @@ class AssetPart:
 
     name: str  # of the object, for messages
     shown: bpy.types.Object | bpy.types.GeometrySet  # the original object whose mesh it is, or the geometry
-    places: list[NDArray[np.float64]] = field(default_factory=list)  # from its space to that of the asset
+    places: list[Floats] = field(default_factory=list)  # from its space to that of the asset
 
     @property
-    def matrices(self) -> NDArray[np.float64]:
+    def matrices(self) -> Floats:
         """All places (n, 4, 4)."""
         return np.concatenate(self.places)
 
@@ -195,9 +195,7 @@ def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh | None:
 
 
 def parts_of(
-    shown: bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet,
-    name: str,
-    depsgraph: bpy.types.Depsgraph,
+    shown: bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet, name: str, depsgraph: bpy.types.Depsgraph
 ) -> tuple[list[AssetPart], list[str]]:
     """Meshes of an asset with their places, and warnings of what is left out.
 
@@ -228,7 +226,7 @@ class _Walk:
         self.parts: dict[object, AssetPart] = {}
         self.warnings: list[str] = []
 
-    def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], path: Trail) -> None:
+    def object(self, obj: bpy.types.Object, matrices: Floats, path: Trail) -> None:
         """Take an original object with what it instances."""
         if obj in path:
             raise SceneError(
@@ -247,7 +245,7 @@ class _Walk:
             if obj.type == 'CURVES' and geometry.mesh is not None:
                 self._add(obj, AssetPart(obj.name, geometry), matrices)
 
-    def collection(self, collection: bpy.types.Collection, matrices: NDArray[np.float64], path: Trail) -> None:
+    def collection(self, collection: bpy.types.Collection, matrices: Floats, path: Trail) -> None:
         """Take what a collection shows in renders."""
         if collection in path:
             raise SceneError(
@@ -258,14 +256,14 @@ class _Walk:
         for obj, places in collected(collection, matrices, self.depsgraph):
             self.object(obj, places, path)
 
-    def geometry(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Trail) -> None:
+    def geometry(self, geometry: bpy.types.GeometrySet, matrices: Floats, path: Trail) -> None:
         """Take geometry without an object, with what it instances."""
         if geometry.mesh is not None:
             name = geometry.name or (path[-1].name if path else self.name)
             self._add(geometry, AssetPart(name, geometry), matrices)
         self._instances(geometry, matrices, path)
 
-    def _instances(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Trail) -> None:
+    def _instances(self, geometry: bpy.types.GeometrySet, matrices: Floats, path: Trail) -> None:
         keys = np.zeros(len(matrices), np.uint64)
         for target, places, _ in instanced(geometry, matrices, keys):
             if isinstance(target, bpy.types.GeometrySet):
@@ -275,10 +273,10 @@ class _Walk:
             else:
                 self.object(target, places, path)
 
-    def _one_by_one(self, obj: bpy.types.Object, matrices: NDArray[np.float64]) -> None:
+    def _one_by_one(self, obj: bpy.types.Object, matrices: Floats) -> None:
         """Instances on vertices and faces, and of particles, which only Blender's own list has."""
         back = np.linalg.pinv(world_matrix(obj, self.depsgraph).astype(np.float64))
-        found: dict[bpy.types.Object, list[NDArray[np.float64]]] = {}
+        found: dict[bpy.types.Object, list[Floats]] = {}
         for _, instance in listed_instances(self.depsgraph, (obj,)):
             if instance.object.original != obj:
                 place = back @ np.array(instance.matrix_world, dtype=np.float64)
@@ -291,7 +289,7 @@ class _Walk:
         for shown, places in found.items():
             self._own(shown, (matrices[:, None] @ np.array(places)).reshape(-1, 4, 4))
 
-    def _own(self, obj: bpy.types.Object, matrices: NDArray[np.float64]) -> None:
+    def _own(self, obj: bpy.types.Object, matrices: Floats) -> None:
         """Take the surface of an object itself."""
         if obj.type not in SURFACE_TYPES or is_ours(obj):
             return
@@ -307,7 +305,7 @@ class _Walk:
         else:
             self._add(obj, AssetPart(obj.name, obj), matrices)
 
-    def _add(self, key: object, part: AssetPart, matrices: NDArray[np.float64]) -> None:
+    def _add(self, key: object, part: AssetPart, matrices: Floats) -> None:
         self.parts.setdefault(key, part).places.append(matrices)
 
 
@@ -336,6 +334,13 @@ class Target:
     def parts(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[AssetPart], list[str]]:
         """What it consists of, see `parts.parts_of`."""
         return parts_of(self.shown, self.name, depsgraph)
+
+    def meshes(self, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[AssetPart, bpy.types.Mesh, Slots]]:
+        """Its parts with faces one after the other, each with its mesh and materials while it is looked at."""
+        for part in self.parts(depsgraph)[0]:
+            with part.opened(depsgraph) as opened:
+                if opened is not None:
+                    yield part, *opened
 
 
 def digest_of(target: Target, depsgraph: bpy.types.Depsgraph) -> str:
@@ -459,15 +464,11 @@ def _surface_steps(
     yield 0.0
     found = yield from looks.steps(faces, positions, loops, corner_verts, face)
     return AssetSurface(
-        name=part.name,
-        positions=positions,
-        triangles=_vertices(loops, corner_verts),
-        face=face,
-        **found,
+        name=part.name, positions=positions, triangles=_vertices(loops, corner_verts), face=face, **found
     )
 
 
-def _vertices(loops: NDArray[np.int32], corner_verts: NDArray[np.int32]) -> NDArray[np.int32]:
+def _vertices(loops: Integers32, corner_verts: Integers32) -> Integers32:
     """Vertices of triangles from their corners, in the same array."""
     for start in range(0, len(loops), _TRIANGLES):
         piece = loops[start : start + _TRIANGLES]

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Keys, Mask
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ..attributes import world_matrix
@@ -46,8 +47,8 @@ class Places:
     """Places of one asset."""
 
     target: Target  # what stands there
-    matrices: NDArray[np.float64]  # (n, 4, 4): from the asset's space to world space
-    keys: NDArray[np.uint64]  # (n,): tell individuals apart, through animations as well
+    matrices: Floats  # (n, 4, 4): from the asset's space to world space
+    keys: Keys  # (n,): tell individuals apart, through animations as well
     #: The original object that shows it: the instancer, the plant or the field; n of them where each place has its own
     owners: tuple[bpy.types.Object, ...]
 
@@ -60,7 +61,7 @@ class Places:
         """Number of places."""
         return len(self.keys)
 
-    def counted_from(self, origin: NDArray[np.float64]) -> Places:
+    def counted_from(self, origin: Floats) -> Places:
         """The same in coordinates that begin at a place (3,) of the present ones."""
         if not origin.any():
             return self
@@ -69,9 +70,7 @@ class Places:
         return replace(self, matrices=matrices)
 
 
-def read_places(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> list[Places]:
+def read_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
     """Places of all assets of a view layer that render: first of plants, then of objects that scatter, by name.
 
     Parameters
@@ -85,16 +84,14 @@ def read_places(
         A transform that is not a number, a species whose collection has no object with faces, or a marked object of a
         kind that cannot be read; the message names the object.
     """
-    found = plant_places(scene, depsgraph, view_layer)
-    marked = sorted((o for o in renderable_objects(view_layer) if is_scatter(o)), key=lambda o: o.name_full)
+    found = plant_places(scene, depsgraph)
+    marked = sorted((o for o in renderable_objects(depsgraph.view_layer) if is_scatter(o)), key=lambda o: o.name_full)
     for scatter in read_scatters(marked, depsgraph).values():
         found += scatter.places
     return found
 
 
-def plant_places(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> list[Places]:
+def plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
     """Places of plants whose species is an asset, by the variants of each.
 
     An object stands as it is turned and scaled in the scene, at the place of the plant instead of its own.
@@ -104,7 +101,7 @@ def plant_places(
     SceneError
         As `read_places`.
     """
-    read = read_asset_plants(scene, depsgraph, view_layer)
+    read = read_asset_plants(scene, depsgraph)
     if not read:
         return []
     species = asset_species(scene)
@@ -115,7 +112,7 @@ def plant_places(
     return found
 
 
-Variant = tuple[Target, NDArray[np.float64]]
+Variant = tuple[Target, Floats]
 
 
 def variants_of(entry: TetFloraAssetSpecies, depsgraph: bpy.types.Depsgraph) -> list[Variant]:
@@ -197,11 +194,7 @@ def shows_faces(target: Target, depsgraph: bpy.types.Depsgraph) -> bool:
     SceneError
         It instances itself; the message names what does.
     """
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                return True
-    return False
+    return any(True for _ in target.meshes(depsgraph))
 
 
 def _target(datablock: bpy.types.Object | bpy.types.Collection) -> Target:
@@ -238,14 +231,14 @@ class Scatter:
             if len(keys):
                 self.places.append(Places(target, matrices, keys, (self.owner,)))
 
-    def shown(self, obj: bpy.types.Object, places: NDArray[np.float64], keys: NDArray, depth: int = 0) -> None:
+    def shown(self, obj: bpy.types.Object, places: Floats, keys: NDArray, depth: int = 0) -> None:
         """Take what an object instances."""
         if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             self.take(obj.instance_collection, places, keys, depth + 1)
         if has_nodes(obj) and (geometry := geometry_of(obj, self.depsgraph)) is not None:
             self._instances(geometry, places, keys, depth + 1)
 
-    def take(self, shown: Reference, places: NDArray[np.float64], keys: NDArray, depth: int) -> None:
+    def take(self, shown: Reference, places: Floats, keys: NDArray, depth: int) -> None:
         """Take an asset, or what a group of them holds."""
         if depth <= DEEPEST and self._is_group(shown):
             if isinstance(shown, bpy.types.Object):
@@ -258,7 +251,7 @@ class Scatter:
         else:
             self.add(_target(shown), places, keys)
 
-    def add(self, target: Target, places: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+    def add(self, target: Target, places: Floats, keys: Keys) -> None:
         """Note places of an asset; of what has no faces only how many there are."""
         if target not in self._faces:
             self._faces[target] = shows_faces(target, self.depsgraph)
@@ -301,7 +294,7 @@ def _one_by_one(walks: dict[bpy.types.Object, Scatter], depsgraph: bpy.types.Dep
         walks[owner].add(_target(original), np.array(matrices, np.float64), keys)
 
 
-def _sizeable(matrices: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _sizeable(matrices: Floats) -> Mask:
     """Whether each of some places (n, 4, 4) has a size along three axes."""
     x, y, z = (matrices[:, :3, i] for i in range(3))
     longest = np.sqrt(np.maximum.reduce([np.einsum("ni,ni->n", axis, axis) for axis in (x, y, z)]))

@@ -5,11 +5,9 @@
 Layers become ordinary populations that know their biome: each can be changed, frozen, updated and painted over.
 """
 
-from __future__ import annotations
-
 import json
 import uuid
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +18,7 @@ import bpy
 
 from ...errors import SceneError, TetFloraError
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress, part_of
+from ...jobs import Job, Progress, part_of
 from ...species.litter import FALLEN
 from ...species.litter import KIND as FALLEN_LEAVES
 from ..placing.cover import fallen_from
@@ -51,13 +49,8 @@ class BiomeResult:
 
 @job("Adding the biome")
 def add_biome_steps(
-    data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    biome: Biome,
-    grounds: Sequence[bpy.types.Object],
-    seed: int = 0,
-) -> Generator[Progress, object, BiomeResult]:
+    data: JobData, biome: Biome, grounds: Sequence[bpy.types.Object], seed: int = 0
+) -> Job[BiomeResult]:
     """Add a biome to grounds, with all of its plants. Closing the steps, or an error, leaves everything as it was.
 
     Raises
@@ -66,6 +59,7 @@ def add_biome_steps(
         It needs a species that the catalog does not have, or no layer finds any place; or something was deleted
         meanwhile.
     """
+    scene, depsgraph = data.scene, data.depsgraph
     data.add_objects(grounds)
     yield Progress(0.0, "Reading the biome")
     with restored(scene):
@@ -105,7 +99,7 @@ def add_biome_steps(
                 entry.species = renamed.get(entry.species, entry.species)
                 entry.shed_by = renamed.get(entry.shed_by, entry.shed_by)
         group.layers_index = index_of(scene, uid)
-        return (yield from _plant(scene, depsgraph, uid, *grown))
+        return (yield from _plant(data, uid, *grown))
 
 
 def _lay_on(population: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object]) -> None:
@@ -123,9 +117,7 @@ def _lay_on(population: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Obj
 
 
 @job("Planting the biome")
-def plant_biome_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, biome: bpy.types.PropertyGroup
-) -> Generator[Progress, object, BiomeResult]:
+def plant_biome_steps(data: JobData, biome: bpy.types.PropertyGroup) -> Job[BiomeResult]:
     """Plant all layers of a biome again by their settings, but frozen ones and stands of which a year is kept.
 
     Raises
@@ -133,16 +125,16 @@ def plant_biome_steps(
     SceneError
         No layer finds any place.
     """
-    uid = biome.uid
+    scene, uid = data.scene, biome.uid
     data.add_objects(entry.object for entry in biome.grounds if is_there(entry.object))
     fields = growing_of(scene, uid)
-    grown = yield from _grown([field.name for field in fields], lambda n: again_steps(scene, depsgraph, fields[n]))
-    return (yield from _plant(scene, depsgraph, uid, *grown))
+    grown = yield from _grown([field.name for field in fields], lambda n: again_steps(scene, data.depsgraph, fields[n]))
+    return (yield from _plant(data, uid, *grown))
 
 
 def _grown(
-    names: Sequence[str], grow: Callable[[int], Generator[Progress, object, GrownStand]]
-) -> Generator[Progress, object, tuple[list[tuple[str, int]], list[str]]]:
+    names: Sequence[str], grow: Callable[[int], Job[GrownStand]]
+) -> Job[tuple[list[tuple[str, int]], list[str]]]:
     """Grow stands by their numbers: names and numbers of plants of those that grew, and why others did not."""
     made, bare = [], []
     for number, name in enumerate(names):
@@ -160,15 +152,9 @@ def _grown(
     return made, bare
 
 
-def _plant(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    uid: str,
-    stands: Sequence[tuple[str, int]],
-    without: Sequence[str] = (),
-) -> Generator[Progress, object, BiomeResult]:
+def _plant(data: JobData, uid: str, stands: Sequence[tuple[str, int]], without: Sequence[str]) -> Job[BiomeResult]:
     """Plants of all layers, one after the other, and the soil under them; ``without`` tells of stands that failed."""
-    first = _STANDS if stands else 0.0
+    scene, depsgraph, first = data.scene, data.depsgraph, _STANDS if stands else 0.0
     yield Progress(first, "Planting")
     names = [population.uid for population in layers_of(scene, uid) if not population.frozen]
     layers, bare = list(stands), list(without)
@@ -201,7 +187,7 @@ def _plant(
     depsgraph.update()
     biome = find_biome(scene, uid)
     grounds = [entry.object for entry in biome.grounds if entry.object is not None] if biome is not None else []
-    kept = lay_biome_soil(scene, depsgraph, grounds) if grounds else []
+    kept = lay_biome_soil(depsgraph, grounds) if grounds else []
     return BiomeResult(biome.name if biome is not None else "", layers, bare, kept)
 
 

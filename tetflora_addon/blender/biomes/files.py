@@ -6,8 +6,6 @@ A layer is a population, with the keys of population files, or a stand that grow
 the name of the file and of the key. What grows on a ground is saved as one, with a picture, into the user's folder.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The ground of biomes: a hectare of land where there is none, and soil in the colors of what stands and lies on it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from math import radians, tan
 from typing import Any
@@ -11,8 +9,8 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers
 from ...growth.hashing import key_of_seed
 from ...planting.cover import Sheet
 from ...planting.plane import gradient_noise
@@ -36,9 +34,7 @@ _WAVES = ((46.0, 0.42), (17.0, 0.1), (5.0, 0.016))
 _FLOOR, _BANK, _BROOK, _DEEP = 7.0, 22.0, 4.5, 0.16
 
 
-def heights(
-    x: NDArray[np.float64], y: NDArray[np.float64], ground: Mapping[str, Any], seed: int = 0
-) -> NDArray[np.float64]:
+def heights(x: Floats, y: Floats, ground: Mapping[str, Any], seed: int = 0) -> Floats:
     """Of land for a biome, meters: hills, a slope that rises to the north, and a valley from west to east."""
     value = {name: ground.get(name, GROUND[name][0]) for name in ("hills", "slope", "valley")}
     points, key = np.stack([x, y], axis=-1).reshape(-1, 2), key_of_seed(seed)
@@ -52,7 +48,7 @@ def heights(
     return value["hills"] * 2.0 * rough + tan(radians(value["slope"])) * y + low
 
 
-def brook(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def brook(x: Floats) -> Floats:
     """Where the middle of a valley is, y by x, meters."""
     return 7.0 * np.sin(np.asarray(x) / 19.0) + 3.0 * np.sin(np.asarray(x) / 7.3 + 1.0)
 
@@ -85,9 +81,7 @@ def make_line(scene: bpy.types.Scene, name: str, grounds: Iterable[bpy.types.Obj
     return made
 
 
-def lay_biome_soil(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.Object]
-) -> list[str]:
+def lay_biome_soil(depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.Object]) -> list[str]:
     """Give ground a soil in the colors of the low plants and the litter of all biomes on it.
 
     Returns
@@ -103,7 +97,7 @@ def lay_biome_soil(
     cells = sheet.rows * sheet.columns
     on_it = set(fits)
     # Groups of the artist's own layers have no file, which says what soil is like.
-    found = [b for b in biomes_in(scene) if b.source and on_it & {entry.object for entry in b.grounds}]
+    found = [b for b in biomes_in(depsgraph.scene) if b.source and on_it & {entry.object for entry in b.grounds}]
     if not found:
         return []
     earth, turf, share, here = np.zeros((cells, 3)), np.zeros((cells, 3)), np.zeros(cells), np.full(cells, 1e-9)
@@ -112,7 +106,7 @@ def lay_biome_soil(
         ground = data_of(biome).get("ground", {})
         value = {name: np.array(ground.get(name, GROUND[name][0])) for name in ("earth", "turf", "turf_share")}
         own = np.full(cells, 1e-6)
-        for low, cell, area, colors in _low_plants(scene, depsgraph, biome.uid, sheet):
+        for low, cell, area, colors in _low_plants(depsgraph, biome.uid, sheet):
             own += np.bincount(cell, minlength=cells)
             if low:
                 hidden += np.bincount(cell, area, cells)
@@ -133,9 +127,10 @@ def lay_biome_soil(
 
 
 def _low_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uid: str, sheet: Sheet
-) -> Iterable[tuple[bool, NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]]:
+    depsgraph: bpy.types.Depsgraph, uid: str, sheet: Sheet
+) -> Iterable[tuple[bool, Integers, Floats, Floats]]:
     """Plants of the layers of a biome: whether they are low, their cells, what each hides, m², and its color."""
+    scene = depsgraph.scene
     for population in scene.tetflora.layers:
         if population.biome != uid:
             continue
@@ -149,7 +144,7 @@ def _low_plants(
             yield bool(population.covers), place[:, 1] * sheet.columns + place[:, 0], seen, colors
 
 
-def _blurred(grid: NDArray[np.float64], reach: int = 8) -> NDArray[np.float64]:
+def _blurred(grid: Floats, reach: int = 8) -> Floats:
     """Means over squares of 2 · reach + 1 cells, (rows, columns)."""
     for axis in (0, 1):
         sums = np.cumsum(np.pad(grid, [(reach + 1, reach) if a == axis else (0, 0) for a in (0, 1)], mode="edge"), axis)

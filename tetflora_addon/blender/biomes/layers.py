@@ -5,8 +5,6 @@
 A biome is followed by the layers that it is made of, which know its identity. Layers of fields point at their object.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -9,14 +9,15 @@ it. A picture has the file's name and lies beside it.
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
 
 from ...errors import NAME, SceneError, readable
 from ...files import is_identifier, is_regular, parse_json, read_whole
+from ..declare import HIDDEN, once, string
 from ..file_library import ENDING, MAX_FILE_BYTES, OwnFiles, Pictures
 from ..preferences import own_species_folder, species_folders
 from ..species.catalog import Item, number_of
@@ -129,23 +130,15 @@ def items(_owner: object = None, _context: bpy.types.Context | None = None) -> l
     return _items[1]
 
 
-def biome_property(**options: Any) -> Any:
-    """An enumeration of all biomes, for property groups and operators."""
-    return EnumProperty(name="Biome", description="Biome from the library", items=items, **options)
+#: An enumeration of all biomes, for property groups and operators.
+BIOMES = partial(once.choice, "Biome", "Biome from the library", items)
 
 
 class BiomeChoice:
     """Mix-in for property groups: a stored identifier, and an enumeration over it for panels, the first if none."""
 
-    biome_file: StringProperty(name="Biome File", options={'HIDDEN'})
-    new_biome: EnumProperty(
-        name="Biome",
-        description="Biome from the library",
-        items=items,
-        get=lambda self: _number(self.biome_file),
-        set=lambda self, number: _choose(self, number),
-        options={'SKIP_SAVE'},
-    )
+    biome_file: string("Biome File", **HIDDEN)
+    new_biome: BIOMES(get=lambda self: _number(self.biome_file), set=lambda self, number: _choose(self, number))
 
 
 def _number(identifier: str) -> int:

@@ -6,8 +6,6 @@ Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An 
 ``--json`` the last line on stdout is a JSON object, after Blender's own output.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -194,7 +192,7 @@ def _refine(options: argparse.Namespace) -> dict:
             raise SceneError(f"The folder {target.parent} does not exist; create it or choose another")
         if target.is_dir():
             raise SceneError(f"{target} is a folder; add a file name")
-    statistics = refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
+    statistics = refine(scene, bpy.context.evaluated_depsgraph_get())
     if target is not None:
         scene.tetflora.output.save_results = True
         write_blend(target, lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))

@@ -2,17 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Columns of an inventory as a dialog shows them: title, some values, and what they are taken for."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
 
 from ...errors import SceneError
 from ...geodata.inventories import FIELDS, preview
+from ..declare import HIDDEN, choice, string
 
 _UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
 
@@ -20,20 +18,18 @@ _UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
 class TetFloraInventoryColumn(bpy.types.PropertyGroup):
     """A column, whose title is the name."""
 
-    field: EnumProperty(
-        name="Meaning",
-        description="What the column holds",
-        items=[(name.upper() or 'NONE', label, "") for name, label in FIELDS.items()],
+    field: choice(
+        "Meaning", "What the column holds", [(name.upper() or 'NONE', label, "") for name, label in FIELDS.items()]
     )
-    unit: EnumProperty(
-        name="Unit",
-        description="Unit of its numbers, where neither they nor the title name one",
-        items=[
+    unit: choice(
+        "Unit",
+        "Unit of its numbers, where neither they nor the title name one",
+        [
             ('AUTO', "Automatic", ""),
             *((unit, label, "") for unit, label in zip(("m", "cm", "mm", "ft", "in"), _UNITS, strict=True)),
         ],
     )
-    values: StringProperty(name="Values", options={'HIDDEN'})
+    values: string("Values", **HIDDEN)
 
 
 def show_columns(table: bpy.types.bpy_prop_collection, path: Path) -> None:
@@ -70,6 +66,3 @@ def columns_in(text: str) -> dict[str, str]:
     if not isinstance(columns, dict) or not all(isinstance(value, str) for value in columns.values()):
         raise SceneError('Columns is not a JSON object of texts, such as {"H": "height"}')
     return columns
-
-
-CLASSES = (TetFloraInventoryColumn,)

@@ -5,9 +5,7 @@
 The first import of a scene finds that place, and all later ones lie where they are in relation to it.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -16,11 +14,11 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Mask
 from ...errors import SceneError
 from ...geodata.projection import MapOrigin, System, between, place_about, system_of
-from ...jobs import Progress
+from ...jobs import Job
 from ..runtime import JobData, guarded
 
 #: Custom property of the scene.
@@ -62,17 +60,17 @@ class Box:
     """What a file is cropped to: corners in meters from a place, and the system that counts for the file."""
 
     place: MapOrigin
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    low: Floats
+    high: Floats
     system: System
 
-    def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def holds(self, points: Floats) -> Mask:
         """Which points (n, 2) of the file lie within it."""
         local = self.place.offsets(points, self.system, "")
         return ((local >= self.low) & (local <= self.high)).all(axis=1)
 
     @property
-    def corners(self) -> NDArray[np.float64]:
+    def corners(self) -> Floats:
         """Its four corners in the file's coordinates, (4, 2)."""
         (west, south), (east, north) = self.low, self.high
         local = np.array([[west, south], [east, south], [east, north], [west, north]])
@@ -106,7 +104,7 @@ class Import:
         """Meshes to put things on: those that are selected, else what was imported as ground."""
         return list(self.selected) or [obj for obj in self.scene.objects if obj.type == 'MESH' and obj.get(TERRAIN)]
 
-    def box(self, points: NDArray[np.float64], system: System) -> Box | None:
+    def box(self, points: Floats, system: System) -> Box | None:
         """What the file with some points (n, 2) is cropped to; None for all of it."""
         if self.crop == WHOLE:
             place_about(system, points.min(axis=0), points.max(axis=0), self.what)
@@ -128,7 +126,7 @@ class Import:
         """The error of a crop that leaves nothing."""
         return SceneError(f"{self.what}nothing of it lies within the Crop; choose another one")
 
-    def origin(self, points: NDArray[np.float64], system: System) -> MapOrigin:
+    def origin(self, points: Floats, system: System) -> MapOrigin:
         """The scene's place, or one in the middle of points (n, 2), if it has none or another is asked for.
 
         Plain meters are taken for those of the scene, if it has a map of meters; whether they are near is asked later.
@@ -136,7 +134,7 @@ class Import:
         place = None if self.new else origin_of(self.scene)
         return place or place_about(system, points.min(axis=0), points.max(axis=0), self.what)
 
-    def local(self, place: MapOrigin, points: NDArray[np.float64], system: System) -> NDArray[np.float64]:
+    def local(self, place: MapOrigin, points: Floats, system: System) -> Floats:
         """Meters from the scene's origin, (n, 2), of points of the file.
 
         Raises
@@ -166,7 +164,7 @@ class Imported:
 
 
 #: Of an import.
-Steps = Generator[Progress, Any, Imported]
+Steps = Job[Imported]
 
 
 def importing(steps: Callable[..., Steps]) -> Callable[..., Steps]:
@@ -181,7 +179,7 @@ def importing(steps: Callable[..., Steps]) -> Callable[..., Steps]:
 
     @wraps(steps)
     def job(order: Import, *others: Any, **named: Any) -> Steps:
-        data = JobData("Importing", order.scene, order.depsgraph.view_layer)
+        data = JobData("Importing", order.scene, order.depsgraph)
         data.add_objects(list(order.selected))
         return guarded(data, read(order, *others, **named))
 

@@ -6,14 +6,12 @@ Woods and meadows are closed curves on the ground. Water is flat and filled, bui
 corners, roads are ribbons: a curve that is tilted on its side and extruded.
 """
 
-from __future__ import annotations
-
 from math import pi
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...geodata.outlines import BUILDING, KINDS, WATER, MapFeature, denser, one_ring, read_outlines
 from ...jobs import Progress
 from ...planting.wetness import HeightGrid
@@ -89,7 +87,7 @@ def outline_steps(order: Import, kind: str = "") -> Steps:
     return Imported(None, [f"Outlines imported: {told}", *notes, f"coordinates: {system.name}"])
 
 
-def building_areas(scene: bpy.types.Scene) -> list[NDArray[np.float64]]:
+def building_areas(scene: bpy.types.Scene) -> list[Floats]:
     """Borders (k, 2) of the buildings that were imported into a scene, in world space."""
     return [
         (members(spline.points, "co", 4).astype(np.float64) @ np.array(obj.matrix_world).T)[:, :2]
@@ -108,7 +106,7 @@ def _remove(collections: list[bpy.types.Collection]) -> None:
     bpy.data.batch_remove([*curves, *(material for material in materials if not material.users)])
 
 
-def _curve(outline: MapFeature, rings: list[NDArray[np.float64]], heights: HeightGrid | None) -> bpy.types.Object:
+def _curve(outline: MapFeature, rings: list[Floats], heights: HeightGrid | None) -> bpy.types.Object:
     """One outline as an object; its points count from its first one, so that far ones are exact."""
     data = bpy.data.curves.new(outline.name, 'CURVE')
     filled = outline.closed and outline.kind in (WATER, BUILDING)

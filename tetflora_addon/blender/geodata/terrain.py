@@ -6,27 +6,24 @@ The engine reads all but pixels of PNG. Those are Blender's, which divides whole
 as long as the image's color space is Non-Color.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
-from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers
 from ...errors import SceneError
 from ...files import read_whole
 from ...geodata.geotiff import place_of_image, use_zstandard
 from ...geodata.grids import ENDINGS, mosaic, read_grid
 from ...geodata.projection import System, between, chosen_system
 from ...geodata.rasters import MAX_CELLS, Raster, checked_size, in_degrees
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...planting.wetness import HeightGrid, cell_for, height_grid
 from ..attributes import image_pixels, write
 from ..compat import shader_tree
@@ -51,7 +48,7 @@ _SOIL, _GREEN, _COVERED = (0.06, 0.043, 0.028), (0.05, 0.075, 0.018), 0.8
 _FINEST, _MOST_CELLS = 0.5, 4_000_000  # of the grid that heights are read from: meters
 
 
-def read_raster(order: Import, path: Path | None = None) -> Generator[Progress, Any, Raster]:
+def read_raster(order: Import, path: Path | None = None) -> Job[Raster]:
     """Read the raster of an import, its tiles as one; yields progress.
 
     Parameters
@@ -184,7 +181,7 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
     return Imported(made, [ground, *notes])
 
 
-def _faces(raster: Raster) -> NDArray[np.int64]:
+def _faces(raster: Raster) -> Integers:
     """Cells at the corners of quads, (f, 4), counter-clockwise from above, between cells that have values."""
     known = np.isfinite(raster.values)
     whole = known[:-1, :-1] & known[1:, :-1] & known[1:, 1:] & known[:-1, 1:]
@@ -206,7 +203,7 @@ def _photo_place(path: Path, ground: System) -> Raster:
     return place if place.system.epsg else replace(place, system=ground)
 
 
-def _photo_material(path: Path, cells: NDArray[np.float64]) -> tuple[bpy.types.Material, NDArray[np.float64], int]:
+def _photo_material(path: Path, cells: Floats) -> tuple[bpy.types.Material, Floats, int]:
     """A material of an image, UV (n, 2) of places in its pixels (n, 2), and how many of these lie beside it."""
     unreadable = "Blender cannot read this image; write it as JPEG, PNG or 8-bit TIFF"
     image = _loaded(path, unreadable)
@@ -256,7 +253,7 @@ def _mesh(
     return made
 
 
-def heights_steps(order: Import, progress: Progress) -> Generator[Progress, Any, HeightGrid | None]:
+def heights_steps(order: Import, progress: Progress) -> Job[HeightGrid | None]:
     """Heights of the ground that an import lies on; None where there is none."""
     if not order.grounds:
         return None

@@ -2,20 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fields of trees from inventories, and from rasters of canopy height: each tree has the size that is recorded."""
 
-from __future__ import annotations
-
 from collections import Counter
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import tau
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats32, Integers32
 from ...compiled.flora import compile_species
 from ...compiled.sizes import crown_of
 from ...errors import SceneError, SpeciesError
@@ -27,7 +24,7 @@ from ...growth.axes import profile
 from ...growth.growth import trunks
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...growth.seeds import Seeds
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...planting.places import Placement
 from ...planting.rules import species_by_weight
 from ...species.ages import ages_of
@@ -52,9 +49,9 @@ _SLENDER = 60.0  # height above breast height over the diameter there, of the th
 class Curves:
     """Sizes of a species by age, each (a,) float64, ascending; meters."""
 
-    height: NDArray[np.float64]
-    diameter: NDArray[np.float64]
-    width: NDArray[np.float64]
+    height: Floats
+    diameter: Floats
+    width: Floats
 
 
 @lru_cache(maxsize=64)
@@ -76,11 +73,8 @@ def curves_of(species: Species) -> Curves:
 
 
 def complete(
-    sizes: dict[str, NDArray[np.float32]],
-    kinds: NDArray[np.int32],
-    identifiers: list[str],
-    find: Callable[[str], Species],
-) -> tuple[NDArray[np.float32], int]:
+    sizes: dict[str, Floats32], kinds: Integers32, identifiers: list[str], find: Callable[[str], Species]
+) -> tuple[Floats32, int]:
     """Heights (n,) with those that follow from the trunk, or else from the crown; and how many these are.
 
     Species that are assets, or cannot be found, have none.
@@ -167,7 +161,7 @@ def inventory_steps(
     return made
 
 
-def _species(inventory: Inventory, unknown: str) -> tuple[list[str], NDArray[np.int32], Counter, Counter]:
+def _species(inventory: Inventory, unknown: str) -> tuple[list[str], Integers32, Counter, Counter]:
     """Species of the catalog, and the index (n,) of each tree's, -1 for those to leave out; and names that stand for
     others, with how many trees have them: of other species, and of no known one.
     """
@@ -262,12 +256,7 @@ _SPECIES, _AZIMUTH, _SEED = 1, 2, 3
 
 
 def _plant(
-    order: Import,
-    place: MapOrigin,
-    flat: NDArray[np.float64],
-    kinds: NDArray[np.int32],
-    identifiers: list[str],
-    sizes: dict[str, NDArray[np.float32]],
+    order: Import, place: MapOrigin, flat: Floats, kinds: Integers32, identifiers: list[str], sizes: dict[str, Floats32]
 ) -> Steps:
     """Make the field; its plants stand on the ground, those beside it as high as the ground is on average."""
     progress = Progress(0.8, "Standing trees on the ground")
@@ -302,8 +291,8 @@ def _plant(
 
 
 def _fit_steps(
-    scene: bpy.types.Scene, placement: Placement, identifiers: list[str], columns: dict[str, NDArray[np.float32]]
-) -> Generator[Progress, Any, NDArray[np.float32]]:
+    scene: bpy.types.Scene, placement: Placement, identifiers: list[str], columns: dict[str, Floats32]
+) -> Job[Floats32]:
     """Factors on height and crown width, (n, 3), that make up for what is random in each plant."""
     none, number = np.zeros((len(placement), 3)), len(placement)
     numbers = (columns.get(name, none[:, 0]).astype(np.float64) for name in NUMBERS)

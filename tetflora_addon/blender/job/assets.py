@@ -6,15 +6,13 @@ Blender's meshes are read here, one asset at a time; the engine compiles each in
 found by its digest.
 """
 
-from __future__ import annotations
-
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers32
 from ...assets import asset_cache
 from ...assets.asset import Asset, AssetSource, AssetTable, Instances
 from ...assets.compiled import compile_steps
@@ -22,7 +20,7 @@ from ...camera.camera import Camera
 from ...emission.asset_costs import AssetCosts
 from ...emission.asset_plan import OriginalPolicy
 from ...errors import SceneError, TetFloraError
-from ...jobs import Progress, mapped, run_to_end
+from ...jobs import Job, Progress, mapped, run_to_end
 from ...refinement.shared_parts import PlacedAssets
 from ..assets.parts import Target, digest_of, read_source_steps
 from ..assets.places import Places
@@ -42,10 +40,10 @@ class SceneAssets:
 
     targets: tuple[Target, ...]  # what each asset is of
     placed: PlacedAssets  # instances, in the coordinates of the job
-    matrices: NDArray[np.float64]  # (n, 4, 4): the same, as Blender takes them
+    matrices: Floats  # (n, 4, 4): the same, as Blender takes them
     #: Objects that show instances; None for those that are plants of many objects
     owners: tuple[bpy.types.Object | None, ...]
-    owner: NDArray[np.int32]  # (n,): index into these
+    owner: Integers32  # (n,): index into these
     originals: OriginalPolicy  # which are always drawn as the originals
     warnings: tuple[str, ...] = field(default=())
 
@@ -65,12 +63,8 @@ def is_plain(scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.ty
 
 
 def bind_steps(
-    scene: bpy.types.Scene,
-    places: Sequence[Places],
-    depsgraph: bpy.types.Depsgraph,
-    camera: Camera,
-    left: float,
-) -> Generator[Progress, bool | None, SceneAssets | None]:
+    scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.types.Depsgraph, camera: Camera, left: float
+) -> Job[SceneAssets | None]:
     """Compile the assets of places, which count from the camera's origin; None where there are none.
 
     Raises
@@ -115,7 +109,7 @@ def _in_cycles(scene: bpy.types.Scene) -> bool:
 
 
 def _costs(
-    places: Sequence[Places], depsgraph: bpy.types.Depsgraph, pixels: NDArray[np.float64] | None = None
+    places: Sequence[Places], depsgraph: bpy.types.Depsgraph, pixels: Floats | None = None
 ) -> tuple[list[Target], AssetCosts]:
     numbers: dict[Target, int] = {}
     for one in places:
@@ -128,15 +122,10 @@ def _costs(
 
 def triangles_of(target: Target, depsgraph: bpy.types.Depsgraph) -> int:
     """Triangles of an asset, without reading any."""
-    number = 0
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                number += (len(opened[0].loops) - 2 * len(opened[0].polygons)) * len(part.matrices)
-    return number
+    return sum((len(m.loops) - 2 * len(m.polygons)) * len(part.matrices) for part, m, _ in target.meshes(depsgraph))
 
 
-def _covered(placed: PlacedAssets, camera: Camera) -> NDArray[np.float64]:
+def _covered(placed: PlacedAssets, camera: Camera) -> Floats:
     """Pixels (a,) that instances of each asset would cover if nothing hid them."""
     wholes = placed.wholes()
     seen = camera.distance_to_view(wholes.center) < wholes.reach
@@ -145,12 +134,8 @@ def _covered(placed: PlacedAssets, camera: Camera) -> NDArray[np.float64]:
 
 
 def _compiled(
-    scene: bpy.types.Scene,
-    target: Target,
-    depsgraph: bpy.types.Depsgraph,
-    progress: Progress,
-    warnings: list[str],
-) -> Generator[Progress, bool | None, Asset]:
+    scene: bpy.types.Scene, target: Target, depsgraph: bpy.types.Depsgraph, progress: Progress, warnings: list[str]
+) -> Job[Asset]:
     """The compiled asset of a target, known already or made now."""
     hidden = bool(hidden_originals(scene))
     source: AssetSource | None = None

@@ -118,9 +118,7 @@ def expected_polygons(flora: Flora, seeds: Seeds) -> float:
     return float(flora.polygons[trunks(flora.rows, seeds).row].sum())
 
 
-def read_scene(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> SceneContents:
+def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneContents:
     """Read everything that takes part in refinement except the camera.
 
     Raises
@@ -130,23 +128,20 @@ def read_scene(
     """
     check_settings(scene)
     with originals_shown(scene, depsgraph):
-        explicit = read_explicit(depsgraph, view_layer)
-        places = tuple(read_places(scene, depsgraph, view_layer))
+        explicit = read_explicit(depsgraph)
+        places = tuple(read_places(scene, depsgraph))
         try:
-            seeds, owners, unknown = read_plants(scene, depsgraph, view_layer)
+            seeds, owners, unknown = read_plants(scene, depsgraph)
         except NoPlantsError:
             if explicit is None and not places:
                 raise
-            none = np.zeros(0)
-            frames = none.reshape(0, 3), none.reshape(0, 3, 3)
-            seeds, owners = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none), ()
-            unknown = ""
-        lights = (*read_lights(depsgraph, view_layer), *sky_suns(scene))
+            seeds, owners, unknown = replace(Seeds.upright(0), identifiers=()), (), ""
+        lights = (*read_lights(depsgraph), *sky_suns(scene))
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
-        sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        looks = LayerLooks(view_layer)
+        sources = read_sources(scene, depsgraph) if baked else None
+        looks = LayerLooks(depsgraph.view_layer)
         worn = {owner: looks.of(owner) for owner in dict.fromkeys(one.owner for one in places)}
-        occluders = read_occluders(depsgraph, view_layer)
+        occluders = read_occluders(depsgraph)
         return SceneContents(seeds, explicit, occluders, lights, sources, owners, places, worn, unknown)
 
 
@@ -193,7 +188,7 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
     TetFloraError
         As `read_scene` and `compile_for`.
     """
-    given = read_scene(scene, depsgraph, depsgraph.view_layer)
+    given = read_scene(scene, depsgraph)
     if given.unknown:  # who counts in advance wants to know it
         raise SceneError(given.unknown)
     flora = in_year(scene, compile_for(given.species, scene, depsgraph))

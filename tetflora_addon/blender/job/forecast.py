@@ -6,8 +6,6 @@ Plants are counted, some of them looked at, and figures computed a moment after 
 often than a few hundredths of the time allow; never while a panel is drawn.
 """
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -17,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import memory
+from ...arrays import Floats, Integers
 from ...compiled.sizes import Crown
 from ...emission.estimate import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
@@ -142,7 +141,7 @@ def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand 
 
 def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
     single: list[bpy.types.Object] = []
-    parts: list[tuple[int, NDArray[np.float64], NDArray[np.float64], list[str]]] = []
+    parts: list[tuple[int, Floats, Floats, list[str]]] = []
     for obj in renderable_objects(view_layer):
         group = obj.tetflora
         if group.is_plant:
@@ -183,9 +182,7 @@ def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
     return float(expected_of(leaf, np.array([season.northern_day]), PRESENT)[0])
 
 
-def _merged(
-    rows: list[tuple[int, NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]], crowns: tuple[Crown, ...]
-) -> Stand:
+def _merged(rows: list[tuple[int, Floats, Floats, Integers]], crowns: tuple[Crown, ...]) -> Stand:
     """Samples of all parts as one, in which each part has the weight of its plants."""
     whole = sum(number for number, *_ in rows)
     found: list[tuple] = [(np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))]
@@ -196,13 +193,13 @@ def _merged(
     return Stand(whole, *map(np.concatenate, zip(*found, strict=True)), crowns)
 
 
-def _some(number: int) -> NDArray[np.int64]:
+def _some(number: int) -> Integers:
     return np.linspace(0, number - 1, min(number, _LOOKED_AT)).round().astype(np.int64)
 
 
 def _plants(
-    scene: bpy.types.Scene, plants: list[bpy.types.Object], carried: NDArray[np.float64]
-) -> tuple[int, NDArray[np.float64], NDArray[np.float64], list[str]]:
+    scene: bpy.types.Scene, plants: list[bpy.types.Object], carried: Floats
+) -> tuple[int, Floats, Floats, list[str]]:
     """How many single plants there are; feet, scales and kinds of some."""
     chosen = [plants[i] for i in _some(len(plants)).tolist()]
     matrices = carried @ np.array([o.matrix_world for o in chosen], dtype=np.float64)
@@ -214,21 +211,15 @@ def _plants(
 
 
 def _aged(
-    scene: bpy.types.Scene,
-    scale: NDArray[np.float64],
-    kinds: list[str],
-    which: NDArray[np.int64],
-    ages: NDArray[np.floating],
-) -> tuple[NDArray[np.float64], list[str]]:
+    scene: bpy.types.Scene, scale: Floats, kinds: list[str], which: Integers, ages: NDArray[np.floating]
+) -> tuple[Floats, list[str]]:
     """Scales of plants and their kinds, by their ages."""
     sound = np.where(sound_ages(ages), ages, 0.0).astype(np.float64)
     named, which, taller = crown_kinds(scene, kinds, which, sound if sound.any() else None)
     return scale * taller, [named[i] for i in which.tolist()]
 
 
-def _field(
-    scene: bpy.types.Scene, obj: bpy.types.Object, there: NDArray[np.int64]
-) -> tuple[int, NDArray[np.float64], NDArray[np.float64], list[str]]:
+def _field(scene: bpy.types.Scene, obj: bpy.types.Object, there: Integers) -> tuple[int, Floats, Floats, list[str]]:
     """The same of those points (n,) of a field that are plants now, as they are stored.
 
     What nodes make of it is not known before they are evaluated.
@@ -251,9 +242,7 @@ def _field(
     return number, foot, *_aged(scene, scale, kinds, which, ages)
 
 
-def _ages_of(
-    scene: bpy.types.Scene, kinds: list[str], which: NDArray[np.int64], tall: NDArray[np.floating]
-) -> NDArray[np.float64]:
+def _ages_of(scene: bpy.types.Scene, kinds: list[str], which: Integers, tall: NDArray[np.floating]) -> Floats:
     """Ages (n,) at which plants of some kinds are so tall, about."""
     out = np.zeros(len(tall))
     for number, kind in enumerate(kinds):
@@ -265,7 +254,7 @@ def _ages_of(
     return out
 
 
-def _stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: NDArray[np.int64]) -> NDArray | None:
+def _stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: Integers) -> NDArray | None:
     """An attribute of some points that is a number each; None where there is none."""
     attribute = points.attributes.get(name)
     if attribute is None or attribute.domain != 'POINT' or attribute.data_type not in {'FLOAT', 'INT'}:

@@ -70,7 +70,6 @@ _of_species: dict[int, tuple[Species, str]] = {}
 def scene_digest(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
-    view_layer: bpy.types.ViewLayer,
     camera: Camera | None = None,
     given: SceneContents | None = None,
 ) -> str:
@@ -91,7 +90,7 @@ def scene_digest(
         The scene cannot be refined as it is.
     """
     if given is None:
-        given = read_scene(scene, depsgraph, view_layer)
+        given = read_scene(scene, depsgraph)
     content = hashlib.sha256()
     explicit = ()
     if given.explicit is not None:
@@ -235,7 +234,7 @@ def key_of(
     TetFloraError
         As `scene_digest`.
     """
-    content = hashlib.sha256(scene_digest(scene, depsgraph, layers[0], camera, given).encode())
+    content = hashlib.sha256(scene_digest(scene, depsgraph, camera, given).encode())
     add_to_digest(content, [scene.name, *(layer.name for layer in layers)])
     for group in (scene.tetflora, scene.tetflora.output, *scene.tetflora.output.species):
         add_to_digest(content, _values(group))

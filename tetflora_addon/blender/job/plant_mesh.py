@@ -2,23 +2,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Single plants as ordinary meshes with branches and leaves: for the species preview and for Convert to Meshes."""
 
-from __future__ import annotations
-
-from collections.abc import Generator, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...compiled.flora import Flora
 from ...emission.expansion import coarse_faces
 from ...emission.plants import expanded_blocks
 from ...errors import SceneError
 from ...growth.seeds import Seeds
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...species.species import Species
 from ..attributes import frames_of, world_matrix, write
 from ..results.hiding import artists_flags
@@ -36,16 +34,10 @@ from .contents import check_fits, compile_for, in_year, memory_left
 _UPRIGHT = np.eye(3)
 
 
-def single_seed(identifier: str, seed: int, frame: NDArray[np.float64] = _UPRIGHT) -> Seeds:
+def single_seed(identifier: str, seed: int, frame: Floats = _UPRIGHT) -> Seeds:
     """One plant at the origin, of scale 1; its frame (3, 3) matters because leaves turn to the sky."""
-    return Seeds(
-        identifiers=(identifier,),
-        species=np.zeros(1, np.int32),
-        seed=np.array([seed], dtype=np.int64),
-        position=np.zeros((1, 3)),
-        frame=np.array(frame)[None],
-        scale=np.ones(1),
-    )
+    own = {"seed": np.array([seed], dtype=np.int64), "frame": np.array(frame)[None]}
+    return replace(Seeds.upright(1), identifiers=(identifier,), **own)
 
 
 #: Polygons of a plant with the same materials: ``'bark'``, ``'leaf'`` or ``'blossom'``; form of leaf; buffers.
@@ -85,17 +77,10 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
 
 
 @job("Convert Plants to Meshes")
-def make_plant_mesh_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
-) -> Generator[Progress, object, list[bpy.types.Object]]:
+def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> Job[list[bpy.types.Object]]:
     """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
 
     A step for each plant; closing the generator early removes what was made.
-
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-        With edited species and leaf objects.
 
     Returns
     -------
@@ -107,7 +92,7 @@ def make_plant_mesh_steps(
     TetFloraError
         An invalid species or transform, or too many polygons; nothing is made.
     """
-    plants = list(plants)
+    scene, depsgraph, plants = data.scene, data.depsgraph, list(plants)
     data.add_objects([*plants, *leaf_objects(scene).values()])
     world = np.array([world_matrix(p, depsgraph) for p in plants]).reshape(-1, 4, 4)
     frame, scale, sound = frames_of(world[:, :3, :3])
@@ -151,9 +136,7 @@ def make_plant_mesh_steps(
     return made
 
 
-def _placed(
-    mesh: bpy.types.Mesh, plant: bpy.types.Object, frame: NDArray[np.float64], position: NDArray[np.float64]
-) -> bpy.types.Object:
+def _placed(mesh: bpy.types.Mesh, plant: bpy.types.Object, frame: Floats, position: Floats) -> bpy.types.Object:
     """An object of a plant's mesh with the plant's look and collections, at its place (3,) with its axes (3, 3)."""
     obj = bpy.data.objects.new(mesh.name, mesh)
     for collection in plant.users_collection:

@@ -8,21 +8,17 @@ While Blender takes one block of polygons over, the engine makes the next in its
 originals where they are whole, and meshes of clusters where some of them are near.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby
-from typing import TypeVar
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import memory
+from ...arrays import Integers, Integers32, Keys, Mask
 from ...assets.measures import kite_mesh
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...camera.camera import Camera, origin_near
@@ -33,7 +29,7 @@ from ...emission.drawing import drawing
 from ...emission.emitters import EmissionInput
 from ...emission.plants import Block, Transition, expanded_blocks
 from ...emission.polygons import PolygonBlock
-from ...jobs import Progress, mapped
+from ...jobs import Job, Progress, mapped
 from ...processes import pool
 from ...proxies.facet_weights import facet_weights, measuring, unmeasured
 from ...refinement import loop
@@ -58,7 +54,7 @@ from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..scene.skeletons import look_of
-from ..worker import call_in_thread, in_thread, nobody_waits, run_to_end, steps_in_thread
+from ..worker import call_in_thread, nobody_waits, run_to_end, steps_in_thread, written
 from .assets import SceneAssets, asset_warnings, bind_steps, is_plain
 from .contents import (
     SceneContents,
@@ -78,8 +74,6 @@ _BATCH = 16
 _LOOP_FRACTION = 0.6
 #: Polygons, were all plants expanded, from which on other processes are started at once.
 _MANY = 1e6
-
-_Block = TypeVar("_Block")
 
 
 @dataclass
@@ -106,7 +100,7 @@ class _Run:
     baking: Baking | None = None
 
 
-def left_alone(bound: SceneAssets, plan: AssetPlan) -> NDArray[np.bool_]:
+def left_alone(bound: SceneAssets, plan: AssetPlan) -> Mask:
     """Owners (k,) of which every instance is the original: they go on showing them themselves."""
     whole = np.zeros(len(bound.placed), bool)
     whole[plan.originals] = True
@@ -132,11 +126,11 @@ def _write_plain(run: _Run) -> None:
         add_instances(run.results, f"{target.name} {number:03d}", source, matrices, _ids(keys))
 
 
-def _ids(keys: NDArray[np.uint64]) -> NDArray[np.int32]:
+def _ids(keys: Keys) -> Integers32:
     return (keys >> np.uint64(33)).astype(np.int32)
 
 
-def write_assets(run: _Run, plan: AssetPlan) -> Generator[Progress, None, None]:
+def write_assets(run: _Run, plan: AssetPlan) -> Job[None]:
     """Write what a plan draws as instances."""
     results, bound, statistics = run.results, run.bound, run.statistics
     alone = left_alone(bound, plan)
@@ -165,8 +159,8 @@ def write_assets(run: _Run, plan: AssetPlan) -> Generator[Progress, None, None]:
 
 
 def _groups(
-    bound: SceneAssets, asset: NDArray[np.int32], owner: NDArray[np.int32]
-) -> Iterator[tuple[Target, bpy.types.Object | None, NDArray[np.int64]]]:
+    bound: SceneAssets, asset: Integers32, owner: Integers32
+) -> Iterator[tuple[Target, bpy.types.Object | None, Integers]]:
     """Rows (k,) of the same asset and the same owner each."""
     for pair in np.unique(asset.astype(np.int64) * len(bound.owners) + owner).tolist():
         target, shown = divmod(pair, len(bound.owners))
@@ -205,12 +199,12 @@ def _kites(run: _Run, target: int) -> Maker:
 def _write_clusters(
     run: _Run,
     target: int,
-    cluster: NDArray[np.int64],
-    instance: NDArray[np.int32],
-    ids: NDArray[np.int32],
+    cluster: Integers,
+    instance: Integers32,
+    ids: Integers32,
     kites: bool,
     maker: Callable[[_Run, int], Maker],
-) -> Generator[Progress, None, None]:
+) -> Job[None]:
     """Meshes of the clusters of one asset, each once, and instances of them."""
     results, bound, make = run.results, run.bound, maker(run, target)
     name = bound.targets[target].name + (" kites" if kites else "")
@@ -241,16 +235,14 @@ def _write_clusters(
 def read_meshes(target: Target, depsgraph: bpy.types.Depsgraph) -> AssetMeshes:
     """All surfaces of an asset, numbered as those of its `AssetSource`."""
     surfaces, numbers, matrices = [], [], []
-    for part in target.parts(depsgraph)[0]:
-        with part.opened(depsgraph) as opened:
-            if opened is not None:
-                numbers += [len(surfaces)] * len(part.matrices)
-                surfaces.append(read_mesh(*opened))
-                matrices.append(part.matrices)
+    for part, *one in target.meshes(depsgraph):
+        numbers += [len(surfaces)] * len(part.matrices)
+        surfaces.append(read_mesh(*one))
+        matrices.append(part.matrices)
     return AssetMeshes(surfaces, np.array(numbers, np.int32), np.concatenate(matrices))
 
 
-def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Generator[Progress, None, None]:
+def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Job[None]:
     """Write blocks of plants; progress goes from a given fraction to .95, and the statistics count."""
     materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
 
@@ -269,7 +261,7 @@ def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Generator
         text = f"Making polygons: {run.statistics.polygons_meshed:,}"
         return Progress(start + (0.95 - start) * block.fraction, text)
 
-    yield from _written(_of_all_ages(run, blocks), write, Progress(start, "Making polygons"))
+    yield from written(_of_all_ages(run, blocks), write, Progress(start, "Making polygons"))
 
 
 def _of_all_ages(run: _Run, blocks: Iterator[Block]) -> Iterator[Block]:
@@ -288,7 +280,7 @@ def _of_all_ages(run: _Run, blocks: Iterator[Block]) -> Iterator[Block]:
             yield replace(some[-1], buffers=concatenate_buffers([block.buffers for block in some]))
 
 
-def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Generator[Progress, None, None]:
+def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Job[None]:
     """Write polygons of meshes that take part, with their own materials; the statistics count."""
     explicit = run.given.explicit
 
@@ -299,18 +291,7 @@ def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Generator[Prog
         _made(run, obj, block.buffers, lit=False)
         return Progress(0.95, f"Keeping polygons: {run.statistics.polygons_meshed:,}")
 
-    yield from _written(blocks, write, Progress(0.95, "Keeping polygons"))
-
-
-def _written(
-    blocks: Iterator[_Block], write: Callable[[_Block], Generator[None, None, Progress]], progress: Progress
-) -> Generator[Progress, None, None]:
-    """Write blocks one by one, while the next is computed."""
-    with closing(in_thread(blocks, ahead=1)) as made:
-        for block in made:
-            if block is not None:
-                progress = yield from progress.during(write(block))
-            yield progress.repeated if block is None else progress
+    yield from written(blocks, write, Progress(0.95, "Keeping polygons"))
 
 
 def _made(run: _Run, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> None:
@@ -320,7 +301,7 @@ def _made(run: _Run, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> 
     run.statistics.memory_mb += buffers.nbytes / 1e6
 
 
-def _bake_light(baking: Baking, refined: EmissionInput) -> Generator[Progress, None, None]:
+def _bake_light(baking: Baking, refined: EmissionInput) -> Job[None]:
     """Compute the light of everything, and write that of meshes."""
     if refined.facet_pixels is not None:
         facets = (Progress(0.9, f"Baking light: {count:,} facets") for count in baking.add_facets(refined))
@@ -338,14 +319,13 @@ def refine_steps(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     *,
-    view_layer: bpy.types.ViewLayer | None = None,
     for_render: bool = False,
     beside: Sequence[bpy.types.Collection] = (),
     camera: Camera | None = None,
     given: SceneContents | None = None,
     mark: str = "",
     first_look: bool = False,
-) -> Generator[Progress, bool | None, Statistics]:
+) -> Job[Statistics]:
     """Refine a scene step by step.
 
     Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced at the end. Send True
@@ -355,8 +335,6 @@ def refine_steps(
     ----------
     depsgraph : bpy.types.Depsgraph
         Evaluated for the frame.
-    view_layer : bpy.types.ViewLayer, optional
-        By default the dependency graph's.
     for_render : bool
         Results get a collection of their own beside the artist's, and are refined for the render region.
     beside : sequence of bpy.types.Collection
@@ -376,20 +354,17 @@ def refine_steps(
     TetFloraError
         No camera, nothing to refine, unknown species, unusable plants or meshes; the message says which.
     """
-    layer = view_layer or depsgraph.view_layer
-    data = JobData("Refine", scene, layer)
+    data = JobData("Refine", scene, depsgraph)
     if camera is None and scene.camera is not None:
         data.add_objects([scene.camera])
     data.add_objects(taking_part(scene))
     data.add_objects(leaf_objects(scene).values())
     results = Results(scene, 'RENDER' if for_render else 'VIEW', mark, data)
     run = _Run(depsgraph, camera, given, data, results, beside)
-    return guarded(data, _refine_steps(run, layer, first_look))
+    return guarded(data, _refine_steps(run, first_look))
 
 
-def _refine_steps(
-    run: _Run, layer: bpy.types.ViewLayer, first_look: bool
-) -> Generator[Progress, bool | None, Statistics]:
+def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     results, depsgraph, clock, statistics = run.results, run.depsgraph, run.clock, run.statistics
     scene = results.scene
     use_machine(scene)
@@ -397,7 +372,7 @@ def _refine_steps(
     if run.camera is None or run.given is None:
         depsgraph.update()  # reading what was deleted since the last step would crash Blender
     camera = run.camera or read_camera(scene, depsgraph, region_only=results.purpose == 'RENDER')
-    given = run.given or read_scene(scene, depsgraph, layer)
+    given = run.given or read_scene(scene, depsgraph)
     camera = camera.local()
     if scene.tetflora.expand_everything:  # for no camera: exports, and others' renderers
         camera = camera.counted_from(origin_near(given.seeds.position))
@@ -457,7 +432,7 @@ def _refine_steps(
     return statistics
 
 
-def _first_look(run: _Run) -> Generator[Progress, bool | None, None]:
+def _first_look(run: _Run) -> Job[None]:
     """A coarse result in place of earlier ones, without baked light."""
     whole = run.results
     results = Results(whole.scene, whole.purpose, "", run.data)
@@ -500,7 +475,7 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
         As `refine_steps`.
     """
     camera = read_camera(scene, depsgraph).local()
-    given = read_scene(scene, depsgraph, depsgraph.view_layer).counted_from(camera.origin)
+    given = read_scene(scene, depsgraph).counted_from(camera.origin)
     flora = in_wind(scene, compile_for(given.species, scene, depsgraph), camera)
     bound = run_to_end(bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera)))
     settings = refinement_settings(scene)
@@ -526,7 +501,7 @@ def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
     return removed
 
 
-def _run_loop(run: _Run) -> Generator[Progress, bool | None, Refinement]:
+def _run_loop(run: _Run) -> Job[Refinement]:
     """Refine; the statistics get a step for each pass."""
     given, placed = run.given, None if run.bound is None else run.bound.placed
     others = given.occluders, given.polygons, given.lights, placed
@@ -546,7 +521,7 @@ def _run_loop(run: _Run) -> Generator[Progress, bool | None, Refinement]:
     return state
 
 
-def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, EmissionInput]:
+def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
     """Refine, and find out what the proxies depend on."""
     flora, given, bound, camera, statistics = run.flora, run.given, run.bound, run.camera, run.statistics
     form = run.form.emission
@@ -588,7 +563,7 @@ def _refined(run: _Run, disc: float) -> Generator[Progress, bool | None, Emissio
     return EmissionInput(flora, refinement, camera, with_all, detail.tolerance, originals, disc)
 
 
-def _write_refined(run: _Run) -> Generator[Progress, bool | None, None]:
+def _write_refined(run: _Run) -> Job[None]:
     """Refine, and make meshes, instances and proxies; objects that scatter what has taken part are replaced as well."""
     scene, given = run.results.scene, run.given
     run.form, left = proxy_kind_of(scene), memory_left(scene, run.camera)

@@ -187,7 +187,7 @@ def _make(scene: bpy.types.Scene) -> None:
     for layers in in_main_thread(partial(_layers_of, scene)):
         layers[0].update()  # going to the frame updates only the active layer's depsgraph
         depsgraph = layers[0].depsgraph
-        given = read_scene(scene, depsgraph, layers[0])
+        given = read_scene(scene, depsgraph)
         read = frame_cache.shared_camera(scene, depsgraph, given), given
         wanted.append((frame_cache.key_of(scene, depsgraph, layers, *read), layers, read))
     in_main_thread(partial(frame_cache.stow, scene, [key for key, *_ in wanted]))
@@ -195,7 +195,7 @@ def _make(scene: bpy.types.Scene) -> None:
         layer, there = layers[0], in_main_thread(partial(frame_cache.recall, scene, key))
         new = [] if there is None else [there]
         if there is None:
-            options = {"view_layer": layer, "for_render": True, "camera": camera, "given": given, "mark": key[:8]}
+            options = {"for_render": True, "camera": camera, "given": given, "mark": key[:8]}
             before = result_collections(scene, 'RENDER')
             statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
             if statistics.unknown:

@@ -8,8 +8,6 @@ it. Over a leaf and both of its sides the mean of what is reflected, and of what
 lines lie in darker surroundings and the other way round.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import cos, radians, sin, tan
 from typing import Any

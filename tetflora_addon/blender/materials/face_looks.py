@@ -17,6 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats16, Floats32, Integers, Integers32
 from ...growth.hashing import mix
 from ..attributes import image_pixels, linear_rgb, read, values_of
 from ..compat import tree_in_use
@@ -37,13 +38,13 @@ class Pyramid:
 
     texels: NDArray[np.uint64]  # (n,): of all copies; each is four float16: linear RGB times alpha, and alpha
     #: start, columns, rows: (l,): First texel, and size, of each copy
-    start: NDArray[np.int32]
-    columns: NDArray[np.int32]
-    rows: NDArray[np.int32]
+    start: Integers32
+    columns: Integers32
+    rows: Integers32
     #: width, height: (l,): Texels that the whole image would be wide and high in each copy; of sizes that are no power
     #: of two, the last texels stick out
-    width: NDArray[np.float32]
-    height: NDArray[np.float32]
+    width: Floats32
+    height: Floats32
 
     @property
     def side(self) -> float:
@@ -55,9 +56,7 @@ class Pyramid:
         """Number of copies l."""
         return len(self.start)
 
-    def look(
-        self, u: NDArray[np.float32], v: NDArray[np.float32], size: NDArray[np.float32], extension: str
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def look(self, u: Floats32, v: Floats32, size: Floats32, extension: str) -> tuple[Floats32, Floats32]:
         """Mean colors (3, p, k) and alpha (p, k) around some points.
 
         Parameters
@@ -87,13 +86,13 @@ class Pyramid:
         color, alpha = np.ascontiguousarray(np.moveaxis(found[..., :3], -1, 0)), found[..., 3].copy()
         return color / np.maximum(alpha, 1e-6), alpha
 
-    def _texels(self, index: NDArray[np.int32]) -> NDArray[np.float32]:
+    def _texels(self, index: Integers32) -> Floats32:
         return np.take(self.texels, index).view(np.float16).reshape(*index.shape, 4).astype(np.float32)
 
 
 def _columns(
-    u: NDArray[np.float32], width: NDArray[np.float32], columns: NDArray[np.int32], extension: str
-) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
+    u: Floats32, width: Floats32, columns: Integers32, extension: str
+) -> tuple[Floats32, Integers32, Integers32]:
     """Of one axis: where between two texels, and both of these."""
     if extension == 'REPEAT':
         u = u - np.floor(u)
@@ -148,7 +147,7 @@ def pyramid_of(image: bpy.types.Image, weighted: bool, most: int = MOST_TEXELS) 
     )
 
 
-def _finest(image: bpy.types.Image, pixels: NDArray[np.float32], weighted: bool, halvings: int) -> NDArray[np.float16]:
+def _finest(image: bpy.types.Image, pixels: Floats32, weighted: bool, halvings: int) -> Floats16:
     """The finest copy that is kept (h, w, 4): linear RGB times alpha, and alpha."""
     height, width, channels = pixels.shape
     # Eight bits have 256 values: a table is ten times as fast as a power.
@@ -183,7 +182,7 @@ def _finest(image: bpy.types.Image, pixels: NDArray[np.float32], weighted: bool,
     return found
 
 
-def _halved(level: NDArray[np.floating]) -> NDArray[np.float32]:
+def _halved(level: NDArray[np.floating]) -> Floats32:
     """Half as many columns and rows; the last ones count twice where their number is odd."""
     height, width = level.shape[:2]
     level = np.pad(level, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge") if height % 2 or width % 2 else level
@@ -222,9 +221,9 @@ class Plan:
     name: str  # of the material, for messages
     layers: MeshLayers
     reader: FaceReader
-    viewport: NDArray[np.float32]  # (3,): the material's color in viewports, for images that are missing
+    viewport: Floats32  # (3,): the material's color in viewports, for images that are missing
     #: (5,): Cover, color times cover, and the lightness of what goes through; of where all has its mean, if it varies
-    constant: NDArray[np.float32]
+    constant: Floats32
     problems: list[str] = field(default_factory=list)  # for the artist
     surface: bpy.types.NodeSocket | None = None  # what its shaders lead to; None if it has none
     is_known: bool = False  # whether its transmission is
@@ -323,7 +322,7 @@ class Plan:
                 found[some] = _means_of(NodeValues(points, self.reader.curves).shader(self.surface))
         return found[which]
 
-    def _parts(self, lengths: list[NDArray[np.float32]], count: int, most: int) -> NDArray[np.int32]:
+    def _parts(self, lengths: list[Floats32], count: int, most: int) -> Integers32:
         """Parts along an edge of each triangle: a power of two that follows its texels, and fewer if they are many."""
         texels = np.max(lengths, axis=0) * self.texels if lengths else np.zeros(count, np.float32)
         limit, each = (_MOST_PARTS_UNEVEN, _TEXELS_UNEVEN) if self.uneven else (_MOST_PARTS, _TEXELS)
@@ -343,13 +342,7 @@ _BATCH = 1 << 15  # points that are evaluated at once, so that they stay in the 
 class _Sampled(Plan):
     """Points (p, k) of k triangles: the middles of n × n parts of each."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        corners: dict[str, NDArray[np.float32]],
-        sizes: dict[str, NDArray[np.float32]],
-        n: int,
-    ) -> None:
+    def __init__(self, plan: Plan, corners: dict[str, Floats32], sizes: dict[str, Floats32], n: int) -> None:
         vars(self).update(vars(plan))
         self._corners, self._sizes, self._weights = corners, sizes, _middles(n)
 
@@ -372,13 +365,13 @@ class _Sampled(Plan):
         return np.stack([*parts[:3], parts[3] if len(parts) > 3 else np.ones_like(parts[0])])
 
 
-def _means_of(shade: Scattered) -> NDArray[np.float32]:
+def _means_of(shade: Scattered) -> Floats32:
     """Means over the points of each triangle (k, 5); (1, 5) where all are the same."""
     parts = [part.mean(axis=0) for part in (shade[0], *shade[1], shade[2])]
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
-def _distinct(corners: list[NDArray[np.float32]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _distinct(corners: list[Floats32]) -> tuple[Integers, Integers]:
     """One of each kind of triangle, by the values (t, 3, width) at its corners; and the kind of each."""
     count = len(corners[0])
     key = np.zeros(count, np.uint64)
@@ -396,7 +389,7 @@ def _distinct(corners: list[NDArray[np.float32]]) -> tuple[NDArray[np.int64], ND
     return order[new], which
 
 
-def _extents(uv: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _extents(uv: Floats32) -> tuple[Floats32, Floats32]:
     """Longest edge of triangles (t, 3, 2), and the height above it."""
     edges = np.roll(uv, -1, axis=1) - uv
     longest = np.sqrt((edges**2).sum(axis=2).max(axis=1))
@@ -405,7 +398,7 @@ def _extents(uv: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.f
 
 
 @cache
-def _middles(n: int) -> NDArray[np.float32]:
+def _middles(n: int) -> Floats32:
     """Barycentric coordinates (n², 3) of the middles of equal parts of a triangle, n along each edge."""
     i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
     up, down = i + j < n, i + j < n - 1
@@ -447,7 +440,7 @@ class FaceReader:
 
     def __init__(self, most: int = MOST_TEXELS) -> None:
         self.warnings: list[str] = []  # what the artist should know, each once
-        self.curves: dict[int, NDArray[np.float32]] = {}  # tables of ramps, see `NodeValues`
+        self.curves: dict[int, Floats32] = {}  # tables of ramps, see `NodeValues`
         self._most = most
         self._pyramids: dict[tuple[bpy.types.Image, bool], Pyramid | None] = {}
 
@@ -489,19 +482,14 @@ class MeshLooks:
         # Without the attribute all faces are of the first slot.
         self._slot = read(mesh, "material_index") if "material_index" in types and len(materials) > 1 else None
 
-    def slots(self, start: int, end: int) -> NDArray[np.int32]:
+    def slots(self, start: int, end: int) -> Integers32:
         """Slot of some faces."""
         if self._slot is None:
             return np.zeros(end - start, np.int32)
         return np.clip(self._slot[start:end], 0, len(self.plans) - 1)
 
     def steps(
-        self,
-        faces: int,
-        positions: NDArray[np.float32],
-        loops: NDArray[np.int32],
-        corner_verts: NDArray[np.int32],
-        face: NDArray[np.int32],
+        self, faces: int, positions: Floats32, loops: Integers32, corner_verts: Integers32, face: Integers32
     ) -> Generator[float, None, FaceLooks]:
         """Evaluate all faces; yields the fraction that is done.
 
@@ -543,7 +531,7 @@ class MeshLooks:
             yield end / len(face)
         return made
 
-    def _write(self, made: FaceLooks, faces: slice, values: NDArray[np.floating], slot: NDArray[np.int32]) -> None:
+    def _write(self, made: FaceLooks, faces: slice, values: NDArray[np.floating], slot: Integers32) -> None:
         """Means over what is not transparent, from those over whole faces (n, 5)."""
         plain = np.array([plan.constant[1:4] / max(plan.constant[0], _LEAST) for plan in self.plans], np.float32)
         known = np.array([plan.is_known for plan in self.plans])
@@ -556,9 +544,7 @@ class MeshLooks:
         made["roughness"][faces] = np.array([roughness_of(material) for material in self.materials])[slot]
         made["transmission"][faces] = np.where(known[slot], np.clip(passed, 0, 1), np.nan)
 
-    def _triangles(
-        self, loops: NDArray, verts: NDArray, face: NDArray[np.int32], slot: NDArray[np.int32], most: int
-    ) -> NDArray[np.float32]:
+    def _triangles(self, loops: NDArray, verts: NDArray, face: Integers32, slot: Integers32, most: int) -> Floats32:
         """Means (t, 5) over some triangles, see `Plan.constant`."""
         values = np.array([plan.constant for plan in self.plans])[slot]
         for number in np.unique(slot).tolist():
@@ -569,7 +555,7 @@ class MeshLooks:
                 values[rows] = plan.sampled(corners, most)
         return values
 
-    def _corners(self, name: str, loops: NDArray, verts: NDArray, face: NDArray) -> NDArray[np.float32]:
+    def _corners(self, name: str, loops: NDArray, verts: NDArray, face: NDArray) -> Floats32:
         """Values of an attribute at the corners of some triangles: (t, 3, width)."""
         domain, values = self._values[name]
         rows = {'FACE': np.broadcast_to(face[:, None], loops.shape), 'CORNER': loops}.get(domain, verts)
@@ -640,6 +626,6 @@ def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, reader: Fa
     return plan
 
 
-def _areas(positions: NDArray[np.float32], verts: NDArray[np.int32]) -> NDArray[np.float64]:
+def _areas(positions: Floats32, verts: Integers32) -> Floats:
     a, b, c = (np.take(positions, column, axis=0).astype(np.float64) for column in verts.T)
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) + _TINY

@@ -5,8 +5,6 @@
 All share one scattering group, so that proxies match what they replace.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -9,8 +9,6 @@ Shells are proxy tetrahedra drawn as such a cloud of constant density (paper, se
 "TetFlora shell"; "TetFlora baked shell" emits baked light.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import reduce
 from math import tau

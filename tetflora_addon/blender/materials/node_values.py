@@ -8,8 +8,6 @@ one half. What depends on the direction of a ray, or on which instance it is, co
 Numbers are arrays (p, k), colors (3, p, k); what is the same everywhere is (1, 1) and (3, 1, 1).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -18,6 +16,7 @@ import numpy as np
 from mathutils import Euler
 from numpy.typing import NDArray
 
+from ...arrays import Floats32
 from .nodes import SNOW, find_socket
 
 Values = NDArray[np.float32]
@@ -223,7 +222,7 @@ class NodeValues:
         Ramps and curves as tables; kept from one call to the next.
     """
 
-    def __init__(self, points: Any, curves: dict[int, NDArray[np.float32]]) -> None:
+    def __init__(self, points: Any, curves: dict[int, Floats32]) -> None:
         self._points, self._curves = points, curves
         self._images: dict[tuple[int, ...], tuple[Values, Values]] = {}
         self._scale, self._size = 1.0, np.zeros((1, 1), np.float32)
@@ -469,7 +468,7 @@ class NodeValues:
         made = np.stack([_looked_up(table[:, i : i + 1], color[i])[0] for i in range(3)])
         return color + factor * (made - color)
 
-    def _table(self, node: bpy.types.Node, value: Callable[[float], list[float]]) -> NDArray[np.float32]:
+    def _table(self, node: bpy.types.Node, value: Callable[[float], list[float]]) -> Floats32:
         key = node.as_pointer()
         if key not in self._curves:
             self._curves[key] = np.array([list(value(x)) for x in np.linspace(0, 1, _CURVE).tolist()], np.float32)
@@ -556,7 +555,7 @@ def _solid(cover: Values, color: Values, through: Values) -> Scattered:
     return Scattered(cover, scattered, luminance(scattered) * through)
 
 
-def _looked_up(table: NDArray[np.float32], place: Values) -> Values:
+def _looked_up(table: Floats32, place: Values) -> Values:
     """Rows of a table over [0, 1] at some places: (columns, p, k), linear between rows."""
     x = np.clip(np.nan_to_num(place), 0, 1) * np.float32(_CURVE - 1)
     row = np.minimum(x.astype(np.int32), _CURVE - 2)

@@ -11,8 +11,6 @@ their particles. Fresh snow reflects .85 to .9 of visible light or more, almost 
 snow", Reviews of Geophysics 20, 1982).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

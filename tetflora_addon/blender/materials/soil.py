@@ -7,16 +7,13 @@ The map is an image that is packed into the file. It is laid on the ground from 
 fits meshes of any resolution, with or without UV maps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import srgb_of
+from ...arrays import Floats, srgb_of
 from ..compat import shader_tree
 from .nodes import Graph, Term
 
@@ -35,10 +32,10 @@ def is_soil(material: bpy.types.Material | None) -> bool:
 def lay_soil(
     name: str,
     grounds: Sequence[bpy.types.Object],
-    colors: NDArray[np.float64],
-    green: NDArray[np.float64],
-    tint: NDArray[np.float64],
-    low: NDArray[np.float64],
+    colors: Floats,
+    green: Floats,
+    tint: Floats,
+    low: Floats,
     cell: float,
 ) -> list[str]:
     """Give grounds a soil, see `soil_material`, of square cells, meters; names of those that keep the artist's own."""
@@ -64,11 +61,11 @@ def may_have_soil(obj: bpy.types.Object) -> bool:
 
 def soil_material(
     name: str,
-    colors: NDArray[np.float64],
-    green: NDArray[np.float64],
-    tint: NDArray[np.float64],
-    low: NDArray[np.float64],
-    size: NDArray[np.float64],
+    colors: Floats,
+    green: Floats,
+    tint: Floats,
+    low: Floats,
+    size: Floats,
     material: bpy.types.Material | None = None,
 ) -> bpy.types.Material:
     """A material for the ground, or the given one with another map.
@@ -108,7 +105,7 @@ def soil_material(
     return material
 
 
-def _image(name: str, colors: NDArray[np.float64], green: NDArray[np.float64]) -> bpy.types.Image:
+def _image(name: str, colors: Floats, green: Floats) -> bpy.types.Image:
     """The map: colors as the display has them, so that eight bits are enough for dark ones, and the green in alpha."""
     rows, columns = green.shape
     image = bpy.data.images.new(name, columns, rows, alpha=True)

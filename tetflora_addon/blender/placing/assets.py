@@ -6,15 +6,12 @@ An asset is an empty like any other plant, so that what is dragged in takes part
 only the open file has are left out: the file into which an asset is dragged would not know them.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from ...errors import SceneError
 from ...files import read_whole, write_whole
@@ -106,19 +103,8 @@ def _make_asset(obj: bpy.types.Object, info: SpeciesInfo, height: float) -> None
         about.tags.new(tag, skip_if_exists=True)
     thumbnail = thumbnail_file(info.identifier)
     if thumbnail is not None:
-        _set_preview(obj, thumbnail)
-
-
-def _set_preview(obj: bpy.types.Object, thumbnail: Path) -> None:
-    image = bpy.data.images.load(str(thumbnail))
-    try:
-        pixels = np.zeros(len(image.pixels), np.float32)
-        image.pixels.foreach_get(pixels)
-        preview = obj.preview_ensure()
-        preview.image_size = image.size[:]
-        preview.image_pixels_float.foreach_set(pixels)
-    finally:
-        bpy.data.images.remove(image)
+        with bpy.context.temp_override(id=obj):
+            bpy.ops.ed.lib_id_load_custom_preview(filepath=str(thumbnail))
 
 
 def _write_catalog(path: Path) -> None:

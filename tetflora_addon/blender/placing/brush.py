@@ -5,14 +5,12 @@
 `planting.strokes` decides, in arrays; here the scene is read before a stroke and changed during it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Keys, Mask
 from ...errors import SceneError
 from ...planting import strokes
 from ...planting.places import Placement
@@ -22,11 +20,12 @@ from ..attributes import world_matrix
 from ..runtime import JobData
 from ..scene.fields import fields_of, read_field
 from ..settings import check_limits
+from ..worker import run_to_end
 from .canopy import not_of_covers
 from .distances import SQUARE, distance_of, painted_weights
 from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
-from .plant_objects import PAINTED_MARK, add_field, add_plants, plants_of
+from .plant_objects import PAINTED_MARK, add_field, add_plants_steps, plants_of
 from .populations import own_number, own_objects
 from .properties import MOST_PAINTED_EMPTIES
 from .rules import note_erased
@@ -99,16 +98,16 @@ class Standing:
         self.source, self.number = np.concatenate(source).astype(np.int32), np.concatenate(number).astype(np.int64)
         self.removable = np.concatenate(removable)  # (n,)
 
-    def add(self, places: NDArray[np.float64], source: int, first: int) -> None:
+    def add(self, places: Floats, source: int, first: int) -> None:
         """Note new plants: at the end of the list of objects or of a field, from number ``first`` on."""
         self.places = np.concatenate([self.places, places])
         self.source = np.concatenate([self.source, np.full(len(places), source, np.int32)])
         self.number = np.concatenate([self.number, first + np.arange(len(places))])
         self.removable = np.concatenate([self.removable, np.ones(len(places), bool)])
 
-    def by_population(self, gone: NDArray[np.bool_]) -> dict[str, NDArray[np.float64]]:
+    def by_population(self, gone: Mask) -> dict[str, Floats]:
         """Places of plants, (n,) bool, by the identity of their population; without those of none."""
-        found: dict[str, list[NDArray[np.float64]]] = {}
+        found: dict[str, list[Floats]] = {}
         for source in np.unique(self.source[gone]).tolist():
             own = np.flatnonzero(gone & (self.source == source))
             if source != _OBJECTS:
@@ -119,7 +118,7 @@ class Standing:
                 found.setdefault(uid, []).append(self.places[own[uids == uid]])
         return {uid: np.concatenate(places) for uid, places in found.items() if uid}
 
-    def remove(self, gone: NDArray[np.bool_]) -> None:
+    def remove(self, gone: Mask) -> None:
         """Take plants, (n,) bool, out of the scene and out of the arrays."""
         single = gone & (self.source == _OBJECTS)
         if single.any():
@@ -142,61 +141,52 @@ class Stroke:
 
     Parameters
     ----------
-    scene, view_layer, depsgraph
+    scene, depsgraph
         As they are now. References to objects are kept until the stroke ends.
     mode : {'PAINT', 'ERASE', 'THIN'}
     """
 
-    def __init__(
-        self,
-        scene: bpy.types.Scene,
-        view_layer: bpy.types.ViewLayer,
-        depsgraph: bpy.types.Depsgraph,
-        mode: str,
-    ) -> None:
+    def __init__(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, mode: str) -> None:
         settings = scene.tetflora.brush
         self.scene, self.mode = scene, mode
         self.changed = False  # whether a flush has changed the scene
-        self._data = JobData("Paint Plants", scene, view_layer)
+        self._data = JobData("Paint Plants", scene, depsgraph)
         _, painted = brush_of(scene)  # reports wrong settings before anything changes
         measure_all(scene, depsgraph, painted)
         # Moss neither counts for the density of trees nor keeps them away.
         self.standing = Standing(scene, depsgraph, covers=mode == 'ERASE')
-        self.ground = Ground(view_layer, depsgraph)
+        self.ground = Ground(depsgraph)
         self._data.add_objects(self.ground.objects)
         self.key = strokes.stroke_key(settings.seed, settings.strokes)
         settings.strokes += 1
         self.dabs = self.added = self.removed = 0
-        self._new: list[tuple[NDArray[np.float64], NDArray[np.uint64]]] = []
+        self._new: list[tuple[Floats, Keys]] = []
         self._gone = np.zeros(len(self.standing.places), bool)
         self._cleared: list[tuple[float, float]] = []  # middles of dabs that clear the ground
         self._weak = False  # whether there were others
-        self._taken: dict[str, list[NDArray[np.float64]]] = {}  # places of plants by their population
+        self._taken: dict[str, list[Floats]] = {}  # places of plants by their population
 
     def dab(self, center: Sequence[float], pressure: float = 1.0) -> int:
         """Do what the brush does at a place on the ground (3 floats); how many plants that adds or removes."""
         with self._data.watched():
-            return self._dab(center, pressure)
-
-    def _dab(self, center: Sequence[float], pressure: float) -> int:
-        brush, _ = brush_of(self.scene, pressure)
-        dab, self.dabs = self.dabs, self.dabs + 1
-        if self.mode == 'PAINT':
-            return self._paint(brush, center, dab)
-        # Those that cannot be removed count for Thin: they are denser all the same.
-        decide = strokes.erase if self.mode == 'ERASE' else strokes.thin
-        alive = np.flatnonzero(~self._gone)
-        chosen = alive[decide(brush, center, self.standing.places[alive], self.key, dab)]
-        chosen = chosen[self.standing.removable[chosen]]
-        self._gone[chosen] = True
-        self.removed += len(chosen)
-        if self.mode == 'THIN' or brush.strength < _STRONG:
-            self._weak = True
-        else:
-            last = np.subtract(self._cleared[-1], center[:2]) if self._cleared else np.inf
-            if len(chosen) or np.linalg.norm(last) > _SAME * brush.radius:
-                self._cleared.append((center[0], center[1]))
-        return len(chosen)
+            brush, _ = brush_of(self.scene, pressure)
+            dab, self.dabs = self.dabs, self.dabs + 1
+            if self.mode == 'PAINT':
+                return self._paint(brush, center, dab)
+            # Those that cannot be removed count for Thin: they are denser all the same.
+            decide = strokes.erase if self.mode == 'ERASE' else strokes.thin
+            alive = np.flatnonzero(~self._gone)
+            chosen = alive[decide(brush, center, self.standing.places[alive], self.key, dab)]
+            chosen = chosen[self.standing.removable[chosen]]
+            self._gone[chosen] = True
+            self.removed += len(chosen)
+            if self.mode == 'THIN' or brush.strength < _STRONG:
+                self._weak = True
+            else:
+                last = np.subtract(self._cleared[-1], center[:2]) if self._cleared else np.inf
+                if len(chosen) or np.linalg.norm(last) > _SAME * brush.radius:
+                    self._cleared.append((center[0], center[1]))
+            return len(chosen)
 
     def _paint(self, brush: Brush, center: Sequence[float], dab: int) -> int:
         # Of a million plants only those nearby are copied.
@@ -218,38 +208,32 @@ class Stroke:
     def flush(self) -> None:
         """Change the scene by what the dabs since the last flush decided."""
         with self._data.watched():
-            self._flush()
-
-    def _flush(self) -> None:
-        changes = self.pending > 0
-        if self._gone.any():
-            for uid, places in self.standing.by_population(self._gone).items():
-                self._taken.setdefault(uid, []).append(places)
-            self.standing.remove(self._gone)
-        if any(len(keys) for _, keys in self._new):
-            self._make(*(np.concatenate(part) for part in zip(*self._new, strict=True)))
-        self._new, self._gone = [], np.zeros(len(self.standing.places), bool)
-        self.changed = self.changed or changes
+            changes = self.pending > 0
+            if self._gone.any():
+                for uid, places in self.standing.by_population(self._gone).items():
+                    self._taken.setdefault(uid, []).append(places)
+                self.standing.remove(self._gone)
+            if any(len(keys) for _, keys in self._new):
+                self._make(*(np.concatenate(part) for part in zip(*self._new, strict=True)))
+            self._new, self._gone = [], np.zeros(len(self.standing.places), bool)
+            self.changed = self.changed or changes
 
     def finish(self) -> None:
         """Flush, and store in populations which plants the stroke removed."""
         with self._data.watched():
-            self._finish()
+            self.flush()
+            for population in self.scene.tetflora.layers:
+                taken = self._taken.get(population.uid)
+                if taken is None:
+                    continue
+                population.made = own_number(own_objects(self.scene, population))
+                if self._weak:
+                    note_erased(population, np.concatenate(taken), _PLACE)
+                if self._cleared:
+                    note_erased(population, self._cleared, self.scene.tetflora.brush.radius)
+            self._taken, self._cleared, self._weak = {}, [], False
 
-    def _finish(self) -> None:
-        self._flush()
-        for population in self.scene.tetflora.layers:
-            taken = self._taken.get(population.uid)
-            if taken is None:
-                continue
-            population.made = own_number(own_objects(self.scene, population))
-            if self._weak:
-                note_erased(population, np.concatenate(taken), _PLACE)
-            if self._cleared:
-                note_erased(population, self._cleared, self.scene.tetflora.brush.radius)
-        self._taken, self._cleared, self._weak = {}, [], False
-
-    def _make(self, places: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+    def _make(self, places: Floats, keys: Keys) -> None:
         brush, species = brush_of(self.scene)
         made = strokes.individuals(brush, keys)
         placement = Placement(position=places, wanted=len(keys), **made)
@@ -257,7 +241,7 @@ class Stroke:
         store, number = self.scene.tetflora.brush.store, len(standing.objects) + len(keys)
         if not (store == 'FIELD' or (store == 'AUTOMATIC' and number > MOST_PAINTED_EMPTIES)):
             first = len(standing.objects)
-            standing.objects += add_plants(self.scene, placement, species)
+            standing.objects += run_to_end(add_plants_steps(self.scene, placement, species))
             standing.add(places, _OBJECTS, first)
             return
         number = next((i for i, o in enumerate(standing.fields) if o.get(PAINTED_MARK) and editable(o)), None)
@@ -278,9 +262,7 @@ class Stroke:
         standing.add(places, number, first)
 
 
-def draped_circle(
-    ground: Ground, center: Sequence[float], normal: Sequence[float], radius: float
-) -> NDArray[np.float64]:
+def draped_circle(ground: Ground, center: Sequence[float], normal: Sequence[float], radius: float) -> Floats:
     """The brush's circle on the map laid on the ground, (49, 3) with the first corner twice.
 
     Where there is no ground, it goes on in the plane through the center.

@@ -5,16 +5,14 @@
 Populations that cover the ground of others are left out: they stand under the crowns.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator
 from dataclasses import fields
 from hashlib import blake2b
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...growth.seeds import BASE, WIDTH
 from ...planting.cover import Canopy, Floor, Habitat, Sheet, Suits, mapping
 from ..attributes import world_matrix
@@ -68,7 +66,7 @@ def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     return canopy, tuple(numbers)
 
 
-def _shaped(crowns: NDArray[np.float64], form: NDArray[np.float64] | None) -> NDArray[np.float64]:
+def _shaped(crowns: Floats, form: Floats | None) -> Floats:
     """Radius, base, top and leaf area (n, 4) of crowns that have forms (n, 5) of their own."""
     if form is None:
         return crowns
@@ -87,7 +85,7 @@ def standing(scene: bpy.types.Scene) -> set[str]:
     return found
 
 
-def floor_steps(canopy: Canopy, triangles: NDArray[np.float64], kinds: int) -> Generator[float, object, Floor]:
+def floor_steps(canopy: Canopy, triangles: Floats, kinds: int) -> Generator[float, object, Floor]:
     """Maps of the ground (t, 3, 3) under plants; those of the same ground and plants are made once."""
     sheet = Sheet.over(triangles.reshape(-1, 3))
     content = blake2b(repr((sheet, kinds)).encode(), digest_size=16)
@@ -103,17 +101,13 @@ def floor_steps(canopy: Canopy, triangles: NDArray[np.float64], kinds: int) -> G
 
 
 def read_suits(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    population: bpy.types.PropertyGroup,
-    triangles: NDArray[np.float64],
-    species: tuple[str, ...],
+    depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup, triangles: Floats, species: tuple[str, ...]
 ) -> Callable[[], dict[int, Suits]]:
     """What finds, without Blender, how suitable the ground (t, 3, 3) is for those species that do not grow anywhere."""
     wanted = {e.species: e for e in population.mix if e.habitat != 'ANYWHERE' and e.species in species}
     if not wanted:
         return dict
-    canopy, above = canopy_of(scene, depsgraph)
+    canopy, above = canopy_of(depsgraph.scene, depsgraph)
     asked = {
         number: (Habitat[wanted[name].habitat], shedder_of(wanted[name], above), population.seed + number)
         for number, name in enumerate(species)

@@ -7,9 +7,7 @@ the cover is an ordinary one: it can be changed, updated, frozen and removed. Le
 so that what grows there, and the litter of years before, keep their places.
 """
 
-from __future__ import annotations
-
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -17,12 +15,12 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...errors import SceneError, TetFloraError
 from ...files import is_identifier
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress, mapped, part_of
+from ...jobs import Job, Progress, mapped, part_of
 from ...planting.cover import FULL, Canopy, Floor, Habitat, Stratum, covered, tinted
 from ...species.litter import FALLEN, KIND, leaves_page, shed_share
 from ..materials.snow import add_snow
@@ -93,13 +91,11 @@ def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None
 @job("Covering the ground")
 def cover_steps(
     data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
     population: bpy.types.PropertyGroup,
     soil: bool = True,
     grounds: Iterable[bpy.types.Object] | None = None,
     masks: Mapping[str, Any] = MappingProxyType({}),
-) -> Generator[Progress, object, CoverResult]:
+) -> Job[CoverResult]:
     """Cover the ground of a population.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
@@ -114,16 +110,16 @@ def cover_steps(
     grounds : iterable of bpy.types.Object, optional
         Other ground than the population's.
     masks : mapping, optional
-        Other values of some of `plane.MASKS` than the population's, for a cover that is new.
+        Other values of some of `terrain.MASKS` than the population's, for a cover that is new.
 
     Raises
     ------
     SceneError
         It has no ground or no plants above it, or the cover is frozen; or something was deleted meanwhile.
     """
-    uid = population.uid or ANYBODY
-    grounds = yield from _begun(data, scene, population, grounds)
-    population = _again(data, scene, population, uid)
+    scene, depsgraph, uid = data.scene, data.depsgraph, population.uid or ANYBODY
+    grounds = yield from _begun(data, population, grounds)
+    population = _again(data, population, uid)
     own = {name: getattr(population, name) for name in MASKS} | dict(masks)
     ground = read_ground(grounds, depsgraph, **own)
     canopy, above = canopy_of(scene, depsgraph)
@@ -134,7 +130,7 @@ def cover_steps(
     told = mapped(mapping, lambda done: Progress(0.05 + (_PLANTING - 0.05) * done, _UNDER))
     floor = yield from steps_in_thread(told, progress)
     yield Progress(_PLANTING, "Planting")
-    population = _again(data, scene, population, uid)
+    population = _again(data, population, uid)
     with restored(scene):
         parts = _parts(scene, canopy, above)
         found = cover_of(scene, uid) or _add_cover(scene, population, grounds, masks)
@@ -147,12 +143,12 @@ def cover_steps(
 
 def _begun(
     data: JobData,
-    scene: bpy.types.Scene,
     population: bpy.types.PropertyGroup,
     grounds: Iterable[bpy.types.Object] | None = None,
     fallen: bool = False,
-) -> Generator[Progress, object, list[bpy.types.Object]]:
+) -> Job[list[bpy.types.Object]]:
     """See whether a population can have a cover, and measure what stands above; returns its ground, or that given."""
+    scene = data.scene
     yield (progress := Progress(0.0, _UNDER))
     found = cover_of(scene, population.uid or ANYBODY, fallen)
     if found is not None:
@@ -167,11 +163,9 @@ def _begun(
     return grounds
 
 
-def _again(
-    data: JobData, scene: bpy.types.Scene, population: bpy.types.PropertyGroup, uid: str
-) -> bpy.types.PropertyGroup:
+def _again(data: JobData, population: bpy.types.PropertyGroup, uid: str) -> bpy.types.PropertyGroup:
     """A population, fetched again after others may have been added; settings for new ones stay where they are."""
-    return population if uid == ANYBODY else still_there(data, scene, uid)
+    return population if uid == ANYBODY else still_there(data, uid)
 
 
 def cover_of(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> bpy.types.PropertyGroup | None:
@@ -296,7 +290,7 @@ def _strata(
     growing: list[Stratum] = []
     for entry in cover.mix:
         habitat, crown = Habitat[entry.habitat], crown_for(scene, entry.species)
-        suits: NDArray[np.float64] = floor.map_of(habitat, shedder_of(entry, above))
+        suits: Floats = floor.map_of(habitat, shedder_of(entry, above))
         patch = 0.6 if habitat.value[1] else 1.0  # of the ground is within patches
         one = Stratum(patch * suits, thin * entry.weight, crown.seen, np.array(crown.color))
         (lying if habitat.falls else growing).append(one)
@@ -304,9 +298,7 @@ def _strata(
 
 
 @job("Strewing leaves")
-def strew_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup
-) -> Generator[Progress, object, PlacedPlants | None]:
+def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[PlacedPlants | None]:
     """Strew the leaves that fall in autumn under a population; None where nothing above sheds its leaves.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
@@ -317,9 +309,9 @@ def strew_steps(
     SceneError
         It has no ground, or the leaves are frozen; or something was deleted meanwhile.
     """
-    uid = population.uid or ANYBODY
-    grounds = yield from _begun(data, scene, population, fallen=True)
-    population = _again(data, scene, population, uid)
+    scene, depsgraph, uid = data.scene, data.depsgraph, population.uid or ANYBODY
+    grounds = yield from _begun(data, population, fallen=True)
+    population = _again(data, population, uid)
     with restored(scene):
         canopy, above = canopy_of(scene, depsgraph)
         parts = _fallen_leaves(scene, canopy, above)

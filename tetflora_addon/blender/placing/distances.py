@@ -5,9 +5,7 @@
 ``min_distance`` is the artist's own, and ``distance_from`` says whether it counts.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import bpy
 import numpy as np
@@ -39,11 +37,7 @@ def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
     SpeciesError
         The catalog is empty.
     """
-    weights: dict[str, float] = {}
-    for entry in population.mix:
-        identifier = entry.species or default_species()
-        weights[identifier] = weights.get(identifier, 0.0) + entry.weight
-    return weights or {default_species(): 1.0}
+    return _summed((entry.species or default_species(), entry.weight) for entry in population.mix)
 
 
 def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
@@ -57,12 +51,15 @@ def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
     brush = scene.tetflora.brush
     if brush.source == 'ONE' and brush.species:
         return {brush.species: 1.0}
-    weights: dict[str, float] = {}
     layer = active_in(scene.tetflora, "layers")
     mix = scene.tetflora.populate.mix if layer is None or not layer.mix else layer.mix
-    for entry in mix if brush.source == 'MIX' else ():
-        if entry.species:
-            weights[entry.species] = weights.get(entry.species, 0.0) + entry.weight
+    return _summed((one.species, one.weight) for one in mix if one.species and brush.source == 'MIX')
+
+
+def _summed(parts: Iterable[tuple[str, float]]) -> dict[str, float]:
+    weights: dict[str, float] = {}
+    for identifier, weight in parts:
+        weights[identifier] = weights.get(identifier, 0.0) + weight
     return weights or {default_species(): 1.0}
 
 

@@ -6,18 +6,17 @@ Whole arrays throughout. A field whose points come from nodes, or that has edges
 modeling and is left alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers32, Mask, quaternions
 from ...planting.places import new_seeds
 from ..attributes import KINDS, read, values_of, write
 from ..scene.field_sizes import has_history
-from ..scene.fields import FIELD_ATTRIBUTES, field_kinds, quaternions
+from ..scene.fields import FIELD_ATTRIBUTES, field_kinds
 from ..scene.skeletons import kind_of_choice
 
 FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made and may remove
@@ -45,13 +44,13 @@ def editable(obj: bpy.types.Object) -> bool:
     )
 
 
-def positions(obj: bpy.types.Object) -> NDArray[np.float64]:
+def positions(obj: bpy.types.Object) -> Floats:
     """Where the points of an editable field are in world space, (n, 3), without reading what grows there."""
     world = np.array(obj.matrix_world, dtype=np.float64)
     return read(obj.data, "position") @ world[:3, :3].T + world[:3, 3]
 
 
-def take_points(obj: bpy.types.Object, keep: NDArray[np.bool_]) -> None:
+def take_points(obj: bpy.types.Object, keep: Mask) -> None:
     """Keep some of a field's points, (n,) bool, with all their attributes."""
     points = {name: (kind, values[keep]) for name, (kind, values) in _points(obj.data).items()}
     _write(obj, points, int(keep.sum()))
@@ -59,11 +58,11 @@ def take_points(obj: bpy.types.Object, keep: NDArray[np.bool_]) -> None:
 
 def add_points(
     obj: bpy.types.Object,
-    position: NDArray[np.float64],
-    frame: NDArray[np.float64],
-    scale: NDArray[np.float64],
-    kinds: NDArray[np.int32],
-    seed: NDArray[np.int32],
+    position: Floats,
+    frame: Floats,
+    scale: Floats,
+    kinds: Integers32,
+    seed: Integers32,
     species: Sequence[str],
 ) -> None:
     """Add plants to a field, at the end; other attributes of theirs are zero.

@@ -6,28 +6,26 @@ An empty scene, or one as Blender starts with, is used and nothing in it is remo
 scene.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
 
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...planting.places import Placement
 from ...planting.plane import Spacing
 from ..attributes import write
 from ..compat import shader_tree
+from ..materials.bark import tones
 from ..materials.nodes import Graph, find_socket
 from ..species.catalog import default_species
 from ..species.edits import catalog
 from ..worker import run_to_end
 from .cover import cover_steps
-from .plant_objects import add_plants
+from .plant_objects import add_plants_steps
 from .terrain import grid_mesh
 
 NAME = "First forest"
@@ -53,7 +51,7 @@ def tread(material: bpy.types.Material) -> None:
         graph.node("ShaderNodeTexNoise", {"Vector": place, "Scale": scale, "Detail": detail})
         for scale, detail in ((1.2, 5.0), (9.0, 6.0))
     )
-    earth = _ramp(graph, fine, ((0.35, (0.085, 0.06, 0.038)), (0.65, (0.19, 0.14, 0.09))))
+    earth = tones(graph, fine, ((0.35, (0.085, 0.06, 0.038)), (0.65, (0.19, 0.14, 0.09))))
     ragged = graph.math('MULTIPLY_ADD', coarse, 1.8, graph.attribute("aside", "Fac"))
     graph.feed(color, graph.mixed(graph.step(ragged, 1.3, 2.6), earth, floor))
 
@@ -68,18 +66,10 @@ def sky(name: str) -> bpy.types.World:
     graph = Graph(shader_tree(world))
     place = find_socket(graph.node("ShaderNodeTexCoord").outputs, "Generated")
     height = graph.node("ShaderNodeSeparateXYZ", {"Vector": place}).outputs["Z"]
-    color = _ramp(graph, height, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.2, 0.3, 0.51))))
+    color = tones(graph, height, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.2, 0.3, 0.51))))
     background = graph.node("ShaderNodeBackground", {"Color": color, "Strength": 0.7})
     graph.node("ShaderNodeOutputWorld", {"Surface": background})
     return world
-
-
-def _ramp(graph: Graph, factor: object, stops: Sequence[tuple[float, tuple[float, ...]]]) -> bpy.types.NodeSocket:
-    """Colors between two stops."""
-    ramp = graph.node("ShaderNodeValToRGB", {"Fac": factor})
-    for element, (position, color) in zip(ramp.color_ramp.elements, stops, strict=True):
-        element.position, element.color = position, (*color, 1.0)
-    return ramp.outputs["Color"]
 
 
 @dataclass(frozen=True)
@@ -149,7 +139,7 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
     return scene, note
 
 
-def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def height(x: Floats, y: Floats) -> Floats:
     """The ground's height at places on the map, meters; the path lies in a shallow hollow and the land rises beyond."""
     x, y = np.asarray(x, float), np.asarray(y, float)
     waves = 0.5 * np.sin(0.11 * x + 0.6) * np.cos(0.083 * y) + 0.22 * np.sin(0.29 * x - 0.17 * y + 1.0)
@@ -158,7 +148,7 @@ def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64
     return waves * np.clip(aside / 4.0, 0.25, 1.0) + banks + 5.0 * np.clip((y - 20.0) / 90.0, 0.0, 1.0) ** 2
 
 
-def path(y: NDArray[np.float64]) -> NDArray[np.float64]:
+def path(y: Floats) -> Floats:
     """Where the middle of the path is, x by y, meters."""
     return 5.0 * np.sin(np.asarray(y, float) / 21.0)
 
@@ -205,7 +195,7 @@ def _ground() -> bpy.types.Object:
     return ground
 
 
-def places(seed: int) -> list[NDArray[np.float64]]:
+def places(seed: int) -> list[Floats]:
     """Places on the map of the plants of each layer, (n, 2) each."""
     standing, out = np.zeros((0, 2)), []
     for number, layer in enumerate(LAYERS):
@@ -235,7 +225,7 @@ def _plant(scene: bpy.types.Scene, seed: int) -> None:
             seed=(uniform(keys, 3) * 2**31).astype(np.int32),
             wanted=layer.number,
         )
-        add_plants(scene, placement, [layer.species if layer.species in known else default_species()])
+        run_to_end(add_plants_steps(scene, placement, [layer.species if layer.species in known else default_species()]))
 
 
 def _cover(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:

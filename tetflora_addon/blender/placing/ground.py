@@ -5,19 +5,17 @@
 `Scene.ray_cast` would stop at the leaves of a refined forest, and cannot leave objects out.
 """
 
-from __future__ import annotations
-
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from math import inf
 
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...errors import SceneError
-from ...jobs import Progress, mapped
+from ...jobs import Job, Progress, mapped
 from ..attributes import read, write
 from ..materials.nodes import is_ours
 from ..runtime import JobData, job
@@ -38,22 +36,13 @@ class Ground:
 
     Parameters
     ----------
-    view_layer : bpy.types.ViewLayer
     depsgraph : bpy.types.Depsgraph
-        Decides about modifiers and places.
-    without : iterable of bpy.types.Object, optional
-        Not ground, whatever they are.
+        Decides about modifiers and places; what is visible in its view layer is looked at.
     """
 
-    def __init__(
-        self,
-        view_layer: bpy.types.ViewLayer,
-        depsgraph: bpy.types.Depsgraph,
-        without: Iterable[bpy.types.Object] = (),
-    ) -> None:
+    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
         self.depsgraph = depsgraph
-        left_out = set(without)
-        found = [o for o in view_layer.objects if o.type == 'MESH' and o not in left_out and is_ground(o)]
+        found = [o for o in depsgraph.view_layer.objects if o.type == 'MESH' and is_ground(o)]
         self.objects = [o for o in found if len(o.evaluated_get(depsgraph).data.polygons)]
         places = [np.array(o.evaluated_get(depsgraph).matrix_world, dtype=np.float64) for o in self.objects]
         boxes = [np.array(o.evaluated_get(depsgraph).bound_box, dtype=np.float64) for o in self.objects]
@@ -84,9 +73,7 @@ class Ground:
                 nearest, found = gap, (world, -turned if turned.dot(direction) > 0.0 else turned)
         return found
 
-    def heights(
-        self, places: NDArray[np.float64], above: float | NDArray[np.float64], below: float | NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def heights(self, places: Floats, above: float | Floats, below: float | Floats) -> Floats:
         """Height of the uppermost ground at places on the map.
 
         Parameters
@@ -109,7 +96,7 @@ class Ground:
                 out[i] = hit[0].z
         return out
 
-    def nearest_heights(self, places: NDArray[np.float64]) -> Generator[float, object, NDArray[np.float64]]:
+    def nearest_heights(self, places: Floats) -> Generator[float, object, Floats]:
         """Find the height of the ground that is nearest along z, below or above, for places (n, 3).
 
         Yields the fraction that is done, and returns (n,) float64, NaN where there is no ground.
@@ -160,18 +147,14 @@ class DropResult:
 
 @job("Dropping plants")
 def drop_steps(
-    data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    plants: Sequence[bpy.types.Object],
-    fields: Sequence[bpy.types.Object],
-) -> Generator[Progress, object, DropResult]:
+    data: JobData, plants: Sequence[bpy.types.Object], fields: Sequence[bpy.types.Object]
+) -> Job[DropResult]:
     """Move plants vertically to the nearest ground; children move with their parents before they fall themselves.
+
+    What is visible in the view layer is ground.
 
     Parameters
     ----------
-    depsgraph : bpy.types.Depsgraph
-        What is visible in its view layer is ground.
     plants : sequence of bpy.types.Object
         Plants that are objects.
     fields : sequence of bpy.types.Object
@@ -184,9 +167,9 @@ def drop_steps(
     """
     data.add_objects([*plants, *fields])
     yield Progress(0.0, _LOOKING)
-    view_layer = depsgraph.view_layer
+    view_layer = data.depsgraph.view_layer
     view_layer.update()
-    ground = Ground(view_layer, depsgraph)
+    ground = Ground(data.depsgraph)
     if not len(ground):
         raise SceneError("No mesh is visible below or above the plants; add a ground mesh, or show it")
     data.add_objects(ground.objects)
@@ -201,9 +184,7 @@ def drop_steps(
     return DropResult(moved, int(np.isnan(heights).sum()))
 
 
-def _drop_plants(
-    view_layer: bpy.types.ViewLayer, plants: Sequence[bpy.types.Object], heights: NDArray[np.float64]
-) -> int:
+def _drop_plants(view_layer: bpy.types.ViewLayer, plants: Sequence[bpy.types.Object], heights: Floats) -> int:
     """Move plants that are objects to heights (n,); how many moved."""
     now = np.array([o.matrix_world.translation.z for o in plants], dtype=np.float64)
     fall = np.flatnonzero(np.abs(heights - now) > _STAYS)
@@ -222,7 +203,7 @@ def _depth(obj: bpy.types.Object) -> int:
     return 0 if obj.parent is None else 1 + _depth(obj.parent)
 
 
-def _drop_field(field: bpy.types.Object, heights: NDArray[np.float64]) -> int:
+def _drop_field(field: bpy.types.Object, heights: Floats) -> int:
     """Move the points of an editable field to heights (n,); how many moved."""
     stored, places = read(field.data, "position"), positions(field)
     world = np.array(field.matrix_world, dtype=np.float64)

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
 
+from ...arrays import quaternions
 from ...errors import SceneError
 from ...jobs import run_to_end
 from ...planting.places import Placement, new_seeds
@@ -17,7 +18,7 @@ from .. import settings
 from ..attributes import world_matrix
 from ..saved_files import VERSION
 from ..scene.ages import plainly_aged, relative_heights
-from ..scene.fields import fields_of, quaternions, read_aged_field, stored_size, write_field
+from ..scene.fields import fields_of, read_aged_field, stored_size, write_field
 from ..scene.own_ages import stored_ages
 from ..scene.plants import single_plants
 from ..scene.skeletons import skeleton_object_of, species_of
@@ -73,16 +74,16 @@ def add_plant(
         seed=np.array([seed]),
         wanted=1,
     )
-    return add_plants(scene, placement, [species])
+    return run_to_end(add_plants_steps(scene, placement, [species]))
 
 
-def add_plants(
+def add_plants_steps(
     scene: bpy.types.Scene,
     placement: Placement,
     species: Sequence[str],
     collection: bpy.types.Collection | None = None,
     ages: np.ndarray | None = None,
-) -> list[bpy.types.Object]:
+) -> Generator[list[bpy.types.Object], object, list[bpy.types.Object]]:
     """Make the empties of a placement.
 
     Parameters
@@ -95,22 +96,16 @@ def add_plants(
     ages : (n,) float, optional
         Years; all are full-grown if not given.
 
+    Yields
+    ------
+    list of bpy.types.Object
+        Those that are made so far, which the caller removes if it goes no further.
+
     Returns
     -------
     list of bpy.types.Object
         In the placement's order.
     """
-    return run_to_end(add_plants_steps(scene, placement, species, collection, ages))
-
-
-def add_plants_steps(
-    scene: bpy.types.Scene,
-    placement: Placement,
-    species: Sequence[str],
-    collection: bpy.types.Collection | None = None,
-    ages: np.ndarray | None = None,
-) -> Generator[list[bpy.types.Object], object, list[bpy.types.Object]]:
-    """As `add_plants`; yields those that are made so far, which the caller removes if it goes no further."""
     rows = (placement.position, _eulers(placement), placement.scale, placement.species, placement.seed)
     return _empties_steps(scene, rows, species, [None] * len(species), collection, ages)
 
@@ -240,10 +235,8 @@ def field_from_plants(
     """
     plants = sorted(plants, key=lambda o: o.name_full)
     read = single_plants(plants, depsgraph)
-    species, forms = (
-        [species_of(kind) for kind in read.identifiers],
-        [skeleton_object_of(kind) for kind in read.identifiers],
-    )
+    species = [species_of(kind) for kind in read.identifiers]
+    forms = [skeleton_object_of(kind) for kind in read.identifiers]
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
     made = link_field(scene, write_field(FIELD, *rows, species, forms, stored_ages(plants)), collection)
     remove_plants(plants)
@@ -280,10 +273,8 @@ def plants_from_field(
             + (f"the limit for objects is {most:,}. Split the field first" if len(read) else "add points first")
         )
     angles = np.array([Matrix(frame).to_euler() for frame in read.frame])
-    species, forms = (
-        [species_of(kind) for kind in read.identifiers],
-        [skeleton_object_of(kind) for kind in read.identifiers],
-    )
+    species = [species_of(kind) for kind in read.identifiers]
+    forms = [skeleton_object_of(kind) for kind in read.identifiers]
     rows = (read.position, angles, read.scale, read.species, read.seed)
     made = run_to_end(_empties_steps(scene, rows, species, forms, collection, ages))
     remove_fields([field])

@@ -5,8 +5,6 @@
 What cannot be is refused by a `ValueError` that names the key.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from math import degrees, radians
 from sys import float_info

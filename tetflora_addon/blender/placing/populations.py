@@ -7,20 +7,18 @@ A copy made by hand has the number of its original: the oldest with a number bel
 the artist's.
 """
 
-from __future__ import annotations
-
 import uuid
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats32
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...planting.places import Placement, plant_ages
 from ..assets.marks import measure_all
 from ..runtime import JobData, is_there, job
@@ -30,12 +28,11 @@ from ..scene.own_ages import MOST_YEARS
 from ..scene.skeletons import aged_kind
 from ..settings import BIOME, SCATTER, with_identity
 from ..species.edits import revert_species
-from ..worker import call_in_thread
+from ..worker import call_in_thread, run_to_end
 from .canopy import is_cover, standing
 from .plant_objects import (
     POPULATION_MARK,
     add_field,
-    add_plants,
     add_plants_steps,
     plant_collection,
     plants_of,
@@ -81,11 +78,7 @@ def recount(scene: bpy.types.Scene) -> None:
         population.made = own_number(own_objects(scene, population))
 
 
-def add_population(
-    scene: bpy.types.Scene,
-    grounds: Iterable[bpy.types.Object] = (),
-    name: str = NAME,
-) -> TetFloraLayer:
+def add_population(scene: bpy.types.Scene, grounds: Iterable[bpy.types.Object] = (), name: str = NAME) -> TetFloraLayer:
     """Add a population without plants, with the scene's settings for new ones, and make it the active one.
 
     Parameters
@@ -116,9 +109,7 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
 
 
 @job("Placing plants")
-def make_plants_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer
-) -> Generator[Progress, object, PlacedPlants]:
+def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPlants]:
     """Place a population's plants by its settings, in place of those that it has.
 
     Closing the steps, or an error, leaves the scene as it was.
@@ -128,8 +119,8 @@ def make_plants_steps(
     SceneError
         It is frozen, or no plants can be placed by its settings, as the message says; or it was deleted meanwhile.
     """
-    progress, uid = Progress(0.0, "Reading the ground"), population.uid
-    yield progress
+    scene, depsgraph, uid = data.scene, data.depsgraph, population.uid
+    yield (progress := Progress(0.0, "Reading the ground"))
     refuse_frozen(population)
     species = {entry.species for entry in population.mix}
     measure_all(scene, depsgraph, species)
@@ -137,12 +128,12 @@ def make_plants_steps(
     if is_cover(population):
         kinds |= standing(scene)
     yield from crown_steps(progress, scene, kinds)
-    population = still_there(data, scene, uid)
+    population = still_there(data, uid)
     search = read_search(scene, depsgraph, population, set(_sorted_out(scene, population)[0]))
     progress = Progress(0.1, "Looking for places")
     yield progress
     placement = yield from call_in_thread(progress, search.placement)
-    population = still_there(data, scene, uid)
+    population = still_there(data, uid)
     if population.as_field == 'EMPTIES' and len(placement) > MOST_EMPTIES:
         raise SceneError(
             f"{len(placement):,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
@@ -163,7 +154,7 @@ def make_plants_steps(
         if is_cover(population):
             made[0].display_type = 'BOUNDS'  # its points would turn the ground black
     elif own:
-        made = add_plants(scene, placement, search.species, collection, ages)
+        made = run_to_end(add_plants_steps(scene, placement, search.species, collection, ages))
     for number, obj in enumerate(made):
         group = obj.tetflora
         group.population, group.population_number = population.uid, number
@@ -175,16 +166,16 @@ def make_plants_steps(
     return PlacedPlants(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
 
 
-def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraLayer:
+def still_there(data: JobData, uid: str) -> TetFloraLayer:
     """A population, fetched again: adding to the list moves what is in it."""
-    found = with_identity(scene.tetflora.layers, uid)
+    found = with_identity(data.scene.tetflora.layers, uid)
     if found is None:
         data.stop("its population was deleted")
         data.check()
     return found
 
 
-def own_ages(population: TetFloraLayer, placement: Placement) -> NDArray[np.float32] | None:
+def own_ages(population: TetFloraLayer, placement: Placement) -> Floats32 | None:
     """Ages (n,) of a population's plants in years; None where all are full-grown."""
     if population.age == 0.0:
         return None
@@ -196,8 +187,8 @@ def _new_plants(
     placement: Placement,
     species: tuple[str, ...],
     collection: bpy.types.Collection,
-    ages: NDArray[np.float32] | None,
-) -> Generator[Progress, object, list[bpy.types.Object]]:
+    ages: Floats32 | None,
+) -> Job[list[bpy.types.Object]]:
     """Plants where none have to go before."""
     steps, made = add_plants_steps(scene, placement, species, collection, ages), []
     try:
@@ -214,7 +205,7 @@ def _new_plants(
 
 def reroll_steps(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer
-) -> Generator[Progress, object, PlacedPlants]:
+) -> Job[PlacedPlants]:
     """Place a population anew with another seed, which follows from the one that it has.
 
     Closing the steps, or an error, leaves the seed as it was as well.

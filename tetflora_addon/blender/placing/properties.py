@@ -2,25 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of populations, of new ones (``Scene.tetflora.populate``), and of the brush (``Scene.tetflora.brush``)."""
 
+from functools import partial
 from math import pi
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
 
-from ...parameters import LENGTH
+from ...parameters import FACTOR, LENGTH, within
 from ...planting.rules import Companion, Rules
 from ...planting.site import Limits
 from ...planting.strokes import Brush
+from ..declare import FIXED, HIDDEN, boolean, choice, integer, list_of, once, pointer_to, real, string
 from ..runtime import Listeners
-from ..scene.own_ages import AGE_PROPERTY
+from ..scene.own_ages import MOST_YEARS
 from ..settings import BIOME, FIELD, SCATTER, properties_of, settings_in
 from ..species.catalog import SpeciesChoice, items_for, number_of
 from .distances import SOURCES, choose, follows_species
@@ -33,12 +26,7 @@ STORAGE_ITEMS = (
     ('EMPTIES', "Empties", "One object per plant. Each can be moved on its own; many slow Blender down", 1),
     ('FIELD', "Field", "One object whose vertices are the plants. Room for millions", 2),
 )
-CREATE_AS = {
-    "name": "Create As",
-    "description": "What the plants are created as",
-    "items": STORAGE_ITEMS,
-    "default": 'AUTOMATIC',
-}
+CREATE_AS = partial(choice, "Create As", "What the plants are created as", STORAGE_ITEMS)
 #: Painted plants become empties as long as the scene has no more plants than this that are objects.
 MOST_PAINTED_EMPTIES = 2_000
 HABITATS = (
@@ -57,10 +45,6 @@ listeners = Listeners()
 _kept_items: dict[int, list] = {}  # Blender keeps no copy of the strings of dynamic items
 
 
-def _notify(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    listeners.notify()
-
-
 def _on_distance(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     settings.distance_from = 'OWN'
     listeners.notify()
@@ -71,23 +55,29 @@ def _choose_distance(settings: bpy.types.PropertyGroup, by_species: bool) -> Non
     listeners.notify()
 
 
-#: Options of settings that the preview follows, and of state.
-LIVE = {"options": set(), "update": _notify}
-HIDDEN = {"options": {'HIDDEN'}}
+#: Options of settings that the preview follows.
+LIVE = {**FIXED, "update": lambda _group, _context: listeners.notify()}
 _COMPANION = properties_of(Companion, **LIVE)
-_DISTANCE = {"options": set(), "update": _on_distance}
-_BY_SPECIES = {
-    "name": "By Species",
-    "description": (
-        "Keep plants as far apart as the crowns of their species need, or closer where the density asks for it. Turn "
-        "off to set the distance yourself"
-    ),
-    "get": follows_species,
-    "set": _choose_distance,
-    "options": {'SKIP_SAVE'},
-}
+_DISTANCE = {**FIXED, "update": _on_distance}
+_BY_SPECIES = partial(
+    once.boolean,
+    "By Species",
+    "Keep plants as far apart as the crowns of their species need, or closer where the density asks for it. Turn "
+    "off to set the distance yourself",
+    get=follows_species,
+    set=_choose_distance,
+)
+#: The age of a plant, and the tooltip of that of a population.
+AGE = partial(
+    real,
+    "Age",
+    "Age in years; 0 is full-grown, as the species describes it. Species that are assets have none",
+    **within(0.0, 200.0, MOST_YEARS),
+    step=100,
+    precision=1,
+)
 _AGE = "Age of the plants in years, half of them younger and half older; 0 is full-grown, as the species describes it"
-_SOURCE = {"name": "Distance From", "items": SOURCES, "default": 'SPECIES', "options": {'HIDDEN'}}
+_SOURCE = partial(choice, "Distance From", "", SOURCES, default='SPECIES', **HIDDEN)
 
 
 def _companion_items(entry: "TetFloraMixEntry", _context: bpy.types.Context | None) -> list:
@@ -103,51 +93,32 @@ def _choose_companion(entry: "TetFloraMixEntry", number: int) -> None:
 class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
     """One species of a mixture to populate with, and its companion."""
 
-    weight: FloatProperty(
-        name="Weight",
-        description="Relative frequency of this species among the plants",
-        default=1.0,
-        min=0.0,
-        soft_max=10.0,
-        **LIVE,
+    weight: real("Weight", "Relative frequency of this species among the plants", 1.0, **within(0.0, 10.0), **LIVE)
+    companion: string(
+        "Companion", "Identifier of the species that this one seeks or avoids; empty for none", **{**LIVE, **HIDDEN}
     )
-    companion: StringProperty(
-        name="Companion",
-        description="Identifier of the species that this one seeks or avoids; empty for none",
-        **{**LIVE, **HIDDEN},
-    )
-    companion_choice: EnumProperty(
-        name="Companion",
-        description="Species that this one seeks or avoids, in this population or planted earlier",
-        items=_companion_items,
+    companion_choice: once.choice(
+        "Companion",
+        "Species that this one seeks or avoids, in this population or planted earlier",
+        _companion_items,
         get=lambda self: number_of(self.companion) if self.companion else 0,
         set=_choose_companion,
-        options={'SKIP_SAVE'},
     )
     companion_strength: _COMPANION.strength
     companion_distance: _COMPANION.distance
-    habitat: EnumProperty(
-        name="Grows",
-        description="Where under the other plants this species is found",
-        items=HABITATS,
-        default='ANYWHERE',
-        **LIVE,
-    )
-    shed_by: StringProperty(
-        name="Shed By",
-        description="Identifier of the species that sheds what lies there; any if empty",
-        options={'HIDDEN'},
-        update=_notify,
+    habitat: choice("Grows", "Where under the other plants this species is found", HABITATS, default='ANYWHERE', **LIVE)
+    shed_by: string(
+        "Shed By", "Identifier of the species that sheds what lies there; any if empty", **{**LIVE, **HIDDEN}
     )
 
 
 class TetFloraGround(bpy.types.PropertyGroup):
     """One mesh that a population grows on."""
 
-    object: PointerProperty(
-        name="Ground",
-        description="Mesh that the plants grow on, including its modifiers",
-        type=bpy.types.Object,
+    object: pointer_to(
+        bpy.types.Object,
+        "Ground",
+        "Mesh that the plants grow on, including its modifiers",
         poll=lambda _group, candidate: candidate.type == 'MESH' and not candidate.tetflora.is_field,
         **{**LIVE, **HIDDEN},
     )
@@ -213,67 +184,53 @@ def _set_limits(owner: bpy.types.PropertyGroup, bits: int) -> None:
 class Limited:
     """Mix-in: which limits of where something grows panels show."""
 
-    limits: EnumProperty(
-        name="Limits",
-        description="What limits where this grows; switched off, it no longer does",
-        items=_limit_items,
+    limits: choice(
+        "Limits",
+        "What limits where this grows; switched off, it no longer does",
+        _limit_items,
         options={'ENUM_FLAG', 'SKIP_SAVE'},
         get=limits_in_use,
         set=_set_limits,
     )
-    limits_shown: IntProperty(name="Limits That Are Shown", options={'HIDDEN'})
+    limits_shown: integer("Limits That Are Shown", **HIDDEN)
 
 
 class GroundMask:
     """Mix-in: where on its grounds something grows, by a vertex group and an image, and whether altitudes count."""
 
-    use_altitude: BoolProperty(
-        name="Altitude", description="Grow only between two heights above the scene's origin", **{**LIVE, **HIDDEN}
-    )
+    use_altitude: boolean("Altitude", "Grow only between two heights above the scene's origin", **{**LIVE, **HIDDEN})
 
-    vertex_group: StringProperty(
-        name="Vertex Group",
-        description="Vertex group of the ground whose weights say where plants grow: 0 is bare, 1 is full",
-        **LIVE,
+    vertex_group: string(
+        "Vertex Group", "Vertex group of the ground whose weights say where plants grow: 0 is bare, 1 is full", **LIVE
     )
-    invert_group: BoolProperty(name="Invert Vertex Group", description="Weight 1 is bare, 0 is full", **LIVE)
-    image: PointerProperty(
-        name="Image",
-        description="Image whose brightness says where plants grow: black is bare, white is full",
-        type=bpy.types.Image,
-        **LIVE,
+    invert_group: boolean("Invert Vertex Group", "Weight 1 is bare, 0 is full", **LIVE)
+    image: pointer_to(
+        bpy.types.Image, "Image", "Image whose brightness says where plants grow: black is bare, white is full", **LIVE
     )
-    invert_image: BoolProperty(name="Invert Image", description="White is bare, black is full", **LIVE)
-    uv_layer: StringProperty(
-        name="UV Map",
-        description="UV map of the ground for the image; the active one if empty",
-        **LIVE,
-    )
+    invert_image: boolean("Invert Image", "White is bare, black is full", **LIVE)
+    uv_layer: string("UV Map", "UV map of the ground for the image; the active one if empty", **LIVE)
 
 
 class AroundPaths(Limited):
     """Mix-in: inside which areas something grows, and how far from which paths."""
 
-    areas: PointerProperty(
-        name="Areas",
-        description="Collection of closed curves; plants grow only inside them, as seen from above",
-        type=bpy.types.Collection,
+    areas: pointer_to(
+        bpy.types.Collection,
+        "Areas",
+        "Collection of closed curves; plants grow only inside them, as seen from above",
         **LIVE,
     )
-    paths: PointerProperty(
-        name="Paths",
-        description="Collection of curves along which the ground stays bare, as seen from above",
-        type=bpy.types.Collection,
+    paths: pointer_to(
+        bpy.types.Collection,
+        "Paths",
+        "Collection of curves along which the ground stays bare, as seen from above",
         **LIVE,
     )
-    path_distance: FloatProperty(
-        name="Path Distance",
-        description=(
-            "Minimum distance from trunks to the path's centerline: half the width of the road, plus room for branches"
-        ),
-        default=2.0,
-        min=0.0,
-        soft_max=50.0,
+    path_distance: real(
+        "Path Distance",
+        "Minimum distance from trunks to the path's centerline: half the width of the road, plus room for branches",
+        2.0,
+        **within(0.0, 50.0),
         **LENGTH,
         **LIVE,
     )
@@ -302,87 +259,67 @@ class TetFloraLayer(bpy.types.PropertyGroup, settings_in(Limits, Rules, **LIVE),
     """Something that grows on a ground, and how it is placed there."""
 
     # Identity and state. Plants refer to ``uid``, never to the name or the place in the list.
-    name: StringProperty(name="Name", description="Name of the layer, and of the collection of its plants")
-    uid: StringProperty(name="Identity", **HIDDEN)
-    kind: EnumProperty(name="Kind", items=[(k, k.title(), "") for k in (SCATTER, BIOME, FIELD)], **HIDDEN)
-    frozen: BoolProperty(
-        name="Freeze",
-        description="Keep the plants of this layer as they are: updates and removal leave them alone",
-        options=set(),
+    name: string("Name", "Name of the layer, and of the collection of its plants")
+    uid: string("Identity", **HIDDEN)
+    kind: choice("Kind", "", [(k, k.title(), "") for k in (SCATTER, BIOME, FIELD)], **HIDDEN)
+    frozen: boolean(
+        "Freeze", "Keep the plants of this layer as they are: updates and removal leave them alone", **FIXED
     )
-    shown: BoolProperty(
-        name="Show",
-        description="Show the plants of this layer in viewports, results and renders",
-        get=_is_shown,
-        set=_show,
-        options={'SKIP_SAVE'},
+    shown: once.boolean(
+        "Show", "Show the plants of this layer in viewports, results and renders", get=_is_shown, set=_show
     )
-    field: PointerProperty(name="Field", type=bpy.types.Object, **HIDDEN)
-    source: StringProperty(name="Source", **HIDDEN)  # identifier of the file that a biome was made from
-    data: StringProperty(name="Data", **HIDDEN)  # of that file: what is not in layers, as JSON
-    collection: PointerProperty(name="Collection", type=bpy.types.Collection, **HIDDEN)
-    made: IntProperty(name="Plants Made", **HIDDEN)
-    message: StringProperty(name="Message", **HIDDEN)
-    placed_by: StringProperty(name="Placed By", **HIDDEN)  # `rules.fingerprint` of when it was placed
-    erased: StringProperty(name="Erased Places", **HIDDEN)  # as `rules.note_erased` writes it
-    covers: StringProperty(name="Covers", **HIDDEN)  # ``uid`` of the population whose ground it covers
+    field: pointer_to(bpy.types.Object, "Field", **HIDDEN)
+    source: string("Source", **HIDDEN)  # identifier of the file that a biome was made from
+    data: string("Data", **HIDDEN)  # of that file: what is not in layers, as JSON
+    collection: pointer_to(bpy.types.Collection, "Collection", **HIDDEN)
+    made: integer("Plants Made", **HIDDEN)
+    message: string("Message", **HIDDEN)
+    placed_by: string("Placed By", **HIDDEN)  # `rules.fingerprint` of when it was placed
+    erased: string("Erased Places", **HIDDEN)  # as `rules.note_erased` writes it
+    covers: string("Covers", **HIDDEN)  # ``uid`` of the population whose ground it covers
 
-    grounds: CollectionProperty(name="Grounds", description="Meshes that the plants grow on", type=TetFloraGround)
-    ground_collection: PointerProperty(
-        name="Ground Collection",
-        description="All meshes in this collection are ground too, including those added later",
-        type=bpy.types.Collection,
+    grounds: list_of(TetFloraGround, "Grounds", "Meshes that the plants grow on")
+    ground_collection: pointer_to(
+        bpy.types.Collection,
+        "Ground Collection",
+        "All meshes in this collection are ground too, including those added later",
         **LIVE,
     )
-    density: FloatProperty(
-        name="Plants per Hectare",
-        description=(
-            "Plants per hectare (10,000 m², a square of 100 m) of fully suitable ground; fewer where it is partly "
-            "suitable. Old forest: 200 to 500 trees; young forest: 2,000; shrubs: 3,000; ferns: 20,000 (2 per m²)"
-        ),
-        default=200.0,
-        min=0.0,
-        soft_max=100_000.0,
+    density: real(
+        "Plants per Hectare",
+        "Plants per hectare (10,000 m², a square of 100 m) of fully suitable ground; fewer where it is partly "
+        "suitable. Old forest: 200 to 500 trees; young forest: 2,000; shrubs: 3,000; ferns: 20,000 (2 per m²)",
+        200.0,
+        **within(0.0, 100_000.0),
         precision=1,
         **LIVE,
     )
-    as_field: EnumProperty(**CREATE_AS, **LIVE)
+    as_field: CREATE_AS(**LIVE)
 
-    mix: CollectionProperty(
-        name="Species",
-        description="Species to choose from; if empty, the first one of the catalog",
-        type=TetFloraMixEntry,
-    )
-    mix_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+    mix: list_of(TetFloraMixEntry, "Species", "Species to choose from; if empty, the first one of the catalog")
+    mix_index: integer("Active Species", options={'HIDDEN', 'SKIP_SAVE'})
 
     min_distance: properties_of(Rules, **_DISTANCE).min_distance
 
-    distance_from: EnumProperty(**_SOURCE)
-    distance_by_species: BoolProperty(**_BY_SPECIES)
+    distance_from: _SOURCE()
+    distance_by_species: _BY_SPECIES()
 
-    age: FloatProperty(**{**AGE_PROPERTY, "description": _AGE}, **LIVE)
-    age_spread: FloatProperty(
-        name="Age Spread",
-        description=(
-            "How much the ages of plants differ: about two in three are within this fraction of Age, and as many "
-            "younger as older. 0 for plants of one age"
-        ),
-        default=0.0,
-        min=0.0,
-        max=1.0,
-        subtype='FACTOR',
+    age: real("Age", _AGE, **{**AGE.keywords, **LIVE})
+    age_spread: real(
+        "Age Spread",
+        "How much the ages of plants differ: about two in three are within this fraction of Age, and as many "
+        "younger as older. 0 for plants of one age",
+        **FACTOR,
         **LIVE,
     )
 
-    biome: StringProperty(name="Biome", **HIDDEN)  # ``uid`` of the biome of which it is a layer
-    folded: BoolProperty(name="Fold", description="Hide the layers of this biome in the list", **HIDDEN)
-    gives_way: BoolProperty(
-        name="Give Way",
-        description=(
-            "Leave the ground that other biomes take by their mask and limits to these: to those above this one in the "
-            "list or, if this one has no limits, to all. Where their edge is soft, the biomes blend"
-        ),
-        default=True,
+    biome: string("Biome", **HIDDEN)  # ``uid`` of the biome of which it is a layer
+    folded: boolean("Fold", "Hide the layers of this biome in the list", **HIDDEN)
+    gives_way: boolean(
+        "Give Way",
+        "Leave the ground that other biomes take by their mask and limits to these: to those above this one in the "
+        "list or, if this one has no limits, to all. Where their edge is soft, the biomes blend",
+        True,
         **LIVE,
     )
 
@@ -392,45 +329,41 @@ MODES = (
     ('ERASE', "Erase", "Remove plants of every species under the brush", 'TRASH', 1),
     ('THIN', "Thin", "Remove plants above the density, or closer than the minimum distance", 'PARTICLES', 2),
 )
-_BRUSH = properties_of(Brush, options=set())
+_BRUSH = properties_of(Brush, **FIXED)
 
 
 class TetFloraBrush(
-    bpy.types.PropertyGroup, settings_in(Rules, only=("scale_min", "scale_max"), options=set()), SpeciesChoice
+    bpy.types.PropertyGroup, settings_in(Rules, only=("scale_min", "scale_max"), **FIXED), SpeciesChoice
 ):
     """How the brush paints."""
 
-    mode: EnumProperty(name="Mode", description="What dragging does; hold Shift to erase", items=MODES, options=set())
+    mode: choice("Mode", "What dragging does; hold Shift to erase", MODES, **FIXED)
     radius: _BRUSH.radius
-    density: FloatProperty(
-        name="Density",
-        description=(
-            "Plants per 100 m² of the map. Paint adds plants up to this density, Thin removes those above it; painting "
-            "over a place again changes nothing"
-        ),
-        default=4.0,
-        min=0.001,
-        soft_max=100.0,
-        max=100_000.0,
-        options=set(),
+    density: real(
+        "Density",
+        "Plants per 100 m² of the map. Paint adds plants up to this density, Thin removes those above it; painting "
+        "over a place again changes nothing",
+        4.0,
+        **within(0.001, 100.0, 100_000.0),
+        **FIXED,
     )
     strength: _BRUSH.strength
     min_distance: properties_of(Brush, **_DISTANCE).min_distance
-    distance_from: EnumProperty(**_SOURCE)
-    distance_by_species: BoolProperty(**_BY_SPECIES)
-    source: EnumProperty(
-        name="Species",
-        description="What to paint",
-        items=(
+    distance_from: _SOURCE()
+    distance_by_species: _BY_SPECIES()
+    source: choice(
+        "Species",
+        "What to paint",
+        (
             ('MIX', "As the Active Layer", "The species of the active layer, by weight", 0),
             ('ONE', "One Species", "The species below", 1),
         ),
-        options=set(),
+        **FIXED,
     )
-    store: EnumProperty(
-        name="Create As",
-        description="What painted plants are created as. Erase and Thin affect both kinds",
-        items=(
+    store: choice(
+        "Create As",
+        "What painted plants are created as. Erase and Thin affect both kinds",
+        (
             (
                 'AUTOMATIC',
                 "Automatic",
@@ -440,20 +373,7 @@ class TetFloraBrush(
             STORAGE_ITEMS[1],
             ('FIELD', "Field", 'One object, "Painted plants", whose vertices are the plants. Room for millions', 2),
         ),
-        options=set(),
+        **FIXED,
     )
-    seed: IntProperty(name="Seed", **HIDDEN)
-    strokes: IntProperty(
-        name="Strokes",
-        description="Strokes painted so far; each draws its own random numbers",
-        min=0,
-        options={'HIDDEN'},
-    )
-
-
-CLASSES = (
-    TetFloraMixEntry,
-    TetFloraGround,
-    TetFloraLayer,
-    TetFloraBrush,
-)
+    seed: integer("Seed", **HIDDEN)
+    strokes: integer("Strokes", "Strokes painted so far; each draws its own random numbers", min=0, **HIDDEN)

@@ -6,8 +6,6 @@ Places where the brush has erased plants stay bare. The population stores them a
 a radius and the x and y of the centers of its circles.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,8 +16,8 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers32
 from ...errors import SceneError
 from ...files import parse_json
 from ...planting.cover import Suits
@@ -167,7 +165,7 @@ def makes_field(population: bpy.types.PropertyGroup, number: int) -> bool:
     return population.as_field == 'FIELD' or (population.as_field == 'AUTOMATIC' and number > EMPTIES_UNASKED)
 
 
-def note_erased(population: bpy.types.PropertyGroup, centers: NDArray[np.float64] | Sequence, radius: float) -> None:
+def note_erased(population: bpy.types.PropertyGroup, centers: Floats | Sequence, radius: float) -> None:
     """Keep circles on the map bare, with centers (n, 2) or more columns; meters."""
     flat = np.round(np.asarray(centers, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
     strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
@@ -209,7 +207,7 @@ class Search:
 
     ground: Terrain
     rules: Rules
-    present: tuple[NDArray[np.float64], NDArray[np.int32]]
+    present: tuple[Floats, Integers32]
     suits: Callable[[], Mapping[int, Suits]]
     erased: tuple[Path, ...]
     species: tuple[str, ...]  # identifiers that placements count through
@@ -269,9 +267,9 @@ def read_search(
         rules = replace(rules, count=min(rules.count, most))
     masks = {name: getattr(population, name) for name in MASKS}
     ground = read_ground(grounds, depsgraph, **masks)
-    suits = read_suits(scene, depsgraph, population, ground.triangles, species)
-    present = standing(scene, depsgraph, own, species)
-    zones = read_zones(scene, depsgraph, population, grounds)
+    suits = read_suits(depsgraph, population, ground.triangles, species)
+    present = standing(depsgraph, own, species)
+    zones = read_zones(depsgraph, population, grounds)
     erased = (  # circles, as lines of one point
         Path(center[None], stroke[0])
         for stroke in _strokes(population)
@@ -281,12 +279,9 @@ def read_search(
 
 
 def standing(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    without: Collection[bpy.types.Object],
-    species: Sequence[str],
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Places (m, 3) and species (m,) of the plants of a scene, those that are objects and those of fields.
+    depsgraph: bpy.types.Depsgraph, without: Collection[bpy.types.Object], species: Sequence[str]
+) -> tuple[Floats, Integers32]:
+    """Places (m, 3) and species (m,) of the plants of the scene, those that are objects and those of fields.
 
     Parameters
     ----------
@@ -297,7 +292,7 @@ def standing(
     """
     numbers = {identifier: number for number, identifier in enumerate(species)}
     # What covers the ground keeps nobody away.
-    objects = [o for o in not_of_covers(scene) if o not in without]
+    objects = [o for o in not_of_covers(depsgraph.scene) if o not in without]
     single = plants_of(objects)
     position = [np.array([o.matrix_world.translation for o in single], dtype=np.float64).reshape(-1, 3)]
     kinds = [np.array([numbers.get(o.tetflora.species, -1) for o in single], dtype=np.int32)]

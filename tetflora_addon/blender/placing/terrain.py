@@ -2,18 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Read terrain to populate: meshes, vertex groups, an image, and curves around areas and along paths."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats32
 from ...errors import SceneError
 from ...planting.plane import Path, Terrain
-from ..attributes import image_pixels, members, read, values_of, world_matrix
+from ..attributes import image_pixels, members, mesh_of, read, values_of, world_matrix
 from ..scene.objects import objects_within
 from ..scene.skeletons import spline_chain
 
@@ -21,13 +19,10 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
 #: Custom property of curves that are paths without a bevel: half their width, meters.
 HALF_WIDTH = "tetflora_half_width"
 #: Settings of populations that mask the ground: keyword arguments of `read_ground`.
-MASKS = (
-    *("vertex_group", "image", "uv_layer", "invert_group", "invert_image"),
-    *("areas", "paths", "path_distance"),
-)
+MASKS = (*("vertex_group", "image", "uv_layer", "invert_group", "invert_image"), *("areas", "paths", "path_distance"))
 
 
-def grid_mesh(name: str, points: NDArray[np.float64]) -> bpy.types.Mesh:
+def grid_mesh(name: str, points: Floats) -> bpy.types.Mesh:
     """A smooth mesh of the quadrilaterals between rows of points (rows, columns, 3)."""
     rows, columns = points.shape[:2]
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1)
@@ -41,7 +36,7 @@ def grid_mesh(name: str, points: NDArray[np.float64]) -> bpy.types.Mesh:
 class Line:
     """One curve."""
 
-    points: NDArray[np.float64]  # (k, 2): on the map, meters
+    points: Floats  # (k, 2): on the map, meters
     cyclic: bool  # the last point is joined to the first, which is not repeated
     half_width: float  # width that its bevel adds to each side, meters
 
@@ -77,17 +72,14 @@ def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line
     return [Line(points, cyclic, half_width) for points, cyclic in lines]
 
 
-def _from_edges(evaluated: bpy.types.Object) -> list[tuple[NDArray[np.float64], bool]] | None:
+def _from_edges(evaluated: bpy.types.Object) -> list[tuple[Floats, bool]] | None:
     """Splines of a curve that evaluates to nothing but edges; None if it has faces."""
-    mesh = evaluated.to_mesh()
-    try:
+    with mesh_of(evaluated) as mesh:
         if mesh is None or len(mesh.polygons):
             return None
         count = len(mesh.vertices)
         positions = members(mesh.vertices, "co", 3).astype(np.float64)
         ends = np.sort(members(mesh.edges, "vertices", 2, np.int32), axis=1)
-    finally:
-        evaluated.to_mesh_clear()
     if not count:
         return []
     # The points of a spline follow each other, and an edge from the last to the first closes it.
@@ -99,7 +91,7 @@ def _from_edges(evaluated: bpy.types.Object) -> list[tuple[NDArray[np.float64], 
     return [(positions[a:b], (a, b - 1) in closing) for a, b in zip(starts.tolist(), stops.tolist(), strict=True)]
 
 
-def _from_spline(spline: bpy.types.Spline, obj: bpy.types.Object) -> tuple[NDArray[np.float64], bool]:
+def _from_spline(spline: bpy.types.Spline, obj: bpy.types.Object) -> tuple[Floats, bool]:
     if spline.type == 'NURBS':
         raise SceneError(
             f'The NURBS curve "{obj.name}" has a bevel, extrusion or fill; remove it, or change its type to Bézier'
@@ -107,7 +99,7 @@ def _from_spline(spline: bpy.types.Spline, obj: bpy.types.Object) -> tuple[NDArr
     return spline_chain(spline).points[:, :3], spline.use_cyclic_u
 
 
-def _from_curves(curves: bpy.types.Curves) -> list[tuple[NDArray[np.float64], bool]]:
+def _from_curves(curves: bpy.types.Curves) -> list[tuple[Floats, bool]]:
     """Lines through the points of hair curves."""
     if not len(curves.curves):
         return []
@@ -186,9 +178,7 @@ def _path(line: Line, distance: float) -> Path:
     return Path(points, distance + line.half_width)
 
 
-def lines_within(
-    collection: bpy.types.Collection, depsgraph: bpy.types.Depsgraph, setting: str
-) -> tuple[NDArray[np.float64], ...]:
+def lines_within(collection: bpy.types.Collection, depsgraph: bpy.types.Depsgraph, setting: str) -> tuple[Floats, ...]:
     """Curves of a collection as lines on the map, (k, 2) each; closed ones end where they begin."""
     return tuple(_path(line, 0.0).points for line in _lines(collection, depsgraph, setting))
 
@@ -213,13 +203,12 @@ def _lines(
 
 def _read_mesh(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, group: str, uv_layer: str, with_uv: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float32] | None, NDArray[np.float64] | None, NDArray[np.float64]]:
+) -> tuple[Floats, Floats32 | None, Floats | None, Floats]:
     """Triangles in world space, weights and UV at their corners where asked for, and the border."""
     if obj.type != 'MESH':
         raise SceneError(f'"{obj.name}" is not a mesh; select a mesh with faces')
     evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
+    with mesh_of(evaluated) as mesh:
         if not len(mesh.polygons):
             raise SceneError(f'"{obj.name}" has no faces; select a mesh with faces')
         mesh.calc_loop_triangles()
@@ -232,12 +221,10 @@ def _read_mesh(
             uv = _uv(mesh, uv_layer, obj.name)[members(mesh.loop_triangles, "loops", 3, np.int32)]
         ends = read(mesh, ".edge_verts")
         faces = np.bincount(read(mesh, ".corner_edge"), minlength=len(ends))
-    finally:
-        evaluated.to_mesh_clear()
     return positions[vertices], weight, uv, positions[ends[faces == 1]]
 
 
-def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name: str) -> NDArray[np.float64]:
+def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name: str) -> Floats:
     """Weight of each vertex, (v,)."""
     attribute = mesh.attributes.get(group)
     # Geometry nodes turn vertex groups into attributes.
@@ -252,7 +239,7 @@ def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name
     return np.fromiter(each, np.float64, len(mesh.vertices))
 
 
-def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> NDArray[np.float64]:
+def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> Floats:
     """UV of each corner, (c, 2)."""
     if layer and layer not in mesh.uv_layers:
         raise SceneError(f'"{name}" has no UV map "{layer}"; add it, or clear UV Map')
@@ -262,7 +249,7 @@ def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> NDArray[np.float64]:
     return read(mesh, found.name).astype(np.float64)
 
 
-def _luminance(image: bpy.types.Image) -> NDArray[np.float32]:
+def _luminance(image: bpy.types.Image) -> Floats32:
     """Gray values of an image, (h, w), the first row at the bottom."""
     if image.source == 'TILED':
         raise SceneError(

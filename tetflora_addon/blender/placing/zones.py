@@ -6,8 +6,6 @@ Biomes with limits or a mask come first, in the order of the list; those without
 that is added to a beech forest pushes it back from the water.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from math import inf
@@ -83,10 +81,7 @@ def zone_values(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> 
 
 
 def read_zones(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    population: bpy.types.PropertyGroup,
-    grounds: Sequence[bpy.types.Object],
+    depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object]
 ) -> tuple[Zone, ...]:
     """Zones that limit a population on its grounds: its biome's, and the inverse of those to which that gives way.
 
@@ -95,20 +90,16 @@ def read_zones(
     SceneError
         A mask or a path cannot be read, as the message says.
     """
-    biome = biome_of(scene, population)
+    biome = biome_of(depsgraph.scene, population)
     if biome is None:
         return ()
     own = [_zone(biome, grounds, depsgraph)] if is_limited(biome) else []
-    others = [replace(_zone(other, grounds, depsgraph), inverse=True) for other in come_before(scene, biome)]
+    others = [replace(_zone(other, grounds, depsgraph), inverse=True) for other in come_before(depsgraph.scene, biome)]
     return (*own, *others)
 
 
 def zoned(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    owner: bpy.types.PropertyGroup,
-    grounds: Sequence[bpy.types.Object],
-    ground: Terrain,
+    depsgraph: bpy.types.Depsgraph, owner: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object], ground: Terrain
 ) -> Terrain:
     """A ground with the zones of a layer, a population or a stand, in its weights: as they are at the corners.
 
@@ -117,7 +108,7 @@ def zoned(
     SceneError
         As `read_zones`.
     """
-    zones = read_zones(scene, depsgraph, owner, grounds)
+    zones = read_zones(depsgraph, owner, grounds)
     if not zones:
         return ground
     corners, count = ground.triangles, len(ground.triangles)

@@ -2,16 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Result collections: what refinement adds to a scene, replaces and clears, and nothing else."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty, StringProperty
 
 from ...buffers import MeshBuffers, PointBuffers
+from ...parameters import within
 from ...species.species import Species
+from ..declare import FIXED, boolean, integer, list_of, pointer_to, string
 from ..materials import snow
 from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
@@ -96,31 +95,22 @@ class Results:
         self,
         name: str,
         kind: str,
-        buffers: MeshBuffers,
+        buffers: MeshBuffers | PointBuffers,
         materials: list[bpy.types.Material],
         species: Species | None = None,
         look: str = "",
     ) -> Generator[None, None, bpy.types.Object]:
-        """Write one mesh as an object of the collection, step by step; of one species, or of None, and of a look."""
+        """Write a mesh, or points of one material, as an object of the collection, step by step.
+
+        It is of one species, or of None, and of a look.
+        """
         self.use(materials)
         name = self.name_for(name)
+        if isinstance(buffers, PointBuffers):
+            return self._link(name, point_object(name, buffers, *materials), kind, species, look)
         mesh = yield from mesh_steps(name, buffers, materials)
         self._made.append(mesh)
         return self._link(name, bpy.data.objects.new(name, mesh), kind, species, look)
-
-    def add_points(
-        self,
-        name: str,
-        kind: str,
-        buffers: PointBuffers,
-        materials: list[bpy.types.Material],
-        species: Species | None = None,
-        look: str = "",
-    ) -> bpy.types.Object:
-        """Write one cloud of points, which has one material, as an object of the collection."""
-        self.use(materials)
-        name = self.name_for(name)
-        return self._link(name, point_object(name, buffers, *materials), kind, species, look)
 
     def name_for(self, name: str) -> str:
         """A name that ends in a number, with the mark; shortened so that Blender does not cut off the end."""
@@ -271,61 +261,52 @@ def leave_out_of_file() -> None:
                 keep_materials(collection)
 
 
-_COMMON = {"update": lambda self, _context: dress_results(self.id_data), "options": set()}
+_COMMON = {"update": lambda self, _context: dress_results(self.id_data), **FIXED}
 
 
-def _replaced(kind: str) -> dict:
-    return {
-        "name": f"{kind} Material",
-        "description": (
-            f"Your material for the {kind.lower()} of this species, used instead of TetFlora's and kept when refining. "
-            "Proxies keep the colors of the species"
-        ),
-        "type": bpy.types.Material,
-    }
+def _replaced(kind: str) -> Any:
+    return pointer_to(
+        bpy.types.Material,
+        f"{kind} Material",
+        f"Your material for the {kind.lower()} of this species, used instead of TetFlora's and kept when refining. "
+        "Proxies keep the colors of the species",
+    )
 
 
 class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
     """Output settings of one species."""
 
-    pass_index: IntProperty(
-        name="Pass Index",
-        description="Object index of this species' meshes and proxies, for compositing masks",
-        default=1,
-        min=0,
-        max=32767,
+    pass_index: integer(
+        "Pass Index",
+        "Object index of this species' meshes and proxies, for compositing masks",
+        1,
+        **within(0, high=32767),
         **_COMMON,
     )
-    light_group: StringProperty(
-        name="Light Group",
-        description="Light group of this species' meshes and proxies; if empty, that of all results",
-        **_COMMON,
+    light_group: string(
+        "Light Group", "Light group of this species' meshes and proxies; if empty, that of all results", **_COMMON
     )
-    leaf: PointerProperty(**_replaced("Leaf"))
-    blossom: PointerProperty(**_replaced("Blossom"))
-    bark: PointerProperty(**_replaced("Bark"))
+    leaf: _replaced("Leaf")
+    blossom: _replaced("Blossom")
+    bark: _replaced("Bark")
 
 
 _PLACES = {
-    "show_viewport": BoolProperty(
-        name="Viewports",
-        description="Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
-        default=True,
+    "show_viewport": boolean(
+        "Viewports",
+        "Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
+        True,
         **_COMMON,
     ),
-    "show_render": BoolProperty(
-        name="Renders", description="Show meshes and proxies in renders", default=True, **_COMMON
-    ),
-    "save_results": BoolProperty(
-        name="File",
-        description=(
-            "Save the meshes made by Refine in the file. Otherwise files stay as small as their plants, and Refine "
-            "makes the same meshes again"
-        ),
+    "show_render": boolean("Renders", "Show meshes and proxies in renders", True, **_COMMON),
+    "save_results": boolean(
+        "File",
+        "Save the meshes made by Refine in the file. Otherwise files stay as small as their plants, and Refine "
+        "makes the same meshes again",
         **_COMMON,
     ),
 }
-_RAYS = {name: BoolProperty(**given, **_COMMON) for name, given in SWITCHES.items()}
+_RAYS = {name: boolean(**given, **_COMMON) for name, given in SWITCHES.items()}
 
 
 class TetFloraOutput(
@@ -335,25 +316,16 @@ class TetFloraOutput(
 ):
     """Output settings of all results."""
 
-    pass_index: IntProperty(
-        name="Pass Index",
-        description="Object index of all meshes and proxies, except for species with their own",
-        default=0,
-        min=0,
-        max=32767,
+    pass_index: integer(
+        "Pass Index",
+        "Object index of all meshes and proxies, except for species with their own",
+        **within(0, high=32767),
         **_COMMON,
     )
-    light_group: StringProperty(
-        name="Light Group",
-        description="Light group of all meshes and proxies; matters where they emit light, as with baked lighting",
+    light_group: string(
+        "Light Group",
+        "Light group of all meshes and proxies; matters where they emit light, as with baked lighting",
         **_COMMON,
     )
-    species: CollectionProperty(
-        name="Species",
-        description="Species with their own pass index, light group or materials",
-        type=TetFloraSpeciesOutput,
-    )
-    species_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
-
-
-CLASSES = (TetFloraSpeciesOutput, TetFloraOutput)
+    species: list_of(TetFloraSpeciesOutput, "Species", "Species with their own pass index, light group or materials")
+    species_index: integer("Active Species", options={'HIDDEN', 'SKIP_SAVE'})

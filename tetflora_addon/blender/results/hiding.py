@@ -11,8 +11,6 @@ the library are excluded from the view layers. What else these hold is shown by 
 scene remembers all of it in a custom property.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

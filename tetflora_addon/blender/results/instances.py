@@ -11,8 +11,6 @@ shows: it has the same data, materials and modifiers, and one more that drops in
 hair. What a simulation made is copied as it is now.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -21,6 +19,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers32
 from ..attributes import write
 from ..compat import set_node_input
 from ..main_thread import in_main_thread
@@ -48,12 +47,7 @@ Source = bpy.types.Object | bpy.types.Collection
 
 
 def add_instances(
-    results: Results,
-    name: str,
-    source: Source,
-    matrices: NDArray[np.float64],
-    ids: NDArray[np.int32],
-    like: bpy.types.Object | None = None,
+    results: Results, name: str, source: Source, matrices: Floats, ids: Integers32, like: bpy.types.Object | None = None
 ) -> bpy.types.Object:
     """Add one object that shows many instances of an object or a collection.
 
@@ -87,9 +81,9 @@ def add_cluster_instances(
     results: Results,
     name: str,
     objects: Sequence[bpy.types.Object],
-    pick: NDArray[np.int32],
-    matrices: NDArray[np.float64],
-    ids: NDArray[np.int32],
+    pick: Integers32,
+    matrices: Floats,
+    ids: Integers32,
     like: bpy.types.Object | None = None,
 ) -> bpy.types.Object:
     """Add one object that shows instances of many objects, such as those of `add_cluster`.
@@ -184,8 +178,8 @@ def _instancer(
     kind: str,
     source: Source,
     matrices: NDArray[np.floating],
-    ids: NDArray[np.int32],
-    pick: NDArray[np.int32] | None = None,
+    ids: Integers32,
+    pick: Integers32 | None = None,
 ) -> bpy.types.Object:
     """An object in no collection whose nodes show instances of a source."""
     mesh = bpy.data.meshes.new(name)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves and blossoms that are the artist's mesh objects: their polygons and materials."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from dataclasses import replace
 from itertools import pairwise
@@ -20,7 +18,7 @@ from ...leaves.models import LeafModel, leaf_model
 from ...leaves.outlines import Blade
 from ...leaves.surfaces import Needles
 from ...species.species import LEAF_KINDS, Species
-from ..attributes import evaluated_mesh
+from ..attributes import mesh_of
 from ..materials.materials import bark_material, bark_steps, leaf_material
 from ..materials.nodes import is_ours
 from ..scene.skeletons import read_skeleton, skeleton_object_of, species_of
@@ -195,7 +193,7 @@ def _named(species: Species, form: str, depsgraph: bpy.types.Depsgraph, kind: st
 def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.Depsgraph, kind: str) -> LeafModel:
     if source.type != 'MESH':
         raise SpeciesError(f'"{source.name}", the {kind} of "{species.name}", is not a mesh object; choose a mesh')
-    with evaluated_mesh(source, depsgraph) as mesh:
+    with mesh_of(source.evaluated_get(depsgraph)) as mesh:
         arrays = read_mesh_arrays(mesh)
     if arrays.polygons == 0:
         raise SpeciesError(

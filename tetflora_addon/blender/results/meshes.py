@@ -9,8 +9,6 @@ cluster only gathers from them, and its normals are those that the faces had amo
 one ends. Faces of several surfaces, such as leaves on twigs, become one mesh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import linear_of, spread
+from ...arrays import Floats, Floats32, Integers, Integers32, Mask, linear_of, spread
 from ...buffers import MeshBuffers, PointBuffers
 from ...jobs import run_to_end
 from ..attributes import KINDS, face_offsets, members, read, type_for, values_of, write
@@ -181,11 +179,7 @@ def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
     return MeshBuffers(positions, edges, corner_verts, corner_edges, face_offsets(mesh), attributes, bool(smooth.any()))
 
 
-def point_object(
-    name: str,
-    buffers: PointBuffers,
-    material: bpy.types.Material,
-) -> bpy.types.Object:
+def point_object(name: str, buffers: PointBuffers, material: bpy.types.Material) -> bpy.types.Object:
     """Make an object of points that render as spheres, not linked to any collection.
 
     Parameters
@@ -266,17 +260,17 @@ class AttributeArray:
 class SurfaceArrays:
     """All of one mesh that renderers read."""
 
-    positions: NDArray[np.float32]  # (v, 3)
-    corner_verts: NDArray[np.int32]  # (c,)
-    face_offsets: NDArray[np.int32]  # (f + 1,)
-    slots: NDArray[np.int32]  # (f,): material of each face
+    positions: Floats32  # (v, 3)
+    corner_verts: Integers32  # (c,)
+    face_offsets: Integers32  # (f + 1,)
+    slots: Integers32  # (f,): material of each face
     materials: list[bpy.types.Material | None]  # at least one
     layers: Mapping[str, AttributeArray]
     #: (str, str): Names of the UV map and the color attribute that materials read if they name none; empty without any
     rendered: tuple[str, str]
-    normals: NDArray[np.float32] | None  # (c, 3): of corners; None where all faces are flat
-    flat: NDArray[np.bool_]  # (f,)
-    texture_space: NDArray[np.float64]  # (2, 3): location and size of the box that generated coordinates fill
+    normals: Floats32 | None  # (c, 3): of corners; None where all faces are flat
+    flat: Mask  # (f,)
+    texture_space: Floats  # (2, 3): location and size of the box that generated coordinates fill
 
 
 def read_mesh(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> SurfaceArrays:
@@ -329,7 +323,7 @@ class AssetMeshes:
         From the space of that surface to that of the asset.
     """
 
-    def __init__(self, surfaces: Sequence[SurfaceArrays], surface: NDArray[np.int32], matrices: NDArray) -> None:
+    def __init__(self, surfaces: Sequence[SurfaceArrays], surface: Integers32, matrices: NDArray) -> None:
         self.surfaces = tuple(surfaces)
         self.surface = np.asarray(surface, np.int32)
         self.matrices = np.asarray(matrices, np.float64).reshape(-1, 4, 4)
@@ -342,7 +336,7 @@ class AssetMeshes:
         self.moved = (self.matrices != np.eye(4)).any(axis=(1, 2))
         self._numbers = np.zeros(0, np.int32)
 
-    def numbered(self, keys: NDArray[np.int64], bound: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    def numbered(self, keys: Integers, bound: int) -> tuple[Integers, Integers32]:
         """Different keys in no particular order, and the number among them of each; keys are below a bound."""
         if bound > max(4 * len(keys), len(self._numbers), 1 << 20):
             unique, number = np.unique(keys, return_inverse=True)
@@ -362,13 +356,13 @@ class _Piece:
     """Faces of one surface in a cluster; ``vertex`` (v,), ``corner`` (c,) and ``face`` (f,) count in the surface."""
 
     surface: SurfaceArrays
-    positions: NDArray[np.float32]
-    corner_verts: NDArray[np.int32]
-    sizes: NDArray[np.int32]
-    normals: NDArray[np.float32] | None
-    vertex: NDArray[np.integer]
-    corner: NDArray[np.integer]
-    face: NDArray[np.integer]
+    positions: Floats32
+    corner_verts: Integers32
+    sizes: Integers32
+    normals: Floats32 | None
+    vertex: Integers
+    corner: Integers
+    face: Integers
 
     def values(self, layer: AttributeArray | None, domain: str, data_type: str) -> NDArray:
         """Values of an attribute of the surface on a domain, as of a type; 0 for None."""
@@ -387,7 +381,7 @@ class _Piece:
 
 
 def cluster_mesh_steps(
-    asset: AssetMeshes, name: str, part: NDArray[np.int32], face: NDArray[np.int32]
+    asset: AssetMeshes, name: str, part: Integers32, face: Integers32
 ) -> Generator[None, None, bpy.types.Mesh]:
     """Make the mesh of a cluster step by step; closing the generator removes it.
 
@@ -493,7 +487,7 @@ def _joined(arrays: Sequence[NDArray]) -> NDArray:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
-def _normals(piece: _Piece) -> NDArray[np.float32]:
+def _normals(piece: _Piece) -> Floats32:
     """Normals of corners, those of its faces where a surface has none."""
     if piece.normals is not None:
         return piece.normals
@@ -508,7 +502,7 @@ def _normals(piece: _Piece) -> NDArray[np.float32]:
     return np.repeat(area, piece.sizes, axis=0).astype(np.float32)
 
 
-def _slots(pieces: Sequence[_Piece]) -> tuple[list[bpy.types.Material | None], list[NDArray[np.int32]]]:
+def _slots(pieces: Sequence[_Piece]) -> tuple[list[bpy.types.Material | None], list[Integers32]]:
     """Materials of a mesh, and the slot of each face, piece by piece."""
     if len(pieces) == 1:
         return pieces[0].surface.materials, [pieces[0].surface.slots[pieces[0].face]]

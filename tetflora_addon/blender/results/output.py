@@ -6,8 +6,6 @@ All objects of a species have one parent, an empty with the species' name, which
 layer. Results of a render and the artist's results share it, so that its name, and thus the matte, is the same in both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

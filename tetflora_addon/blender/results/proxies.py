@@ -2,25 +2,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Proxies of a refinement as objects, in the scene's form, and baked light of proxies and meshes."""
 
-from __future__ import annotations
-
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Generator, Iterator, Mapping
+from itertools import count
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats32, Integers32
 from ...buffers import MeshBuffers, PointBuffers
 from ...emission.asset_plan import ASSETS
 from ...emission.emitters import Buffers, EmissionInput
 from ...emission.light import BATCH, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...refinement.statistics import Statistics
-from ...species.species import Species
 from ..attributes import face_offsets, read, write
 from ..materials.nodes import find_socket, is_ours
-from ..worker import calling, in_thread
+from ..worker import calling, in_thread, written
 from .collection import Results
 from .output import KIND
 from .proxy_kinds import ProxyKind, proxy_kind_of
@@ -83,12 +80,12 @@ def _light_of_mesh(
     light: BakedLight,
     first: int,
     rounded: bool,
-    offsets: NDArray[np.int32],
-    positions: NDArray[np.float32],
-    corner_verts: NDArray[np.int32],
-    color: NDArray[np.float32],
-    transmission: NDArray[np.float32],
-) -> Mapping[str, tuple[str, NDArray[np.float32]]]:
+    offsets: Integers32,
+    positions: Floats32,
+    corner_verts: Integers32,
+    color: Floats32,
+    transmission: Floats32,
+) -> Mapping[str, tuple[str, Floats32]]:
     """Attributes of a mesh whose faces are the sheets from ``first`` on: its light, at vertices where it is round."""
     faces = len(offsets) - 1
     front, back = np.zeros((2, faces, 3), np.float32)
@@ -104,7 +101,7 @@ def _light_of_mesh(
 
 def write_proxies(
     results: Results, form: ProxyKind, refined: EmissionInput, statistics: Statistics, baking: Baking | None = None
-) -> Generator[Progress, None, None]:
+) -> Job[None]:
     """Make the proxies of a refined scene; a thread makes the next block while one is written.
 
     Parameters
@@ -124,39 +121,28 @@ def write_proxies(
     blocks = emission.baked_blocks(refined, baking.light, baking.first_facet) if baked else emission.blocks(refined)
     statistics.facet_pixels = float(refined.facet_pixels or 0.0)
     statistics.facet_asked = results.scene.tetflora.facet if refined.facet_pixels else 0.0
-    with closing(in_thread((buffers for buffers in blocks), ahead=1)) as made:
-        number, progress = 0, Progress(0.95, "Making proxies")
-        yield progress
-        for buffers in made:
-            if buffers is None:
-                yield progress.repeated
-                continue
-            yield from progress.during(_added(results, form, buffers, number, baked, refined.flora.species))
-            statistics.polygons_proxy += buffers.polygons
-            statistics.memory_mb += buffers.nbytes / 1e6
-            progress = Progress(1.0 - 0.05 * 0.9**number, f"Making proxies: {statistics.polygons_proxy:,}")
-            yield progress
-            number += 1
+    numbers = count()
 
-
-def _added(
-    results: Results, form: ProxyKind, buffers: Buffers, number: int, baked: bool, every: Sequence[Species]
-) -> Generator[None, None, None]:
-    """Write one block of proxies, of one of some species, step by step."""
-    points, of_assets = isinstance(buffers, PointBuffers), buffers.species == ASSETS
-    species = None if buffers.species is None or of_assets else every[buffers.species]
-    look = buffers.look or results.look_of(buffers.species)
-    if baked:
-        material = form.baked_material()
-    else:
-        kinds = (form.asset_material, form.asset_point_material) if of_assets else (form.material, form.point_material)
-        material = kinds[points]()
-        set_sockets(material, results.scene, form.sockets)
-    name = f"{'TetFlora' if species is None else species.name} proxies {number:03d}"
-    if points:
-        results.add_points(name, "proxy", buffers, [material], species, look)
-    else:
+    def write(buffers: Buffers) -> Generator[None, None, Progress]:
+        number, of_assets = next(numbers), buffers.species == ASSETS
+        species = None if buffers.species is None or of_assets else refined.flora.species[buffers.species]
+        look = buffers.look or results.look_of(buffers.species)
+        if baked:
+            material = form.baked_material()
+        else:
+            kinds = (
+                (form.asset_material, form.asset_point_material) if of_assets else (form.material, form.point_material)
+            )
+            material = kinds[isinstance(buffers, PointBuffers)]()
+            set_sockets(material, results.scene, form.sockets)
+        name = f"{'TetFlora' if species is None else species.name} proxies {number:03d}"
         yield from results.add(name, "proxy", buffers, [material], species, look)
+        statistics.polygons_proxy += buffers.polygons
+        statistics.memory_mb += buffers.nbytes / 1e6
+        return Progress(1.0 - 0.05 * 0.9**number, f"Making proxies: {statistics.polygons_proxy:,}")
+
+    yield (progress := Progress(0.95, "Making proxies"))
+    yield from written(blocks, write, progress)
 
 
 def set_sockets(material: bpy.types.Material, scene: bpy.types.Scene, sockets: Mapping[str, str]) -> None:

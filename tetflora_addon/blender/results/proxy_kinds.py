@@ -6,8 +6,6 @@ A new form is a new row. Transparent bounces of Cycles matter for shells: a ray 
 where it runs out of bounces. EEVEE has no bounces, but without ray tracing nothing keeps the sky out of crowns.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial

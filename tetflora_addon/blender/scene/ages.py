@@ -9,8 +9,6 @@ is full-grown where that is less, to when the last limbs of a dead plant have fa
 before. The years that pass in a scene are added afterward and change no class.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -20,6 +18,7 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers, Integers32
 from ...errors import SpeciesError
 from ...growth.seeds import Seeds
 from ...species.ages import ages_of, stage
@@ -33,7 +32,7 @@ from .skeletons import age_of, aged_kind, dead_of, is_aged, later, plain_kind, s
 #: Classes of a species at most, and years from its death to the last of them.
 MOST, _FALLEN = 12, 40.0
 FULL_GROWN = "Full-grown"
-Part = tuple[str, Seeds, NDArray[np.float64] | None, Sizes | None]
+Part = tuple[str, Seeds, Floats | None, Sizes | None]
 """The name of an object, its plants, their ages, None where all are full-grown, and recorded sizes if there are any."""
 
 
@@ -62,13 +61,13 @@ def classed(scene: bpy.types.Scene, parts: Sequence[Part]) -> list[tuple[str, Se
 
 
 def with_sizes(
-    scene: bpy.types.Scene, seeds: Seeds, ages: NDArray[np.float64] | None, sizes: Sizes | None
-) -> tuple[Seeds, NDArray[np.float64] | None]:
+    scene: bpy.types.Scene, seeds: Seeds, ages: Floats | None, sizes: Sizes | None
+) -> tuple[Seeds, Floats | None]:
     """Plants (n,) in their recorded sizes, if there are any, and the ages of all others."""
     return sized(seeds, ages, sizes, lambda identifier: species_for(scene, identifier))
 
 
-def class_ages(species: Species, years: NDArray[np.float64]) -> NDArray[np.float64]:
+def class_ages(species: Species, years: Floats) -> Floats:
     """Ages of the classes of ages (n,): the nearest by ratio; full-grown plants stay it."""
     ages = ages_of(species)
     first = min(1.0, ages.full / 10.0)
@@ -78,8 +77,8 @@ def class_ages(species: Species, years: NDArray[np.float64]) -> NDArray[np.float
 
 
 def plainly_aged(
-    scene: bpy.types.Scene, seeds: Seeds, ages: NDArray[np.float64] | None, sizes: Sizes | None
-) -> tuple[Seeds, NDArray[np.float64] | None]:
+    scene: bpy.types.Scene, seeds: Seeds, ages: Floats | None, sizes: Sizes | None
+) -> tuple[Seeds, Floats | None]:
     """As `with_sizes`, with all ages (n,) beside kinds that name none; what died young is old and small."""
     seeds, ages = with_sizes(scene, seeds, ages, sizes)
     if not any(is_aged(kind) for kind in seeds.identifiers):
@@ -97,7 +96,7 @@ def plainly_aged(
     return replace(seeds, identifiers=kinds, scale=seeds.scale * smaller[seeds.species]), found
 
 
-def relative_heights(identifier: str, years: NDArray[np.floating]) -> NDArray[np.float64]:
+def relative_heights(identifier: str, years: NDArray[np.floating]) -> Floats:
     """Heights (n,) of plants of a species at ages (n,) over that of the description, for what stands for them."""
     try:
         found = heights(species_for(None, identifier), years)
@@ -112,7 +111,7 @@ def kind_species(species: Species, kind: str, years: float = 0.0) -> Species:
     return at_age(species, age, dead + years) if dead > 0.0 else at_age(species, age + years)
 
 
-def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: NDArray[np.float64], many: set[str]) -> Seeds:
+def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: Floats, many: set[str]) -> Seeds:
     years, which = years_of(scene), [n for n, kind in enumerate(seeds.identifiers) if species_of(kind) in many]
     classes, taller = _in_classes(scene, seeds.identifiers, seeds.species, ages, years, which)
     kinds, number = _by_age(seeds.identifiers, seeds.species, classes)
@@ -120,8 +119,8 @@ def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: NDArray[np.float64], ma
 
 
 def crown_kinds(
-    scene: bpy.types.Scene, kinds: Sequence[str], number: NDArray[np.integer], ages: NDArray[np.float64] | None
-) -> tuple[tuple[str, ...], NDArray[np.int32], NDArray[np.float64]]:
+    scene: bpy.types.Scene, kinds: Sequence[str], number: Integers, ages: Floats | None
+) -> tuple[tuple[str, ...], Integers32, Floats]:
     """Kinds of plants of which crowns are known well enough, for plants (n,) of some kinds and their ages.
 
     Returns
@@ -144,9 +143,7 @@ def crown_kinds(
     return *_by_age(older, number, classes), taller
 
 
-def _by_age(
-    kinds: Sequence[str], number: NDArray[np.integer], ages: NDArray[np.float64]
-) -> tuple[tuple[str, ...], NDArray[np.int32]]:
+def _by_age(kinds: Sequence[str], number: Integers, ages: Floats) -> tuple[tuple[str, ...], Integers32]:
     """Kinds with their ages, and the number (n,) of each plant's, from those without (n,)."""
     found: list[str] = []
     out = np.zeros(len(number), np.int32)
@@ -159,13 +156,8 @@ def _by_age(
 
 
 def _in_classes(
-    scene: bpy.types.Scene,
-    kinds: Sequence[str],
-    number: NDArray[np.integer],
-    ages: NDArray[np.float64],
-    years: float,
-    which: Iterable[int],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    scene: bpy.types.Scene, kinds: Sequence[str], number: Integers, ages: Floats, years: float, which: Iterable[int]
+) -> tuple[Floats, Floats]:
     """Ages of classes (n,) for plants (n,) of some of the kinds, and their heights over those (n,) in so many years.
 
     Species that cannot be read are left as they are, which is told elsewhere.

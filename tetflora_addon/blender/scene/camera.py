@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The active camera: its window, its lens, its movement while the shutter is open, and the other eyes of stereo."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -6,16 +6,14 @@ A species is compiled for its crown once in a session, which takes up to a tenth
 must not wait for that.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 import bpy
 
 from ...compiled.sizes import Crown, crown_of, known_crown, prepare
 from ...errors import SpeciesError
-from ...jobs import Progress
+from ...jobs import Job, Progress
 from ...species.species import Species
 from ..runtime import call_soon, redraw
 from ..species.asset_species import find_asset
@@ -29,7 +27,7 @@ _RADIUS, _BASE, _AREA, _POLYGONS = 0.2, 0.3, 0.5, 50_000.0
 _SOON = 0.05  # seconds between two looks at crowns that are being found
 
 _wanted: list[Species] = []
-_finding: list[Generator] = []  # at most one
+_finding: list[Job] = []  # at most one
 _without: set[Species] = set()  # an object for a leaf
 
 
@@ -57,7 +55,7 @@ def crown_to_draw(scene: bpy.types.Scene, kind: str) -> Crown | None:
     return known
 
 
-def crown_steps(progress: Progress, scene: bpy.types.Scene, kinds: Iterable[str]) -> Generator[Progress, object, None]:
+def crown_steps(progress: Progress, scene: bpy.types.Scene, kinds: Iterable[str]) -> Job[None]:
     """Find the crowns of kinds in the background, so that nobody has to wait for them later."""
     species = []
     for kind in sorted(kinds):

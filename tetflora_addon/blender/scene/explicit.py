@@ -7,33 +7,22 @@ everything else that such an instancer shows, because an instancer can only be h
 whose scatter is refined counts as assets instead.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats32, Integers32
 from ...assets.mesh_features import mesh_features
 from ...errors import SceneError
 from ...refinement.polygons import Meshes, Surface
-from ..attributes import face_offsets, members, read, values_of, world_matrix
+from ..attributes import face_offsets, members, mesh_of, read, values_of, world_matrix
 from ..materials.face_looks import Looks
 from ..materials.nodes import is_ours
 from .looks import LayerLooks
 from .objects import SURFACE_TYPES, materials_of, may_instance, renderable_objects, scatters
 
-#: Of the property `is_explicit`.
-EXPLICIT_PROPERTY = {
-    "name": "Refine This Mesh",
-    "description": (
-        "Refine the object's own polygons with the plants: kept where they are near, drawn as proxies where they are "
-        "far or hidden. Use it for trees from other sources, rocks and scans, and for objects that instance them"
-    ),
-    "options": set(),
-}
 #: Transmission of sheets whose material leaves it open.
 _SHEET_TRANSMISSION = 0.3
 _TYPES = {'FLOAT', 'FLOAT2', 'FLOAT_VECTOR', 'FLOAT_COLOR', 'BYTE_COLOR'}
@@ -49,7 +38,7 @@ class Explicit:
     originals: list[bpy.types.Object]  # whose place the refined polygons take
 
 
-def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Explicit | None:
+def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
     """Polygons of all marked objects of a view layer that render, and of their instances; None where there are none.
 
     Raises
@@ -60,12 +49,12 @@ def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLaye
     """
     if not any(o.tetflora.is_explicit for o in bpy.data.objects):
         return None
-    rendered = set(renderable_objects(view_layer))
+    rendered = set(renderable_objects(depsgraph.view_layer))
     marked = {o for o in rendered if o.tetflora.is_explicit}
     wanted = marked | _instancers_of_marked(rendered, depsgraph)
     if not wanted:
         return None
-    reader, looks, found = _Reader(), LayerLooks(view_layer), set()
+    reader, looks, found = _Reader(), LayerLooks(depsgraph.view_layer), set()
     for instance in depsgraph.object_instances:
         owner = instance.parent.original if instance.is_instance else instance.object.original
         if owner not in wanted or not instance.show_self or instance.object.type not in SURFACE_TYPES:
@@ -125,11 +114,11 @@ class _Reader:
         self.surfaces: list[Surface] = []
         self.materials: list[list[bpy.types.Material | None]] = []
         self.surface: list[int] = []
-        self.matrices: list[NDArray[np.float64]] = []
+        self.matrices: list[Floats] = []
         self._known: dict[tuple, int | None] = {}
         self._looks = Looks()
 
-    def add(self, obj: bpy.types.Object, matrix: NDArray[np.float64], look: str) -> bool:
+    def add(self, obj: bpy.types.Object, matrix: Floats, look: str) -> bool:
         """Take an evaluated object, or an original that is not evaluated; False if it has no faces."""
         own = tuple(slot.material.name_full for slot in obj.material_slots if slot.link == 'OBJECT' and slot.material)
         key = obj.data.as_pointer(), obj.type, own, obj.original.as_pointer() if obj.type != 'MESH' else 0, look
@@ -143,14 +132,11 @@ class _Reader:
         return True
 
     def _read(self, obj: bpy.types.Object, look: str) -> int | None:
-        mesh = obj.to_mesh()
-        try:
+        with mesh_of(obj) as mesh:
             if mesh is None or not len(mesh.polygons):
                 return None
             materials = materials_of(obj, mesh)
             self.surfaces.append(replace(_surface(obj.original.name, mesh, materials, self._looks), look=look))
-        finally:
-            obj.to_mesh_clear()
         self.materials.append(materials)
         return len(self.surfaces) - 1
 
@@ -192,9 +178,7 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
     )
 
 
-def _attributes(
-    mesh: bpy.types.Mesh, corner_verts: NDArray[np.int32], sizes: NDArray[np.int32]
-) -> Iterator[tuple[str, NDArray[np.float32]]]:
+def _attributes(mesh: bpy.types.Mesh, corner_verts: Integers32, sizes: Integers32) -> Iterator[tuple[str, Floats32]]:
     """Attributes of floating point numbers at corners (c, k), the UV map that renders first."""
     layers = mesh.uv_layers
     first = next((layer.name for layer in layers if layer.active_render), "")

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The points of a field of plants and their attributes, in the field's own space, checked and with defaults."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -11,6 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers, Keys, Mask
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
 from ...planting.places import new_seeds
@@ -33,14 +32,14 @@ class FieldPoints:
     """
 
     kinds: tuple[str, ...]
-    position: NDArray[np.float64]
-    rotation: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    species: NDArray[np.int64]
-    seed: NDArray[np.int64]
-    age: NDArray[np.float64] | None
+    position: Floats
+    rotation: Floats
+    scale: Floats
+    species: Integers
+    seed: Integers
+    age: Floats | None
 
-    def seeds(self, keys: NDArray[np.uint64] | None) -> NDArray[np.int64]:
+    def seeds(self, keys: Keys | None) -> Integers:
         """Seeds of the points in all places with the given keys; those of the points themselves where it is None."""
         if keys is None:
             return self.seed
@@ -98,16 +97,14 @@ def _attribute(obj: bpy.types.Object, points: Points, name: str, kinds: Iterable
     return found
 
 
-def _integers(
-    obj: bpy.types.Object, points: Points, name: str, size: int, default: NDArray[np.int64] | int
-) -> NDArray[np.int64]:
+def _integers(obj: bpy.types.Object, points: Points, name: str, size: int, default: Integers | int) -> Integers:
     attribute = _attribute(obj, points, name, _INTEGERS)
     if attribute is None:
         return np.broadcast_to(np.asarray(default, np.int64), size)
     return values_of(attribute).astype(np.int64)
 
 
-def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> NDArray[np.int64]:
+def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> Integers:
     """Stored seeds, hashed where the object has a seed; without stored ones, hashes of the points' ids."""
     roll = obj.tetflora.seed
     stored = _attribute(obj, points, "seed", _INTEGERS) is not None
@@ -124,7 +121,7 @@ def _ages(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.floati
     return np.broadcast_to(np.zeros(1) if own is None else own, size)
 
 
-def _rotations(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.float64]:
+def _rotations(obj: bpy.types.Object, points: Points, size: int) -> Floats:
     """Rotation of each point in the field's space, (3, 3, n): numpy is fast with long rows."""
     attribute = _attribute(obj, points, "rotation", {'QUATERNION', 'FLOAT_VECTOR'})
     if attribute is None:
@@ -133,7 +130,7 @@ def _rotations(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.f
     return _from_quaternions(values) if len(values) == 4 else _from_eulers(values)
 
 
-def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> NDArray[np.float64]:
+def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> Floats:
     """Scale of each point along its axes, (3, n), or (1, n) if uniform and ``least`` is 1."""
     attribute = _attribute(obj, points, "scale", {'FLOAT', 'FLOAT_VECTOR'})
     if attribute is None:
@@ -145,7 +142,7 @@ def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> NDA
     return np.ascontiguousarray(values.T, np.float64)
 
 
-def _from_quaternions(q: NDArray[np.float64]) -> NDArray[np.float64]:
+def _from_quaternions(q: Floats) -> Floats:
     """Rotations, (3, 3, n), of quaternions of any length, (4, n); that of length 0 is no rotation."""
     with np.errstate(invalid="ignore", divide="ignore"):
         squared = np.einsum("in,in->n", q, q)
@@ -160,7 +157,7 @@ def _from_quaternions(q: NDArray[np.float64]) -> NDArray[np.float64]:
     return out
 
 
-def _from_eulers(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def _from_eulers(angles: Floats) -> Floats:
     """Rotations, (3, 3, n), of XYZ Euler angles in radians, (3, n): first about x, last about z, as Blender's."""
     with np.errstate(invalid="ignore"):
         (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
@@ -172,9 +169,7 @@ def _from_eulers(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.stack(row) for row in rows])
 
 
-def placed_frames(
-    world: NDArray[np.float64], rotation: NDArray[np.float64], scale: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+def placed_frames(world: Floats, rotation: Floats, scale: Floats) -> tuple[Floats, Floats, Mask]:
     """Frames, scales and soundness, as `frames_of`, of all points (3, 3, n) in all places (k, 3, 3): k · n of each."""
     places, size = len(world), rotation.shape[2]
     frames, scales, sound = frames_of(world)
@@ -191,7 +186,7 @@ def placed_frames(
     return turned, found, np.isfinite(turned.sum(axis=(1, 2))) & np.isfinite(found)
 
 
-def refuse(obj: bpy.types.Object, bad: NDArray[np.bool_], what: str) -> None:
+def refuse(obj: bpy.types.Object, bad: Mask, what: str) -> None:
     """Raise `SceneError` where some points (n,) of a field are bad, with their number and the first one."""
     if bad.any():
         raise SceneError(

@@ -6,8 +6,6 @@ All names have the prefix ``tf_``: without it, they belong to other tools. Attri
 are 0, say nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -15,6 +13,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers
 from ...errors import SceneError
 from ..attributes import values_of
 from .field_points import FieldPoints, Points, joined, point_count, refuse
@@ -23,13 +22,7 @@ from .own_ages import Lives, Sizes
 
 HEIGHT = "tf_height"
 #: Attributes of numbers, with the most that is sound: meters, and years since death.
-NUMBERS = {
-    HEIGHT: 200.0,
-    "tf_diameter": 20.0,
-    "tf_crown_width": 200.0,
-    "tf_crown_base": 200.0,
-    "tf_dead": 10_000.0,
-}
+NUMBERS = {HEIGHT: 200.0, "tf_diameter": 20.0, "tf_crown_width": 200.0, "tf_crown_base": 200.0, "tf_dead": 10_000.0}
 OFFSET, FIT = "tf_crown_offset", "tf_fit"
 #: Attributes of histories: the year of the stand that a point is a record of, and the plant whose record it is.
 YEAR, PLANT = "tf_year", "tf_plant"
@@ -43,26 +36,6 @@ SIZE_ATTRIBUTES = {
     YEAR: 'FLOAT',
     PLANT: 'INT',
 }
-#: Properties of objects that are histories.
-STAND_YEAR = {
-    "name": "Stand Year",
-    "description": "Year of the stand's growth that is shown. Animate it to let the stand grow",
-    "default": 100.0,
-    "min": 0.0,
-    "soft_max": 200.0,
-    "max": 10_000.0,
-    "step": 100,
-    "precision": 1,
-}
-STAND_SMOOTH = {
-    "name": "Smooth Growth",
-    "description": (
-        "Let plants grow without jumps from frame to frame, for animations. Each frame then takes longer to prepare. "
-        "Off, each plant has the form that is nearest to its size, which is best for stills"
-    ),
-    "default": False,
-    "options": {'HIDDEN'},
-}
 _MOST_FIT, _MOST_OFFSET = 10.0, 10.0
 _STEADY = np.cos(np.radians(30.0))  # trunks that turn further from one record to the next have fallen
 
@@ -71,10 +44,10 @@ _STEADY = np.cos(np.radians(30.0))  # trunks that turn further from one record t
 class History:
     """Which points are records of which plant."""
 
-    year: NDArray[np.float64]  # (n,)
-    first: NDArray[np.int64]  # (n,): first record of the same plant
+    year: Floats  # (n,)
+    first: Integers  # (n,): first record of the same plant
 
-    def chosen(self, now: float) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    def chosen(self, now: float) -> tuple[Integers, Integers, Floats]:
         """Records (m,) before and after a year of those plants that are there, and how far it is from the first."""
         first, last = self.year.min(initial=np.inf), self.year.max(initial=-np.inf)
         now = last if first == last else min(float(now), last)  # what has one year has no others
@@ -119,7 +92,7 @@ def stand_years(scene: bpy.types.Scene) -> list[float]:
     return [group.stand_year for obj in meshes if (group := obj.tetflora).is_field and has_history(obj)]
 
 
-def stored_now(obj: bpy.types.Object) -> NDArray[np.int64]:
+def stored_now(obj: bpy.types.Object) -> Integers:
     """Numbers (m,) of the stored points of a field that are plants now: of a history, those of the present year."""
     points = obj.data
     if not has_history(obj):
@@ -216,12 +189,12 @@ def in_year(
     return chosen, Sizes(**columns)
 
 
-def _between(values: NDArray, a: NDArray[np.int64], b: NDArray[np.int64], part: NDArray[np.float64]) -> NDArray:
+def _between(values: NDArray, a: Integers, b: Integers, part: Floats) -> NDArray:
     one, other = values[a], values[b]
     return one + part.reshape(-1, *[1] * (values.ndim - 1)) * (other - one)
 
 
-def _turned(rotation: NDArray, a: NDArray[np.int64], b: NDArray[np.int64], part: NDArray[np.float64]) -> NDArray:
+def _turned(rotation: NDArray, a: Integers, b: Integers, part: Floats) -> NDArray:
     """Rotations (3, 3, m) between those of records; those before where a trunk falls."""
     one, other = rotation[:, :, a], rotation[:, :, b]
     upright = (one[:, 2] * other[:, 2]).sum(axis=0)
@@ -236,7 +209,7 @@ def _turned(rotation: NDArray, a: NDArray[np.int64], b: NDArray[np.int64], part:
     return one
 
 
-def _values(obj: bpy.types.Object, points: Points, name: str) -> NDArray[np.float64]:
+def _values(obj: bpy.types.Object, points: Points, name: str) -> Floats:
     """An attribute in double precision; 0 where it is absent."""
     size, vector = point_count(points), SIZE_ATTRIBUTES[name] == 'FLOAT_VECTOR'
     found = points.attributes.get(name)

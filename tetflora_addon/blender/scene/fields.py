@@ -6,8 +6,6 @@ A field is a mesh or point cloud whose object is marked as one. Attributes of it
 wrote them. Nothing here loops over plants.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
@@ -16,6 +14,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers, Integers32, Keys
 from ...camera.camera import origin_near
 from ...errors import SceneError
 from ...growth.seeds import Seeds
@@ -48,7 +47,7 @@ def stored_size(obj: bpy.types.Object) -> int:
     return len(obj.data.points if obj.type == 'POINTCLOUD' else obj.data.vertices) if obj.type in FIELD_TYPES else 0
 
 
-def read_field(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, matrices: NDArray[np.float64]) -> Seeds:
+def read_field(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, matrices: Floats) -> Seeds:
     """Plants of a field as `read_aged_field`, without their ages and sizes."""
     return read_aged_field(obj, depsgraph, matrices)[0]
 
@@ -56,10 +55,10 @@ def read_field(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, matrices: 
 def read_aged_field(
     obj: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
-    matrices: NDArray[np.float64],
-    keys: NDArray[np.uint64] | None = None,
+    matrices: Floats,
+    keys: Keys | None = None,
     geometry: bpy.types.GeometrySet | None = None,
-) -> tuple[Seeds, NDArray[np.float64] | None, Sizes | None]:
+) -> tuple[Seeds, Floats | None, Sizes | None]:
     """Plants of a field, once for each of its places.
 
     Transforms of points count as those of plants that are objects; where a height is recorded, without their scale.
@@ -106,7 +105,7 @@ def read_aged_field(
     return seeds, ages, None if sizes is None else _placed_sizes(sizes, world)
 
 
-def _placed_sizes(sizes: Sizes, world: NDArray[np.float64]) -> Sizes:
+def _placed_sizes(sizes: Sizes, world: Floats) -> Sizes:
     """Sizes of the plants of a field in all of its places (k, 3, 3); offsets of crowns turn with the field."""
     out = sizes.take(np.tile(np.arange(len(sizes)), len(world)))
     turn = np.repeat(np.arctan2(world[:, 1, 0], world[:, 0, 0]), len(sizes))
@@ -118,11 +117,11 @@ def _placed_sizes(sizes: Sizes, world: NDArray[np.float64]) -> Sizes:
 def read_field_matrices(
     obj: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
-    matrices: NDArray[np.float64],
+    matrices: Floats,
     wanted: Container[str],
-    keys: NDArray[np.uint64] | None = None,
+    keys: Keys | None = None,
     geometry: bpy.types.GeometrySet | None = None,
-) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.float64]]]:
+) -> Iterator[tuple[str, Integers, Floats]]:
     """Plants of a field of some species, with all of their transform: stretched and mirrored as the points are.
 
     Parameters and errors are those of `read_aged_field`.
@@ -156,7 +155,7 @@ def read_field_matrices(
         yield kind, seeds[:, own].reshape(-1), placed.reshape(-1, 4, 4)
 
 
-def _stretch(kind: str, sizes: Sizes) -> NDArray[np.float64]:
+def _stretch(kind: str, sizes: Sizes) -> Floats:
     """Scales along their axes (3, n) with which assets have their recorded sizes; 1 where there are none."""
     asset, known = find_asset(None, species_of(kind)), sizes.height > 0.0
     if asset is None:
@@ -189,11 +188,11 @@ def _read(
 
 def write_field(
     name: str,
-    position: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    scale: NDArray[np.float64],
-    species: NDArray[np.int32],
-    seed: NDArray[np.int32],
+    position: Floats,
+    rotation: Floats,
+    scale: Floats,
+    species: Integers32,
+    seed: Integers32,
     identifiers: Sequence[str],
     forms: Sequence[bpy.types.Object | None] | None = None,
     ages: NDArray[np.floating] | None = None,
@@ -239,22 +238,3 @@ def write_field(
         entry = group.field_species.add()
         entry.species, entry.skeleton = identifier, form
     return obj
-
-
-def quaternions(frame: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit quaternions, (n, 4) with w first, of rotations, (n, 3, 3).
-
-    Each of the four ways to write it down is exact where its own component is large; the one with the largest is taken
-    (Shepperd, Journal of Guidance and Control, 1978).
-    """
-    r = frame
-    trace = np.trace(r, axis1=1, axis2=2)
-    w = np.stack(
-        [1 + r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2], *(1.0 + 2.0 * r[:, i, i] - trace for i in range(3))], axis=1
-    )
-    a, b, c = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
-    d, e, f = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
-    rows = ((w[:, 0], a, b, c), (a, w[:, 1], d, e), (b, d, w[:, 2], f), (c, e, f, w[:, 3]))
-    ways = np.stack([np.stack(row, axis=1) for row in rows], axis=1)
-    best = ways[np.arange(len(r)), np.argmax(w, axis=1)]
-    return best / np.linalg.norm(best, axis=1, keepdims=True)

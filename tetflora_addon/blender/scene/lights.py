@@ -6,16 +6,14 @@ World node trees can be arbitrary. Only the background that leads to the output 
 feeds its color. Blender's skies cannot be evaluated outside of a render; a few measured numbers describe them.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...emission.light import Sources
 from ...light.sources import World
 from ...refinement.lights import Light
@@ -37,7 +35,7 @@ _ELEVATIONS = (2.0, 10.0, 30.0, 60.0, 90.0)
 _SKIES: dict[str, list[list[float]]] = json.loads(Path(__file__).with_name("skies.json").read_text(encoding="utf-8"))
 
 
-def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> tuple[Light, ...]:
+def read_lights(depsgraph: bpy.types.Depsgraph) -> tuple[Light, ...]:
     """Lights that render and shine, by name.
 
     Instances of lights and lights with an invalid transform are left out. Light linking, textures and the spread of
@@ -49,7 +47,7 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer)
     of Φ watts sends Φ / 4π W/sr each way, an area Φ / π W/sr ahead.
     """
     found = []
-    for obj in sorted(renderable_objects(view_layer), key=lambda o: o.name_full):
+    for obj in sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full):
         if obj.type != 'LIGHT':
             continue
         data = obj.evaluated_get(depsgraph).data
@@ -73,7 +71,7 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer)
     return tuple(found)
 
 
-def _area(data: bpy.types.AreaLight, matrix: NDArray[np.float64], color: NDArray[np.float64], given: dict) -> Light:
+def _area(data: bpy.types.AreaLight, matrix: Floats, color: Floats, given: dict) -> Light:
     ellipse = data.shape in {'DISK', 'ELLIPSE'}
     sides = np.array([data.size, data.size_y if data.shape in {'RECTANGLE', 'ELLIPSE'} else data.size])
     span = matrix[:3, :2].T * sides[:, None] / 2.0
@@ -83,7 +81,7 @@ def _area(data: bpy.types.AreaLight, matrix: NDArray[np.float64], color: NDArray
     return Light('AREA', width=width, color=color / np.pi, span=span, ellipse=ellipse, **given)
 
 
-def _color(data: bpy.types.Light) -> NDArray[np.float64]:
+def _color(data: bpy.types.Light) -> Floats:
     """Linear RGB times energy, nodes and exposure included."""
     color = np.array(data.color[:]) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if getattr(data, "use_temperature", False):
@@ -172,7 +170,7 @@ def _image(node: bpy.types.Node, factor: float, turn: float) -> World:
     rows, columns = len(pixels) // step, pixels.shape[1] // step
     pixels = pixels[: rows * step, : columns * step].reshape(rows, step, columns, step, 3).mean(axis=(1, 3))
 
-    def radiance(toward: NDArray[np.float64]) -> NDArray[np.float64]:
+    def radiance(toward: Floats) -> Floats:
         # As Cycles: u = ½ − φ / 2π, v = ½ + latitude / π, with row 0 lowest.
         longitude = np.arctan2(toward[:, 1], toward[:, 0]) + turn
         column = (0.5 - longitude / (2.0 * np.pi)) % 1.0 * columns
@@ -203,7 +201,7 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
     level = toward * [1.0, 1.0, 0.0]
     level /= max(np.linalg.norm(level), 1e-9)
 
-    def radiance(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def radiance(places: Floats) -> Floats:
         height = places[:, 2:]
         above = mean + rise * (height - 0.5) + ahead * (places @ level)[:, None]
         return np.where(height > 0.0, np.maximum(above, 0.0), below)
@@ -215,11 +213,11 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
     return World.of(radiance), suns
 
 
-def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Sources:
+def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Sources:
     """Lights, world, and occluders, which cast shadows and reflect light upward."""
     world = read_world(scene)
-    grounds, looks = (o for o in renderable_objects(view_layer) if o.tetflora.is_occluder), Looks()
+    grounds, looks = (o for o in renderable_objects(depsgraph.view_layer) if o.tetflora.is_occluder), Looks()
     colors = [looks.of(ground.active_material, {}).color for ground in grounds]
     ground = np.mean(colors, axis=0) if colors else np.zeros(3)
-    lights = (*read_lights(depsgraph, view_layer), *world.suns)
-    return Sources(lights, world.world, read_occluders(depsgraph, view_layer), ground)
+    lights = (*read_lights(depsgraph), *world.suns)
+    return Sources(lights, world.world, read_occluders(depsgraph), ground)

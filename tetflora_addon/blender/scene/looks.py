@@ -6,8 +6,6 @@ A look is that as JSON, which settles what of several objects may become one res
 collections are as new ones are.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from typing import Any

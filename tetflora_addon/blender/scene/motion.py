@@ -6,8 +6,6 @@ Nothing is evaluated and the scene does not change: only curves of actions of ob
 other times; what constraints, drivers, simulations and the NLA do stays as it is now.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -15,18 +13,12 @@ from functools import partial
 import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Quaternion
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from .. import attributes
 
 #: Paths of animation that place an object, and how many values each has.
-_CHANNELS = {
-    "location": 3,
-    "rotation_euler": 3,
-    "rotation_quaternion": 4,
-    "rotation_axis_angle": 4,
-    "scale": 3,
-}
+_CHANNELS = {"location": 3, "rotation_euler": 3, "rotation_quaternion": 4, "rotation_axis_angle": 4, "scale": 3}
 
 
 def exposure(scene: bpy.types.Scene) -> tuple[float, float]:
@@ -72,7 +64,7 @@ def moment(frame: float) -> Iterator[None]:
         attributes.elsewhere = None
 
 
-def _displaced(frame: float, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+def _displaced(frame: float, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """Matrix (4, 4) that takes an object from where it is now to where it is at a frame."""
     if not moves(obj):
         return np.eye(4)

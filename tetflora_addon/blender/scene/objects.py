@@ -9,8 +9,6 @@ Instances of some objects are refined as assets: of those that are marked, and o
 The mark is a property of the object. Objects that are linked cannot keep one, so the scene has a list of those.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,31 +16,21 @@ from zlib import crc32
 
 import bpy
 import numpy as np
-from bpy.props import PointerProperty
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats32, Integers, Integers32, Keys
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
-from ..attributes import evaluated_mesh, members, read, values_of, world_matrix
+from ..attributes import members, mesh_of, read, values_of, world_matrix
+from ..declare import pointer_to
 from ..species.asset_species import asset_of, asset_species
 from .looks import LayerLooks
-
-#: Of the property `is_scatter`.
-SCATTER_PROPERTY = {
-    "name": "Refine Scatter",
-    "description": (
-        "Refine what the object's modifiers or particles scatter: instances stay as they are where they are near, and "
-        "become proxies where they are far or hidden. The object goes on scattering by its own rules, and its own "
-        "surface stays as it is"
-    ),
-    "options": set(),
-}
 
 
 class TetFloraLinkedScatter(bpy.types.PropertyGroup):
     """A linked object whose scatter is refined."""
 
-    object: PointerProperty(name="Object", description="Linked object whose scatter is refined", type=bpy.types.Object)
+    object: pointer_to(bpy.types.Object, "Object", "Linked object whose scatter is refined")
 
 
 def is_scatter(obj: bpy.types.Object) -> bool:
@@ -83,9 +71,6 @@ def is_drop(obj: bpy.types.Object) -> bool:
     return species is not None and not species.variants
 
 
-CLASSES = (TetFloraLinkedScatter,)
-
-
 #: What nodes instance.
 Reference = bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet
 
@@ -96,12 +81,10 @@ _PART = 4_096  # matrices of one product
 class Rows:
     """Instances of one reference: columns of their transforms (n, 4, 4), and their identifiers (n,)."""
 
-    columns: NDArray[np.float32]
-    number: NDArray[np.int64]
+    columns: Floats32
+    number: Integers
 
-    def within(
-        self, matrices: NDArray[np.float64], keys: NDArray[np.uint64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.uint64]]:
+    def within(self, matrices: Floats, keys: Keys) -> tuple[Floats, Keys]:
         """Places (k · n, 4, 4) and keys (k · n,) of the instances in each of k places with their keys."""
         many, own = len(matrices), len(self.number)
         names = child_key(keys[:, None], self.number).reshape(-1)
@@ -145,15 +128,15 @@ def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, 
 
 
 def instanced(
-    geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], keys: NDArray[np.uint64]
-) -> Iterator[tuple[Reference, NDArray[np.float64], NDArray[np.uint64]]]:
+    geometry: bpy.types.GeometrySet, matrices: Floats, keys: Keys
+) -> Iterator[tuple[Reference, Floats, Keys]]:
     """As `references_of`, but originals, with places (k, 4, 4) and keys (k,) of all that stand in some places (n)."""
     for target, rows in references_of(geometry):
         original = target if isinstance(target, bpy.types.GeometrySet) else target.original
         yield original, *rows.within(matrices, keys)
 
 
-def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int64]]:
+def _read_instances(points: bpy.types.PointCloud) -> tuple[Integers32, Floats32, Integers]:
     """Reference, columns of the transform (n, 4, 4) and identifier of each instance."""
     transform = read(points, "instance_transform").reshape(-1, 4, 4)
     own = points.attributes.get("id")
@@ -165,7 +148,7 @@ def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], ND
     )
 
 
-def name_keys(objects: Sequence[bpy.types.Object]) -> NDArray[np.uint64]:
+def name_keys(objects: Sequence[bpy.types.Object]) -> Keys:
     """A key (n,) of each object, which follows from its name."""
     return key_of_seed(np.array([crc32(obj.name_full.encode()) for obj in objects]))
 
@@ -301,8 +284,8 @@ class Copies:
     owner: bpy.types.Object  # the original object that is a plant or a field
     #: None for the object itself; else geometry that its nodes instance, which counts for fields only
     geometry: bpy.types.GeometrySet | None
-    matrices: NDArray[np.float64]  # (n, 4, 4): to world space
-    keys: NDArray[np.uint64]  # (n,): tell individuals apart
+    matrices: Floats  # (n, 4, 4): to world space
+    keys: Keys  # (n,): tell individuals apart
     #: The original object that shows all of them, or another with the same look
     instancer: bpy.types.Object | None = None
 
@@ -382,8 +365,8 @@ def listed_instances(
 
 
 def collected(
-    collection: bpy.types.Collection, matrices: NDArray[np.float64], depsgraph: bpy.types.Depsgraph
-) -> Iterator[tuple[bpy.types.Object, NDArray[np.float64]]]:
+    collection: bpy.types.Collection, matrices: Floats, depsgraph: bpy.types.Depsgraph
+) -> Iterator[tuple[bpy.types.Object, Floats]]:
     """What instances (n, 4, 4) of a collection show in renders, by name: each object with its places (n, 4, 4)."""
     back = np.eye(4)
     back[:3, 3] = -np.array(collection.instance_offset)
@@ -413,7 +396,7 @@ class _Walk:
         self.found: list[Copies] = []
         self._depth = 0
 
-    def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+    def object(self, obj: bpy.types.Object, matrices: Floats, keys: Keys) -> None:
         if obj.hide_render or self._depth == DEEPEST:
             return
         self._depth += 1
@@ -428,16 +411,16 @@ class _Walk:
             self.nodes(obj, matrices, keys)
         self._depth -= 1
 
-    def collection(self, collection: bpy.types.Collection, matrices: NDArray, keys: NDArray[np.uint64]) -> None:
+    def collection(self, collection: bpy.types.Collection, matrices: NDArray, keys: Keys) -> None:
         for n, (obj, places) in enumerate(collected(collection, matrices, self.depsgraph)):
             self.object(obj, places, child_key(keys, n))
 
-    def nodes(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+    def nodes(self, obj: bpy.types.Object, matrices: Floats, keys: Keys) -> None:
         geometry = geometry_of(obj, self.depsgraph)
         if geometry is not None:
             self._instances(obj, geometry, matrices, keys)
 
-    def _instances(self, owner, geometry: bpy.types.GeometrySet, matrices: NDArray, keys: NDArray[np.uint64]) -> None:
+    def _instances(self, owner, geometry: bpy.types.GeometrySet, matrices: NDArray, keys: Keys) -> None:
         for target, places, names in instanced(geometry, matrices, keys):
             if isinstance(target, bpy.types.Collection):
                 self.collection(target, places, names)
@@ -460,11 +443,11 @@ def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgrap
             yield Copies(original, None, np.array(instance.matrix_world, dtype=np.float64)[None], key, instancer)
 
 
-def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """Triangles of an occluder in world space, with its modifiers if it is evaluated."""
     if obj.type != 'MESH':
         raise SceneError(f'"{obj.name}" is not a mesh; {_OCCLUDER_REMEDY}')
-    with evaluated_mesh(obj, depsgraph) as mesh:
+    with mesh_of(obj.evaluated_get(depsgraph)) as mesh:
         if not len(mesh.polygons):
             raise SceneError(f'"{obj.name}" has no faces; {_OCCLUDER_REMEDY}')
         mesh.calc_loop_triangles()
@@ -474,7 +457,7 @@ def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray
     return (positions @ matrix[:3, :3].T + matrix[:3, 3])[corners]
 
 
-def read_occluders(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> NDArray[np.float64]:
+def read_occluders(depsgraph: bpy.types.Depsgraph) -> Floats:
     """Triangles of all occluders of a view layer that render.
 
     Returns
@@ -487,6 +470,6 @@ def read_occluders(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLay
     SceneError
         One of them has no faces or is no longer a mesh.
     """
-    marked = [o for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
+    marked = [o for o in renderable_objects(depsgraph.view_layer) if o.tetflora.is_occluder]
     marked.sort(key=lambda o: o.name_full)
     return np.concatenate([np.zeros((0, 3, 3)), *(_triangles(o, depsgraph) for o in marked)])

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ages and sizes that plants and fields have of their own, as they are stored."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,26 +9,15 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Arrays
+from ...arrays import Arrays, Floats, Integers, Mask
 from ...errors import SceneError
 
 MOST_YEARS = 10_000.0
 #: Attribute of fields whose plants differ in their ages; one with `field_points.PREFIX` overrides it.
 AGE = "age"
-#: The age of a plant, for property groups.
-AGE_PROPERTY = {
-    "name": "Age",
-    "description": "Age in years; 0 is full-grown, as the species describes it. Species that are assets have none",
-    "default": 0.0,
-    "min": 0.0,
-    "soft_max": 200.0,
-    "max": MOST_YEARS,
-    "step": 100,
-    "precision": 1,
-}
 
 
-def stored_ages(plants: Sequence[bpy.types.Object]) -> NDArray[np.float64] | None:
+def stored_ages(plants: Sequence[bpy.types.Object]) -> Floats | None:
     """Ages (n,) of plants that are objects, or of fields without the attribute; None where all are full-grown.
 
     Raises
@@ -53,7 +40,7 @@ def has_ages(field: bpy.types.Object) -> bool:
     return any(name in field.data.attributes for name in (f"tf_{AGE}", AGE))
 
 
-def sound_ages(ages: NDArray[np.floating]) -> NDArray[np.bool_]:
+def sound_ages(ages: NDArray[np.floating]) -> Mask:
     """Which ages are numbers within the limits."""
     return (ages >= 0.0) & (ages <= MOST_YEARS)
 
@@ -64,11 +51,11 @@ class Lives:
 
     now: float
     #: year, height, dead: (n,): As of `Sizes`
-    year: NDArray[np.float64]
-    height: NDArray[np.float64]
-    dead: NDArray[np.float64]
-    first: NDArray[np.int64]  # (n,): first record of the same plant; its records follow each other
-    species: NDArray[np.int64]  # (n,): number of the kind in the field
+    year: Floats
+    height: Floats
+    dead: Floats
+    first: Integers  # (n,): first record of the same plant; its records follow each other
+    species: Integers  # (n,): number of the kind in the field
 
 
 @dataclass(frozen=True)
@@ -77,13 +64,13 @@ class Sizes(Arrays):
 
     #: height, diameter, width, base: (n,): Of the plant, of its trunk at 1.3 m, mean width of its crown, height of its
     #: lowest limb
-    height: NDArray[np.float64]
-    diameter: NDArray[np.float64]
-    width: NDArray[np.float64]
-    base: NDArray[np.float64]
-    dead: NDArray[np.float64]  # (n,): years since it died; 0 alive
-    offset: NDArray[np.float64]  # (n, 2): by which fraction limbs to the east and north are longer
-    fit: NDArray[np.float64]  # (n, 2): factors on height and crown width that make up for what is random in the plant
+    height: Floats
+    diameter: Floats
+    width: Floats
+    base: Floats
+    dead: Floats  # (n,): years since it died; 0 alive
+    offset: Floats  # (n, 2): by which fraction limbs to the east and north are longer
+    fit: Floats  # (n, 2): factors on height and crown width that make up for what is random in the plant
     #: (n,): First record of the plant among those of ``lives``, where a history is to be animated
-    plant: NDArray[np.int64] | None = None
+    plant: Integers | None = None
     lives: Lives | None = None  # all of that history

@@ -6,8 +6,6 @@ Plants whose species is an asset do not grow and are read apart, with all of the
 `objects` loop over plants, and only over those that are objects.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -15,9 +13,9 @@ from functools import partial
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import SceneError, TetFloraError
+from ...arrays import Floats, Integers, Integers32
+from ...errors import SceneError, TetFloraError, listed
 from ...growth.hashing import child_key, key_of_seed
 from ...growth.seasons import is_gone
 from ...growth.seeds import Seeds, crown_shapes
@@ -56,7 +54,7 @@ class NoPlantsError(SceneError):
 
 
 def read_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
     """Enabled plants of a view layer that render: single ones by name, then instances, then fields.
 
@@ -83,7 +81,7 @@ def read_plants(
         No plant is of a species that the catalog has, or one has a scale of 0, or a transform that is not a number;
         the message names the objects.
     """
-    read = partial(_read_plants, scene, depsgraph, view_layer)
+    read = partial(_read_plants, scene, depsgraph)
     if not (scene.render.use_motion_blur and any(map(moves, filter(may_take_part, bpy.data.objects)))):
         return read()
     first, last = exposure(scene)
@@ -100,17 +98,17 @@ def read_plants(
 
 
 def _read_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
     known, assets = catalog(), {*asset_species(scene), *gone_species(scene)}
     odd: list[tuple[str, str]] = []  # names of objects, each with a species
-    objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
+    objects = sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
     own = [o for o, _ in grouped]
     single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
     odd += [(o.name, o.tetflora.species) for o in single if o.tetflora.species not in known]
-    looks, alike = LayerLooks(view_layer), {}
+    looks, alike = LayerLooks(depsgraph.view_layer), {}
     for obj in single:
         if obj.tetflora.species in known:
             alike.setdefault(looks.of(obj), []).append(obj)
@@ -175,14 +173,12 @@ class AssetPlants:
     #: The original object that they are, that they are instances of, or whose points they are; several objects of a
     #: plant each, one for each place
     owners: tuple[bpy.types.Object, ...]
-    seed: NDArray[np.int64]  # (n,)
+    seed: Integers  # (n,)
     #: (n, 4, 4): To world space; stretched and mirrored as the objects, points and instances are
-    matrices: NDArray[np.float64]
+    matrices: Floats
 
 
-def read_asset_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
-) -> list[AssetPlants]:
+def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[AssetPlants]:
     """Enabled plants of a view layer that render and whose species is an asset, in the order of `read_plants`.
 
     Objects that show a collection which is a species count as plants of it, each by itself, seeded by its name.
@@ -195,7 +191,7 @@ def read_asset_plants(
     assets = asset_species(scene)
     if not assets:
         return []
-    objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
+    objects = sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full)
     single: dict[str, list[bpy.types.Object]] = {}
     fields, drops = [], []
     for obj in objects:
@@ -230,7 +226,7 @@ def read_asset_plants(
         if bad.any():
             names = [plants.owners[min(i, len(plants.owners) - 1)].name for i in np.flatnonzero(bad).tolist()[:_NAMED]]
             raise SceneError(
-                f"{_listed(list(dict.fromkeys(names)))}: an invalid position; clear it with Alt S and Alt G"
+                f"{listed(list(dict.fromkeys(names)))}: an invalid position; clear it with Alt S and Alt G"
             )
     return found
 
@@ -239,7 +235,7 @@ def _none_left(off: bool, fields: list[str], hidden: int) -> str:
     if off:
         return "All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar"
     if fields:
-        return f"{_listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
+        return f"{listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
     if hidden:
         return (
             f"No plants to render; {hidden:,} are hidden in renders or excluded from the view layer. Enable them "
@@ -269,7 +265,7 @@ def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
     return _placed(names, tuple(number), species, seeds, matrices)
 
 
-def _copied_plants(copies: Copies) -> tuple[Seeds, NDArray[np.float64] | None, None]:
+def _copied_plants(copies: Copies) -> tuple[Seeds, Floats | None, None]:
     """Instances of a plant, each an individual of its own: its key is added to the seed. And their ages."""
     plant = copies.owner
     seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
@@ -278,19 +274,13 @@ def _copied_plants(copies: Copies) -> tuple[Seeds, NDArray[np.float64] | None, N
     return found, None if age is None else np.repeat(age, len(seeds)), None
 
 
-def _placed(
-    names: list[str],
-    kinds: tuple[str, ...],
-    species: NDArray[np.int32],
-    seeds: NDArray[np.int64],
-    matrices: NDArray[np.float64],
-) -> Seeds:
+def _placed(names: list[str], kinds: tuple[str, ...], species: Integers32, seeds: Integers, matrices: Floats) -> Seeds:
     frame, scale, sound = frames_of(matrices[:, :3, :3])
     sound &= np.isfinite(matrices).all(axis=(1, 2))
     if not sound.all():
         bad = [names[min(i, len(names) - 1)] for i in np.flatnonzero(~sound)[: _NAMED * len(names)].tolist()]
         raise SceneError(
-            f"{_listed(list(dict.fromkeys(bad)))}: zero scale or an invalid position; clear them with Alt S and Alt G"
+            f"{listed(list(dict.fromkeys(bad)))}: zero scale or an invalid position; clear them with Alt S and Alt G"
         )
     return Seeds(kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
 
@@ -324,7 +314,7 @@ def _check_species(plants: list[tuple[str, str]]) -> None:
 def _unknown(odd: list[tuple[str, str]]) -> str:
     """What is said of objects with the species that nobody has, of the first of these."""
     species = odd[0][1]
-    names = _listed([name for name, other in odd if other == species])
+    names = listed([name for name, other in odd if other == species])
     if find_asset(None, species) is not None:
         return (
             f'{names}: "{name_of(species)}", which was used as their species, was deleted; undo that, or choose '
@@ -336,8 +326,3 @@ def _unknown(odd: list[tuple[str, str]]) -> str:
         "another in the TetFlora tab of the sidebar, or add "
         f"{species or 'its file'}{'.json' if species else ''} with Load Species"
     )
-
-
-def _listed(names: list[str]) -> str:
-    text = ", ".join(f'"{name}"' for name in names[:_NAMED])
-    return text if len(names) <= _NAMED else f"{text} and {len(names) - _NAMED} more"

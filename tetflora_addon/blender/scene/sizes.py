@@ -11,16 +11,14 @@ difference in height. What a plant belongs to follows from its whole life and no
 alone is that of the film.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...compiled.flora import compile_species
 from ...compiled.sizes import fitted, measured
 from ...errors import SpeciesError
@@ -46,13 +44,13 @@ _PLANTS = 32  # that are measured of each class
 _MEASURED = 1  # times that a plant is, to fit it
 
 
-def heights(species: Species, years: NDArray[np.float64]) -> NDArray[np.float64]:
+def heights(species: Species, years: Floats) -> Floats:
     """Heights (n,) at ages (n,), over that at the full age."""
     known = _heights(ages_of(species))
     return np.interp(np.log(np.maximum(years, 1e-3)), *known)
 
 
-def ages_of_heights(species: Species, ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+def ages_of_heights(species: Species, ratio: Floats) -> Floats:
     """Ages (n,) at which plants have heights (n,), over that at the full age; the oldest of health for taller ones."""
     ages = ages_of(species)
     log_years, found = _heights(ages)
@@ -75,8 +73,8 @@ def at_age(species: Species, years: float, dead: float = 0.0) -> Species:
 
 
 def sized(
-    seeds: Seeds, ages: NDArray[np.float64] | None, sizes: Sizes | None, find: Callable[[str], Species]
-) -> tuple[Seeds, NDArray[np.float64] | None]:
+    seeds: Seeds, ages: Floats | None, sizes: Sizes | None, find: Callable[[str], Species]
+) -> tuple[Seeds, Floats | None]:
     """Plants (n,) of kinds that suit their recorded sizes, and the ages that are left to the others.
 
     Species that ``find`` does not find are left as they are, which is told elsewhere.
@@ -114,7 +112,7 @@ def sized(
     ), None if left is None or not left.any() else left
 
 
-def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> NDArray[np.float64]:
+def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> Floats:
     """Factors (n, 2) with which plants (n,) have exactly the heights and crown widths of their sizes (`Sizes.fit`)."""
     out = np.ones((len(seeds), 2))
     plain, _ = sized(seeds, None, replace(sizes, fit=out), find)
@@ -139,7 +137,7 @@ def kinds_of_sizes(species: Species, sizes: Sizes) -> list[Species]:
     return [at_age(species, age, since) for age, dead in stages for since in {0.0, dead}]
 
 
-def _stages(species: Species, sizes: Sizes, number: int) -> NDArray[np.float64]:
+def _stages(species: Species, sizes: Sizes, number: int) -> Floats:
     """Age and years since death (n, 2) of the kind that each plant belongs to.
 
     ``number`` is that of their kind in the field.
@@ -160,7 +158,7 @@ def _stages(species: Species, sizes: Sizes, number: int) -> NDArray[np.float64]:
     return np.column_stack([np.where(died, older, years), np.where(died, gone, 0.0)])
 
 
-def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> NDArray[np.float64]:
+def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> Floats:
     """Present age of the cohort of each plant of a kind, at its first record; of all records (n,)."""
     own = np.flatnonzero((lives.species == number) & (lives.dead <= 0.0) & (lives.height > 0.0))
     out = np.ones(len(lives.year))
@@ -193,13 +191,13 @@ def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> ND
     return out
 
 
-def _class_ages(species: Species, ratio: NDArray[np.float64], every: int) -> NDArray[np.float64]:
+def _class_ages(species: Species, ratio: Floats, every: int) -> Floats:
     """Ages (n,) of the nearest classes to heights (n,) over that at the full age; one of so many classes counts."""
     classes = _classes(species, every)
     return ages_of_heights(species, classes[np.searchsorted(np.sqrt(classes[1:] * classes[:-1]), ratio)])
 
 
-def _classes(species: Species, every: int) -> NDArray[np.float64]:
+def _classes(species: Species, every: int) -> Floats:
     """Heights of classes over that at the full age."""
     ages = ages_of(species)
     highest = ages.heights(ages.decline * ages.lifespan)
@@ -235,7 +233,7 @@ class Measure:
         """Of a crown on average, meters."""
         return self._typical * self.ratios[1]
 
-    def fitted(self, seeds: Seeds, sizes: Sizes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def fitted(self, seeds: Seeds, sizes: Sizes) -> tuple[Floats, Floats]:
         """Scales (n,) and crown shapes (n, 5) with which plants have their recorded sizes."""
         none = np.zeros(len(seeds), np.int32)
         one = replace(seeds, identifiers=("",), species=none, scale=np.ones(len(seeds)), crown=None)
@@ -277,7 +275,7 @@ def _grown(species: Species, years: float) -> Measure:
 
 
 @lru_cache(maxsize=64)
-def _heights(ages: Ages) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _heights(ages: Ages) -> tuple[Floats, Floats]:
     """Logarithms of ages and heights; the same ones whatever plants there are."""
     years = np.geomspace(1e-3, 2.0 * MOST_YEARS, _NODES)
     found = np.array([ages.heights(year) for year in years.tolist()])

@@ -6,12 +6,11 @@ A kind is a text of the species and, if there are any, the skeleton, the age, ye
 plants of one kind are compiled once, and are results of their own.
 """
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Integers
 from ...errors import SpeciesError
 from ...species.skeletons import (
     Chains,
@@ -22,7 +21,7 @@ from ...species.skeletons import (
     skeleton_from_edges,
     smooth_handles,
 )
-from ..attributes import evaluated_mesh, frames_of, members, values_of, world_matrix
+from ..attributes import frames_of, members, mesh_of, values_of, world_matrix
 
 #: Types of objects that can be the skeleton of a plant.
 SKELETON_TYPES = ('CURVE', 'CURVES', 'MESH')
@@ -34,7 +33,7 @@ _DEFAULT_STEPS = 12
 _BREAK = "\n"
 
 
-def upright_turn(matrix: NDArray[np.float64]) -> float:
+def upright_turn(matrix: Floats) -> float:
     """Turn about the vertical, in radians, of an object with a matrix (4, 4) in world space: that of its x axis."""
     return float(np.arctan2(matrix[1, 0], matrix[0, 0])) if np.hypot(*matrix[:2, 0]) > 0 else 0.0
 
@@ -81,9 +80,9 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
     return skeleton_from_edges(points[:, :3] @ upright.T, points[:, 3] * scale[0], edges, obj.name, line)
 
 
-def _of_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _of_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, Integers]:
     """Points (p, 4) with radii, 0 where there are none, and edges (e, 2)."""
-    with evaluated_mesh(obj, depsgraph) as mesh:
+    with mesh_of(obj.evaluated_get(depsgraph)) as mesh:
         if not len(mesh.polygons):
             return _mesh_arrays(mesh)
     # A modifier such as Skin adds faces around the edges: the modeled mesh is the skeleton.
@@ -95,7 +94,7 @@ def _of_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[NDA
     return _mesh_arrays(obj.data)
 
 
-def _mesh_arrays(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _mesh_arrays(mesh: bpy.types.Mesh) -> tuple[Floats, Integers]:
     points = np.zeros((len(mesh.vertices), 4))
     points[:, :3] = _read(mesh.vertices, "co", 3)
     radius = mesh.attributes.get(RADIUS)
@@ -185,7 +184,7 @@ def _of_hair(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
     return _meant_radii(chains, 0.0)
 
 
-def _read(collection: bpy.types.bpy_prop_collection, name: str, width: int = 1) -> NDArray[np.float64]:
+def _read(collection: bpy.types.bpy_prop_collection, name: str, width: int = 1) -> Floats:
     return members(collection, name, width).astype(np.float64)
 
 

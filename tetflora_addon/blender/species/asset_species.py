@@ -8,8 +8,6 @@ the file's other scenes. What of their measures plants need, such as the size of
 becomes a species and when plants are placed; panels only read it.
 """
 
-from __future__ import annotations
-
 import base64
 import zlib
 from collections import Counter
@@ -18,12 +16,13 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
+from bpy.props import FloatVectorProperty
 from numpy.typing import NDArray
 
 from ...errors import NAME, SpeciesError, readable
 from ...files import is_identifier
 from ...species.catalog import SpeciesInfo
+from ..declare import boolean, pointer_to, real, string
 
 #: What identifiers of assets begin with.
 PREFIX = "asset-"
@@ -36,23 +35,19 @@ Datablock = bpy.types.Object | bpy.types.Collection
 class TetFloraAssetSpecies(bpy.types.PropertyGroup):
     """An object or collection that is a species."""
 
-    identifier: StringProperty(name="Identifier", description="Identifier that plants store")
-    name: StringProperty(name="Name", description="Name of the asset when it was used last")
-    object: PointerProperty(name="Object", description="What plants of the species look like", type=bpy.types.Object)
-    collection: PointerProperty(
-        name="Collection", description="What plants of the species look like", type=bpy.types.Collection
-    )
-    variants: BoolProperty(
-        name="Variants", description="Each object of the collection is a plant by itself, chosen by the plant's seed"
-    )
+    identifier: string("Identifier", "Identifier that plants store")
+    name: string("Name", "Name of the asset when it was used last")
+    object: pointer_to(bpy.types.Object, "Object", "What plants of the species look like")
+    collection: pointer_to(bpy.types.Collection, "Collection", "What plants of the species look like")
+    variants: boolean("Variants", "Each object of the collection is a plant by itself, chosen by the plant's seed")
     # Of a plant of scale 1.
-    radius: FloatProperty(name="Crown Radius", description="Half of the width, meters", default=1.0)
-    base: FloatProperty(name="Crown Base", description="Height below which there is little, meters")
-    height: FloatProperty(name="Height", description="Height above the asset's origin, meters", default=5.0)
-    polygons: FloatProperty(name="Polygons", description="Number of faces")
-    leaves: FloatProperty(name="Leaf Area", description="One-sided area, square meters")
+    radius: real("Crown Radius", "Half of the width, meters", 1.0)
+    base: real("Crown Base", "Height below which there is little, meters")
+    height: real("Height", "Height above the asset's origin, meters", 5.0)
+    polygons: real("Polygons", "Number of faces")
+    leaves: real("Leaf Area", "One-sided area, square meters")
     color: FloatVectorProperty(name="Color", description="Mean color, linear", size=3, default=(0.1, 0.2, 0.05))
-    picture: StringProperty(name="Picture", description="Small picture for menus, as compressed pixels")
+    picture: string("Picture", "Small picture for menus, as compressed pixels")
 
 
 def entries_of(scene: bpy.types.Scene | None = None) -> Iterator[TetFloraAssetSpecies]:
@@ -159,6 +154,3 @@ def picture_of(entry: TetFloraAssetSpecies) -> NDArray[np.uint8] | None:
     if len(pixels) != size:
         return None
     return np.frombuffer(pixels, np.uint8).reshape(PICTURE_SIDE, PICTURE_SIDE, 4)
-
-
-CLASSES = (TetFloraAssetSpecies,)

@@ -13,12 +13,12 @@ from zlib import crc32
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, StringProperty
 
 from ...errors import NAME, SpeciesError, readable
 from ...files import write_whole
 from ...species.catalog import SpeciesInfo, builtin_folder, checked_identifier
 from ...species.schema import species_file, species_from_json
+from ..declare import once, string
 from ..file_library import OwnFiles, Pictures, as_text, file_of
 from ..preferences import own_species_folder, species_folders
 from ..settings import season_name, season_of
@@ -159,19 +159,18 @@ class SpeciesChoice:
     #: Whether the enumeration has assets.
     takes_assets = True
 
-    species: StringProperty(
-        name="Species",
-        description="File name of the species in the catalog, without extension",
+    species: string(
+        "Species",
+        "File name of the species in the catalog, without extension",
         override={'LIBRARY_OVERRIDABLE'},
         options={'HIDDEN', 'ANIMATABLE'},
     )
-    species_choice: EnumProperty(
-        name="Species",
-        description="Species from the catalog",
-        items=lambda self, _context: items_for(self.species, self.takes_assets),
+    species_choice: once.choice(
+        "Species",
+        "Species from the catalog",
+        lambda self, _context: items_for(self.species, self.takes_assets),
         get=lambda self: _chosen(self),
         set=lambda self, number: _choose(self, number),
-        options={'SKIP_SAVE'},
     )
 
 

@@ -11,7 +11,7 @@ from math import degrees, isfinite, radians
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 
 from ...errors import SpeciesError, readable
 from ...leaves.models import LEAF_MODELS
@@ -19,6 +19,7 @@ from ...parameters import Key
 from ...species.schema import LENGTH_HIGH, ORDER_KEYS
 from ...species.skeletons import MAX_ORDERS
 from ...species.species import BARKS, QUALITY_LIMITS
+from ..declare import FIXED, HIDDEN, boolean, integer, once
 from ..settings import SUBTYPES
 from .catalog import SpeciesChoice
 from .edits import catalog, change_species, species_data, species_for, tell_listeners
@@ -189,46 +190,42 @@ def _set_form(editor: bpy.types.PropertyGroup, kind: str, identifier: str) -> No
 
 
 def _form_property(kind: str, items: list[tuple[str, str, str, int]], name: str, description: str) -> Any:
-    return EnumProperty(
-        name=name,
-        description=description,
-        items=items,
+    return once.choice(
+        name,
+        description,
+        items,
         get=lambda self: next(i for key, _, _, i in items if key == _form(self, kind)),
         set=lambda self, number: _set_form(self, kind, {i: key for key, _, _, i in items}.get(number, OWN_LEAF)),
-        options={'SKIP_SAVE'},
     )
 
 
 def _object_property(kind: str) -> Any:
-    return StringProperty(
-        name=f"{kind.capitalize()} Object",
-        description=f"Mesh object used as the {kind}: stalk at the origin, pointing along +Y, upper side facing +Z",
+    return once.string(
+        f"{kind.capitalize()} Object",
+        f"Mesh object used as the {kind}: stalk at the origin, pointing along +Y, upper side facing +Z",
         get=lambda self: readable(str(_forms(self, kind).get("object", ""))),
         set=lambda self, value: set_species_value(self, kind, {"object": value}),
-        options={'SKIP_SAVE'},
     )
 
 
 def _number(key: str, name: str, description: str, default: float = 0.0, **options: Any) -> Any:
     """A number of the whole species; from 0 to 1 unless the options say otherwise."""
-    return FloatProperty(
-        name=name,
-        description=description,
-        default=default,
+    return once.real(
+        name,
+        description,
+        default,
         get=lambda self: number_in(species_value(self, key, default)),
         set=lambda self, value: set_species_value(self, key, rounded(value)),
-        options={'SKIP_SAVE'},
         **(options or {"min": 0.0, "max": 1.0, "subtype": 'FACTOR'}),
     )
 
 
 def _text(key: str, name: str, description: str) -> Any:
-    return StringProperty(
-        name=name,
-        description=description,
+    return once.string(
+        name,
+        description,
         get=lambda self: readable(str(species_value(self, key, ""))),
         set=lambda self, value: set_species_value(self, key, value),
-        options={'SKIP_SAVE'},
     )
 
 
@@ -240,25 +237,22 @@ class WholeSpecies(SpeciesChoice):
 
     takes_assets = False  # there is nothing to edit in them
 
-    shown: BoolProperty(
-        name="Species Editor", description="Show the tab Species in the sidebar, to edit species", options=set()
-    )
-    order_index: IntProperty(name="Active Order", min=0, options={'HIDDEN'})
-    order: EnumProperty(
-        name="Order",
-        description="Generation of branches to edit: 0 is the trunk, 1 grows on the trunk",
-        items=_order_items,
+    shown: boolean("Species Editor", "Show the tab Species in the sidebar, to edit species", **FIXED)
+    order_index: integer("Active Order", min=0, **HIDDEN)
+    order: once.choice(
+        "Order",
+        "Generation of branches to edit: 0 is the trunk, 1 grows on the trunk",
+        _order_items,
         get=present_order,
         set=lambda self, number: setattr(self, "order_index", number),
-        options={'SKIP_SAVE'},
     )
-    preview_seed: IntProperty(
-        name="Seed",
-        description="Individual of the species to show in the preview",
-        default=1,
+    preview_seed: integer(
+        "Seed",
+        "Individual of the species to show in the preview",
+        1,
         min=0,
         update=lambda _self, _context: tell_listeners(),
-        options=set(),
+        **FIXED,
     )
     species_name: _text("name", "Name", "Name shown in menus; the identifier that plants refer to does not change")
     species_description: _text("description", "Description", "Tooltip of the species in menus, in one sentence")
@@ -270,20 +264,18 @@ class WholeSpecies(SpeciesChoice):
     )
     blossom_object: _object_property("blossom")
     blossom_transmission: _number("blossom_transmission", "Blossom Translucency", _THROUGH.format("blossom"), 0.4)
-    exact: BoolProperty(
-        name="Exact Plant",
-        description="Make all plants of the species identical: ignore variation and seeds",
+    exact: once.boolean(
+        "Exact Plant",
+        "Make all plants of the species identical: ignore variation and seeds",
         get=lambda self: species_value(self, "exact", False) is True,
         set=lambda self, value: set_species_value(self, "exact", value),
-        options={'SKIP_SAVE'},
     )
-    bark: EnumProperty(
-        name="Bark",
-        description="Pattern of the bark",
-        items=[(name, name.capitalize(), "", number) for number, name in enumerate(BARKS)],
+    bark: once.choice(
+        "Bark",
+        "Pattern of the bark",
+        [(name, name.capitalize(), "", number) for number, name in enumerate(BARKS)],
         get=lambda self: BARKS.index(value) if (value := species_value(self, "bark", BARKS[0])) in BARKS else 0,
         set=lambda self, number: set_species_value(self, "bark", BARKS[number]),
-        options={'SKIP_SAVE'},
     )
     quality: _number(
         "quality",
@@ -455,6 +447,3 @@ TetFloraSpeciesEditor = type(
         "__module__": __name__,
     },
 )
-
-
-CLASSES = (TetFloraSpeciesEditor,)

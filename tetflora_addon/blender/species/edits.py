@@ -10,8 +10,6 @@ get a page of each species of their plants that is not shipped: edited, made her
 Pages of linked collections are read where they are; those of appended ones become edits of the scene.
 """
 
-from __future__ import annotations
-
 import copy
 import json
 import re
@@ -24,7 +22,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import bpy
-from bpy.props import StringProperty
 
 from ...errors import NAME, SpeciesError, readable
 from ...files import is_identifier, parse_json
@@ -40,6 +37,7 @@ from ...species.catalog import (
 )
 from ...species.schema import species_file, species_from_json
 from ...species.species import Species
+from ..declare import string
 from ..preferences import species_folders
 from ..runtime import Handlers, Listeners
 from .asset_species import asset_infos, find_asset, name_of, refuse_asset
@@ -65,10 +63,8 @@ _odd: list[str] = []  # files of the folders that are no species, each with the 
 class TetFloraSpeciesEdit(bpy.types.PropertyGroup):
     """A species as this file has it."""
 
-    identifier: StringProperty(
-        name="Identifier", description="Catalog species that the text replaces in this file, or a new species"
-    )
-    text: StringProperty(name="Text", description="The species in JSON, as in a species file")
+    identifier: string("Identifier", "Catalog species that the text replaces in this file, or a new species")
+    text: string("Text", "The species in JSON, as in a species file")
 
 
 def listed() -> dict[str, SpeciesInfo]:
@@ -371,9 +367,6 @@ def edited_infos() -> dict[str, SpeciesInfo]:
                 data = {}
             found[edit.identifier] = info_of(edit.identifier, data, Path())
     return found
-
-
-CLASSES = (TetFloraSpeciesEdit,)
 
 
 def pack(_path: object = None, _other: object = None) -> None:

@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Grow a stand as a job, and make a field of its records: each point is a plant in one year (`scene.field_sizes`)."""
 
-from __future__ import annotations
-
 import time
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
 from dataclasses import dataclass, fields
 
@@ -13,8 +11,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, quaternions
 from ...errors import SceneError, SpeciesError, TetFloraError
-from ...jobs import Progress, part_of
+from ...jobs import Job, Progress, part_of
 from ...planting.plane import Terrain, inside_any
 from ...planting.site import lines_of_paths
 from ...planting.wetness import HeightGrid, cell_for, height_grid, wet_ground
@@ -44,7 +43,7 @@ from ..scene.field_sizes import (
     read_sizes,
     year_curves,
 )
-from ..scene.fields import field_kinds, quaternions, write_field
+from ..scene.fields import field_kinds, write_field
 from ..scene.own_ages import Sizes
 from ..scene.sizes import kinds_of_sizes, measure_of
 from ..settings import check_limits
@@ -68,7 +67,7 @@ class Soil:
     slope_max: float
 
 
-def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, NDArray[np.float64]]:
+def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
     """The site of a stand, and the place (2,) in the world that its coordinates are counted from.
 
     Raises
@@ -112,7 +111,7 @@ def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, NDArray[np.float
     return site, np.array([grid.west, grid.south])
 
 
-def _grid(triangles: NDArray[np.float64], relief: float) -> tuple[HeightGrid, NDArray[np.float64]]:
+def _grid(triangles: Floats, relief: float) -> tuple[HeightGrid, Floats]:
     """The ground as a grid, and how wet it is (h, w)."""
     if relief > 0.0:
         wet = wet_ground(triangles)
@@ -121,7 +120,7 @@ def _grid(triangles: NDArray[np.float64], relief: float) -> tuple[HeightGrid, ND
     return grid, np.full(grid.height.shape, _LEVEL)
 
 
-def _masks(ground: Terrain, grid: HeightGrid) -> NDArray[np.float64]:
+def _masks(ground: Terrain, grid: HeightGrid) -> Floats:
     """How suitable cells are (h, w), by what is drawn on the ground."""
     rows, columns = grid.height.shape
     x, y = (corner + grid.cell * (np.arange(n) + 0.5) for corner, n in ((grid.west, columns), (grid.south, rows)))
@@ -141,7 +140,7 @@ def _masks(ground: Terrain, grid: HeightGrid) -> NDArray[np.float64]:
     return suitable.reshape(rows, columns)
 
 
-def _whole(height: NDArray[np.float64]) -> NDArray[np.float64]:
+def _whole(height: Floats) -> Floats:
     """Heights (h, w) with what is missing beside the ground going on level."""
     out = height.copy()
     for _ in range(3):
@@ -219,12 +218,10 @@ def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup)
 @job("Growing the stand")
 def new_stand_steps(
     data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
     grounds: Iterable[bpy.types.Object],
     name: str = NAME,
     fill: Callable[[bpy.types.PropertyGroup], None] | None = None,
-) -> Generator[Progress, object, GrownStand]:
+) -> Job[GrownStand]:
     """Grow a stand on meshes, by settings that a function fills in or by those of the scene for new ones.
 
     Closing the steps, or an error, leaves the scene as it was.
@@ -234,7 +231,8 @@ def new_stand_steps(
     TetFloraError
         No ground, a species that the catalog does not have, or settings with which nothing grows.
     """
-    data.add_objects(grounds := list(grounds))
+    scene, grounds = data.scene, list(grounds)
+    data.add_objects(grounds)
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
     field = write_field(name, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ())
     mesh, made = field.data, False
@@ -246,7 +244,7 @@ def new_stand_steps(
             fill(stand)
         for obj in grounds:
             stand.grounds.add().object = obj
-        grown = yield from _again_steps(data, scene, depsgraph, field, grounds)
+        grown = yield from _again_steps(data, field, grounds)
         stand = field.tetflora.stand
         stand.is_grown, made = True, True
         field.tetflora.stand_year = float(stand.years)
@@ -262,23 +260,17 @@ def new_stand_steps(
 
 
 @job("Growing the stand")
-def again_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, field: bpy.types.Object
-) -> Generator[Progress, object, GrownStand]:
+def again_steps(data: JobData, field: bpy.types.Object) -> Job[GrownStand]:
     """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
-    grounds = [e.object for e in field.tetflora.stand.grounds if e.object is not None and scene in e.object.users_scene]
+    grounds = [
+        e.object for e in field.tetflora.stand.grounds if e.object is not None and data.scene in e.object.users_scene
+    ]
     data.add_objects([*grounds, field])
-    return (yield from _again_steps(data, scene, depsgraph, field, grounds))
+    return (yield from _again_steps(data, field, grounds))
 
 
-def _again_steps(
-    data: JobData,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    field: bpy.types.Object,
-    grounds: list[bpy.types.Object],
-) -> Generator[Progress, object, GrownStand]:
-    progress = Progress(0.0, "Reading the ground")
+def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types.Object]) -> Job[GrownStand]:
+    scene, depsgraph, progress = data.scene, data.depsgraph, Progress(0.0, "Reading the ground")
     yield progress
     stand = field.tetflora.stand
     for group in (stand, *stand.species):
@@ -293,7 +285,7 @@ def _again_steps(
     soil = Soil(**{f.name: getattr(stand, f.name) for f in fields(Soil)})
     settings = StandSettings(**{f.name: getattr(stand, f.name) for f in fields(StandSettings)})
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
-    ground = zoned(scene, depsgraph, stand, grounds, ground)
+    ground = zoned(depsgraph, stand, grounds, ground)
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
     try:
         growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))
@@ -324,7 +316,7 @@ def _again_steps(
     return GrownStand(field, len(records.at(last)), len(records), last)
 
 
-def _measuring(species: list[Species], records: Records) -> Generator[Progress, object, None]:
+def _measuring(species: list[Species], records: Records) -> Job[None]:
     """Compile species in the stages that the stand shows, last year first, as far as there is time."""
     end = time.monotonic() + _PATIENCE
     for some in (records.at(records.year.max()), records):
@@ -339,9 +331,7 @@ def _measuring(species: list[Species], records: Records) -> Generator[Progress, 
                     _ = measure_of(kind).flora.samples
 
 
-def _columns(
-    records: Records, site: StandSite, corner: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], Records]:
+def _columns(records: Records, site: StandSite, corner: Floats) -> tuple[Floats, Floats, Records]:
     """Positions (n, 3) in the world and rotations (n, 4) of records."""
     position = records.position.astype(np.float64)
     lean, lying = records.lean.astype(np.float64), records.lying
@@ -358,13 +348,7 @@ def _columns(
     return position, turn / np.linalg.norm(turn, axis=1, keepdims=True), records
 
 
-def _replace(
-    field: bpy.types.Object,
-    names: list[str],
-    position: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    records: Records,
-) -> None:
+def _replace(field: bpy.types.Object, names: list[str], position: Floats, rotation: Floats, records: Records) -> None:
     """Give a field the records in place of its points."""
     given = position, rotation, np.ones(len(records)), records.species, records.seed
     other = write_field(NAME, *given, names)

@@ -8,10 +8,8 @@ through undo. Undo, loading, rendering, and operators that change results stop t
 that they remove. Blender tells nobody when a viewport is turned: where that is to be followed, it is looked at.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import blake2b
@@ -19,7 +17,8 @@ from hashlib import blake2b
 import bpy
 
 from ...errors import TetFloraError
-from ...jobs import Pace, Progress
+from ...jobs import Job, Pace
+from ...refinement.statistics import Statistics
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
 from ..main_thread import in_main_thread
@@ -48,7 +47,7 @@ class _State:
     """The job of the session; the scene by its `session_uid`, because datablocks do not outlive a load."""
 
     scene: int = 0
-    steps: Generator[Progress, bool | None, object] | None = None
+    steps: Job[Statistics] | None = None
     digest: str = ""  # of the job
     made_for: dict[str, str] = field(default_factory=dict)
     pace: Pace = field(default_factory=lambda: Pace(SLICE))
@@ -129,7 +128,7 @@ def refined(scene: bpy.types.Scene) -> None:
     if scene.tetflora.auto_refine:
         layer = _view_layer(scene)
         layer.update()
-        _done[scene.session_uid] = scene_digest(scene, layer.depsgraph, layer)  # for the scene's camera
+        _done[scene.session_uid] = scene_digest(scene, layer.depsgraph)  # for the scene's camera
 
 
 def tick() -> float | None:
@@ -168,14 +167,14 @@ def _begin(scene: bpy.types.Scene) -> bool:
     layer = _view_layer(scene)
     layer.update()
     camera = view_camera(scene) if scene.tetflora.follow_viewport else None
-    digest = scene_digest(scene, layer.depsgraph, layer, camera)
+    digest = scene_digest(scene, layer.depsgraph, camera)
     if _done.get(scene.session_uid) == digest and has_results(scene):
         _state.message = ""
         redraw()
         return False
     _state.digest, _state.again, _state.waiting = digest, False, False
     _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE)
-    _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer, camera=camera, first_look=True)
+    _state.steps = refine.refine_steps(scene, layer.depsgraph, camera=camera, first_look=True)
     return True
 
 

@@ -42,9 +42,7 @@ _SOON = 0.2  # seconds from a change of plants to reading them again
 
 
 @job("Compute Levels")
-def level_steps(
-    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
-) -> Generator[Progress, None, Levels]:
+def level_steps(data: JobData) -> Generator[Progress, None, Levels]:
     """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
 
     Raises
@@ -52,6 +50,7 @@ def level_steps(
     TetFloraError
         As `job.refine_steps`.
     """
+    scene, depsgraph = data.scene, data.depsgraph
     data.add_objects([*taking_part(scene), *([] if scene.camera is None else [scene.camera])])
     yield Progress(0.0, "Reading the scene")
     depsgraph.update()  # reading what was deleted since the last step would crash Blender
@@ -59,7 +58,7 @@ def level_steps(
     before = find(scene)
     camera = before.frozen if before is not None and before.frozen is not None else read_camera(scene, depsgraph)
     camera = camera.local()
-    given = read_scene(scene, depsgraph, depsgraph.view_layer).counted_from(camera.origin)
+    given = read_scene(scene, depsgraph).counted_from(camera.origin)
     progress = Progress(0.02, "Compiling species")
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
@@ -112,12 +111,12 @@ def _shapes_of(
 ) -> Shapes:
     """Plants that grow in the form of ``make``, and those that are assets as simple crowns."""
     crowns = []
-    for plants in read_asset_plants(scene, depsgraph, depsgraph.view_layer):
+    for plants in read_asset_plants(scene, depsgraph):
         crown = crown_for(scene, plants.species)
         size = crown.radius, crown.base, crown.height
         crowns.append(simple_crowns(plants.matrices, size, crown.color, boxes=make is bounds_of_plants))
     try:
-        seeds, _, of(scene).message = read_plants(scene, depsgraph, depsgraph.view_layer)
+        seeds, _, of(scene).message = read_plants(scene, depsgraph)
     except NoPlantsError:
         if not crowns:
             raise

@@ -6,8 +6,6 @@ Batches that do not depend on the view are made once and kept. Translucent tetra
 changes, as many as the last view could draw in a moment.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 import traceback
@@ -19,6 +17,7 @@ import gpu
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats32
 from ...camera.camera import Camera
 from ...preview.levels import FORMS, THICK, Level, Levels, as_shown, colors_of, drawable, project
 from ...preview.light_plants import Shapes
@@ -119,11 +118,11 @@ def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]
     return batch('LINES', np.concatenate(parts), np.tile(color, (8, 1)), np.array(edges))
 
 
-def _opaque(colors: NDArray[np.float32], alpha: float) -> NDArray[np.float32]:
+def _opaque(colors: Floats32, alpha: float) -> Floats32:
     return np.concatenate([colors, np.full((len(colors), 1), alpha, np.float32)], axis=1)
 
 
-def view_camera(region: bpy.types.RegionView3D, near: float, origin: NDArray[np.float64]) -> Camera:
+def view_camera(region: bpy.types.RegionView3D, near: float, origin: Floats) -> Camera:
     """A viewport's view as the engine takes it, counted from a place (3,); the size of its image does not matter."""
     matrix = np.array(region.view_matrix.inverted(), np.float64)
     kind = "PERSP" if region.is_perspective else "ORTHO"
@@ -140,7 +139,7 @@ def _kept(preview: Preview, name: str, key: tuple, make: Callable[[], object]) -
     return preview.cache[name][1]
 
 
-def _draw(made: gpu.types.GPUBatch | None, origin: NDArray[np.float64]) -> None:
+def _draw(made: gpu.types.GPUBatch | None, origin: Floats) -> None:
     """Draw what counts from a place (3,) in the world."""
     if made is not None:
         with gpu.matrix.push_pop():

@@ -6,8 +6,6 @@ Dots belong to the session and are forgotten when a file is loaded. The state ho
 do not outlive undo.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -15,13 +13,13 @@ from dataclasses import dataclass, field
 import bpy
 import gpu
 import numpy as np
-from bpy.props import BoolProperty
 from gpu_extras.batch import batch_for_shader
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Floats32
 from ...camera.camera import origin_near
 from ...errors import TetFloraError
 from .. import compat
+from ..declare import once
 from ..placing import properties
 from ..placing.populations import own_objects
 from ..placing.rules import awaits_update, makes_field, read_search, shown_population
@@ -49,12 +47,12 @@ _SOON = 0.08  # seconds from a change to new dots
 class Dots:
     """The dots of a population."""
 
-    position: NDArray[np.float32]  # (n, 3), meters from the origin
-    color: NDArray[np.float32]  # (n, 4)
+    position: Floats32  # (n, 3), meters from the origin
+    color: Floats32  # (n, 4)
     plants: int  # that would be placed; at least, where ``more``
     more: bool
     message: str  # why there are fewer than asked for; empty if there are not
-    origin: NDArray[np.float64]  # (3,), near most of them, meters in world space
+    origin: Floats  # (3,), near most of them, meters in world space
 
 
 @dataclass
@@ -99,7 +97,7 @@ def schedule() -> None:
         call_soon(_on_timer, max(_SOON, _state.seconds))
 
 
-def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Dots:
+def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Dots:
     """Dots for the population that the panel shows, without a change to anything.
 
     Raises
@@ -112,7 +110,8 @@ def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: 
         raise TetFloraError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to preview changes')
     grounds = None
     if not population.uid:  # settings for a new population, which would grow on what is selected
-        chosen = [o for o in view_layer.objects if o.select_get(view_layer=view_layer)]
+        layer = depsgraph.view_layer
+        chosen = [o for o in layer.objects if o.select_get(view_layer=layer)]
         grounds = [o for o in chosen if o.type == 'MESH' and not o.tetflora.is_field]
     own = set(own_objects(scene, population))
     placement = read_search(scene, depsgraph, population, own, grounds, MOST_PLACED).placement()
@@ -162,7 +161,7 @@ def _on_timer() -> None:
         return
     begin = time.perf_counter()
     try:
-        dots = dots_of(scene, bpy.context.evaluated_depsgraph_get(), bpy.context.view_layer)
+        dots = dots_of(scene, bpy.context.evaluated_depsgraph_get())
         _state.error = ""
     except TetFloraError as wrong:
         dots, _state.error = None, str(wrong)
@@ -198,30 +197,23 @@ def _clear() -> None:
     redraw()
 
 
-def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
-    schedule()
-
-
 def _on_load_pre(_path: object, _other: object = None) -> None:
     _state.scene = None
     call_off(_on_timer)
     _clear()
 
 
-_HANDLERS = Handlers(undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_pre)
+_HANDLERS = Handlers(undo_post=lambda *_: schedule(), redo_post=lambda *_: schedule(), load_pre=_on_load_pre)
 
 
 def register() -> None:
     """Listen to changes of populations and species, undo and loading."""
-    bpy.types.WindowManager.tetflora_points = BoolProperty(
-        name="Preview Points",
-        description=(
-            "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
-            "colored by species, updated with every change. Creates no objects"
-        ),
+    bpy.types.WindowManager.tetflora_points = once.boolean(
+        "Preview Points",
+        "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
+        "colored by species, updated with every change. Creates no objects",
         get=lambda _: bpy.context.scene is not None and shown_in(bpy.context.scene),
         set=lambda _, on: show(bpy.context.scene, on),
-        options={'SKIP_SAVE'},
     )
     properties.listeners.append(schedule)
     edits.listeners.append(schedule)
@@ -243,7 +235,7 @@ class GroundCursor:
     """Line strips in one window, from `start` to `stop`; change ``lines`` and redraw the area."""
 
     def __init__(self) -> None:
-        self.lines: list[tuple[NDArray[np.float64], Color]] = []
+        self.lines: list[tuple[Floats, Color]] = []
         self._window: int | None = None
         self._handle: object | None = None
 
@@ -284,7 +276,7 @@ class GroundCursor:
         gpu.state.blend_set('NONE')
 
 
-def circle(center: Sequence[float], radius: float, sides: int = 32) -> NDArray[np.float64]:
+def circle(center: Sequence[float], radius: float, sides: int = 32) -> Floats:
     """A level circle, (sides + 1, 3) with the first corner twice."""
     angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
     return np.stack([np.cos(angle), np.sin(angle), np.zeros(sides + 1)], axis=1) * radius + np.asarray(center, float)

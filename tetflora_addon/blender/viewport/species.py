@@ -7,18 +7,16 @@ runtime data. They change without steps of undo, and undo keeps what is equal in
 datablocks that it frees: Blender would crash. So they are taken away before each undo and made anew after it.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 
 import bpy
-from bpy.props import BoolProperty
 
 from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...species.species import Range
+from ..declare import once
 from ..job.contents import expected_polygons, in_year
 from ..job.plant_mesh import plant_mesh, plant_parts, single_seed
 from ..materials.nodes import is_ours, tag
@@ -179,15 +177,12 @@ _HANDLERS = Handlers(
 
 def register() -> None:
     """Listen to changes of species, undo and loading."""
-    bpy.types.WindowManager.tetflora_species = BoolProperty(
-        name="Preview",
-        description=(
-            "Show one plant of the species in the editor at the 3D cursor, updated with every change. It is never "
-            "rendered or saved"
-        ),
+    bpy.types.WindowManager.tetflora_species = once.boolean(
+        "Preview",
+        "Show one plant of the species in the editor at the 3D cursor, updated with every change. It is never "
+        "rendered or saved",
         get=lambda _: bpy.context.scene is not None and shown_in(bpy.context.scene),
         set=lambda _, on: show(bpy.context.scene, on),
-        options={'SKIP_SAVE'},
     )
     edits.listeners.append(schedule)
     _HANDLERS.register()

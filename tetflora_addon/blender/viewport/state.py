@@ -5,18 +5,17 @@
 The settings are saved in the file; what is shown lives in the session.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from ...camera.camera import Camera
 from ...errors import TetFloraError
+from ...parameters import within
 from ...preview.levels import Levels
 from ...preview.light_plants import Shapes
+from ..declare import FIXED, HIDDEN, boolean, choice, integer
 from ..runtime import Listeners, redraw
 from ..scene.camera import read_camera
 
@@ -132,14 +131,6 @@ def plants_wanted(scene: bpy.types.Scene) -> None:
         listeners.notify()
 
 
-def _plants_changed(group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    plants_wanted(group.id_data)
-
-
-def _freeze_changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get)
-
-
 #: Of settings that only panels for developers show.
 _SHOWN = {"options": {'HIDDEN'}, "update": lambda _group, _context: redraw()}
 
@@ -147,27 +138,18 @@ _SHOWN = {"options": {'HIDDEN'}, "update": lambda _group, _context: redraw()}
 class TetFloraPreview(bpy.types.PropertyGroup):
     """Preview of refine levels and of plants in 3D viewports."""
 
-    level: IntProperty(
-        name="Level",
-        description=(
-            "Level of refinement to show: 0 is the view before any pass, each further level is one pass. Beyond the "
-            "last level, the last one is shown"
-        ),
-        min=0,
-        soft_max=24,
-        max=1000,
+    level: integer(
+        "Level",
+        "Level of refinement to show: 0 is the view before any pass, each further level is one pass. Beyond the "
+        "last level, the last one is shown",
+        **within(0, 24, 1000),
         **_SHOWN,
     )
-    wires: BoolProperty(
-        name="Tetrahedra",
-        description="Draw the edges of tetrahedra that contain plants",
-        default=True,
-        **_SHOWN,
-    )
-    color: EnumProperty(
-        name="Color By",
-        description="What the colors of tetrahedra show",
-        items=(
+    wires: boolean("Tetrahedra", "Draw the edges of tetrahedra that contain plants", True, **_SHOWN)
+    color: choice(
+        "Color By",
+        "What the colors of tetrahedra show",
+        (
             (
                 'FORM',
                 "Representation",
@@ -183,22 +165,18 @@ class TetFloraPreview(bpy.types.PropertyGroup):
                 3,
             ),
         ),
-        default='FORM',
         **_SHOWN,
     )
-    projected: BoolProperty(
-        name="Translucent",
-        description=(
-            "Draw tetrahedra as clouds with the color and density of their contents. The most important ones are drawn "
-            "first, as many as keep the viewport responsive"
-        ),
-        default=False,
+    projected: boolean(
+        "Translucent",
+        "Draw tetrahedra as clouds with the color and density of their contents. The most important ones are drawn "
+        "first, as many as keep the viewport responsive",
         **_SHOWN,
     )
-    forms: EnumProperty(
-        name="Show",
-        description="Tetrahedra to draw, by what they become; Shift-click to select several",
-        items=(
+    forms: choice(
+        "Show",
+        "Tetrahedra to draw, by what they become; Shift-click to select several",
+        (
             ('EXPLICIT', "Polygons", "Tetrahedra whose leaves and branches become polygons", 1),
             ('PROXY', "Proxies", "Tetrahedra drawn as proxies because they affect few pixels", 2),
             ('HIDDEN', "Hidden", "Tetrahedra that the camera barely sees", 4),
@@ -207,33 +185,27 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         default={'EXPLICIT', 'PROXY', 'HIDDEN', 'SPLIT'},
         **{**_SHOWN, "options": {'ENUM_FLAG', 'HIDDEN'}},
     )
-    plants: EnumProperty(
-        name="Plants",
-        description="How plants appear in viewports. Not rendered, and no objects are created",
-        items=(
+    plants: choice(
+        "Plants",
+        "How plants appear in viewports. Not rendered, and no objects are created",
+        (
             ('NONE', "None", "Only their empties, or the points of their fields", 0),
             ('LIGHT', "Simple Shapes", "A crown and a trunk of about twenty triangles, in the species' color", 1),
             ('BOUNDS', "Bounds", "Bounding boxes of the species", 2),
         ),
-        default='NONE',
-        options=set(),
-        update=_plants_changed,
+        **FIXED,
+        update=lambda group, _context: plants_wanted(group.id_data),
     )
-    statistics: BoolProperty(
-        name="Statistics",
-        description="Show the level and the numbers of tetrahedra and polygons in the corner of the viewport",
-        default=True,
+    statistics: boolean(
+        "Statistics",
+        "Show the level and the numbers of tetrahedra and polygons in the corner of the viewport",
+        True,
         **_SHOWN,
     )
-    freeze: BoolProperty(
-        name="Freeze Camera",
-        description=(
-            "Keep the current camera for the preview, even when levels are computed again, while you move the scene's "
-            "camera or navigate. Its view is drawn as a pyramid. Not saved in the file"
-        ),
-        options={'HIDDEN'},
-        update=_freeze_changed,
+    freeze: boolean(
+        "Freeze Camera",
+        "Keep the current camera for the preview, even when levels are computed again, while you move the scene's "
+        "camera or navigate. Its view is drawn as a pyramid. Not saved in the file",
+        **HIDDEN,
+        update=lambda group, context: freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get),
     )
-
-
-CLASSES = (TetFloraPreview,)

@@ -5,8 +5,6 @@
 Looked for a moment after a change, never while panels are drawn; the larger the scene, the less often.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -15,8 +13,8 @@ from math import isclose
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ..job.render import render_errors
 from ..placing.field_edits import positions
 from ..placing.plant_objects import plants_of
@@ -137,20 +135,20 @@ def _apply(obj: bpy.types.Object, _scene: bpy.types.Scene) -> None:
     obj.scale = (1.0, 1.0, 1.0)
 
 
-def _places(scene: bpy.types.Scene) -> NDArray[np.float64]:
+def _places(scene: bpy.types.Scene) -> Floats:
     """Where plants stand in the world, (n, 3)."""
     single = [o.matrix_world.translation for o in plants_of(scene.objects) if o.tetflora.enabled and not o.hide_render]
     return np.concatenate([np.array(single, np.float64).reshape(-1, 3), *(own for _, own in _fields(scene))])
 
 
-def _fields(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, NDArray[np.float64]]]:
+def _fields(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, Floats]]:
     """Fields that render, and where their points are in the world."""
     for field in fields_of(scene.objects):
         if field.type == 'MESH' and not field.hide_render and len(field.data.vertices):
             yield field, positions(field)
 
 
-def _crowns(scene: bpy.types.Scene, at: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float, float]]:
+def _crowns(scene: bpy.types.Scene, at: Floats) -> list[tuple[Floats, float, float]]:
     """Feet, radii and heights of plants near a place, as far as their crowns are known."""
     near = [
         (np.array(o.matrix_world.translation), o.tetflora.species, o.matrix_world.median_scale)
@@ -167,7 +165,7 @@ def _crowns(scene: bpy.types.Scene, at: NDArray[np.float64]) -> list[tuple[NDArr
     return [(foot, crown.radius * scale, crown.height * scale) for foot, crown, scale in crowns if crown is not None]
 
 
-def _camera(scene: bpy.types.Scene, place: NDArray[np.float64]) -> Iterator[Warned]:
+def _camera(scene: bpy.types.Scene, place: Floats) -> Iterator[Warned]:
     camera = scene.camera
     at = np.array(camera.matrix_world.translation)
     if any(_holds(at, *one) for one in _crowns(scene, at)):
@@ -178,7 +176,7 @@ def _camera(scene: bpy.types.Scene, place: NDArray[np.float64]) -> Iterator[Warn
         yield Warned("clip", "Clip End", text, "Raise", _setter("camera.data.clip_end", 1.2 * most))
 
 
-def cut_off(scene: bpy.types.Scene, place: NDArray[np.float64] | None = None) -> tuple[str, float]:
+def cut_off(scene: bpy.types.Scene, place: Floats | None = None) -> tuple[str, float]:
     """A warning if the camera's range ends before some plants, else an empty text; and how far the last is, meters.
 
     A new file's camera ends at 100 m: a forest then renders as nothing, and nobody sees why.
@@ -196,7 +194,7 @@ def cut_off(scene: bpy.types.Scene, place: NDArray[np.float64] | None = None) ->
     return text if beyond else "", float(depth.max())
 
 
-def _holds(at: NDArray[np.float64], foot: NDArray[np.float64], radius: float, height: float) -> bool:
+def _holds(at: Floats, foot: Floats, radius: float, height: float) -> bool:
     """Whether a place is within a crown, as far as eyes mind: not at its rim, and not under it beside the trunk."""
     away, up = np.linalg.norm(at[:2] - foot[:2]), at[2] - foot[2]
     if not 0.0 <= up <= height:
@@ -204,7 +202,7 @@ def _holds(at: NDArray[np.float64], foot: NDArray[np.float64], radius: float, he
     return bool(away < (0.6 * radius if up > 0.25 * height or height < 4.0 else 0.08 * radius))
 
 
-def open_place(scene: bpy.types.Scene, at: NDArray[np.float64]) -> NDArray[np.float64]:
+def open_place(scene: bpy.types.Scene, at: Floats) -> Floats:
     """The nearest place as high as one that is in no crown, on a grid of circles around it."""
     crowns = _crowns(scene, at)
     for away in np.arange(0.0, _NEAR, 0.5):
