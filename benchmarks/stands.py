@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetflora_addon.compiled.crowns import crown_of
+from tetflora_addon.compiled.sizes import crown_of
 from tetflora_addon.growth.hashing import key_of_seed, uniform
 from tetflora_addon.species.ages import ages_of, with_age
 from tetflora_addon.species.catalog import load_species
@@ -81,7 +81,7 @@ def stand(species: str) -> tuple[list[Figure], tuple[float, float]]:
             )
         )
         if year + 1 in YEARS and year < _OLD * ages_of(member.species).lifespan:
-            leaves = float(plants.leaf_area(traits).sum())
+            leaves = float((plants.crowns(traits).leaves / traits.extinction[plants.species]).sum())
             trees = Trees(diameter, plants.height, plants.base, 2.0 * plants.radius, area, leaves)
             found += figures(species, year + 1, trees)
             stands.append(trees)

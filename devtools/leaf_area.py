@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tetflora_addon.growth.seasons import AREA, expected, leaf_table
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.species.year import LeafYear, Year
+from tetflora_addon.species.species import LeafYear, Year
 
 from .house import ROOT
 

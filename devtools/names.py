@@ -87,9 +87,9 @@ def file_keys() -> dict[str, list[str]]:
     from tetflora_addon.blender.placing.properties import TetFloraLayer
     from tetflora_addon.blender.placing.rules import ENTRY
     from tetflora_addon.parameters import keys_of
-    from tetflora_addon.species import ecology, growing, schema, species, year
+    from tetflora_addon.species import growing, schema, species
 
-    parts = (species.Bud, species.Dead, year.Year, year.LeafYear, growing.Ages, ecology.Ecology)
+    parts = (species.Bud, species.Dead, species.Year, species.LeafYear, growing.Ages, species.Ecology)
     return {
         "species": list(schema.SPECIES_KEYS),
         "species: orders, spur": list(schema.ORDER_KEYS),

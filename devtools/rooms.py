@@ -45,7 +45,7 @@ _TABLE = {
     "compiled": ". leaves species growth",
     "assets": ". growth compiled",
     "subplants": ". leaves growth compiled",
-    "tetrahedra": "",
+    "tetrahedra": ".",
     "camera": ". tetrahedra",
     "refinement": ". growth assets compiled subplants tetrahedra camera",
     "preview": ". growth compiled subplants tetrahedra camera refinement",

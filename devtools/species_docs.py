@@ -16,8 +16,7 @@ from tetflora_addon.leaves.models import LEAF_MODELS, OUTLINES, Spines
 from tetflora_addon.parameters import Key, keys_of
 from tetflora_addon.species.catalog import builtin_folder, load_species
 from tetflora_addon.species.schema import LENGTH_HIGH, ORDER_KEYS
-from tetflora_addon.species.species import CROWN_PROFILES, LEAF_KINDS
-from tetflora_addon.species.year import DAYS
+from tetflora_addon.species.species import CROWN_PROFILES, DAYS, LEAF_KINDS
 
 from . import forms
 from .house import ROOT

@@ -61,7 +61,7 @@ _CLOTHES = (
 
 def build(scene: bpy.types.Scene, size: tuple[int, int]) -> list[tuple[float, str]]:
     """Fill an empty scene; where in the image trees stand, 0 to 1, and what to write under each."""
-    from tetflora_addon.compiled.crowns import crown_of
+    from tetflora_addon.compiled.sizes import crown_of
     from tetflora_addon.species import ages, catalog
 
     from .haze import add_haze

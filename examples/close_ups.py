@@ -66,13 +66,13 @@ class Subject:
 
     def __init__(self, identifier: str) -> None:
         from tetflora_addon.blender.job.plant_mesh import single_seed
-        from tetflora_addon.compiled.crowns import crown_of
         from tetflora_addon.compiled.flora import compile_species
+        from tetflora_addon.compiled.sizes import crown_of
         from tetflora_addon.growth.axes import axes
         from tetflora_addon.growth.growth import WholeBranches, trunks
-        from tetflora_addon.leaves.needles import Needles
+        from tetflora_addon.leaves.surfaces import Needles
         from tetflora_addon.species import catalog
-        from tetflora_addon.species.habit import with_habit
+        from tetflora_addon.species.ages import with_habit
 
         habit = _AMONG_OTHERS.get(identifier, 0.0)
         species = replace(catalog.load_species(identifier), habit=habit)

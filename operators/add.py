@@ -20,8 +20,8 @@ from ..tetflora_addon.blender.species.editor import present_species
 from ..tetflora_addon.blender.species.edits import catalog, unknown_text
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Job, Progress
+from ..tetflora_addon.parameters import within
 from ..tetflora_addon.planting.rules import Rules
-from ..tetflora_addon.setting import within
 from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, selected_plants, show_shapes
 from .layers import ground_found, grounds_to_plant, tell_placed
 

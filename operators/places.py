@@ -26,7 +26,7 @@ from ..tetflora_addon.geodata.inventories import IMPERIAL, METRIC
 from ..tetflora_addon.geodata.layers import ENDINGS
 from ..tetflora_addon.geodata.outlines import KINDS
 from ..tetflora_addon.geodata.projection import PLAIN
-from ..tetflora_addon.setting import within
+from ..tetflora_addon.parameters import within
 from .add import mix_in, parse_weights
 from .base import ModalJob, in_object_mode, select_only
 from .layers import selected_grounds

@@ -20,7 +20,7 @@ from ..tetflora_addon.blender.scene.fields import fields_of, stored_size
 from ..tetflora_addon.blender.settings import SCATTER
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
 from ..tetflora_addon.jobs import Job
-from ..tetflora_addon.setting import within
+from ..tetflora_addon.parameters import within
 from .base import LINKED, ModalJob, Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
 
 

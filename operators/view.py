@@ -14,7 +14,7 @@ from ..tetflora_addon.blender.placing.ground import Ground
 from ..tetflora_addon.blender.viewport import state
 from ..tetflora_addon.blender.viewport.warnings import mend, open_place
 from ..tetflora_addon.camera.camera import Camera
-from ..tetflora_addon.setting import FACTOR, within
+from ..tetflora_addon.parameters import FACTOR, within
 from .base import NO_CAMERA, Reporting, in_object_mode
 
 #: Extent of a viewport's longer side at distance 1, times its focal length in millimeters.

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from tetflora_addon.errors import SceneError
-from tetflora_addon.geodata.inventories import Inventory, preview, read_inventory
+from tetflora_addon.geodata.inventories import Inventory, preview, read_inventory, read_title
 from tetflora_addon.geodata.species_names import KIND, best_of, species_named
-from tetflora_addon.geodata.titles import read_title
 
 FOLDER = Path(__file__).parent.parent / "tests" / "data" / "geodata"
 #: Fields that read what a list of titles says they hold. Genus and epithet are names, and a girth tells the diameter.

@@ -18,12 +18,13 @@ import re
 import sys
 import time
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import wraps
 from itertools import islice
 from math import prod
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from .arrays import Floats
 from .errors import TetFloraError
 from .files import PART, path_in, read_whole, write_whole
 
+Result = TypeVar("Result")
 #: Raise it when files are written in another way.
 _FORMAT = 1
 #: All files of a user together take no more than so many bytes; those that were not used for longest go first. Each has
@@ -90,7 +92,7 @@ def cached(kind: str, content: str, shape: tuple[int, ...], compute: Callable[[]
     values = _read(path, shape)
     if values is None:
         values = compute()
-        _write(path, values)
+        write_arrays(path, _OURS, MOST_BYTES, values=values, name=np.array(path.name))
     return values
 
 
@@ -123,21 +125,33 @@ def clear(folder: Path | None = None, names: re.Pattern[str] | None = None) -> i
 
 
 def _read(path: Path, shape: tuple[int, ...]) -> Floats | None:
-    most = 8 * prod(shape) + _HEADERS
+    def checked(stored: Mapping[str, NDArray]) -> Floats:
+        values, name = stored["values"], str(stored["name"])
+        if name != path.name or values.dtype != np.float64 or values.shape != shape or not np.isfinite(values).all():
+            raise ValueError(path.name)
+        return values
+
+    return read_arrays(path, 8 * prod(shape) + _HEADERS, checked)
+
+
+def read_arrays(path: Path, most: int, checked: Callable[[Mapping[str, NDArray]], Result]) -> Result | None:
+    """What a function makes of the arrays in a file of at most so many bytes; None where it is absent or damaged.
+
+    The function refuses by an error of any kind what is not sound.
+    """
     try:
         content = read_whole(path, most)
         refuse_packed(content, most)
         with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-            values, name = stored["values"], str(stored["name"])
+            result = checked(stored)
     except FileNotFoundError:
         return None
     except Exception:  # there is no end to what zipfile and numpy raise for what is not theirs
-        return _damaged(path)
-    if name != path.name or values.dtype != np.float64 or values.shape != shape or not np.isfinite(values).all():
-        return _damaged(path)
+        warn(f"{path} is damaged or unreadable and will be rebuilt")
+        return None
     with suppress(OSError):  # a folder of somebody else's, to be read only
         os.utime(path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
-    return values
+    return result
 
 
 def refuse_packed(content: bytes, most: int) -> None:
@@ -159,17 +173,14 @@ def refuse_packed(content: bytes, most: int) -> None:
                     raise ValueError("it says to be larger than it is")
 
 
-def _damaged(path: Path) -> None:
-    warn(f"{path} is damaged or unreadable and will be rebuilt")
-
-
-def _write(path: Path, values: Floats) -> None:
+def write_arrays(path: Path, names: re.Pattern[str], most: int, **arrays: NDArray) -> None:
+    """Store arrays in a file, and make room for it among those of some names; trouble is reported and stops nothing."""
     content = io.BytesIO()
-    np.savez(content, values=values, name=np.array(path.name))
+    np.savez(content, **arrays)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path_in(path.parent, path.name), content.getvalue())
-        make_room(_folder, _OURS, MOST_BYTES)
+        make_room(path.parent, names, most)
     except OSError as error:
         warn(f"cannot write to the cache folder {path.parent}: {error.strerror}")
 

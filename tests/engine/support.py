@@ -20,13 +20,13 @@ from tetflora_addon.emission.drawing import drawing
 from tetflora_addon.emission.emitters import EmissionInput
 from tetflora_addon.emission.plants import Block, Transition
 from tetflora_addon.growth.axes import axes
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts, trunks
-from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.growth.seeds import Branches, Seeds
 from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights, facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.primitives import joined
+from tetflora_addon.refinement.contents import bounding_capsules
 from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.species.catalog import builtin_folder, load_species
 from tetflora_addon.species.members import expected_polygons
@@ -290,6 +290,12 @@ def drawn(
     parts = [part for parts in scene.facet_parts() for part in parts]
     facets = joined([some for some, _ in parts]) if parts else Facets.empty()
     return blocks, facets, np.concatenate([np.zeros(0, bool), *(np.full(len(some), seen) for some, seen in parts)])
+
+
+def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDArray, NDArray]:
+    """Centers (n, 3), radii and half heights (n,) of cylinders about branches that hold all of sub-plants."""
+    capsules = bounding_capsules(flora, subplants)
+    return capsules[:3].T, capsules[6] + capsules[8], capsules[7] + capsules[8]
 
 
 def face_planes(vertices: NDArray[np.float64]) -> NDArray[np.float64]:

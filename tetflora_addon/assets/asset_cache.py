@@ -7,17 +7,15 @@ Files are read as those of strangers: one that is damaged, packed, too large or 
 
 from __future__ import annotations
 
-import io
-import os
 import re
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import storage
-from ..files import path_in, read_whole, write_whole
 from .asset import COUNTS, Asset, AssetKites, Clusters, SurfaceSamples
 
 #: Raise it when assets are compiled in another way.
@@ -46,19 +44,11 @@ def keep(asset: Asset) -> None:
     path = _path(asset.digest)
     if path is None:
         return
-    content = io.BytesIO()
     columns = {
         f"{name}.{f.name}": getattr(getattr(asset, name), f.name) for name, kind in _KINDS.items() for f in fields(kind)
     }
-    np.savez(
-        content, name=np.array(asset.name), digest=np.array(asset.digest), part=asset.part, face=asset.face, **columns
-    )
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path_in(path.parent, path.name), content.getvalue())
-        storage.make_room(path.parent, _NAMES, _MOST_FILES)
-    except OSError as error:
-        storage.warn(f"cannot write to the cache folder {path.parent}: {error.strerror}")
+    columns |= {"name": np.array(asset.name), "digest": np.array(asset.digest), "part": asset.part, "face": asset.face}
+    storage.write_arrays(path, _NAMES, _MOST_FILES, **columns)
 
 
 def clear() -> int:
@@ -94,21 +84,13 @@ def _path(digest: str) -> Path | None:
 
 
 def _read(path: Path, digest: str) -> Asset | None:
-    try:
-        content = read_whole(path, _MOST)
-        storage.refuse_packed(content, _MOST)
-        with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-            made = [kind(*(stored[f"{name}.{f.name}"] for f in fields(kind))) for name, kind in _KINDS.items()]
-            asset = Asset(str(stored["name"]), str(stored["digest"]), *made, stored["part"], stored["face"])
+    def checked(stored: Mapping[str, NDArray]) -> Asset:
+        made = [kind(*(stored[f"{name}.{f.name}"] for f in fields(kind))) for name, kind in _KINDS.items()]
+        asset = Asset(str(stored["name"]), str(stored["digest"]), *made, stored["part"], stored["face"])
         _check(asset, digest)
-    except FileNotFoundError:
-        return None
-    except Exception:  # there is no end to what zipfile and numpy raise for what is not theirs
-        storage.warn(f"{path} is damaged or unreadable and will be rebuilt")
-        return None
-    with suppress(OSError):
-        os.utime(path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
-    return asset
+        return asset
+
+    return storage.read_arrays(path, _MOST, checked)
 
 
 def _check(asset: Asset, digest: str) -> None:

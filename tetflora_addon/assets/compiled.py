@@ -4,24 +4,151 @@
 
 The paper compiles a species before any plant is modeled. Here the model is there, and compiled in the same spirit:
 what refinement asks of a cluster is known without looking at its polygons again.
+
+Facets need a fraction of the area of their cluster to block as much light as it does, which is their weight. Leaves
+hide each other; a few large facets in their place do so less, and would be too opaque (`proxies.facet_weights` says
+more). Parallel rays are cast through the triangles of some clusters of each depth, which let through what is
+transparent, and through facets at their samples, as many as there may be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import replace
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers
+from ..arrays import Floats, Integers, perpendicular, unit
+from ..compiled.rays import basis, covered
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .asset import COUNTS, Asset, AssetKites, AssetSource, Clusters, SurfaceSamples
-from .clusters import Hierarchy, hierarchy_of
-from .facet_weights import facet_weights_of
-from .measures import ALONG, Measured, measured, patch_table_of, runs_of, shared_out, well_spread
-from .patches import patches_of
+from .measures import ALONG, Measured, Run, measured, patch_table_of, runs_of, shared_out, well_spread
+from .patches import Hierarchy, hierarchy_of, patches_of
+
+#: Rays across the longer side of a cluster; clusters of a depth that are looked at, and directions.
+RAYS, CLUSTERS = 56, 3
+DIRECTIONS = np.array([[0.8, 0.5, 0.33166248], [-0.45, 0.85, 0.27386128], [0.35, 0.25, 0.90277350]])
+#: Facets for each number of them, over all sets; sets of few large ones; and weights that are tried.
+FACETS, FEW_SETS, TRIED = 192, 16, np.array([0.25, 0.5, 0.75, 1.0])
+#: Rays that a cluster blocks from which on what they tell counts more than that leaves so sparse hide nothing.
+SURE = 64.0
+_TURN, _PICK = 245, 246
+_CORNERS = np.array([[0.0, 1.0], [-np.sqrt(3) / 2, -0.5], [np.sqrt(3) / 2, -0.5]]) * 2 / 27**0.25
+
+
+def facet_weights_of(
+    clusters: Clusters, samples: SurfaceSamples, triangles: Callable[[int], Iterator[Run]], start: float = 0.0
+) -> Generator[float, None, Floats]:
+    """Weights (c, counts) for each of `asset.COUNTS`; yields the fraction that is done, from a start to 1.
+
+    triangles: those of a cluster, in runs.
+    """
+    depth = np.zeros(len(clusters), np.int64)
+    while (deeper := np.where(clusters.parent >= 0, depth[clusters.parent] + 1, 0)).max() > depth.max():
+        depth = deeper
+    weights = np.ones((len(clusters), len(COUNTS)))
+    for level in range(int(depth.max()) + 1):
+        own = np.flatnonzero((depth == level) & (clusters.optical_area > 0.0))
+        some = own[np.unique((np.arange(CLUSTERS) + 0.5) * len(own) // CLUSTERS).astype(np.int64)] if len(own) else own
+        found = np.zeros((2, len(COUNTS), len(TRIED)))
+        for cluster in some.tolist():
+            found += _looked(clusters, samples, cluster, triangles(cluster))
+        weights[depth == level] = _fitting(found)
+        yield start + (1.0 - start) * (level + 1) / (int(depth.max()) + 1)
+    return weights
+
+
+def _fitting(found: Floats) -> Floats:
+    """Weights (counts,) with which facets block as much: areas (2, counts, tried) of the cluster, and of its facets."""
+    wanted, made = found
+    out = np.ones(len(COUNTS))
+    for k in range(len(COUNTS)):
+        if made[k].max() > 0.0:
+            out[k] = np.interp(wanted[k, 0], made[k], TRIED, left=TRIED[0] * wanted[k, 0] / max(made[k, 0], 1e-300))
+        blocked = wanted[k, 0] * RAYS**2
+        out[k] = (blocked * out[k] + SURE) / (blocked + SURE)
+    return np.clip(out, 0.1, 1.0)
+
+
+@dataclass(frozen=True)
+class _View:
+    """A lattice of rays through the bound of a cluster, all in one direction: one a step of u and of v."""
+
+    u: Floats
+    v: Floats
+    origin: Floats
+    step: float
+
+    @classmethod
+    def of(cls, clusters: Clusters, cluster: int, direction: Floats) -> _View:
+        u, v = basis(direction / np.linalg.norm(direction))
+        bound = np.stack([clusters.low[cluster], clusters.high[cluster]])
+        box = np.stack(np.meshgrid(*bound.T, indexing="ij"), -1).reshape(-1, 3)
+        flat = np.stack([box @ u, box @ v], axis=1)
+        return cls(u, v, flat.min(axis=0), max(float(np.ptp(flat, axis=0).max()), 1e-12) / RAYS)
+
+    def met(self, corners: Floats) -> tuple[NDArray[np.intp], Integers]:
+        """Triangles (k,) of some (t, 3, 3), and rays (k, 2), that meet."""
+        flat = (np.stack([corners @ self.u, corners @ self.v], axis=-1).reshape(-1, 2) - self.origin) / self.step
+        first = np.arange(0, len(flat), 3)
+        return covered(flat, first, np.full(len(first), 3))
+
+
+def _looked(clusters: Clusters, samples: SurfaceSamples, cluster: int, runs: Iterator[Run]) -> Floats:
+    """Areas (2, counts, tried) that a cluster blocks, and that its facets do, over those of its bound."""
+    views = [_View.of(clusters, cluster, direction) for direction in DIRECTIONS]
+    through = np.zeros((len(views), RAYS * RAYS))
+    for run in runs:
+        # Both sides of what is closed count: it is either that blocks a ray.
+        light = np.log(np.maximum(1.0 - run.coverage.astype(np.float64), 1e-12))
+        for own, view in zip(through, views, strict=True):
+            triangle, ray = view.met(run.corners)
+            inside = np.flatnonzero(((ray >= 0) & (ray < RAYS)).all(axis=1))
+            own += np.bincount(ray[inside, 0] * RAYS + ray[inside, 1], light[triangle[inside]], RAYS * RAYS)
+    out = np.zeros((2, len(COUNTS), len(TRIED)))
+    out[0] = float((1.0 - np.exp(through)).sum()) / RAYS**2
+    for k, count in enumerate(COUNTS):
+        for w, weight in enumerate(TRIED):
+            for view in views:
+                out[1, k, w] += _blocked_by_facets(clusters, samples, cluster, view, float(count), weight)
+    return out
+
+
+def _blocked_by_facets(
+    clusters: Clusters, samples: SurfaceSamples, cluster: int, view: _View, count: float, weight: float
+) -> float:
+    """Area over that of the lattice that ``count`` facets block, the mean of several sets of them."""
+    each = max(round(count), 1)
+    sets = int(np.ceil(FACETS / each)) if each >= 4 else FEW_SETS
+    area = clusters.optical_area[cluster] / count * weight
+    # Facets of dense clusters may be far larger than the bound: rays farther apart tell as much about these.
+    apart = max(float(np.sqrt(area)) / (RAYS * view.step), 1.0)
+    view = replace(view, step=view.step * apart)
+    number = np.arange(sets * each)
+    owner = number // each
+    key = child_key(key_of_seed(number), cluster)
+    leaf = clusters.leaf_optical[cluster] / clusters.optical_area[cluster]
+    runs = (clusters.leaf_sample, clusters.wood_sample), (clusters.leaf_samples, clusters.wood_samples)
+    on_leaf = (number % each + uniform(key_of_seed(owner), _PICK)) / each < leaf
+    first, many = (np.where(on_leaf, a[cluster], b[cluster]) for a, b in runs)
+    pick = first + np.minimum((uniform(key, _PICK) * many).astype(np.int64), np.maximum(many - 1, 0))
+    normal = unit(samples.normal[pick].astype(np.float64))
+    across = perpendicular(normal)
+    turn = 2 * np.pi * uniform(key, _TURN)[:, None]
+    across = np.cos(turn) * across + np.sin(turn) * np.cross(normal, across)
+    along = np.cross(normal, across)
+    place = samples.position[pick].astype(np.float64)
+    corner = _CORNERS[None, :, :1] * across[:, None] + _CORNERS[None, :, 1:] * along[:, None]
+    facet, ray = view.met(place[:, None] + np.sqrt(area) * corner)
+    if not len(facet):
+        return 0.0
+    low, (tall, wide) = ray.min(axis=0), np.ptp(ray, axis=0) + 1
+    cell = np.sort((owner[facet] * tall + ray[:, 0] - low[0]) * wide + ray[:, 1] - low[1])
+    # A facet smaller than a step is missed more often than not, but hit by as many rays on the mean.
+    return (1 + int(np.count_nonzero(np.diff(cell)))) * apart**2 / sets / RAYS**2 * min(count, 1.0)
+
 
 #: Samples of a cluster with children.
 SAMPLES_ABOVE = 64

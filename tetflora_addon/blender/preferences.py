@@ -9,7 +9,7 @@ import bpy
 
 from .. import storage
 from ..errors import SpeciesError
-from ..setting import within
+from ..parameters import within
 from .declare import boolean, choice, integer, real, string
 
 # Blender stores preferences under the name of the extension's root package, two levels above this one.

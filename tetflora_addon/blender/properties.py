@@ -6,7 +6,7 @@ from functools import partial
 
 import bpy
 
-from ..setting import within
+from ..parameters import within
 from . import settings
 from .biomes import library
 from .declare import FIXED, HIDDEN, boolean, choice, integer, list_of, pointer_to, real, string

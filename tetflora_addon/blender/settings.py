@@ -20,8 +20,8 @@ from ..camera.view_cells import ViewCells
 from ..errors import SceneError, quoted, readable
 from ..growth.seasons import DAYS, Season
 from ..growth.wind import Wind
+from ..parameters import within
 from ..refinement.settings import QUALITIES, RefinementSettings
-from ..setting import within
 from .declare import FIXED, boolean, choice, integer, once, real
 from .preferences import QUALITY_ITEMS, preferences
 
@@ -39,7 +39,7 @@ MONTHS = (
 
 
 def properties_of(settings: type, **common: Any) -> SimpleNamespace:
-    """A property for each field of a dataclass that is declared with `setting.setting`.
+    """A property for each field of a dataclass that is declared with `parameters.setting`.
 
     Parameters
     ----------

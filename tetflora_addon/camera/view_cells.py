@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, quaternions
-from ..setting import script_setting, setting
+from ..parameters import script_setting, setting
 from .camera import Camera
 
 #: How far beyond a cell, as fractions of it in place and angle, its camera still sees enough: while the shutter is
@@ -122,7 +122,9 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
         None where a camera cannot share its refinement: it moves out of its cell while the shutter is open, its view is
         wider than any window, or it is a panorama of less than the whole sphere.
     """
-    if camera.kind == "PANO" and not _is_whole_sphere(camera):
+    left, right, bottom, top = camera.window
+    whole = right - left > 2.0 * np.pi - 1e-3 and top - bottom > np.pi - 1e-3
+    if camera.kind == "PANO" and not whole:
         return None
     turns = _Turns.around(camera.frame, cells.turn)
     frame = turns.frame(np.zeros(3))
@@ -244,11 +246,6 @@ def _projected(frame: Floats, largest: int) -> Floats:
     """The other three parts (3,) of the quaternion of a rotation (3, 3), scaled so that one of the four is 1."""
     quaternion = _product(_BEFORE, quaternions(frame[None])[0])
     return np.delete(quaternion, largest) / quaternion[largest]
-
-
-def _is_whole_sphere(camera: Camera) -> bool:
-    left, right, bottom, top = camera.window
-    return right - left > 2.0 * np.pi - 1e-3 and top - bottom > np.pi - 1e-3
 
 
 def _product(p: Floats, q: Floats) -> Floats:

@@ -25,13 +25,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import GOLDEN_TURN, Floats, Mask, Table, spiral
-from ..growth.branches import Branches
-from ..growth.growth import trunks
+from ..growth.growth import open_branches, trunks
 from ..growth.hashing import key_of_seed, mix, uniform
-from ..growth.seeds import Seeds
+from ..growth.seeds import Branches, Seeds
 from ..leaves.models import LeafModel
 from ..storage import cached
-from .rays import WIDEST, PlantElements, basis, cell_numbers, elements_of, opened, path_lengths
+from .rays import WIDEST, PlantElements, basis, cell_numbers, elements_of, path_lengths
 
 #: Raise it when factors are found in another way.
 _METHOD = 1
@@ -49,7 +48,7 @@ _SEGMENTS = 50_000  # of rays, for each size: fewer rays through finer cells
 _PRIOR = np.array([0.5, 0.3, 0.5, 0.0])
 _RIDGE = np.array([5e-4, 3e-3, 5e-4, 0.02])
 _STEPS = 15
-_AT, _TURN, _RAY, _CELL = range(121, 125)  # draws of this module
+_AT, _CELL = 121, 124  # draws of this module
 _OFFSETS = 0.0, 1.5
 #: Factors are never less or more than this.
 LEAST, MOST = 0.1, 1.5
@@ -136,7 +135,7 @@ def _plants(rows: Table, first: int, polygons: Floats) -> list[Branches]:
     if one > _LARGEST:
         number = _PLANTS
     while polygons[plants.row].max() > _LARGEST:
-        grown = opened(rows, plants)[2]
+        grown = open_branches(rows, plants)[2]
         if len(grown) == 0:
             break
         order = np.argsort(-polygons[grown.row], kind="stable")

@@ -17,24 +17,22 @@ import numpy as np
 
 from ..arrays import Floats, Integers, Table
 from ..errors import SpeciesError
-from ..growth.branches import Branches
-from ..growth.envelopes import envelope_reach
-from ..growth.foliage import YOUTH
+from ..growth.foliage import YOUTH, envelope_reach
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
 from ..growth.seasons import Season
+from ..growth.seeds import Branches
 from ..growth.wind import Wind, is_windy, widest_sway, windy_rows
 from ..leaves.models import LeafModel
-from ..species.habit import with_habit
+from ..species.ages import with_habit
 from ..species.quality import with_quality
 from ..species.species import LEAF_KINDS, Species
 from .averages import Averages, RowLeaves, average, quadratic, row_leaves
 from .bounds import leaf_reaches, limb_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
-from .day import DayTotals, totals_of_day
+from .factors import DayTotals, ShapedTotals, shaped_totals, totals_of_day
 from .orientation import Orientation, orientation_of
 from .samples import Samples, draw_samples
-from .shaped_totals import ShapedTotals, shaped_totals
 
 
 def _in_summer(compute: Callable[[Flora], Any]) -> Any:

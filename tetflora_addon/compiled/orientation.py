@@ -19,12 +19,20 @@ import numpy as np
 
 from ..arrays import GOLDEN_ANGLE, Floats, Integers, Table, columns, cross, perpendicular, spiral
 from ..growth.axes import Axes, axes
-from ..growth.branches import Branches
-from ..growth.envelopes import axis_places
-from ..growth.foliage import leaf_frames, leaf_keys, leaf_lights, leaf_places, leaf_sizes, outwardness, settled
+from ..growth.foliage import (
+    axis_places,
+    leaf_frames,
+    leaf_keys,
+    leaf_lights,
+    leaf_places,
+    leaf_sizes,
+    outwardness,
+    settled,
+)
 from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
 from ..growth.hashing import Draw, key_of_seed, mix, thinned, uniform
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR, ranged
+from ..growth.seeds import Branches
 from ..leaves.models import LeafModel
 from .averages import NODES, quadratic
 

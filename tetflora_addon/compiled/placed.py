@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask, Table, gathered
-from ..growth.branches import Branches
 from ..growth.crown_effects import (
     LIGHT,
     MOST_LEANING,
@@ -23,9 +22,9 @@ from ..growth.crown_effects import (
     length_factors,
     trunk_length_factors,
 )
-from ..growth.crown_shapes import BASE, WIDTH
 from ..growth.grown_rows import lengths
 from ..growth.rows import FORK, LATERAL
+from ..growth.seeds import BASE, WIDTH, Branches
 from .flora import Flora
 from .samples import LIMB, STEM, STEM_LIMB, Limbs, Points, Shares
 

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask, Table, spread
-from ..growth.axes import Axes, axes
-from ..growth.branches import Branches
+from ..growth.axes import Axes
 from ..growth.foliage import leaf_forms, leaf_keys, leaf_places, place_leaves, settled
-from ..growth.growth import children, drawn_children, leaf_counts, radius_at
+from ..growth.growth import leaf_counts, open_branches, radius_at
+from ..growth.seeds import Branches
 from ..leaves.models import LeafModel
 from .averages import tube_perimeter
 
@@ -131,16 +131,6 @@ def path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[In
 _SKY = np.array([0.0, 0.0, 1.0])
 #: λ and 1 / λ, see `clumping`, are taken to be within e to this power.
 WIDEST = 1.5
-
-
-def opened(rows: Table, subplants: Branches) -> tuple[Branches, Axes, Branches]:
-    """Branches (m,) of sub-plants (n,), their axes, and the sub-plants on them; forms drawn by hand have several."""
-    phantom = rows["phantom"][subplants.row]
-    if phantom.any():
-        drawn, _ = drawn_children(rows, subplants.take(np.flatnonzero(phantom)))
-        subplants = Branches.concatenate([subplants.take(np.flatnonzero(~phantom)), drawn])
-    lines = axes(rows, subplants)
-    return subplants, lines, children(rows, subplants, lines)[0]
 
 
 def _inwards(frame: NDArray[np.floating], direction: Floats) -> Floats:
@@ -275,7 +265,8 @@ def elements_of(
     """
     parts, groups, dense = [], [], []
     while len(subplants) and orders != 0:
-        bodies, lines, subplants = opened(rows, subplants)
+        whole, _, subplants, _ = open_branches(rows, subplants)
+        bodies, lines = whole.branches, whole.lines
         orders = None if orders is None else orders - 1
         ratio = np.log(np.maximum(bodies.length, 1e-12) / (bodies.scale * length[bodies.row]))
         ratio = np.clip(ratio, -WIDEST, WIDEST)

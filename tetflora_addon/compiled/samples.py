@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Table, column, dot, gathered
 from ..growth.axes import Axes, axes
-from ..growth.branches import Branches
 from ..growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, youth
 from ..growth.growth import branch_counts, chosen_children, chosen_drawn, leaf_counts, radius_at
 from ..growth.hashing import child_key, evenly, key_of_seed, mix, systematic, thinned
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR, SPUR_ORDER
+from ..growth.seeds import Branches
 
 SAMPLES = 1024
 _PATHS = 1536  # branches of each row that are followed

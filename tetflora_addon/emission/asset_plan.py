@@ -23,9 +23,9 @@ from ..growth.hashing import Draw, uniform
 from ..proxies.asset_facets import facet_totals, facets_of_assets
 from ..proxies.microsurfaces import Facets
 from ..proxies.primitives import triangle_corners
-from ..refinement.asset_parts import AssetParts, PlacedAssets
 from ..refinement.decisions import explicit_fraction
 from ..refinement.loop import Refinement
+from ..refinement.shared_parts import AssetParts, PlacedAssets
 from ..subplants.pieces import chunks
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
 from .plants import KITES, inside_explicit

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What refining will take, before it is done: seconds, polygons and bytes, from a few thousand leaves and branches.
 
-These stand for all there are (`compiled.crowns.CrownParts`), more of them on near plants. Each has a place in the image
+These stand for all there are (`compiled.sizes.CrownParts`), more of them on near plants. Each has a place in the image
 and a size there, from which follow its polygons, as they do when it is drawn. In each part of the image they lie one
 behind the other: as many as fill it are drawn, and of what is behind them or out of view few facets are made. So
 numbers follow from the rules of drawing and the budget, with their own constants; only how many layers fill a pixel is
@@ -20,12 +20,11 @@ import numpy as np
 
 from ..arrays import GOLDEN_ANGLE, GOLDEN_TURN, Floats, Integers, Mask, spread
 from ..camera.camera import Camera
-from ..compiled.crowns import LEVEL, Crown, CrownParts
+from ..compiled.sizes import LEVEL, Crown, CrownParts
 from ..leaves.levels import chosen_polygons
 from ..refinement.decisions import explicit_fraction
 from ..refinement.settings import RefinementSettings
-from ..subplants.buds import BUD_RINGS, bud_sides
-from ..subplants.wood_detail import finer, round_up_to
+from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
 from .budget import A_PIXEL, BYTES_PER_POLYGON, BYTES_PER_TRIANGLE, FINEST, NEVER_TOO_MANY
 from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, OUTSIDE_A_PIXEL
 from .drawing import NEVER_TOO_MANY as NEVER_TOO_MANY_UNSEEN

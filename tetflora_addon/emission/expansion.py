@@ -16,9 +16,8 @@ from ..arrays import Floats
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import extents
-from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, leaf_counts, trunks
-from ..growth.seeds import Seeds
+from ..growth.seeds import Branches, Seeds
 from ..leaves.levels import chosen_polygons
 from ..subplants.pieces import expand
 from ..subplants.tubes import tube_faces

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..growth.envelopes import envelope_reach
+from ..growth.foliage import envelope_reach
 from ..growth.growth import WholeBranches
 from ..leaves.levels import coarse_error
 from ..species.species import LEAF_KINDS
-from ..subplants.wood_detail import Pixels
+from ..subplants.rings import Pixels
 
 #: Pixels by which the margin of a leaf may be off.
 TOLERANCE = 0.5

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Parts of plants as the frontier draws them: leaves, wood and facets.
 
-A leaf is drawn as itself where a facet would be about as large (`plants.Transition`). Branches that are opened are
+A leaf is drawn as itself where a facet would be about as large (`change.Transition`). Branches that are opened are
 tubes while they are macroscopic, and else one thin triangle each, with the direction and the area of the branch.
 """
 
@@ -20,21 +20,20 @@ from ..compiled.bounds import own_leaf_reaches
 from ..compiled.flora import Flora
 from ..compiled.placed import extents
 from ..growth.axes import Axes, axes
-from ..growth.branches import Branches
 from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, uniform
+from ..growth.seeds import Branches
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.hotspots import LightRatios, light_ratios
 from ..proxies.microsurfaces import Facets, piece_facets, subplant_facets
 from ..refinement.contents import PlantParts, as_pieces
 from ..refinement.decisions import explicit_fraction
 from ..refinement.lights import Light
-from ..refinement.shares import opened
+from ..refinement.shared_parts import opened
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import Pieces, Thin, whole_pieces
-from ..subplants.tubes import tube_buffers
-from ..subplants.twigs import twig_buffers
+from ..subplants.tubes import tube_buffers, twig_buffers
 from .coverage import Coverage, Footprints
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
 from .plants import Transition

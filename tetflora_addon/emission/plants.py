@@ -22,9 +22,8 @@ from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.axes import axes
-from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, trunks
-from ..growth.seeds import Seeds
+from ..growth.seeds import Branches, Seeds
 from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..refinement.contents import as_pieces, piece_totals
 from ..refinement.decisions import Decision, explicit_fraction

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Floats32, Integers, Mask
+from ..arrays import top as top_of
 from ..errors import SceneError
 from ..jobs import Progress
 from .projection import between
@@ -147,11 +148,7 @@ def find_trees(values: Floats32, cell: float, least: float) -> Generator[Progres
     yield Progress(0.3, "Looking for treetops")
     parent[summits] = yield from _hidden_by(flat, summits, stride, cell)
     yield Progress(0.7, "Measuring crowns")
-    while True:  # twice as far each time
-        above = parent[parent[inside]]
-        if (above == parent[inside]).all():
-            break
-        parent[inside] = above
+    parent = top_of(parent)
     tops = summits[parent[summits] == summits]
     number = np.full(len(flat), -1)
     number[tops] = np.arange(len(tops))

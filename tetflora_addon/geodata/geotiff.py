@@ -22,12 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Mask
+from ..arrays import Floats, Integers, Mask, spread, top
 from ..errors import SceneError, quoted
 from ..jobs import Progress
 from . import table
-from .prj import described, system_in, utm_zone
-from .projection import Definition, Ellipsoid, System, known_systems
+from .projection import Definition, Ellipsoid, System, described, known_systems, system_in, utm_zone
 from .rasters import Raster, check_regular, checked_size, system_beside, without_nodata, world_file
 
 _CLEAR, _END, _ZSTANDARD = 256, 257, 50000
@@ -434,12 +433,9 @@ def _strings(codes: Integers) -> tuple[bytes, bool]:
         steps, root = steps + steps[root], root[root]
     length = steps + 1
     start = np.cumsum(length) - length
-    code = np.repeat(index, length)
-    offset = np.arange(len(code)) - start[code]
+    code, offset = spread(length)
     source = start[maker[code]] + offset
-    while (source[source] != source).any():
-        source = source[source]
-    return codes[code[source]].astype(np.uint8).tobytes(), bool(len(bad))
+    return codes[code[top(source)]].astype(np.uint8).tobytes(), bool(len(bad))
 
 
 def _packed(data: bytes, most: int) -> bytes:

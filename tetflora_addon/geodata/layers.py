@@ -22,8 +22,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import SceneError, quoted
 from ..files import is_regular, parse_json, read_whole
-from .prj import system_in
-from .projection import LONGITUDE_LATITUDE, System, chosen_system, code_in, known_systems, may_be_degrees
+from .projection import LONGITUDE_LATITUDE, System, chosen_system, code_in, known_systems, may_be_degrees, system_in
 from .rasters import beside, system_beside
 
 MAX_BYTES, MAX_ROWS = 200_000_000, 2_000_000

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, spread
 from ..errors import NAME, SceneError, readable
 from . import table
 from .layers import LAYER, list_of, parts_of, read_features
@@ -201,12 +201,9 @@ def one_ring(rings: tuple[Floats, ...]) -> Floats:
     return outer
 
 
-def denser(line: Floats, step: float, closed: bool = False) -> Floats:
+def denser(line: Floats, step: float) -> Floats:
     """A line (k, 2) with more points, none farther than so many meters from the next."""
-    ends = np.concatenate([line, line[:1]]) if closed else line
-    pieces = np.linalg.norm(np.diff(ends, axis=0), axis=1)
-    number = np.maximum(np.ceil(pieces / step), 1).astype(np.int64)
-    place = np.repeat(np.arange(len(number)), number)
-    part = (np.arange(len(place)) - np.repeat(np.cumsum(number) - number, number)) / number[place]
-    between = ends[place] + part[:, None] * (ends[place + 1] - ends[place])
-    return between if closed else np.concatenate([between, ends[-1:]])
+    number = np.maximum(np.ceil(np.linalg.norm(np.diff(line, axis=0), axis=1) / step), 1).astype(np.int64)
+    place, index = spread(number)
+    between = line[place] + (index / number[place])[:, None] * (line[place + 1] - line[place])
+    return np.concatenate([between, line[-1:]])

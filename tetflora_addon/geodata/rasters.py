@@ -18,8 +18,7 @@ from ..arrays import Floats, Floats32
 from ..errors import SceneError, quoted
 from ..files import is_regular, read_whole
 from ..jobs import Progress
-from .prj import system_in
-from .projection import LONGITUDE_LATITUDE, System, may_be_degrees
+from .projection import LONGITUDE_LATITUDE, System, may_be_degrees, system_in
 
 #: Most cells of a raster, and bytes of a text file of them.
 MAX_CELLS, MAX_TEXT = 40_000_000, 1_000_000_000

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Keys, Table, by_component, columns, cross, gathered
-from .branches import Branches
 from .hashing import Draw, signed
 from .rows import ranged, varied
+from .seeds import Branches
 from .wind import axis_and_angle, is_windy, leaned, moment, sway, turned_by, turned_vectors
 
 
@@ -29,12 +29,8 @@ class Axes(Arrays):
     knots: Floats  # (n, S + 1, 3): ends of the segments; a branch with fewer than S segments repeats its last knot
     frames: Floats  # (n, S, 3, 3): local axes along each segment
     segments: Integers  # (n,): number of segments
-    skies: Floats | None = None  # (n, S, 3): in the wind: `branches.Branches.sky` along each segment
+    skies: Floats | None = None  # (n, S, 3): in the wind: `seeds.Branches.sky` along each segment
     later: Axes | None = None  # the same lines a moment later, where it is asked how plants move
-
-    @staticmethod
-    def _rows(own: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:
-        return own.take(index) if isinstance(own, Arrays) else _selected(own, index)
 
     def at(self, branch: Integers, t: Floats) -> tuple[NDArray, NDArray]:
         """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
@@ -70,24 +66,12 @@ class Axes(Arrays):
         return _picked(self.frames, branch, segment)
 
 
-def _selected(array: NDArray, index: NDArray | slice) -> NDArray:
-    """``array[index]`` of an array whose first axis is the last in memory and whose second the one before."""
-    if isinstance(index, slice) or array.ndim == 1:
-        return array[index]
-    return _to_front(np.take(_to_back(array), index, axis=-1))
-
-
 def _picked(array: NDArray, first: Integers, second: Integers) -> NDArray:
     """``array[first, second]`` of an array whose first axis is the last in memory and whose second the one before."""
-    flat = _to_back(array)
+    flat = array.transpose(*range(2, array.ndim), 1, 0)  # (..., S, n), as it lies in memory
     flat = flat.reshape(*flat.shape[:-2], -1)
     picked = np.take(flat, second * len(array) + first, axis=-1)
     return picked.transpose(-1, *range(picked.ndim - 1))
-
-
-def _to_back(array: NDArray) -> NDArray:
-    """(n, S, ...) to (..., S, n), as it lies in memory."""
-    return array.transpose(*range(2, array.ndim), 1, 0)
 
 
 def _to_front(array: NDArray) -> NDArray:

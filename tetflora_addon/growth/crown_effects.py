@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Floats32, Integers, Mask, Table, by_component
-from .branches import Branches
-from .crown_shapes import BASE, EAST, NORTH, PLAIN, THICKNESS, WIDTH
 from .rows import DEAD, FORK, LATERAL, SPUR
+from .seeds import BASE, EAST, NORTH, PLAIN, THICKNESS, WIDTH, Branches
 
 #: Columns of ``crown`` of branches: the first two are those of crown shapes, then the vector (east, north) in the
 #: branch's own axes.

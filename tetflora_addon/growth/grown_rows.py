@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Integers, Keys, Mask, Table
 from ..species.growing import NodeLaw, Nodes, faded, shortened, some_nodes
 from ..species.species import crown_ratio
-from .branches import Branches
 from .hashing import Draw, child_key, signed
+from .seeds import Branches
 
 NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA, VARIES, FADES = range(11)
 """Columns of ``growing``."""

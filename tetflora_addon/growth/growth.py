@@ -18,14 +18,11 @@ from ..species.growing import faded
 from ..species.members import dead_vigor
 from . import crown_effects
 from .axes import Axes, axes, profile
-from .branches import Branches, Pose
-from .crown_shapes import BASE
-from .envelopes import BOX
 from .grown_rows import FADES, NOW, Grown, child_number, fullness_of, grown_nodes, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
-from .rows import DEAD, FLARE_RINGS, FORK, LATERAL, SPUR, ranged, varied
+from .rows import BOX, DEAD, FLARE_RINGS, FORK, LATERAL, SPUR, ranged, varied
 from .seasons import plant_years
-from .seeds import Seeds
+from .seeds import BASE, Branches, Pose, Seeds
 from .wind import axis_and_angle, is_windy, moment, turned_by, turned_vectors
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
@@ -334,3 +331,16 @@ class WholeBranches(Arrays):
             t[cut] = at[index[cut]]
             position[cut] = self.lines.at(owner[cut], t[cut])[0]
         return owner, t, position
+
+
+def open_branches(rows: Table, subplants: Branches) -> tuple[WholeBranches, Integers, Branches, Integers]:
+    """Branches of sub-plants with the index of the sub-plant of each, and their children with that of their parent."""
+    phantom = rows["phantom"][subplants.row]
+    if phantom.any():  # a form drawn by hand: its branches are known, and opened with the plant
+        plants, rest = np.flatnonzero(phantom), np.flatnonzero(~phantom)
+        drawn, plant = drawn_children(rows, subplants.take(plants))
+        bodies, body = Branches.concatenate([subplants.take(rest), drawn]), np.concatenate([rest, plants[plant]])
+    else:
+        bodies, body = subplants, np.arange(len(subplants))
+    lines = axes(rows, bodies)
+    return WholeBranches(bodies, lines), body, *children(rows, bodies, lines)

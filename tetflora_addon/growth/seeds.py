@@ -1,14 +1,22 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Seeds: all that is stored of a plant before it is needed (paper, section 5)."""
+"""Seeds: all that is stored of a plant before it is needed (paper, section 5).
+
+Beside it some have a crown shape, five numbers by which one plant differs from others of its kind because of how it
+grew: a tree of a stand has a narrow crown far up, which leans to where the light is; one that is recorded in an
+inventory has the crown that was measured.
+
+Of what has begun to grow from them there are `Branches`.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Arrays, Floats, Integers, Integers32
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, column
 
 
 @dataclass(frozen=True)
@@ -37,3 +45,88 @@ class Seeds(Arrays):
     def counted_from(self, origin: Floats) -> Seeds:
         """The same plants in coordinates that begin at a place (3,) of the present ones."""
         return replace(self, position=self.position - origin) if origin.any() else self
+
+
+#: Columns: factor on the lengths of limbs; bare fraction of the trunk, 0 as described; by which fraction limbs to the
+#: east and to the north are longer, and those opposite shorter; factor on the radius of the trunk.
+WIDTH, BASE, EAST, NORTH, THICKNESS = range(5)
+#: A plant as its species describes it.
+PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0])
+#: Limits of each column.
+LEAST = np.array([0.2, 0.0, -0.8, -0.8, 0.2])
+MOST = np.array([3.0, 0.95, 0.8, 0.8, 5.0])
+
+
+def farthest(forms: Floats | None) -> Floats | float:
+    """How many times as far as described plants (n,) reach at most, by their crown shapes (n, 5)."""
+    if forms is None:
+        return 1.0
+    return np.maximum(forms[:, WIDTH] * (1.0 + np.hypot(forms[:, EAST], forms[:, NORTH])), 1.0)
+
+
+def crown_shapes(
+    number: int,
+    width: ArrayLike = 1.0,
+    base: ArrayLike = 0.0,
+    east: ArrayLike = 0.0,
+    north: ArrayLike = 0.0,
+    thickness: ArrayLike = 1.0,
+) -> Floats:
+    """Crown shapes (number, 5) of plants, within the limits; each argument is one number or (number,)."""
+    out = np.empty((number, len(PLAIN)))
+    for k, value in enumerate((width, base, east, north, thickness)):
+        out[:, k] = np.clip(value, LEAST[k], MOST[k])
+    return out
+
+
+@dataclass(frozen=True)
+class Pose(Arrays):
+    """Where branches are."""
+
+    position: Floats  # (n, 3)
+    frame: Floats  # (n, 3, 3)
+    sky: Floats  # (n, 3)
+
+
+@dataclass(frozen=True)
+class Branches(Arrays):
+    """Branches (or sub-plants) as a structure of arrays."""
+
+    row: Integers32 = column(dtype=np.int32)  # (n,): row of the parameter table: which kind of branch of which species
+    plant: Integers32 = column(dtype=np.int32)  # (n,): index of the plant that it belongs to
+    key: Keys = column(dtype=np.uint64)  # (n,): hash of the plant's seed and the path of child indices
+    position: Floats = column(3)  # (n, 3): base, meters, world space
+    #: (n, 3, 3): columns are the local axes at the base; the branch sets out along the third, the first points away
+    #: from the parent.
+    frame: Floats = column(3, 3)
+    #: length and radius, (n,): length of the axis and radius at its base, meters.
+    length: Floats
+    radius: Floats
+    scale: Floats  # (n,): scale of the plant, which leaves take as well
+    #: (n,): length as the crown's shape has it here, relative to the longest; numbers of branches and leaves may follow
+    #: it.
+    vigor: Floats
+    #: (n,): where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
+    #: themselves, along which it grows.
+    outward: Floats
+    #: (n, 3): in the wind: where the direction that was up without it has turned to. Plants grow toward that, so that
+    #: wind moves them and does not change how they grow.
+    sky: Floats | None = None
+    later: Pose | None = None  # position and frame a moment later, where it is asked how plants move
+    #: (n, 2): on a day of the year: the day that it is for the plant, and its place among the autumn colors of its
+    #: species.
+    year: Floats | None = None
+    #: (n, 5): where plants have crown shapes: what trunks and their stems know of these, see `crown_effects`; of all
+    #: others the factor on their length in the first column, and 0.
+    crown: Floats32 | None = None
+
+    @classmethod
+    def apart(cls, row: int, key: NDArray, frame: NDArray, length: float, scale: float) -> Branches:
+        """Branches (n,) of one row at the origin, of radius 1, as long as any and each a plant of its own."""
+        one, kind = np.ones(len(key)), np.full(len(key), row, np.int32)
+        plant, place = np.arange(len(key), dtype=np.int32), np.zeros((len(key), 3))
+        return cls(kind, plant, key, place, frame, length * one, one, scale * one, one, 0.0 * one)
+
+    def moved(self) -> Branches:
+        """The same a moment later; only where that is known."""
+        return replace(self, **vars(self.later), later=None)

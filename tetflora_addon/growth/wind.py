@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Floats32, Integers, Keys, Table, cross, dot
 from ..errors import TetFloraError
-from ..setting import FACTOR, setting, within
-from .branches import Branches
+from ..parameters import FACTOR, setting, within
 from .hashing import Draw, uniform
 from .rows import SPUR_ORDER, with_columns
+from .seeds import Branches
 
 #: Radians by which the tip of a trunk `_SLENDER` times as long as thick leans at `_STRONG` m/s; and over that for
 #: limbs, their branches, and all beyond, as they carry more leaves for their wood. A cantilever leans by the fourth

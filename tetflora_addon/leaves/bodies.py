@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_ANGLE, Floats, Floats32, Integers, connected, cross, perpendicular
+from ..arrays import GOLDEN_ANGLE, Floats, Floats32, Integers, connected, cross, perpendicular, spread
 from .models import LeafModel, Spines
 
 #: Angle of all faces around a vertex below which it is a point, and stays: a full turn on flat ground, 4/3 π on an
@@ -113,8 +113,7 @@ def _divided(
 def _triangles(model: LeafModel, faces: Integers) -> tuple[Integers, Floats, Integers]:
     """Vertices (t, 3), texture (t, 3, 2) and owners (t,) of the triangles of faces: fans around their first corners."""
     first, size = model.face_offsets[:-1][faces], np.diff(model.face_offsets)[faces]
-    owner = np.repeat(np.arange(len(faces)), size - 2)
-    step = np.arange(len(owner)) - np.repeat(np.cumsum(size - 2) - (size - 2), size - 2)
+    owner, step = spread(size - 2)
     corner = np.stack([first[owner], first[owner] + step + 1, first[owner] + step + 2], axis=1)
     return model.corner_verts[corner].astype(np.int64), model.uv[corner].astype(np.float64), owner
 

@@ -17,13 +17,11 @@ import numpy as np
 
 from ..arrays import Floats, Floats32, Integers
 from ..optics import needle_color
-from .blades import blade_surface
+from .blades import Compound, blade_surface, compound_surface
 from .bodies import closed_parts, rounded, spined
-from .compounds import Compound, compound_surface
 from .models import LeafModel, mean_silhouette
-from .needles import FLAT, SPARSE, Needles, needle_surface
 from .outlines import Blade, distance_to_links
-from .surfaces import LeafSurface
+from .surfaces import FLAT, SPARSE, LeafSurface, Needles, needle_surface
 
 #: Tolerances of levels, in lengths of the leaf.
 TOLERANCES = (0.03, 0.012, 0.004, 0.0015, 0.0005, 0.0002)

@@ -18,10 +18,9 @@ from ..arrays import GOLDEN_ANGLE, Floats, Floats32, Integers, Integers32, perpe
 from ..errors import SpeciesError
 from ..files import beside
 from ..parameters import limited
-from .compounds import Compound
-from .needles import Needles
+from .blades import Compound
 from .outlines import Blade
-from .surfaces import next_corners
+from .surfaces import Needles, next_corners
 
 MAX_LEAF_POLYGONS = 2000
 MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices
@@ -251,11 +250,9 @@ def _outline(page: dict[str, Any]) -> Blade | Needles | Compound:
     return OUTLINES[page["kind"]](**own)
 
 
-def _built_in(page: dict[str, Any]) -> LeafModel:
-    """A leaf as species files have leaves: polygons, and the outline that they stand for."""
-    return replace(leaf_model(page["vertices"], page["faces"], page.get("uv")), shape=_outline(page["outline"]))
-
-
 _PAGES: dict[str, dict[str, Any]] = beside(__file__, "models.json")
-LEAF_MODELS = {name: _built_in(page) for name, page in _PAGES.items()}
-"""The built-in leaves by name."""
+LEAF_MODELS = {
+    name: replace(leaf_model(page["vertices"], page["faces"], page.get("uv")), shape=_outline(page["outline"]))
+    for name, page in _PAGES.items()
+}
+"""The built-in leaves by name: as species files have leaves, polygons and the outline that they stand for."""

@@ -11,13 +11,12 @@ import numpy as np
 
 from ..errors import SpeciesError, quoted
 from ..parameters import FileReader
-from .blades import check_outline
+from .blades import Compound, check_outline
 from .bodies import closed_parts
-from .compounds import Compound
 from .levels import TOLERANCES, fitted, shown_area, surface_of
 from .models import LEAF_MODELS, OUTLINES, LeafModel, Spines, leaf_model
-from .needles import Needles
 from .outlines import Blade
+from .surfaces import Needles
 
 #: Most forms of a leaf.
 MAX_FORMS = 8
@@ -78,13 +77,11 @@ def _read_leaf(reader: FileReader, data: Any, where: str) -> LeafModel | str:
         made = leaf_model(data["vertices"], faces, data.get("uv"))
     except SpeciesError as error:
         raise reader.fail(where, str(error)) from None
-    return _with_spines(reader, made, data["spines"], f"{where}.spines") if "spines" in data else made
-
-
-def _with_spines(reader: FileReader, model: LeafModel, data: Any, where: str) -> LeafModel:
-    if not (closed_parts(model) >= 0).any():
-        raise reader.fail(where, "must be left out, because the polygons have no closed part to stand on")
-    return replace(model, spines=reader.read(Spines, data, where))
+    if "spines" not in data:
+        return made
+    if not (closed_parts(made) >= 0).any():
+        raise reader.fail(f"{where}.spines", "must be left out, because the polygons have no closed part to stand on")
+    return replace(made, spines=reader.read(Spines, data["spines"], f"{where}.spines"))
 
 
 def _is_list_of_points(value: Any, size: int) -> bool:

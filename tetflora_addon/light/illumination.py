@@ -130,7 +130,7 @@ class Illumination:
         color: Floats,
         transmission: Floats,
         cells: Integers,
-        camera: Camera | None = None,
+        camera: Camera,
         sheets: Integers | None = None,
         dull: Floats | None = None,
     ) -> tuple[Floats32, Floats32]:
@@ -146,8 +146,8 @@ class Illumination:
             Fraction of the scattered light that passes through; 0 for bark.
         cells : (m,) int
             As for `direct`.
-        camera : Camera, optional
-            For the gloss; without, it is even.
+        camera : Camera
+            For the gloss.
         sheets : (m,) int, optional
             As for `direct`.
         dull : (m,) float64, optional
@@ -163,7 +163,7 @@ class Illumination:
             part = slice(start, start + _BATCH)
             hidden = 0.0 if dull is None else dull[part]
             fractions = scattering.scattered_fractions(color[part], transmission[part], hidden)
-            view = None if camera is None else to_eye(camera, center[part])
+            view = to_eye(camera, center[part])
             sides = scattering.facet_ambient(normal[part], fractions, self.around(center[part], cells[part]), view)
             on = None if sheets is None else sheets[part]
             for toward, light in self.direct(center[part], cells[part], on):
@@ -179,9 +179,8 @@ class Illumination:
         transmission: Floats,
         cells: Integers,
         camera: Camera,
-        normal: Floats | None = None,
-        plane: Floats | None = None,
-        sheets: Integers | None = None,
+        normal: Floats,
+        plane: Floats,
     ) -> Floats32:
         """Radiance (m, 3) of microspheres or, the same, of thick clouds around points, as the camera sees them.
 
@@ -190,32 +189,23 @@ class Illumination:
         points, color, transmission, cells
             As for `facet_radiance`.
         camera : Camera
-        normal : (m, 3) float64, optional
+        normal : (m, 3) float64
             Axis of the plane term; both ways are alike.
-        plane : (m,) float64, optional
-            Weight of the plane term, by default 0.
-        sheets : (m,) int, optional
-            As for `direct`.
+        plane : (m,) float64
+            Weight of the plane term.
         """
         result = np.zeros((len(points), 3), np.float32)
         for start in range(0, len(points), _BATCH):
             part = slice(start, start + _BATCH)
-            fractions, view = (
-                scattering.scattered_fractions(color[part], transmission[part]),
-                to_eye(camera, points[part]),
-            )
-            around = self.around(points[part], cells[part])
-            particles, planes = scattering.particle_ambient(fractions, around, view), 0.0
-            if plane is not None:
-                axis = normal[part]
-                axis = axis * np.where(np.sum(axis * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
-                planes = scattering.facet_ambient(axis, fractions, around, view)[0]
-            on = None if sheets is None else sheets[part]
-            for toward, light in self.direct(points[part], cells[part], on):
+            fractions = scattering.scattered_fractions(color[part], transmission[part])
+            axis, view, around = normal[part], to_eye(camera, points[part]), self.around(points[part], cells[part])
+            axis = axis * np.where(np.sum(axis * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
+            particles = scattering.particle_ambient(fractions, around, view)
+            planes = scattering.facet_ambient(axis, fractions, around, view)[0]
+            for toward, light in self.direct(points[part], cells[part]):
                 particles += scattering.particle_direct(fractions, toward, light, view)
-                if plane is not None:
-                    planes = planes + scattering.facet_direct(axis, fractions, toward, light, view)[0]
-            weight = 0.0 if plane is None else plane[part][:, None]
+                planes += scattering.facet_direct(axis, fractions, toward, light, view)[0]
+            weight = plane[part][:, None]
             result[part] = (1.0 - weight) * particles + weight * planes
         return result
 

@@ -126,41 +126,29 @@ _PHASE_BANDS = _bands()
 
 
 def facet_direct(
-    normal: Floats, fractions: Fractions, toward: Floats, arriving: Floats, view: Floats | None = None
+    normal: Floats, fractions: Fractions, toward: Floats, arriving: Floats, view: Floats
 ) -> tuple[Floats, Floats]:
     """Radiance of the front, where normals point, and of the back of facets (n, 3 each) by one light.
 
-    All vectors (n, 3) are unit vectors; ``arriving`` (n, 3) is W/m² on a surface that faces the light. Without a
-    ``view`` to the eye the gloss is as even as what is scattered.
+    All vectors (n, 3) are unit vectors, ``view`` to the eye; ``arriving`` (n, 3) is W/m² on what faces the light.
     """
     reflected, through, gloss = fractions
     cosine = np.sum(normal * toward, axis=1)
     same = reflected * arriving / np.pi * np.abs(cosine)[:, None]
     other = through * arriving / np.pi * np.abs(cosine)[:, None]
-    lobe = np.abs(cosine) / np.pi if view is None else _mirrored(normal, toward, view)
-    same = same + (gloss * lobe)[:, None] * arriving
+    same = same + (gloss * _mirrored(normal, toward, view))[:, None] * arriving
     lit = (cosine > 0.0)[:, None]
     return np.where(lit, same, other), np.where(lit, other, same)
 
 
-def facet_ambient(
-    normal: Floats, fractions: Fractions, light: Floats, view: Floats | None = None
-) -> tuple[Floats, Floats]:
+def facet_ambient(normal: Floats, fractions: Fractions, light: Floats, view: Floats) -> tuple[Floats, Floats]:
     """Radiance of the front and the back of facets (n, 3 each) by light from all sides, as harmonics (n, 9, 3)."""
     reflected, through, gloss = fractions
     front, back = irradiance(light, normal) / np.pi, irradiance(light, -normal) / np.pi
-    if view is None:
-        mirrored = front, back
-    else:
-        # The lobe is about as broad as a cosine's.
-        across = np.sum(normal * view, axis=1, keepdims=True)
-        seen = irradiance(light, 2.0 * across * normal - view) / np.pi
-        mirrored = seen, seen
-    gloss = gloss[:, None]
-    return (
-        reflected * front + through * back + gloss * mirrored[0],
-        reflected * back + through * front + gloss * mirrored[1],
-    )
+    # The lobe is about as broad as a cosine's.
+    across = np.sum(normal * view, axis=1, keepdims=True)
+    mirrored = gloss[:, None] * (irradiance(light, 2.0 * across * normal - view) / np.pi)
+    return reflected * front + through * back + mirrored, reflected * back + through * front + mirrored
 
 
 def _mirrored(normal: Floats, toward: Floats, view: Floats) -> Floats:

@@ -147,19 +147,22 @@ def buffers_of(
 
     A sun has further ones before it for what is ``near``, with smaller pixels.
     """
-    views = _views(light, clouds, occluders, resolution) if len(clouds) else []
-    if light.kind == "SUN" and near is not None:
-        views = [closer for view in views for closer in _closer(view, near)] + views
-    return [_buffer(view, light, clouds, sheets, occluders, resolution) for view in views]
-
-
-def _views(light: Light, clouds: MediumCells, occluders: Floats | None, resolution: int) -> list[Camera]:
-    corners = clouds.vertices.reshape(-1, 3)
-    if light.kind != "SUN":
-        return lamp_views(light.position, corners, resolution)
-    # Occluders affect how far the view reaches, not how wide it is.
-    every = corners if occluders is None or not len(occluders) else np.concatenate([corners, occluders.reshape(-1, 3)])
-    return light_views(light, clouds.vertices, every, resolution)
+    if not len(clouds):
+        return []
+    corners, sun = clouds.vertices.reshape(-1, 3), light.kind == "SUN"
+    if sun:
+        # Occluders affect how far the view reaches, not how wide it is.
+        every = corners if occluders is None else np.concatenate([corners, occluders.reshape(-1, 3)])
+        views = light_views(light, clouds.vertices, every, resolution)
+        views = [closer for view in views for closer in _closer(view, near)] + views if near else views
+    else:
+        views = lamp_views(light.position, corners, resolution)
+    made = []
+    for view in views:
+        along = light.direction if sun else -to_eye(view, clouds.vertices.mean(axis=1))
+        extinction = np.where(sheets.replaced, 0.0, clouds.extinction(along))
+        made.append(LightBuffer(view, resolution, clouds.vertices, extinction, occluders, sheets.corners))
+    return made
 
 
 def _closer(view: Camera, near: Near) -> list[Camera]:
@@ -174,11 +177,3 @@ def _closer(view: Camera, near: Near) -> list[Camera]:
             columns, rows = image_size(width, height)
             made.append(replace(view, window=window, width=columns, height=rows))
     return made
-
-
-def _buffer(
-    view: Camera, light: Light, clouds: MediumCells, sheets: SurfaceElements, occluders: Floats | None, resolution: int
-) -> LightBuffer:
-    along = light.direction if light.kind == "SUN" else -to_eye(view, clouds.vertices.mean(axis=1))
-    extinction = np.where(sheets.replaced, 0.0, clouds.extinction(along))
-    return LightBuffer(view, resolution, clouds.vertices, extinction, occluders, sheets.corners)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import Floats, Integers32
 from ..errors import SceneError
-from ..setting import FACTOR, LENGTH, meters, setting, within
+from ..parameters import FACTOR, LENGTH, meters, setting, within
 
 #: Most plants that are placed at once.
 MOST_PLANTS = 10_000_000

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Keys, Mask
 from ..growth.hashing import child_key, key_of_seed, uniform
-from ..setting import meters, setting
+from ..parameters import meters, setting
 from .plane import NO_DISTANCE, Spacing, cells_of, packed
 from .rules import species_by_weight
 

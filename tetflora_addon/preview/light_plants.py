@@ -19,9 +19,8 @@ from ..arrays import Floats, Floats32, Integers, Integers32
 from ..camera.camera import origin_near
 from ..compiled.flora import Flora
 from ..compiled.placed import extents, outlines
-from ..growth.branches import Branches
 from ..growth.growth import trunks
-from ..growth.seeds import Seeds
+from ..growth.seeds import Branches, Seeds
 from .levels import as_shown
 
 #: Plants that a preview shows; of more, `thinned` chooses.

@@ -16,8 +16,8 @@ from ..arrays import perpendicular, unit
 from ..assets.asset import COUNTS
 from ..growth.hashing import signed, uniform
 from ..optics import recollision_albedo
-from ..refinement.asset_parts import AssetParts, PlacedAssets
 from ..refinement.contents import Totals
+from ..refinement.shared_parts import AssetParts, PlacedAssets
 from .facet_weights import by_number
 from .microsurfaces import Facets, facet_numbers
 

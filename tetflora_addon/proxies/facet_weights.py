@@ -36,11 +36,10 @@ from ..arrays import GOLDEN_TURN, Floats, Integers, Mask, Table, spiral, spread
 from ..compiled.clumping import fingerprint
 from ..compiled.flora import Flora, compile_species
 from ..compiled.rays import PlantElements, basis, elements_of
-from ..growth.branches import Branches
-from ..growth.envelopes import are_solids
+from ..growth.foliage import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
-from ..growth.seeds import Seeds
+from ..growth.seeds import Branches, Seeds
 from ..jobs import mapped, run_to_end
 from ..refinement.contents import piece_totals, subplant_totals
 from ..species.ages import ages_of, with_age

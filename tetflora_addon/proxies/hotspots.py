@@ -22,7 +22,7 @@ from ..arrays import Arrays, Floats, Integers, column
 from ..camera.camera import Camera, to_eye
 from ..compiled.flora import Flora
 from ..compiled.placed import extents
-from ..growth.branches import Branches
+from ..growth.seeds import Branches
 from ..refinement.lights import Light
 
 #: Probability that light which a leaf of a crown scatters meets another, about.

@@ -24,12 +24,11 @@ from ..compiled.flora import Flora
 from ..compiled.placed import placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import axes
-from ..growth.branches import Branches
-from ..growth.colors import leaf_colors_at, mean_leaf_colors
 from ..growth.foliage import leaf_start, outwardness, place_leaves, settled, youth
 from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, child_key, mix, signed, uniform
-from ..growth.seasons import AREA, PRESENT, leaf_stages
+from ..growth.seasons import AREA, PRESENT, leaf_colors_at, leaf_stages, mean_leaf_colors
+from ..growth.seeds import Branches
 from ..growth.wind import moment
 from ..optics import GLOSS, cluster_color
 from ..refinement.contents import piece_leaves

@@ -13,9 +13,9 @@ from ..arrays import Floats, Integers, unit
 from ..compiled.clumping import factors
 from ..compiled.flora import Flora
 from ..compiled.orientation import leaf_moments, own_leaf_moments, wood_moments
-from ..refinement.asset_parts import AssetParts, PlacedAssets
 from ..refinement.contents import Contents, InCells
 from ..refinement.polygons import MEASURE_BATCH
+from ..refinement.shared_parts import AssetParts, PlacedAssets
 from ..subplants.pieces import Pieces, chunks, outward_ends, piece_leaf_colors
 
 #: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Contents of tetrahedra: sub-plants, branches and explicit polygons, with their totals (paper, section 6.5).
 
-Plants are shared among tetrahedra, see `shares`. Polygons come from meshes that were modeled elsewhere; each is in one
-tetrahedron. Totals are what decisions need: areas, numbers of polygons, and the width of features.
+Plants are shared among tetrahedra, see `shared_parts`. Polygons come from meshes that were modeled elsewhere; each is
+in one tetrahedron. Totals are what decisions need: areas, numbers of polygons, and the width of features.
 
 Polygons of divided tetrahedra are handed on to the children. What lies on one side of a plane goes there whole, what
 crosses it is clipped. Nothing smaller than a pixel of the alpha buffer shows in the image: what reaches beyond a plane
@@ -23,10 +23,10 @@ from ..arrays import Arrays, Chunks, Floats, Integers, Integers32, Mask, column,
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds, extents
-from ..growth.branches import Branches
-from ..growth.envelopes import are_solids, envelope_reach
+from ..growth.foliage import are_solids, envelope_reach
 from ..growth.growth import fullness
 from ..growth.seasons import AREA, PRESENT
+from ..growth.seeds import Branches
 from ..subplants.pieces import Pieces, chunks, leaf_fraction, piece_leaf_integrals, wood_areas
 from ..tetrahedra.tree import TetrahedralTree
 from .polygons import Polygons, area_fractions
@@ -197,11 +197,10 @@ class Contents:
     polygons: InCells[Polygons] = field(default_factory=lambda: InCells.none(Polygons))
 
 
-def in_the_root(polygons: Polygons, large: Mask | None = None) -> InCells[Polygons]:
+def in_the_root(polygons: Polygons, large: Mask | bool = False) -> InCells[Polygons]:
     """Polygons (n,), all in the root; ``large`` ones (n,) stay polygons whatever is decided about their cells."""
     totals = polygon_totals(polygons)
-    if large is not None:
-        totals = replace(totals, width=np.where(large, np.inf, totals.width))
+    totals = replace(totals, width=np.where(large, np.inf, totals.width))
     return InCells(polygons, np.zeros(len(polygons), np.int32), totals)
 
 
@@ -254,20 +253,6 @@ def bounding_capsules(flora: Flora, subplants: Branches) -> Floats:
     out[6], out[7] = bound[0], (bound[2] - bound[1]) / 2
     out[8] = pad
     return out
-
-
-def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDArray, NDArray]:
-    """Cylinders about the sub-plants' branches that hold all of their vertices, whatever the seed.
-
-    Returns
-    -------
-    center : (n, 3) float64
-        Meters, world space.
-    radius, half_height : (n,) float64
-        Across and along the branch's axis, meters.
-    """
-    capsules = bounding_capsules(flora, subplants)
-    return capsules[:3].T, capsules[6] + capsules[8], capsules[7] + capsules[8]
 
 
 def bounding_box(flora: Flora, subplants: Branches) -> Floats:
@@ -331,7 +316,7 @@ def cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tupl
     return np.concatenate([owner[stays], owner[from_]]), np.concatenate([larger, side]), parts
 
 
-def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Slack | None = None) -> InCells[Polygons]:
+def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Slack) -> InCells[Polygons]:
     """Hand polygons of divided nodes on until all lie in terminal ones.
 
     What reaches no further than ``slack`` beyond a plane stays whole. Nothing is lost or held twice.
@@ -343,13 +328,12 @@ def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Sl
             cells[some], crosses[some] = _lowered(tree, polygons.take(some), cells[some], slack)
         placed.append(replace(held, cell=cells).take(~crosses))
         polygons, cells, width = polygons.take(crosses), cells[crosses], held.totals.width[crosses]
-        loose = 0.0 if slack is None else slack(polygons.center)
-        owner, side, polygons = cut(polygons, tree.planes(cells), loose)
+        owner, side, polygons = cut(polygons, tree.planes(cells), slack(polygons.center))
         held = InCells(polygons, tree.children[cells[owner], side], polygon_totals(polygons, width[owner]))
     return InCells.concatenate(placed)
 
 
-def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack | None) -> tuple[Integers32, Mask]:
+def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack) -> tuple[Integers32, Mask]:
     """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""
     cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
     center, reach, touching = polygons.center, polygons.reach, polygons.touching()
@@ -361,7 +345,7 @@ def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: S
         # The sphere is a first guess; slack and corners are computed only for what it leaves open.
         unclear = np.flatnonzero(~whole)
         some = moving[unclear]
-        loose = touching[some] if slack is None else np.maximum(touching[some], slack(center[some]))
+        loose = np.maximum(touching[some], slack(center[some]))
         whole[unclear] = np.abs(distance[unclear]) > reach[some] - loose
         left = np.flatnonzero(~whole[unclear])
         if len(left):

@@ -25,8 +25,7 @@ from ..tetrahedra.tree import TetrahedralTree
 from .decisions import Decision, Terminals, mean_extinction
 from .rasterize import buffer_size, image_places, occluder_depth, pixel_rays, tetrahedron_fragments
 from .settings import RefinementSettings
-from .views import face_cameras
-from .visibility import AlphaBuffer
+from .visibility import AlphaBuffer, face_cameras
 
 #: Pixels of a light's buffer along each side of a field that receives light as a whole: points that the camera sees
 #: lie farther apart than the pixels of a light.

@@ -3,6 +3,10 @@
 """The main loop: visibility, refinement, update, until the image gains nothing more (paper, section 6.2).
 
 A pass costs what it changes: only divided tetrahedra give their contents away, only new ones are drawn and summed up.
+
+Outliers are a few things far beyond all others that nobody sees, such as a plant that slipped to the end of the world.
+The root of the tree holds all that there is. One plant 1,000 km away takes twenty levels of division before there is
+anything of the size of the others, and with that what the settings allow. Outliers are left out, and named.
 """
 
 from __future__ import annotations
@@ -13,19 +17,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers32, Mask
-from ..camera.camera import Camera
-from ..camera.silhouette import expected_pixels
+from ..arrays import Floats, Integers, Integers32, Mask
+from ..camera.camera import Camera, expected_pixels
 from ..compiled.flora import Flora
-from ..growth.branches import Branches
-from ..growth.seeds import Seeds
+from ..growth.growth import trunks
+from ..growth.seeds import Branches, Seeds
 from ..tetrahedra.geometry import squared_edges
 from ..tetrahedra.roots import view_root, world_root
 from ..tetrahedra.tree import TetrahedralTree
-from .asset_parts import PlacedAssets, SharedAssets
 from .contents import (
     Contents,
-    InCells,
+    PlantParts,
     PolygonsByCell,
     Slack,
     Totals,
@@ -37,14 +39,96 @@ from .contents import (
 )
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
-from .outliers import Outliers, outliers_of
 from .polygons import Polygons
 from .settings import RefinementSettings
-from .shared_parts import SharedParts
-from .shares import SharedPlants
+from .shared_parts import PlacedAssets, SharedAssets, SharedParts, SharedPlants
 from .statistics import Step, Stopwatch
-from .views import PanoramaBuffers, is_anchored, pixels_of_buffer, widened_for
-from .visibility import AlphaBuffer, Buffers
+from .visibility import AlphaBuffer, Buffers, is_anchored, pixels_of_buffer, widened_for
+
+#: Outliers are so many times as far from the camera as all others, or as so many meters if these are nearer.
+GAP, NEAR = 16.0, 1000.0
+#: There are at most so many, or that fraction of all things, and never more than of the others.
+MOST, FRACTION = 8, 0.01
+#: Pixels under which nobody sees a thing.
+UNSEEN = 1.0
+_NONE = np.zeros(0, np.int64)
+
+
+@dataclass(frozen=True)
+class Outliers:
+    """What is left out of a scene."""
+
+    #: plants, assets and instances, (k,), (l,) and (m,): rows of the seeds, of instances of assets, and instances of
+    #: other meshes.
+    plants: Integers = field(default_factory=lambda: _NONE)
+    assets: Integers = field(default_factory=lambda: _NONE)
+    instances: Integers = field(default_factory=lambda: _NONE)
+    away: Floats = field(default_factory=lambda: np.zeros(0))  # (k + l + m,): how far they are from the camera, meters
+
+    def others(self, seeds: Seeds, polygons: Polygons, placed: PlacedAssets) -> tuple[Seeds, Polygons, PlacedAssets]:
+        """What is left of plants, polygons and instances of assets."""
+        if len(self.plants):
+            seeds = seeds.take(np.delete(np.arange(len(seeds)), self.plants))
+        if len(self.instances):
+            polygons = polygons.take(np.flatnonzero(~np.isin(polygons.instance, self.instances)))
+        if len(self.assets):
+            placed = placed.take(np.delete(np.arange(len(placed)), self.assets))
+        return seeds, polygons, placed
+
+
+def outliers_of(
+    flora: Flora, seeds: Seeds, camera: Camera, polygons: Polygons | None = None, placed: PlacedAssets | None = None
+) -> Outliers:
+    """Outliers among plants, assets and instances of other meshes; nothing depends on their order."""
+    center, reach = seeds.position, np.zeros(len(seeds))
+    plants_end = assets_end = len(seeds)
+    if placed is not None and len(placed):
+        own = placed.wholes()
+        center, reach = np.concatenate([center, own.center]), np.append(reach, own.reach)
+        assets_end += len(placed)
+    if polygons is not None and len(polygons):
+        others = _around_instances(polygons)
+        center, reach = np.concatenate([center, others[0]]), np.append(reach, others[1])
+    away = np.linalg.norm(center - camera.eye, axis=1)
+    some = far_off(away - reach)
+    plants = some[some < plants_end]
+    if len(plants):
+        reach[plants] = PlantParts.of_subplants(flora, trunks(flora.rows, seeds.take(plants))).extent
+    for eye in (camera, *camera.shutter):
+        some = some[_unseen(eye, center[some], reach[some], away[some])]
+    own, last = some < plants_end, some >= assets_end
+    return Outliers(some[own], some[~own & ~last] - plants_end, some[last] - assets_end, away[some])
+
+
+def far_off(away: Floats) -> Integers:
+    """The few (k,) of things by their distances (n,) that are far beyond all others, meters."""
+    most = min(max(MOST, int(FRACTION * len(away))), len(away) // 2)
+    if most == 0:
+        return _NONE
+    first = len(away) - most - 1
+    last = np.argpartition(away, first)[first:]
+    last = last[np.argsort(away[last], kind="stable")]
+    from_here = np.maximum(away[last], NEAR)
+    gaps = np.flatnonzero(from_here[1:] > GAP * from_here[:-1])
+    return np.sort(last[gaps[0] + 1 :]) if len(gaps) else _NONE
+
+
+def _unseen(camera: Camera, center: Floats, reach: Floats, away: Floats) -> Mask:
+    """Things (n,) that are specks, or out of the view and too far for their shadows to fall into it."""
+    specks = 2.0 * reach < UNSEEN * camera.extent_around(center)
+    depth = away if camera.kind == "PANO" else camera.to_camera_space(center)[:, 2]
+    out = (depth - reach > camera.far) | (depth + reach < camera.near) | (camera.distance_to_view(center) > reach)
+    return specks | (out & (GAP * reach < away))
+
+
+def _around_instances(polygons: Polygons) -> tuple[Floats, Floats]:
+    """Middles (i, 3) of all instances of meshes, and how far they reach from there (i,), meters."""
+    number = len(polygons.meshes.surface)
+    low, high = np.full((number, 3), np.inf), np.full((number, 3), -np.inf)
+    np.minimum.at(low, polygons.instance, polygons.center - polygons.reach[:, None])
+    np.maximum.at(high, polygons.instance, polygons.center + polygons.reach[:, None])
+    return (low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0
+
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight parts.
 GENERATIONS = 3
@@ -148,6 +232,7 @@ def refine(
     """
     clock = Stopwatch()
     placed = PlacedAssets.none() if placed is None else placed
+    polygons = Polygons.empty() if polygons is None else polygons
     outliers = outliers_of(flora, seeds, camera, polygons, placed)
     seeds, polygons, placed = outliers.others(seeds, polygons, placed)
     filled = bool(np.isfinite(settings.proxy_block))
@@ -155,10 +240,9 @@ def refine(
     settings = _on_day(settings, flora, plants.parts.branches)
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
-    own = InCells.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
+    own = in_the_root(polygons, large_polygons(polygons, camera))
     bounds = _bounds(flora, plants, assets, polygons)
     tree = world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
-    whole = Polygons.empty() if polygons is None else polygons
     cell_polygons, most = PolygonsByCell(sort_into_children(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
     divided = np.arange(len(tree)) == 0
     shared = plants, assets
@@ -167,8 +251,7 @@ def refine(
     clock.lap("update")
     shadowed = bool(lights) and settings.shadow_cutoff > 0.0
     ground = seen_ground(camera, occluders, _height(seeds, polygons, placed)) if shadowed else None
-    kind = PanoramaBuffers if camera.kind == "PANO" else Buffers
-    buffers = kind(camera, settings.visibility_resolution, occluders)
+    buffers = Buffers(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
     cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, shared, cell_polygons, np.ones(len(tree), bool)))
@@ -200,7 +283,7 @@ def refine(
             splitting &= ~barred
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
-        found = cells, transmittance, decision, ranks, passes, not limited, seconds, outliers, lights, whole
+        found = cells, transmittance, decision, ranks, passes, not limited, seconds, outliers, lights, polygons
         state = Refinement(tree, plants, assets, cell_polygons, *found)
         if not splitting.any():
             return state
@@ -228,18 +311,17 @@ def refine(
         clock.lap("visibility")
 
 
-def _height(seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets) -> float:
+def _height(seeds: Seeds, polygons: Polygons, placed: PlacedAssets) -> float:
     """Median height of what there is, meters."""
-    heights = [seeds.position[:, 2], placed.instances.position[:, 2]]
-    heights += [] if polygons is None else [polygons.center[:, 2]]
-    return float(np.median(np.concatenate(heights)))
+    every = np.concatenate([seeds.position, placed.instances.position, polygons.center])
+    return float(np.median(every[:, 2]))
 
 
-def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons | None) -> Floats:
+def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons) -> Floats:
     """Axis-aligned box (2, 3) of all that is there, meters."""
     boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
     boxes += [assets.parts.bounding_box()] if len(assets.parts) else []
-    boxes += [] if polygons is None else [polygons.bounding_box()]
+    boxes += [polygons.bounding_box()] if len(polygons) else []
     return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
 
 

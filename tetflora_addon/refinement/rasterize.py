@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Arrays, Floats, Integers, Integers32, column, spread
-from ..camera.camera import Camera
-from ..camera.silhouette import silhouette_area, window_bounds
+from ..camera.camera import Camera, silhouette_area, window_bounds
 from ..parallel import blocks
 from ..tetrahedra.geometry import face_area_vectors, projected_area, volume
 

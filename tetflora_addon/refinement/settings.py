@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ..setting import script_setting, setting, within
+from ..parameters import script_setting, setting, within
 
 
 @dataclass(frozen=True)

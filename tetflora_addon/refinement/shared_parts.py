@@ -4,7 +4,12 @@
 
 A part that crosses planes stays whole. Points on it, which stand for equal fractions of its area, go down the tree,
 and each tetrahedron holds the fraction whose points it holds. Only where a tetrahedron is divided that is not much
-larger than a part is the part opened, see `shares` and `asset_parts`.
+larger than a part is the part opened. Instances of assets are clusters, opened as sub-plants are (section 6.5).
+
+The paper opens a sub-plant as soon as a plane crosses it (section 6.5). Most of what is so opened is never seen: a
+plane of the first tetrahedra runs through the crowns of a whole forest. Here it is opened late: into the
+branch itself and the sub-plants of the next order, with points of their own. The number of points follows the size in
+the image, so that the work is bounded by what the image shows.
 """
 
 from __future__ import annotations
@@ -26,13 +31,25 @@ from ..arrays import (
     Integers32,
     Mask,
     column,
+    nested,
     renumber,
     rows_within,
+    spread,
 )
+from ..assets.asset import AssetTable, Instances
 from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..compiled.placed import placed_samples
+from ..compiled.samples import Points
+from ..growth.axes import Axes, axes
+from ..growth.foliage import are_solids, leaf_keys, leaf_sites, leaf_start
+from ..growth.growth import open_branches, radius_at, trunks
+from ..growth.hashing import child_key, uniform
+from ..growth.seeds import Branches, Seeds
 from ..parallel import blocks, each_on_all_cores
+from ..subplants.pieces import Pieces
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import InCells, Totals, sums
+from .contents import InCells, PlantParts, Totals, as_pieces, sums
 
 #: Parts larger than this many times the longest edge of a tetrahedron that is divided are opened.
 LARGE = 1.6
@@ -109,10 +126,12 @@ class SharedParts(Generic[Parts]):
     Parameters
     ----------
     camera : Camera
+    filled : bool
+        Whether proxies fill their tetrahedra, so that small ones without points would be holes.
     """
 
-    def __init__(self, camera: Camera) -> None:
-        self.camera = camera
+    def __init__(self, camera: Camera, filled: bool) -> None:
+        self.camera, self._times = camera, FILLED if filled else 1
 
     def can_open(self, parts: Parts) -> Mask:
         """Parts (n,) that consist of others."""
@@ -235,3 +254,360 @@ class SharedParts(Generic[Parts]):
             cell, part, leaf, wood = (np.take(own, some) for own in (cell, part, leaf, wood))
         fraction = (leaf + wood) / np.maximum(np.take(figures.area, part), 1e-300)
         return Totals(leaf, wood, np.take(figures.polygons, part) * fraction, np.take(figures.width, part)), cell
+
+
+#: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
+PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
+#: The same of leaves that fill a solid, which cannot be opened: there is a point in each square of so many pixels.
+PIXELS_IN_SOLID, FEWEST_IN_SOLID, MOST_IN_SOLID = 3.0, 16, 2048
+#: Points in all of them together, but for the fewest: thousands may lie in front of each other.
+MOST_IN_SOLIDS = 1_000_000
+#: Wood that is wider in the view than this part of the image is looked for where it is, whatever share of its plant it
+#: has: such sub-plants are opened at once, and their branches have points so many widths apart, at most so many.
+THICK, APART, MOST_ALONG = 0.08, 1.0, 96
+#: Places on a branch at which it is asked how wide it is.
+_PLACES = np.linspace(0.0, 1.0, 9)
+#: How many times as many points there are where proxies fill their tetrahedra.
+FILLED = 4
+#: Sub-plants that are opened at a time; bounds what that takes to some hundred megabytes.
+OPEN_BATCH = 40_000
+#: Draws of this module: where a part's run of samples starts, of plants and of assets.
+_START, _ASSET_START = 221, 251
+
+
+def share_points(
+    flora: Flora,
+    parts: PlantParts,
+    pixels: Floats,
+    lines: Axes | None = None,
+    times: int = 1,
+    along: Integers | int = 0,
+) -> SharePoints:
+    """Points on parts of plants, all in the root.
+
+    Parameters
+    ----------
+    flora : Flora
+    parts : PlantParts of n
+        Sub-plants, or if ``lines`` are given branches alone.
+    pixels : (n,) float64
+        Extent of the parts in the image.
+    lines : Axes of n, optional
+    times : int
+        How many times as many points as usual.
+    along : (n,) int64, optional
+        Points on the wood of branches alone at least.
+    """
+    number = times * np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, MOST)).astype(np.int64)
+    wood = np.maximum(np.ceil(WOOD * number).astype(np.int64), along)
+    solid = are_solids(flora.rows)[parts.branches.row]
+    squares = (pixels[solid] / PIXELS_IN_SOLID) ** 2
+    # Cells that are filled are smaller than what cannot be opened: too few points make holes and lumps of it.
+    squares = np.clip(squares, FEWEST_IN_SOLID, MOST_IN_SOLID)
+    squares *= min(MOST_IN_SOLIDS / (times**2 * max(squares.sum(), 1.0)), 1.0)
+    number[solid] = times**2 * np.ceil(np.maximum(squares, FEWEST_IN_SOLID)).astype(np.int64)
+    made = []
+    for leafy in (True, False):
+        area = parts.totals.leaf_area if leafy else parts.totals.wood_area
+        count = np.where(area > 0, number if leafy else wood, 0)
+        owner, index = spread(count)
+        even = (area / np.maximum(count, 1))[owner]
+        if lines is not None:
+            t = (index + 0.5) / count[owner]
+            if leafy:
+                position = _along_leaves(flora, parts.branches, lines, owner, index, t)
+            else:  # thicker parts have more of the wood
+                thick = radius_at(flora.rows, parts.branches.take(owner), t)
+                mean = np.bincount(owner, thick, len(parts)) / np.maximum(count, 1)
+                even = even * thick / np.maximum(mean, 1e-300)[owner]
+                position = lines.at(owner, t)[0]
+        else:
+            points = flora.samples.leaves if leafy else flora.samples.wood
+            position, share = _sampled(flora, points, parts.branches, owner, index)
+            even = even if share is None else even * share
+            some = np.flatnonzero(solid[owner])
+            if leafy and len(some):  # more places than samples
+                given = owner[some], index[some], (index[some] + 0.5) / count[owner[some]]
+                position[some] = _along_leaves(flora, parts.branches, axes(flora.rows, parts.branches), *given)
+        none = np.zeros(len(owner), np.float32)
+        areas = (even.astype(np.float32), none) if leafy else (none, even.astype(np.float32))
+        made.append(SharePoints(owner.astype(np.int32), none.astype(np.int32), position.astype(np.float32), *areas))
+    return SharePoints.concatenate(made)
+
+
+def _along_leaves(
+    flora: Flora, branches: Branches, lines: Axes, owner: Integers, index: Integers, part: Floats
+) -> Floats:
+    """Places (m, 3) of leaves on branches, after parts (m,) of them; ``index`` (m,) numbers those of a branch."""
+    start = leaf_start(flora.rows, branches)[owner]
+    t, key = start + (1.0 - start) * part, leaf_keys(branches, owner, index)
+    return leaf_sites(flora.rows, branches, lines, branches.row[owner], owner, key, t)[0]
+
+
+def _sampled(
+    flora: Flora, points: Points, branches: Branches, owner: Integers, index: Integers
+) -> tuple[Floats, Floats | None]:
+    """Places (m, 3) of samples of sub-plants, and what they stand for; runs of samples are spread over them."""
+    first, number = points.runs(branches)
+    start = (uniform(branches.key, _START) * number).astype(np.int64)
+    pick = first[owner] + (start[owner] + index) % np.maximum(number[owner], 1)
+    local, share = placed_samples(flora, points, branches, owner, pick)
+    local = local.astype(np.float32) * branches.length[owner, None].astype(np.float32)
+    frame = branches.frame.astype(np.float32)
+    out = np.take(branches.position, owner, axis=0)
+    for axis in range(3):
+        for column_ in range(3):
+            out[:, axis] += np.take(frame[:, axis, column_], owner) * local[:, column_]
+    return out, share
+
+
+def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, Integers, Axes | None]]:
+    """Open sub-plants into branches alone and the sub-plants of the next order.
+
+    Yields
+    ------
+    PlantParts of m, (m,) int64, Axes or None
+        Some of the new parts, of one of the two kinds, the part that each comes from, and the axes of branches alone.
+    """
+    segments = flora.rows["segments"][parts.branches.row]
+    for number in np.flatnonzero(np.bincount(segments)):  # bending takes as long for all as for the most
+        some = np.flatnonzero(segments == number)
+        for chosen in np.split(some, np.arange(OPEN_BATCH, len(some), OPEN_BATCH)):
+            whole, body, grown, parent = open_branches(flora.rows, parts.branches.take(chosen))
+            yield PlantParts.of_branches(flora, whole.branches), chosen[body], whole.lines
+            if len(grown):
+                yield PlantParts.of_subplants(flora, grown), chosen[body[parent]], None
+
+
+class SharedPlants(SharedParts[PlantParts]):
+    """All plants of a refinement, as parts and the points on them."""
+
+    def __init__(self, flora: Flora, seeds: Seeds, camera: Camera, filled: bool = False) -> None:
+        super().__init__(camera, filled)
+        self.flora = flora
+        parts = PlantParts.of_subplants(flora, trunks(flora.rows, seeds)) if len(seeds) else PlantParts.empty()
+        self.hold(parts, self.points_on(parts, None) if len(seeds) else SharePoints.empty())
+        while (near := self.thick(self.parts) & self.parts.can_open(flora)).any():
+            self.open(near, None)
+
+    def can_open(self, parts: PlantParts) -> Mask:
+        """As `SharedParts.can_open`."""
+        return parts.can_open(self.flora)
+
+    def branch_only(self, parts: PlantParts) -> Mask:
+        """Branches without what grows on them."""
+        return parts.branch_only
+
+    def opened(self, parts: PlantParts) -> Iterator[tuple[PlantParts, Integers, Axes | None]]:
+        """As `opened` of this module."""
+        return opened(self.flora, parts)
+
+    def pixels(self, parts: PlantParts) -> Floats:
+        """Extent (n,) of parts in the image."""
+        return parts.extent / self.camera.extent_around(parts.branches.position)
+
+    def thick(self, parts: PlantParts) -> Mask:
+        """Parts (n,) whose own branch is wide in the view somewhere, as if it were straight."""
+        branches, camera = parts.branches, self.camera
+        axis = branches.length[:, None] * branches.frame[:, :, 2]
+        # As far from a place as its branch may come into view.
+        beside = branches.radius + 0.5 * branches.length / (len(_PLACES) - 1)
+        width = 2.0 * branches.radius / (THICK * min(camera.width, camera.height))
+        out = np.zeros(len(parts), bool)
+        for place in _PLACES:
+            at = branches.position + place * axis
+            out |= (width > camera.extent_around(at)) & (camera.distance_to_view(at) < beside)
+        return out
+
+    def points_on(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
+        """As `SharedParts.points_on`."""
+        along = 0
+        if lines is not None:
+            along = parts.branches.length / np.maximum(2.0 * APART * parts.branches.radius, 1e-300)
+            along = np.where(self.thick(parts), np.minimum(along, MOST_ALONG), 0.0).astype(np.int64)
+        return share_points(self.flora, parts, self.pixels(parts), lines, times=self._times, along=along)
+
+    def held_apart(self, nodes: int) -> tuple[InCells[Branches], InCells[Pieces]]:
+        """As `held`: sub-plants, and branches alone as one piece each."""
+        every = self.held(nodes)
+        own, opened = (every.take(np.flatnonzero(every.items.branch_only == alone)) for alone in (False, True))
+        pieces = as_pieces(opened.items.branches)
+        return InCells(own.items.branches, own.cell, own.totals), InCells(pieces, opened.cell, opened.totals)
+
+
+#: Axes that differ in length by more than this are stretched, and the same of the cosine between them.
+_EVEN = 1e-4
+
+
+@dataclass(frozen=True)
+class AssetParts(Arrays):
+    """Clusters of instances (n)."""
+
+    instance: Integers32 = column(dtype=np.int32)  # (n,)
+    cluster: Integers32 = column(dtype=np.int32)  # (n,): of `AssetTable.clusters`
+    center: Floats = column(3)  # (n, 3): middle of its bound, meters
+    totals: Totals = nested(Totals)  # of n
+    extent: Floats  # (n,): longest side of its bound, meters
+
+    @property
+    def reach(self) -> Floats:
+        """Distance (n,) from the middle within which all of each is, meters."""
+        return 0.5 * np.sqrt(3.0) * self.extent
+
+    def bounding_box(self) -> Floats:
+        """Axis-aligned box (2, 3) around all of them, at least one, meters."""
+        reach = self.reach[:, None]
+        return np.stack([(self.center - reach).min(axis=0), (self.center + reach).max(axis=0)])
+
+
+class PlacedAssets:
+    """Assets and their instances, and what a cluster of an instance is in the world.
+
+    Parameters
+    ----------
+    assets : AssetTable
+    instances : Instances
+    """
+
+    def __init__(self, assets: AssetTable, instances: Instances) -> None:
+        self.assets, self.instances = assets, instances
+        self.scale, self.largest = instances.scale, instances.largest
+        gram = np.einsum("nki,nkj->nij", instances.linear, instances.linear)
+        even = self.scale[:, None, None] ** 2 * np.eye(3)
+        self.stretched = (np.abs(gram - even) > _EVEN * self.scale[:, None, None] ** 2).any(axis=(1, 2))
+
+    def __len__(self) -> int:
+        return len(self.instances)
+
+    @classmethod
+    def none(cls) -> PlacedAssets:
+        """No instances."""
+        return cls(AssetTable.none(), Instances.empty())
+
+    def take(self, index: NDArray) -> PlacedAssets:
+        """Some instances (k,) or a mask (n,) of them."""
+        return PlacedAssets(self.assets, self.instances.take(index))
+
+    def wholes(self) -> AssetParts:
+        """All instances as they are."""
+        return self.parts(np.arange(len(self)), self.assets.root[self.instances.asset])
+
+    def parts(self, instance: Integers, cluster: Integers) -> AssetParts:
+        """Clusters (n,) of instances (n,)."""
+        clusters = self.assets.clusters
+        low, high = clusters.low[cluster], clusters.high[cluster]
+        side = (high - low).max(axis=1) * self.largest[instance]
+        leaf, wood = self._areas(instance, cluster)
+        width = clusters.width[cluster] * self.scale[instance]
+        totals = Totals(leaf, wood, clusters.faces[cluster].astype(np.float64), width)
+        center = self.to_world((low + high) / 2, instance)
+        return AssetParts(instance.astype(np.int32), cluster.astype(np.int32), center, totals, side)
+
+    def children(self, parts: AssetParts) -> tuple[AssetParts, Integers]:
+        """Children of clusters (n,), and whose each is (m,)."""
+        clusters = self.assets.clusters
+        owner, index = spread(clusters.children[parts.cluster].astype(np.int64))
+        return self.parts(parts.instance[owner], clusters.child[parts.cluster][owner] + index), owner
+
+    def kites(self, parts: AssetParts) -> Floats:
+        """Corners (k, 4, 3) of kites for all leaves of clusters (n,), meters."""
+        leaves, clusters, asset = self.assets.leaves, self.assets.clusters, self.instances.asset[parts.instance]
+        owner, index = spread(clusters.leaves[parts.cluster].astype(np.int64))
+        own = leaves.take((self.assets.first_leaf[asset] + clusters.first_leaf[parts.cluster])[owner] + index)
+        corners = (own.center - own.along, own.center - own.across, own.center + own.along, own.center + own.across)
+        return np.stack([self.to_world(corner, parts.instance[owner]) for corner in corners], axis=1)
+
+    def to_world(self, points: NDArray[np.floating], instance: Integers) -> Floats:
+        """Points (n, 3) of assets' spaces in the world, by instances (n,)."""
+        linear, out = self.instances.linear, self.instances.position[instance]
+        for i in range(3):
+            for k in range(3):
+                out[:, i] += linear[instance, i, k] * points[:, k]
+        return out
+
+    def cofactors(self, instance: Integers) -> Floats:
+        """Matrices (n, 3, 3) that take area vectors of assets' spaces to the world."""
+        a, b, c = np.moveaxis(self.instances.linear[instance], 2, 0)
+        return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
+
+    def _areas(self, instance: NDArray, cluster: NDArray) -> tuple[Floats, Floats]:
+        """Areas (n,) of sheets and of solids, m²; where an instance is stretched, as its samples say."""
+        clusters, scale = self.assets.clusters, self.scale[instance] ** 2
+        leaf, wood = clusters.leaf_area[cluster] * scale, clusters.wood_area[cluster] * scale
+        some = np.flatnonzero(self.stretched[instance])
+        if len(some):
+            own, of = cluster[some], instance[some]
+            owner, index = spread((clusters.leaf_samples + clusters.wood_samples)[own].astype(np.int64))
+            normal = self.assets.samples.normal[clusters.leaf_sample[own][owner] + index].astype(np.float64)
+            turned = np.einsum("nij,nj->ni", self.cofactors(of[owner]), normal)
+            longer = np.bincount(owner, np.linalg.norm(turned, axis=1), len(own)) / np.bincount(
+                owner, minlength=len(own)
+            )
+            leaf[some] *= longer / scale[some]
+            wood[some] *= longer / scale[some]
+        return leaf, wood
+
+    def closed_leaves(self, parts: AssetParts) -> Floats:
+        """Area (n,) of solids that facets stand for as for leaves, m²."""
+        clusters = self.assets.clusters
+        part = clusters.closed_leaf_area[parts.cluster] / np.maximum(clusters.wood_area[parts.cluster], 1e-300)
+        return parts.totals.wood_area * part
+
+    def keys(self, parts: AssetParts) -> NDArray[np.uint64]:
+        """A key (n,) for each part, which tells it apart from all others of all instances."""
+        local = parts.cluster - self.assets.root[self.instances.asset[parts.instance]]
+        return child_key(self.instances.key[parts.instance], local)
+
+    def picked(
+        self, parts: AssetParts, key: NDArray[np.uint64], leafy: bool, owner: Integers, index: NDArray
+    ) -> Integers:
+        """Samples (m,) of parts (n,) with keys (n,): a run on leaves, or on wood, that begins anywhere."""
+        clusters = self.assets.clusters
+        first = (clusters.leaf_sample if leafy else clusters.wood_sample)[parts.cluster].astype(np.int64)
+        number = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster].astype(np.int64)
+        start = (uniform(key, _ASSET_START) * number).astype(np.int64)
+        return first[owner] + (start[owner] + index) % np.maximum(number[owner], 1)
+
+
+class SharedAssets(SharedParts[AssetParts]):
+    """All instances of assets of a refinement, as clusters and the points on them."""
+
+    def __init__(self, placed: PlacedAssets, camera: Camera, filled: bool = False) -> None:
+        super().__init__(camera, filled)
+        self.placed = placed
+        parts = placed.wholes()
+        self.hold(parts, self.points_on(parts, None))
+
+    def can_open(self, parts: AssetParts) -> Mask:
+        """As `SharedParts.can_open`."""
+        return self.placed.assets.clusters.children[parts.cluster] > 0
+
+    def branch_only(self, parts: AssetParts) -> Mask:
+        """None of them counts apart."""
+        return np.zeros(len(parts), bool)
+
+    def opened(self, parts: AssetParts) -> Iterator[tuple[AssetParts, Integers, None]]:
+        """Children of clusters, as `SharedParts.opened`."""
+        yield *self.placed.children(parts), None
+
+    def points_on(self, parts: AssetParts, known: None) -> SharePoints:
+        """Points on clusters, all in the root: at their samples."""
+        pixels = parts.extent / self.camera.extent_around(parts.center)
+        clusters, key = self.placed.assets.clusters, self.placed.keys(parts)
+        closed_leaves = self.placed.closed_leaves(parts)
+        number = np.ceil(np.maximum(pixels / PIXELS_A_POINT, FEWEST)) * self._times
+        made = []
+        for leafy in (True, False):
+            sheets = parts.totals.leaf_area if leafy else np.zeros(len(parts))
+            solids = closed_leaves if leafy else parts.totals.wood_area - closed_leaves
+            part = (sheets + solids / 2) / np.maximum(parts.totals.optical_area, 1e-300)
+            there = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
+            count = np.minimum(np.ceil(number * part), there)
+            count = np.where((sheets + solids > 0.0) & (there > 0), np.maximum(count, 1), 0).astype(np.int64)
+            owner, index = spread(count)
+            pick = self.placed.picked(parts, key, leafy, owner, index)
+            place = self.placed.to_world(self.placed.assets.samples.position[pick], parts.instance[owner])
+            leaf, wood = ((area / np.maximum(count, 1))[owner].astype(np.float32) for area in (sheets, solids))
+            cell = np.zeros(len(owner), np.int32)
+            made.append(SharePoints(owner.astype(np.int32), cell, place.astype(np.float32), leaf, wood))
+        return SharePoints.concatenate(made)

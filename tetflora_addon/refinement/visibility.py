@@ -6,6 +6,11 @@ The paper draws the tree front to back and reads an alpha buffer along the way. 
 numbers come from sorting all fragments by pixel and front-to-back rank: what stands before a fragment is a cumulative
 sum within its pixel. No pixel is visited in a loop. A tetrahedron is drawn once; its fragments stay until it is
 divided.
+
+Panoramas have six square views, the faces of a cube, with an alpha buffer each. The views have one eye, so that the
+tree's front-to-back order is that of all of them. What a tetrahedron affects is summed over the faces: the solid angle
+of each fragment times the pixels that the image has for a solid angle there, which in an equirectangular panorama grow
+with one over the cosine of the latitude.
 """
 
 from __future__ import annotations
@@ -16,9 +21,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Integers, Mask
-from ..camera.camera import Camera
-from ..camera.silhouette import silhouette_pixels
-from .rasterize import buffer_size, occluder_depth, tetrahedron_fragments
+from ..camera.camera import LEAST_COSINE, Camera, blur_margins, silhouette_pixels
+from ..compiled.flora import Flora
+from ..growth.seeds import Branches
+from .contents import bounding_capsules
+from .polygons import Polygons
+from .rasterize import buffer_size, occluder_depth, pixel_rays, tetrahedron_fragments
+from .settings import RefinementSettings
+from .shared_parts import AssetParts
 
 #: Optical depth of one fragment at most. e^−60 is no light at all, and larger or infinite numbers would cost the
 #: cumulative sum over the whole image its precision.
@@ -156,18 +166,14 @@ class AlphaBuffer:
         # Only where something has come or gone is there anything to sort again.
         some = np.flatnonzero(self._changed[self._pixel])
         self._changed[:] = False
-        self._before[some] = np.exp(-self._depth_before(some, rank))
-        return np.bincount(self._cell, self._fraction * self._before, len(rank))
-
-    def _depth_before(self, some: Integers, rank: Integers) -> Floats:
-        """Optical depth in front of some fragments (n,), which are all of their pixels."""
         pixel, depth = np.take(self._pixel, some), np.take(self._depth, some)
         # One number to sort by is several times as fast as two.
         key = pixel.astype(np.int64) * (int(rank.max(initial=0)) + 1) + np.take(rank, np.take(self._cell, some))
         order = np.argsort(key)
         before = np.zeros_like(depth)
         before[order] = depth_in_front(np.take(pixel, order), np.take(depth, order))[1]
-        return before
+        self._before[some] = np.exp(-before)
+        return np.bincount(self._cell, self._fraction * self._before, len(rank))
 
 
 def hiding(camera: Camera) -> Camera:
@@ -196,16 +202,18 @@ class Buffers:
     """
 
     def __init__(self, camera: Camera, resolution: int, occluders: Floats | None = None) -> None:
-        self.camera, self.resolution = camera, resolution
-        self.size = buffer_size(camera, resolution)
-        some = occluders is not None and len(occluders)
-        self.depth = occluder_depth(occluders, hiding(camera), *self.size) if some else None
+        self.camera, self.occluders, self.depth, self.around = camera, occluders, None, camera.kind == "PANO"
+        self.finest, self.size = face_side(resolution) if self.around else resolution, buffer_size(camera, resolution)
+        if not self.around and occluders is not None and len(occluders):
+            self.depth = occluder_depth(occluders, hiding(camera), *self.size)
 
-    def fit(self, buffer: AlphaBuffer | None, cells: int) -> AlphaBuffer:
+    def fit(self, buffer: AlphaBuffer | PanoramaBuffer | None, cells: int) -> AlphaBuffer | PanoramaBuffer:
         """The buffer itself if it is fine enough for a number of tetrahedra, or a finer one that is empty."""
-        wanted = fitting(cells, self.resolution)
+        wanted = fitting(cells // 2 if self.around else cells, self.finest)
         if buffer is not None and max(buffer.width, buffer.height) >= wanted:
             return buffer
+        if self.around:
+            return PanoramaBuffer(self.camera, wanted, self.occluders)
         return AlphaBuffer(self.camera, wanted, None if self.depth is None else self._reduced(wanted))
 
     def _reduced(self, resolution: int) -> Floats:
@@ -214,3 +222,145 @@ class Buffers:
         row = ((np.arange(rows) + 0.5) * height / rows).astype(np.int64)
         column = ((np.arange(columns) + 0.5) * width / columns).astype(np.int64)
         return self.depth.reshape(height, width)[np.ix_(row, column)].ravel()
+
+
+#: Side of a face for the longer side of a buffer. A face spans a quarter of the way round; in its corners its pixels
+#: are several times as dense as in the middle.
+FACE_FRACTION = 0.5
+
+#: Directions and upward directions of the six faces in camera space (x right, y up, z back).
+_FACES = (
+    ((0, 0, -1), (0, 1, 0)),
+    ((1, 0, 0), (0, 1, 0)),
+    ((0, 0, 1), (0, 1, 0)),
+    ((-1, 0, 0), (0, 1, 0)),
+    ((0, 1, 0), (0, 0, 1)),
+    ((0, -1, 0), (0, 0, -1)),
+)
+
+
+def face_cameras(camera: Camera, side: int) -> list[Camera]:
+    """Six perspective cameras at the eye of a panorama, whose square images fill the sphere.
+
+    Their near planes lie within the panorama's near sphere and touch it at the corners.
+    """
+    turns = [np.stack([np.cross(ahead, up), up, np.negative(ahead)], axis=1).astype(np.float64) for ahead, up in _FACES]
+    window, near, radius = (-1, 1, -1, 1), camera.near / np.sqrt(3.0), camera.cell_radius
+    return [
+        Camera("PERSP", camera.position, camera.frame @ t, window, near, camera.far, side, side, cell_radius=radius)
+        for t in turns
+    ]
+
+
+def pixels_per_solid_angle(camera: Camera, directions: Floats) -> Floats:
+    """Pixels (n,) of a panorama for each steradian around directions (n, 3) in world space; 0 beside the image."""
+    local = (directions @ camera.frame) * np.array([1.0, 1.0, -1.0])
+    longitude, latitude = camera.longitude_latitude(local)
+    left, right, bottom, top = camera.window
+    seen = (longitude >= left) & (longitude <= right) & (latitude >= bottom) & (latitude <= top)
+    return np.where(seen, 1.0 / (camera.pixel_size**2 * np.maximum(np.cos(latitude), LEAST_COSINE)), 0.0)
+
+
+class PanoramaBuffer:
+    """The fragments of all tetrahedra around the eye; to be used as an `AlphaBuffer`.
+
+    Parameters
+    ----------
+    camera : Camera
+        A panorama.
+    side : int
+        Of each of the six faces, pixels.
+    occluders : (t, 3, 3) float64, optional
+        Opaque triangles, meters.
+    """
+
+    def __init__(self, camera: Camera, side: int, occluders: Floats | None = None) -> None:
+        self.camera = camera
+        self.width = self.height = side
+        self.faces: list[AlphaBuffer] = []
+        for face in face_cameras(camera, side):
+            directions = pixel_rays(face, side, side)[1]
+            # Seen from the eye, a pixel at the side of a face is smaller than one in the middle.
+            solid = (2.0 / side) ** 2 * (directions @ -face.frame[:, 2]) ** 3
+            pixel_weight = solid * pixels_per_solid_angle(camera, directions)
+            if pixel_weight.any():
+                some = occluders is not None and len(occluders)
+                end = occluder_depth(occluders, hiding(face), side, side) if some else None
+                self.faces.append(AlphaBuffer(face, side, end, pixel_weight))
+        self._weight = np.zeros((len(self.faces), 0))
+
+    def add(self, cells: Integers, vertices: Floats, extinction: ArrayLike) -> Outline:
+        """Draw tetrahedra (n, 4, 3); parameters and result as for `AlphaBuffer.add`."""
+        count, extinction = len(vertices), np.asarray(extinction, np.float64)
+        pixels, opacity = np.zeros((2, count))
+        if count:
+            self._grow(int(np.max(cells)) + 1)
+        for number, face in enumerate(self.faces):
+            x, y, depth = np.moveaxis(face.camera.to_camera_space(vertices), -1, 0)
+            walls = (depth - x, depth + x, depth - y, depth + y)  # of the face's pyramid
+            some = np.flatnonzero(np.logical_and.reduce([(wall > 0.0).any(axis=1) for wall in walls]))
+            outline = face.add(cells[some], vertices[some], extinction[some])
+            self._weight[number, cells[some]] = outline.pixels
+            pixels[some] += outline.pixels
+            opacity[some] += outline.pixels * outline.opacity
+        outside = self.camera.distance_to_view(vertices.reshape(-1, 3)).reshape(-1, 4)
+        whole = (outside <= 0.0).all(axis=1)
+        return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), whole)
+
+    def remove(self, chosen: Mask) -> None:
+        """Remove tetrahedra; ``chosen`` is a mask (m,) by their numbers."""
+        for face in self.faces:
+            face.remove(chosen)
+
+    def transmittance(self, rank: Integers) -> Floats:
+        """Fraction (m,) of each tetrahedron's light that nothing in front blocks, as `AlphaBuffer.transmittance`."""
+        self._grow(len(rank))
+        weight = self._weight[:, : len(rank)]
+        seen = sum(w * face.transmittance(rank) for w, face in zip(weight, self.faces, strict=True))
+        total = weight.sum(axis=0)
+        return seen / np.where(total > 0.0, total, 1.0)
+
+    def _grow(self, numbers: int) -> None:
+        if numbers > self._weight.shape[1]:
+            grown = np.zeros((len(self.faces), max(numbers, 2 * self._weight.shape[1])))
+            grown[:, : self._weight.shape[1]] = self._weight
+            self._weight = grown
+
+
+def face_side(resolution: int) -> int:
+    """Side in pixels of the faces, given the longer side of a flat image's buffer."""
+    return max(1, round(FACE_FRACTION * resolution))
+
+
+def widened_for(
+    camera: Camera,
+    margin: float,
+    flora: Flora,
+    subplants: Branches,
+    polygons: Polygons,
+    assets: AssetParts,
+) -> Camera:
+    """The camera with a margin, in fractions of the image, and what depth of field and motion blur add to it.
+
+    Polygons count by their centers: one large face from the eye to the horizon needs no margin.
+    """
+    if not (camera.lens_radius > 0.0 or camera.shutter):
+        return camera.widened(margin)
+    capsules = bounding_capsules(flora, subplants)
+    reach = np.hypot(capsules[6] + capsules[8], capsules[7] + capsules[8])
+    reach = np.concatenate([reach, np.zeros(len(polygons)), assets.reach])
+    center = np.concatenate([capsules[:3].T, polygons.center, assets.center])
+    across, up = blur_margins(camera, center, reach)
+    return camera.widened(margin + across, margin + up)
+
+
+def is_anchored(camera: Camera, settings: RefinementSettings) -> bool:
+    """Whether the root stays where it is in the world; a panorama has no pyramid that a root could begin with."""
+    return settings.anchored or camera.kind == "PANO"
+
+
+def pixels_of_buffer(camera: Camera, resolution: int) -> float:
+    """Side of a pixel of the finest alpha buffer, in pixels of the final image."""
+    if camera.kind == "PANO":
+        return 2.0 / face_side(resolution) / camera.pixel_size
+    return camera.width / buffer_size(camera, resolution)[0]

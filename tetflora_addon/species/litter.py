@@ -22,11 +22,10 @@ from typing import Any
 from ..files import beside
 from ..formats import FORMATS
 from ..leaves.models import LeafModel
-from ..leaves.needles import Needles
 from ..leaves.outlines import Blade
 from ..leaves.schema import MAX_FORMS
-from .species import LEAF_KINDS, Species
-from .year import DAYS, LeafYear
+from ..leaves.surfaces import Needles
+from .species import DAYS, LEAF_KINDS, LeafYear, Species
 
 #: Leaves without outline that let less light through than this are needles and scales, whose plants bear cones.
 NEEDLES = 0.2

@@ -24,7 +24,6 @@ class Members:
     """Expected numbers on one plant, by order."""
 
     branches: list[float]  # a branch that divides counts once
-    stems: list[float]  # the same with every part between forks as one
     segments: list[float]  # straight pieces of all branches of the order
     leaves: list[float]
     #: spurs and spur_leaves: short shoots of all orders, and their leaves.
@@ -35,13 +34,12 @@ class Members:
 
 def expected_members(species: Species) -> Members:
     """Expected numbers; linear in the numbers that each order asks for."""
-    branches, stems, segments, leaves, spurs, dead = [], [], [], [], 0.0, np.zeros(2)
+    branches, segments, leaves, spurs, dead = [], [], [], 0.0, np.zeros(2)
     number = full = 1.0  # branches of the order, and the sum of the factors on what they bear
     for i, order in enumerate(species.orders):
         cuts = fork_cuts(order)
         fold = expected_forks(order.forks) ** np.arange(len(cuts) - 1)  # stems side by side in each part
         branches.append(number)
-        stems.append(number * float(fold.sum()))
         segments.append(number * float(fold @ part_segments(order)))
         leaves.append(full * order.leaves.mean * _fold(cuts, fold, order.leaf_start))
         spurs += full * order.spurs.mean * _fold(cuts, fold, order.spur_start)
@@ -56,7 +54,7 @@ def expected_members(species: Species) -> Members:
             number = full * order.branches.mean * float(stems_there.mean())
             full = full * order.branches.mean * float((stems_there * follow).mean())
     on_spur = species.spur.leaves.mean if species.spur is not None else 0.0
-    return Members(branches, stems, segments, leaves, spurs, spurs * on_spur, tuple(dead))
+    return Members(branches, segments, leaves, spurs, spurs * on_spur, tuple(dead))
 
 
 def expected_leaf_area(species: Species) -> float:

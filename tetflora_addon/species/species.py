@@ -3,21 +3,160 @@
 """What a species is: ranges for each branch order and a sample leaf (paper, section 5).
 
 `crown_ratio` gives the length of branches along their parent.
+
+Its ecology is what it needs, how it grows beside others, and how it spreads; it changes no plant. Tolerances are those
+of Niinemets and Valladares ("Tolerance to shade, drought, and waterlogging of temperate northern hemisphere trees and
+shrubs", Ecological Monographs 76, 2006), from 0, none, to 5.
+
+Its year is when its leaves appear, grow, turn and fall, in dates that are published, and their colors. Dates are days
+of the year, 1 to 365, at a latitude that the species names. How far they move with the latitude is measured in Europe;
+Hopkins' law of four days a degree ("Periodical events and natural law as guides to agricultural research and practice",
+1918) is that of eastern North America.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Floats, Integers
 from ..leaves.models import LeafModel
 from ..parameters import Color, Range, Rgb, described, limited, named
-from .ecology import Ecology
 from .growing import Ages, PartGrown
 from .skeletons import Skeleton
-from .year import Year
+
+DAYS = 365.0
+"""Length of the year; a date beyond it is one of the next year."""
+MAX_AUTUMN = 4
+"""Autumn colors of a kind of leaf at most."""
+#: Days by which spring comes later for each degree toward the pole (birch's bud burst in Europe from 44° to 68° N in
+#: 2010, first leaves of others 1.6 to 2.7: results of the BEAGLE project), and by which autumn comes earlier: leaves
+#: turn by .5 to 3 days a degree (Menzel, Estrella and Fabian, "Spatial and temporal variability of the phenological
+#: seasons in Germany", 2001, and others).
+_SPRING_DAYS, _AUTUMN_DAYS = 2.2, 2.0
+_MIDSUMMER, _MIDWINTER = 190.0, 10.0
+#: No leaf is farther from the mean than so many standard deviations.
+_FARTHEST = 2.8
+
+
+@dataclass(frozen=True)
+class LeafYear:
+    """The year of one kind of leaves; those of a plant differ by what their keys say.
+
+    Days on which half of the leaves have done a thing come each later than the one before by less than a year; those
+    beyond `DAYS` lie in the next year. Spreads are standard deviations among the leaves of a plant.
+    """
+
+    appear: float = limited(..., 1, DAYS, "day on which half of the leaves have appeared")
+    turn: float = limited(..., 1, 2 * DAYS, "day on which half of them have changed their color")
+    fall: float = limited(..., 1, 2 * DAYS, "day on which half of them have fallen")
+    appear_spread: float = limited(4.0, 0, 60, "spread of the day on which they appear", "days")
+    growth: float = limited(25.0, 0, 120, "time in which a leaf grows to its full size", "days")
+    fresh: Rgb | None = described(None, "color of a leaf that has just appeared; as in summer without", "linear RGB")
+    turn_spread: float = limited(8.0, 0, 60, "spread of the day on which they turn", "days")
+    turning: float = limited(14.0, 0, 90, "time in which a leaf changes its color", "days")
+    #: Linear RGB of leaves that have turned, at most `MAX_AUTUMN` of them; none for leaves that fall as they are.
+    autumn: tuple[Rgb, ...] = ()
+    fall_spread: float = limited(5.0, 0, 60, "spread of the day on which they fall beyond that of turning", "days")
+    dry: Rgb = described((0.21, 0.115, 0.052), "color of dead leaves that hang on", "linear RGB")
+    kept: float = limited(0.0, 0, 1, "fraction of the leaves that hang on, dry, until the next ones appear")
+    turnover: float = limited(1.0, 0, 1, "fraction of the leaves that all this happens to each year; others stay")
+
+    @property
+    def middle(self) -> float:
+        """Day in the middle of the leaves' life."""
+        return (self.appear + self.fall) / 2
+
+    @property
+    def origin(self) -> float:
+        """Day half a year before that, from which tables and the days of leaves are counted."""
+        return self.middle - DAYS / 2
+
+
+@dataclass(frozen=True)
+class Year:
+    """The year of a species; where it has none for leaves or blossoms, these are there all year."""
+
+    latitude: float = limited(50.0, 0, 70, "latitude at which its dates hold", "degrees north")
+    spring: float = limited(5.0, 0, 40, "time by which plants of one place are earlier or later at most", "days")
+    autumn: float = limited(7.0, 0, 40, "the same in autumn", "days")
+    leaf: LeafYear | None = None
+    blossom: LeafYear | None = None
+    #: Plants are gone while there are none, and in a summer without days.
+    fallen: bool = described(False, "whether it is nothing but leaves that have fallen")
+    source: str = described("", "where the dates are from")
+
+    def of_kind(self, kind: int) -> LeafYear | None:
+        """That of a kind of leaves, by its index in `species.LEAF_KINDS`."""
+        return (self.leaf, self.blossom)[kind]
+
+    def at_latitude(self, latitude: float) -> Year:
+        """The same at another latitude of the northern hemisphere, degrees."""
+        north = latitude - self.latitude
+        if north == 0.0:
+            return self
+        leaf, blossom = (None if one is None else _moved(one, north) for one in (self.leaf, self.blossom))
+        return replace(self, latitude=latitude, leaf=leaf, blossom=blossom)
+
+
+def _moved(one: LeafYear, north: float) -> LeafYear:
+    """Dates so many degrees farther north: those before midsummer later, those after it earlier, and never swapped.
+
+    Where the year of the leaves would close, far in the south, the first and the last of them stay apart.
+    """
+    appear, turn, fall = (day + _days_north(day) * north for day in (one.appear, one.turn, one.fall))
+    farthest = DAYS - _FARTHEST * (one.appear_spread + one.turn_spread + one.fall_spread)
+    longest = max(farthest, one.fall - one.appear)
+    over = max(0.0, fall - appear - longest) / 2
+    appear, turn, fall = appear + over, turn - over, fall - over
+    turn = max(turn, appear + one.growth)
+    fall = min(max(fall, turn + one.turning / 2), appear + longest)
+    return replace(one, appear=appear, turn=min(turn, fall), fall=fall)
+
+
+def _days_north(day: float) -> float:
+    """Days by which a date moves for a degree; nothing at midsummer and midwinter, between which it goes smoothly."""
+    day = (day - _MIDWINTER) % DAYS
+    half = _MIDSUMMER - _MIDWINTER
+    spring = day < half
+    place = day / half if spring else (day - half) / (DAYS - half)
+    near = min(1.0, 4.0 * min(place, 1.0 - place))
+    return near * (_SPRING_DAYS if spring else -_AUTUMN_DAYS)
+
+
+@dataclass(frozen=True)
+class Ecology:
+    """What a species needs and does; where a number is from is said in ``source``."""
+
+    shade: float = limited(2.7, 0, 5, "tolerance of shade, 0 none to 5")
+    drought: float = limited(2.7, 0, 5, "tolerance of drought")
+    waterlogging: float = limited(1.7, 0, 5, "tolerance of waterlogging")
+    degree_days: float = limited(700.0, 0, 8000, "sum of daily mean temperatures over 5 °C that it needs at least")
+    coldest_month: float = limited(-15.0, -70, 30, "coldest mean of a month that it survives", "°C")
+    fertility: float = limited(0.4, 0, 1, "fertility of the soil below which it grows less")
+    fecundity: float = limited(30.0, 0, 1e6, "seeds that can germinate, for each square meter of crown and year")
+    dispersal: float = limited(25.0, 0.1, 1e5, "mean distance that seeds travel", "m")
+    height: float = limited(32.0, 0.01, 130, "height of the largest on a good site", "m")
+    diameter: float = limited(1.2, 0.001, 12, "diameter of the largest on a good site", "m")
+    height_curve: tuple[float, float] = limited(
+        (4.0, 0.9), 0.1, 1000, "b and c of heights in closed stands, 1.3 + (height − 1.3)(1 − exp(−b diameter))^c, in m"
+    )
+    crown_width: tuple[float, float] = limited(
+        (1.2, 20.0), 0, 300, "width of the crown of a tree that stands free, first + second × diameter", "m"
+    )
+    crown_conicity: float = limited(0.3, 0, 1, "shape of the crown: 0 a dome, 1 a cone")
+    leaves: float = limited(6.0, 0.05, 20, "leaf area over the ground below a crown that is free to its foot")
+    extinction: float = limited(0.5, 0.1, 1, "fraction of the light that a thin layer of leaves takes, over its area")
+    light_compensation: float = limited(0.08, 0.001, 0.9, "light at which the lowest limbs die, over that in the open")
+    wood_density: float = limited(530.0, 20, 1400, "dry mass of the wood over its fresh volume", "kg/m³")
+    form_factor: float = limited(0.6, 0.05, 3, "wood above ground, with limbs, over diameter² × π/4 × height")
+    light_use_efficiency: float = limited(
+        0.9, 0.001, 10, "dry wood that all light on a square meter makes in a year on a good site", "kg"
+    )
+    diameter_increment: float = limited(0.012, 1e-5, 0.1, "most by which the diameter grows in a year", "m")
+    source: str = described("", "where the numbers are from")
+
 
 LEAF_KINDS = ("leaf", "blossom")
 LEAF_ENVELOPES = ("none", "sphere", "cylinder", "cone", "box")

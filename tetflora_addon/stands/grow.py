@@ -17,10 +17,9 @@ from ..arrays import Mask
 from ..errors import TetFloraError
 from ..jobs import Progress
 from ..parallel import blocks, on_all_cores
-from ..setting import script_setting, setting, within
-from .change import MOST_PLANTS, SeedDispersal, dying, fallen, grown, planted
+from ..parameters import script_setting, setting, within
+from .change import MOST_PLANTS, DeadPlants, Plants, Records, SeedDispersal, dying, fallen, grown, in_order, planted
 from .light import LightGrid
-from .plants import DeadPlants, Plants, Records, in_order
 from .site import StandSite
 from .traits import StandSpecies, StandTraits
 
@@ -154,7 +153,7 @@ class GrowingStand:
 
         def changed(block: slice) -> tuple[Plants, Mask]:
             after = grown(plants, crowns, taken, self.light, self.traits, block)
-            return after, dying(after, self.traits, year, slice(None))
+            return after, dying(after, self.traits, year)
 
         parts = list(on_all_cores(changed, blocks(len(plants), _BLOCK)))
         new = Plants.empty()

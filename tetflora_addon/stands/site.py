@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Integers, bilinear
 from ..errors import TetFloraError
-from ..species.ecology import Ecology
+from ..species.species import Ecology
 
 #: Kelvin by which it is colder for each meter of altitude, and degree days that a kelvin is worth: days of the season.
 _LAPSE, _DAYS = 0.006, 165.0

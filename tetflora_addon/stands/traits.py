@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..errors import TetFloraError
 from ..species.ages import ages_of
-from ..species.ecology import Ecology
-from ..species.species import Species
+from ..species.species import Ecology, Species
 
 BREAST_HEIGHT = 1.3
 #: Heights in a table, up to so many of the largest diameter.

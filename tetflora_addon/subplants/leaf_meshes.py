@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Floats32, Integers, Integers32, Keys, spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
-from ..growth.branches import Branches
-from ..growth.colors import leaf_colors
 from ..growth.foliage import (
     in_wind,
     leaf_forms,
@@ -34,7 +32,8 @@ from ..growth.foliage import (
 )
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
-from ..growth.seasons import is_seasonal
+from ..growth.seasons import is_seasonal, leaf_colors
+from ..growth.seeds import Branches
 from ..growth.wind import moment
 from ..leaves.kites import KITE, LeafKites, leaf_kites
 from ..leaves.levels import LeafLevel, chosen_level, hidden_gloss, leaf_levels

@@ -15,11 +15,10 @@ import numpy as np
 from ..arrays import Arrays, Floats, Integers, Keys, Table, column, gathered, nested
 from ..compiled.averages import own_leaf_integrals, tube_perimeter
 from ..compiled.flora import Flora
-from ..growth.axes import axes, profile_integral
-from ..growth.branches import Branches
-from ..growth.envelopes import leaf_start
-from ..growth.foliage import outwardness
-from ..growth.growth import WholeBranches, children, drawn_children
+from ..growth.axes import profile_integral
+from ..growth.foliage import leaf_start, outwardness
+from ..growth.growth import WholeBranches, open_branches
+from ..growth.seeds import Branches
 
 #: What of leaves or facets is worth making, before it is made. Given keys (m,), places (m, 3), how far they may be from
 #: there and their own radii (m,), meters: which (k,) are made, and how many times as large the area (k,) of each is.
@@ -106,7 +105,7 @@ def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, Integer
     Branches, (m,) int64, Pieces, (k,) int64
         Children with the index of the sub-plant that each comes from, and pieces with theirs.
     """
-    whole, body, grown, owner = open_branches(flora, subplants)
+    whole, body, grown, owner = open_branches(flora.rows, subplants)
     pieces, piece_owner = whole_pieces(flora.rows, whole)
     return grown, body[owner], pieces, body[piece_owner]
 
@@ -119,22 +118,8 @@ def expand(flora: Flora, subplants: Branches) -> Iterator[WholeBranches]:
     Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
     """
     while len(subplants):
-        whole, _, subplants, _ = open_branches(flora, subplants)
+        whole, _, subplants, _ = open_branches(flora.rows, subplants)
         yield whole
-
-
-def open_branches(flora: Flora, subplants: Branches) -> tuple[WholeBranches, Integers, Branches, Integers]:
-    """Branches of sub-plants with the index of the sub-plant of each, and their children with that of their parent."""
-    rows = flora.rows
-    phantom = rows["phantom"][subplants.row]
-    if phantom.any():  # a form drawn by hand: its branches are known, and opened with the plant
-        plants, rest = np.flatnonzero(phantom), np.flatnonzero(~phantom)
-        drawn, plant = drawn_children(rows, subplants.take(plants))
-        bodies, body = Branches.concatenate([subplants.take(rest), drawn]), np.concatenate([rest, plants[plant]])
-    else:
-        bodies, body = subplants, np.arange(len(subplants))
-    lines = axes(rows, bodies)
-    return WholeBranches(bodies, lines), body, *children(rows, bodies, lines)
 
 
 def chunks(polygons: Floats, limit: float) -> Iterator[slice]:

@@ -5,25 +5,191 @@
 Where wood begins it has collars, the joints of forks, buttresses of trunks, and roots from these into the ground. All
 of it is for near wood only, and grows with its size in the image. Buttresses take as much at some angles as they give
 at others, so that a trunk is as thick on average as from afar.
+
+Buds of shoots with leaves are one over the end of each, others in the axils of leaves, always at the same places. They
+belong to near wood and grow with its size in the image from nothing. Averages leave them out: of the surface of a twig
+they are some hundredths, and of a crown with leaves less than a hundredth.
+
+A branch of which a pixel shows that it has sides gets twice as many, or four times, and so on; its joints become a
+curve, as far as its own thickness allows, since what grows on it stands on the straight segments. What the coarse tube
+has not at all (the curve, buttresses, collars) grows with the size in the image from nothing: nothing appears at once.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Floats32, Integers, Keys, Mask, Table, spread, unit
+from ..arrays import Arrays, Floats, Floats32, Integers, Keys, Mask, Table, cross, dot, smoothstep, spread, unit
 from ..compiled.averages import tube_perimeter
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds
 from ..growth.axes import Axes
-from ..growth.branches import Branches
-from ..growth.growth import WholeBranches, branch_counts, radius_at
+from ..growth.foliage import leaf_keys, leaf_places, place_leaves
+from ..growth.growth import WholeBranches, branch_counts, leaf_counts, radius_at
 from ..growth.hashing import Draw, child_key, uniform
 from ..growth.rows import FORK, ranged
-from .wood_detail import Curve, Fineness, Pixels, curve, parts, unit_of
+from ..growth.seeds import Branches
+
+#: Pixels by which a tube may be off the round and bent branch that it stands for.
+DEVIATION = 0.5
+#: Sides of a tube at most, unless its species has more; rings of a segment at most.
+MOST_SIDES, MOST_RINGS = 512, 48
+#: Width over the one from which on branches are finer, at which they have all that near wood has.
+_BAND = 2.5
+#: Radius in pixels up to which joints pass for curves.
+_BENT = 8.0
+#: The curve leaves the straight segment by no more than this part of the radius.
+_ASIDE = 0.5
+#: How bent segments are, about.
+_SAGITTA = 0.05
+# Largest value of both Hermite polynomials of tangents.
+_HERMITE = 4.0 / 27.0
+# Places on a segment at which it is asked how near it comes.
+_PLACES = np.array([0.25, 0.5, 0.75])
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """How large pixels are."""
+
+    #: Meters (n,) that a pixel spans at what reaches so far, (n,) or a number, around points (n, 3).
+    extent: Callable[[Floats, Floats | float], Floats]
+    slope: float = 0.0  # by how much that falls at most with each meter that one comes nearer
+
+
+@dataclass(frozen=True)
+class Fineness(Arrays):
+    """How finely branches (n,) are drawn."""
+
+    sides: Integers  # (n,)
+    #: (n,): from 0 to 1: how much there is of what near wood has besides; 0 for the coarse tube, unchanged.
+    weight: Floats
+    pixels: Floats  # (n,): radius in the image where that is largest
+
+
+def round_up_to(sides: Integers) -> Floats:
+    """Radius in pixels (n,) up to which polygons of so many sides (n,) pass for circles, and joints for curves."""
+    return np.minimum(DEVIATION / (1.0 - np.cos(np.pi / sides)), _BENT)
+
+
+def fine_sides(sides: Integers, pixels: Floats) -> Integers:
+    """Sides (n,) of branches of a radius in pixels (n,) whose species has so many (n,): twice that, four times, ..."""
+    enough = np.pi / np.arccos(np.clip(1.0 - DEVIATION / np.maximum(pixels, DEVIATION), -1.0, 1.0 - 1e-9))
+    power = np.ceil(np.log2(np.maximum(enough / sides, 1.0)) - 1e-9)
+    most = np.floor(np.log2(np.maximum(MOST_SIDES / sides, 1.0)))
+    return sides << np.minimum(power, most).astype(np.int64)
+
+
+def fineness(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Fineness:
+    """How finely branches are drawn where pixels are so large, from nothing but the branch itself."""
+    branches, sides = whole.branches, flora.rows["sides"][whole.branches.row]
+    limit = round_up_to(sides)
+    # The base tells of most branches that they are too far away.
+    nearest = pixels.extent(branches.position, np.inf) - pixels.slope * branches.length
+    size = branches.radius * flora.widest[branches.row] / np.maximum(nearest, 1e-9)
+    near = np.flatnonzero(size > limit)
+    size = np.minimum(size, limit)
+    if len(near):
+        size[near] = _largest(flora, whole.take(near), pixels)
+    weight = smoothstep(np.log(np.maximum(size, 1e-300) / limit) / np.log(_BAND))
+    return Fineness(fine_sides(sides, size), weight, size)
+
+
+def _largest(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Floats:
+    """Largest radius in pixels (n,) of branches at knots and between them."""
+    owner, index = spread(whole.lines.segments * (len(_PLACES) + 1) + 1)
+    segment, place = index // (len(_PLACES) + 1), np.concatenate([[0.0], _PLACES])[index % (len(_PLACES) + 1)]
+    t = np.minimum((segment + place) / whole.lines.segments[owner], 1.0)
+    radius = radius_at(flora.rows, whole.branches.take(owner), t)
+    size = radius / np.maximum(pixels.extent(whole.lines.at(owner, t)[0], radius), 1e-300)
+    return np.maximum.reduceat(size, np.searchsorted(owner, np.arange(len(whole))))
+
+
+def finer(sides: Integers, pixels: Floats) -> tuple[Integers, Floats]:
+    """Sides (n,) of branches of a radius in pixels (n,) whose species has so many (n,), and rings over those it has."""
+    # Along, sagittas fall with the square of the parts.
+    return fine_sides(sides, pixels), np.where(pixels > round_up_to(sides), 1.0 + np.sqrt(_SAGITTA * pixels), 1.0)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The curves through the joints of branches (n,) of up to S segments: cubic, with given tangents at joints."""
+
+    lines: Axes  # of n
+    chord: Floats  # (n, S, 3): of each segment
+    #: start and end, (n, S, 3): what the tangents at both ends of a segment add to its chord.
+    start: Floats
+    end: Floats
+    across: Floats  # (n, S + 1, 3): first axis of the frames at joints
+
+    def deviation(self) -> Floats:
+        """How far the curve may be off each segment (n, S), meters."""
+        return _HERMITE * (_norm(self.start) + _norm(self.end))
+
+    def at(self, branch: Integers, segment: Integers, x: Floats, most: Floats) -> tuple[Floats, Floats]:
+        """Places (m, 3) at fractions x (m,) of segments, at most so far (m,) off these, and axes (2, 3, m) across."""
+        x = x[:, None]
+        chord, start, end = (some[branch, segment] for some in (self.chord, self.start, self.end))
+        aside = x * (x - 1.0) ** 2 * start + x * x * (x - 1.0) * end
+        aside *= np.minimum(1.0, most / np.maximum(_norm(aside), 1e-300))[:, None]
+        center = self.lines.knot(branch, segment) + x * chord + aside
+        along = chord + (3.0 * x * x - 4.0 * x + 1.0) * start + (3.0 * x * x - 2.0 * x) * end
+        along = unit(along)
+        first = (1.0 - x) * self.across[branch, segment] + x * self.across[branch, segment + 1]
+        first = unit(first - dot(first, along) * along)
+        return center, np.stack([first.T, cross(along, first).T])
+
+
+def curve(lines: Axes, radius: Floats, weight: Floats) -> Curve:
+    """The curves of branches.
+
+    Parameters
+    ----------
+    lines : Axes of n
+    radius : (n, S + 1) float64
+        At joints; curves stay within a part of it.
+    weight : (n,) float64
+        0 for straight segments, 1 for the whole curve.
+    """
+    n, most = len(lines.segments), lines.frames.shape[1]
+    segment = np.arange(most)
+    there = segment < lines.segments[:, None]
+    chord = np.diff(lines.knots, axis=1)
+    length = _norm(chord)[..., None]
+    ahead = np.where(there[..., None], lines.frames[..., 2], 0.0)
+    # Beyond the tip both are zero, so that the last joint has the direction of its segment.
+    none = np.zeros((n, 1, 3))
+    tangent = unit_of(np.concatenate([none, ahead], axis=1) + np.concatenate([ahead, none], axis=1))
+    first = np.where(there[..., None], lines.frames[..., 0], 0.0)
+    across = unit_of(np.concatenate([none, first], axis=1) + np.concatenate([first, none], axis=1))
+    start, end = tangent[:, :-1] * length - chord, tangent[:, 1:] * length - chord
+    allowed = _ASIDE * np.minimum(radius[:, :-1], radius[:, 1:])
+    share = allowed / np.maximum(2.0 * _HERMITE * np.maximum(_norm(start), _norm(end)), 1e-300)
+    share = np.where(there, np.minimum(share, 1.0), 1.0)
+    one = np.ones((n, 1))
+    joint = np.minimum(np.concatenate([one, share], axis=1), np.concatenate([share, one], axis=1)) * weight[:, None]
+    start, end = start * joint[:, :-1, None], end * joint[:, 1:, None]
+    return Curve(lines, chord, np.where(there[..., None], start, 0.0), np.where(there[..., None], end, 0.0), across)
+
+
+def parts(deviation: Floats, pixel: Floats) -> Integers:
+    """Straight parts (...) of segments whose curve is so far off them, where a pixel spans so much."""
+    number = np.ceil(np.sqrt(deviation / (DEVIATION * np.maximum(pixel, 1e-300))))
+    return np.clip(number, 1, MOST_RINGS).astype(np.int64)
+
+
+def unit_of(vectors: Floats) -> Floats:
+    """Vectors (..., 3) scaled to length 1."""
+    return vectors / np.maximum(_norm(vectors), 1e-300)[..., None]
+
+
+def _norm(vectors: Floats) -> Floats:
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+
 
 _SHORTEST = 1e-9  # meters of a branch that has just begun to grow
 _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
@@ -408,3 +574,89 @@ def roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Floats
     high = base[:, None] * (0.3 * size[:, None] * (1 - x) ** 1.5 - steep * x**3 + bumps)
     high = high - (1.0 - weight[trunk])[:, None] * (width + 0.2 * base[:, None])
     return np.stack([away * np.cos(turn), away * np.sin(turn), high], axis=2), width, trunk
+
+
+#: Rings of a bud, and where they are: fractions of its length, and radii over the largest.
+BUD_RINGS = 7
+_ALONG = np.array([-0.08, 0.06, 0.2, 0.42, 0.68, 0.9, 1.0])
+_WIDTH = np.array([0.5, 0.76, 0.96, 1.0, 0.7, 0.27, 0.0])
+#: Child index of the bud at the end, of which random numbers are drawn.
+_LAST = (1 << 28) + 7
+#: Length of the bud at the end over that of others; variation of lengths.
+_AT_END, _VARIED = 1.3, 0.25
+#: How far a bud in an axil leans away from its shoot, and how deep its base is in the wood, in radii of that.
+_LEAN, _SUNK = 0.62, 0.75
+
+
+def bud_numbers(flora: Flora, whole: WholeBranches) -> Integers:
+    """Rings (n,) of the buds of near branches."""
+    owner = _places(flora, whole)[0]
+    return BUD_RINGS * np.bincount(owner, minlength=len(whole))
+
+
+def bud_sides(sides: int | Integers) -> Integers:
+    """Sides of the buds on twigs of so many."""
+    return np.clip(2 * sides, 6, 24)
+
+
+def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings, Integers] | None:
+    """Rings of the buds of near branches (n), and the branch of each bud; None without any."""
+    owner, index, key = _places(flora, whole)
+    if not len(owner):
+        return None
+    rows, branches = flora.rows, whole.branches
+    number = leaf_counts(rows, branches)
+    at_end = index < 0
+    t = np.ones(len(owner))
+    side = np.flatnonzero(~at_end)
+    # Leaves are placed branch row by branch row: the same for all where there is one.
+    t[side] = leaf_places(rows, branches, owner[side], index[side], number, key[side])
+    some = without_places(branches, owner)
+    radius = radius_at(rows, some, t)
+    sort = [species.bud for species in flora.species]
+    table = np.array([(0.0, 0.0) if bud is None else (bud.length, bud.width) for bud in sort])
+    color = np.array([(0.0, 0.0, 0.0) if bud is None else bud.color for bud in sort])
+    species = rows["species"][some.row]
+    varied = 1.0 + _VARIED * (2.0 * uniform(key, Draw.LENGTH) - 1.0)
+    length = table[species, 0] * some.scale * varied * np.where(at_end, _AT_END, 1.0) * fine.weight[owner]
+    thick = 0.5 * table[species, 1] * length
+
+    def placed(lines: Arrays, bearers: Branches) -> tuple[NDArray, NDArray]:
+        base, frame = lines.at(owner, t)
+        x, along = frame[:, :, 0], frame[:, :, 2].copy()
+        if len(side):
+            leaves = place_leaves(rows, bearers, lines, owner[side], index[side], key[side], t[side])
+            leaf = leaves.frame[:, :, 1].astype(np.float64)
+            out = unit(leaf - dot(leaf, along[side]) * along[side] + 1e-6 * x[side])
+            base = base.copy()
+            base[side] += _SUNK * radius[side, None] * out
+            along[side] = unit(along[side] + _LEAN * out)
+        x = unit(x - dot(x, along) * along)
+        center = base[:, None] + (length[:, None] * _ALONG)[..., None] * along[:, None]
+        reach = np.stack([x, cross(along, x)])[:, :, None] * (thick[:, None] * _WIDTH)[None, :, :, None]
+        return center.reshape(-1, 3), reach.reshape(2, -1, 3).transpose(0, 2, 1).astype(np.float32)
+
+    center, reach = placed(whole.lines, branches)
+    later = None if whole.lines.later is None else placed(whole.lines.later, branches.moved())
+    wood = replace(branches.take(owner), radius=np.maximum(thick, 1e-9), length=np.maximum(length, 1e-9), later=None)
+    bud = np.repeat(np.arange(len(owner)), BUD_RINGS)
+    goes_on = np.tile(np.arange(BUD_RINGS) < BUD_RINGS - 1, len(owner))
+    rings = Rings(wood, bud, np.tile(_ALONG, len(owner)), center, reach, goes_on, later, None, color[species])
+    return rings, owner
+
+
+def _places(flora: Flora, whole: WholeBranches) -> tuple[Integers, Integers, Keys]:
+    """Branch (m,), leaf in whose axil it is, or -1 for the one at the end, and key of each bud of branches (n)."""
+    rows, branches = flora.rows, whole.branches
+    lateral = np.array([-1.0 if one.bud is None else one.bud.lateral for one in flora.species])
+    # Leaves that fill a solid stand in no axils.
+    lateral = np.where(rows["envelope"][branches.row] > 0, -1.0, lateral[rows["species"][branches.row]])
+    number = leaf_counts(rows, branches)
+    bears = (lateral >= 0.0) & (number > 0)
+    ends = np.flatnonzero(bears & (rows["next"][branches.row, FORK] < 0))
+    owner, index = spread(np.where(bears & (lateral > 0.0), number, 0))
+    key = leaf_keys(branches, owner, index)
+    kept = np.flatnonzero(uniform(key, Draw.BUD) < lateral[owner])
+    owner = np.concatenate([ends, owner[kept]])
+    index = np.concatenate([np.full(len(ends), -1), index[kept]])
+    return owner, index, np.concatenate([child_key(branches.key[ends], _LAST), key[kept]])

@@ -9,7 +9,8 @@ edges from vertex 0 to vertices 1, 2 and 3 form a right-handed system.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..arrays import Floats
 
 #: Vertices of the six edges; edge ``i`` and edge ``5 - i`` are opposite.
 EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
@@ -18,7 +19,7 @@ EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
 
 
-def signed_volume(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def signed_volume(vertices: Floats) -> Floats:
     """Volume, positive where the tetrahedron is positively oriented.
 
     Parameters
@@ -35,12 +36,12 @@ def signed_volume(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.sum(np.cross(a, b) * c, axis=-1) / 6.0
 
 
-def volume(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def volume(vertices: Floats) -> Floats:
     """Absolute volume ``(...)`` of tetrahedra ``(..., 4, 3)``, cubic meters."""
     return np.abs(signed_volume(vertices))
 
 
-def squared_edges(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def squared_edges(vertices: Floats) -> Floats:
     """Squared lengths ``(..., 6)`` of the edges of tetrahedra ``(..., 4, 3)``, in the order of `EDGES`, m²."""
     # By component, because six short differences in a row are faster than one gather of (n, 6, 3) and its sum.
     x, y, z = (vertices[..., i] for i in range(3))
@@ -49,7 +50,7 @@ def squared_edges(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     return dx * dx + dy * dy + dz * dz
 
 
-def quality(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def quality(vertices: Floats) -> Floats:
     """Mean-ratio quality η = 12 (3V)^(2/3) / Σ l², 1 for the regular tetrahedron and 0 for a flat one.
 
     Parameters
@@ -70,7 +71,7 @@ def quality(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     return 12.0 * np.cbrt(3.0 * volume(vertices)) ** 2 / np.where(total > 0.0, total, 1.0)
 
 
-def face_area_vectors(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def face_area_vectors(vertices: Floats) -> Floats:
     """Outward normals times area of the four faces of positive tetrahedra.
 
     Parameters
@@ -91,7 +92,7 @@ def face_area_vectors(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([-np.sum(sides, axis=-2, keepdims=True), sides], axis=-2)
 
 
-def projected_area(vertices: NDArray[np.float64], direction: NDArray[np.float64]) -> NDArray[np.float64]:
+def projected_area(vertices: Floats, direction: Floats) -> Floats:
     """Area of the silhouette in parallel projection: half of Σ |A_i · ω|.
 
     Parameters
@@ -110,7 +111,7 @@ def projected_area(vertices: NDArray[np.float64], direction: NDArray[np.float64]
     return np.sum(np.abs(np.sum(areas * np.asarray(direction)[..., None, :], axis=-1)), axis=-1) / 2.0
 
 
-def barycentric_gradients(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def barycentric_gradients(vertices: Floats) -> Floats:
     """Gradients of the four barycentric coordinates.
 
     Parameters
@@ -128,7 +129,7 @@ def barycentric_gradients(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(flat, 0.0, -face_area_vectors(vertices) / np.where(flat, 1.0, triple))
 
 
-def barycentric(vertices: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def barycentric(vertices: Floats, points: Floats) -> Floats:
     """Barycentric coordinates of points, one tetrahedron each (leading axes broadcast).
 
     Parameters
@@ -148,7 +149,7 @@ def barycentric(vertices: NDArray[np.float64], points: NDArray[np.float64]) -> N
     return np.concatenate([1.0 - np.sum(rest, axis=-1, keepdims=True), rest], axis=-1)
 
 
-def plane_through(points: NDArray[np.float64], negative: NDArray[np.float64]) -> NDArray[np.float64]:
+def plane_through(points: Floats, negative: Floats) -> Floats:
     """Planes through three points each, turned so that a fourth one is on the negative side.
 
     Parameters
@@ -173,7 +174,7 @@ def plane_through(points: NDArray[np.float64], negative: NDArray[np.float64]) ->
     return np.concatenate([normal, offset], axis=-1)
 
 
-def plane_distance(planes: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def plane_distance(planes: Floats, points: Floats) -> Floats:
     """Signed distances ``(...)`` of points ``(..., 3)`` from planes ``(..., 4)``, meters; side 1 is ``>= 0``."""
     n, p = planes, points
     return n[..., 0] * p[..., 0] + n[..., 1] * p[..., 1] + n[..., 2] * p[..., 2] + n[..., 3]

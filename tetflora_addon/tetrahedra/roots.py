@@ -21,6 +21,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats, Integers
 from .geometry import plane_through, quality, signed_volume
 from .tree import TetrahedralTree
 
@@ -33,13 +34,13 @@ class ViewingCamera(Protocol):
     """What a root needs of `tetflora_addon.camera.camera.Camera`, which this package must not import."""
 
     kind: str
-    position: NDArray[np.float64]
-    frame: NDArray[np.float64]
+    position: Floats
+    frame: Floats
     window: tuple[float, float, float, float]
     near: float
     far: float
 
-    def to_camera_space(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_camera_space(self, points: Floats) -> Floats:
         """World points ``(..., 3)`` to (x right, y up, depth)."""
 
 
@@ -47,7 +48,7 @@ class ViewingCamera(Protocol):
 class _Cut:
     """A convex piece cut in two by the plane through three points, which has ``negative`` on side 0."""
 
-    through: NDArray[np.float64]
+    through: Floats
     negative: _Piece
     positive: _Piece
 
@@ -60,7 +61,7 @@ class _View:
 
 
 #: A tetrahedron (4, 3), or a piece that is cut further.
-_Piece = NDArray[np.float64] | _Cut | _View
+_Piece = Floats | _Cut | _View
 
 
 def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
@@ -101,7 +102,7 @@ def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
     return tree
 
 
-def _box(camera: ViewingCamera, bounds: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _box(camera: ViewingCamera, bounds: Floats) -> tuple[Floats, Floats, float]:
     """Camera-aligned box ``low``, ``high`` around scene and view, and the depth at which the view ends."""
     corners = np.stack(np.meshgrid(*bounds.T, indexing="ij"), axis=-1).reshape(-1, 3)
     corners = camera.to_camera_space(corners)
@@ -122,23 +123,21 @@ def _box(camera: ViewingCamera, bounds: NDArray[np.float64]) -> tuple[NDArray[np
     return low, high, far
 
 
-def _to_world(camera: ViewingCamera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _to_world(camera: ViewingCamera, points: Floats) -> Floats:
     return (points * np.array([1.0, 1.0, -1.0])) @ camera.frame.T + camera.position
 
 
-def _rectangle(low: NDArray[np.float64], high: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
+def _rectangle(low: Floats, high: Floats, depth: float) -> Floats:
     """Corners ``(4, 3)`` around the box's section at a depth."""
     (x0, y0, _), (x1, y1, _) = low, high
     return np.array([(x0, y0, depth), (x1, y0, depth), (x1, y1, depth), (x0, y1, depth)])
 
 
-def _slab(low: NDArray[np.float64], high: NDArray[np.float64], near: float, far: float) -> _Piece:
+def _slab(low: Floats, high: Floats, near: float, far: float) -> _Piece:
     return _hexahedron(np.concatenate([_rectangle(low, high, near), _rectangle(low, high, far)]))
 
 
-def _around_pyramid(
-    window: tuple[float, float, float, float], low: NDArray[np.float64], high: NDArray[np.float64], far: float
-) -> _Piece:
+def _around_pyramid(window: tuple[float, float, float, float], low: Floats, high: Floats, far: float) -> _Piece:
     """Box from the eye's depth to ``far``: left, right, below, above, and the pyramid in two halves."""
     (x0, y0, _), (x1, y1, _) = low, high
     left, right, bottom, top = np.array(window) * far
@@ -166,9 +165,7 @@ def _around_pyramid(
     return _Cut(np.array([eye, far_corners[0], far_corners[3]]), side(x0, left), middle)
 
 
-def _around_box(
-    window: tuple[float, float, float, float], low: NDArray[np.float64], high: NDArray[np.float64], far: float
-) -> _Piece:
+def _around_box(window: tuple[float, float, float, float], low: Floats, high: Floats, far: float) -> _Piece:
     """Box from depth 0 to ``far``: left, right, below, above, and the orthographic view in the middle."""
     (x0, y0, _), (x1, y1, _) = low, high
     left, right, bottom, top = window
@@ -176,7 +173,7 @@ def _around_box(
     def block(x: tuple[float, float], y: tuple[float, float]) -> _Piece:
         return _slab(np.array([x[0], y[0], 0.0]), np.array([x[1], y[1], 0.0]), 0.0, far)
 
-    def wall(a: tuple[float, float], b: tuple[float, float]) -> NDArray[np.float64]:
+    def wall(a: tuple[float, float], b: tuple[float, float]) -> Floats:
         return np.array([(*a, 0.0), (*b, 0.0), (*b, far)])
 
     middle = _Cut(
@@ -187,7 +184,7 @@ def _around_box(
     return _Cut(wall((left, bottom), (left, top)), block((x0, left), (y0, y1)), middle)
 
 
-def _hexahedron(corners: NDArray[np.float64]) -> _Piece:
+def _hexahedron(corners: Floats) -> _Piece:
     """Two quadrilaterals ``(8, 3)``, one shifted against the other, as two prisms, cut at the better diagonal."""
     triangles = [(0, 1, 2), (0, 2, 3), (1, 2, 3), (1, 3, 0)]  # on either side of a diagonal, then of the other
     found = _best_prisms(corners[[[*triangle, *(i + 4 for i in triangle)] for triangle in triangles]])
@@ -206,7 +203,7 @@ _WAYS = np.array(
 )
 
 
-def _best_prisms(corners: NDArray[np.float64]) -> list[tuple[float, _Piece]]:
+def _best_prisms(corners: Floats) -> list[tuple[float, _Piece]]:
     """Prisms between two triangles ``(n, 6, 3)`` as three tetrahedra, of the twelve ways the one of best quality.
 
     The paper as well "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra".
@@ -239,7 +236,7 @@ def _hang(tree: TetrahedralTree, node: int, piece: _Piece, camera: ViewingCamera
         tree.place([node], vertices[None])
 
 
-def _center(piece: _Piece) -> NDArray[np.float64]:
+def _center(piece: _Piece) -> Floats:
     """A point inside a piece."""
     while not isinstance(piece, np.ndarray):
         piece = piece.piece if isinstance(piece, _View) else piece.negative
@@ -318,7 +315,7 @@ def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Tetrah
     return tree
 
 
-def _divide_cubes(tree: TetrahedralTree, nodes: NDArray[np.intp], corners: NDArray[np.float64], side: float) -> None:
+def _divide_cubes(tree: TetrahedralTree, nodes: Integers, corners: Floats, side: float) -> None:
     """Divide cubes (n,) with lowest corners (n, 3), meters, into six tetrahedra each."""
     # The planes of equal x and y, y and z, z and x meet in the diagonal. The first parts three tetrahedra from three,
     # and the other two cut off the one that lies between them.
@@ -345,7 +342,7 @@ def _divide_cubes(tree: TetrahedralTree, nodes: NDArray[np.intp], corners: NDArr
         tree.place(terminals, corners[:, None] + way * side)
 
 
-def _diagonal(corners: NDArray[np.float64], more: int, less: int) -> NDArray[np.float64]:
+def _diagonal(corners: Floats, more: int, less: int) -> Floats:
     """Planes (n, 4) through cubes' diagonals, positive where coordinate ``more`` exceeds ``less``."""
     planes = np.zeros((len(corners), 4))
     planes[:, more], planes[:, less] = np.sqrt(0.5), -np.sqrt(0.5)

@@ -19,8 +19,7 @@ from tetflora_addon.blender.scene import fields, plants
 from tetflora_addon.blender.scene.crowns import crown_for
 from tetflora_addon.blender.species.edits import species_for
 from tetflora_addon.blender.worker import run_to_end
-from tetflora_addon.planting.canopy import Sheet
-from tetflora_addon.planting.cover import mapping
+from tetflora_addon.planting.cover import Sheet, mapping
 from tetflora_addon.species.litter import shed_share
 
 pytestmark = pytest.mark.usefixtures("clean_file")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tests.blender.scenes import add_mesh, add_plant, select
 from tetflora_addon import errors
 from tetflora_addon.blender.scene.plants import read_plants
-from tetflora_addon.planting import places, rules, terrain
+from tetflora_addon.planting import places, plane, rules
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -35,7 +35,7 @@ def _place(triangles=SQUARE, **changes):
     low, high = given.pop("scale_range")
     occupied = given.pop("occupied", None)
     limits = rules.Rules(slope_max=given.pop("slope_max"), scale_min=low, scale_max=high, **given)
-    return places.place(terrain.Terrain(triangles), limits, occupied)
+    return places.place(plane.Terrain(triangles), limits, occupied)
 
 
 def _distances(points: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import pytest
 
 from tetflora_addon.blender.scene import crowns
 from tetflora_addon.blender.species.edits import species_for
-from tetflora_addon.compiled.crowns import crown_of, known_crown
+from tetflora_addon.compiled.sizes import crown_of, known_crown
 from tetflora_addon.errors import SpeciesError
 
 

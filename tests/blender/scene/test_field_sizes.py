@@ -19,9 +19,9 @@ from tetflora_addon.blender.scene.sizes import fits_of, measure_of
 from tetflora_addon.blender.scene.skeletons import age_of, dead_of
 from tetflora_addon.blender.species.asset_species import asset_species
 from tetflora_addon.compiled.flora import compile_species
-from tetflora_addon.compiled.measured import measured
-from tetflora_addon.growth.crown_shapes import BASE, EAST
+from tetflora_addon.compiled.sizes import measured
 from tetflora_addon.growth.growth import radius_at, trunks
+from tetflora_addon.growth.seeds import BASE, EAST
 from tetflora_addon.species.catalog import load_species
 
 pytestmark = pytest.mark.usefixtures("clean_file")

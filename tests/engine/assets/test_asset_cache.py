@@ -19,7 +19,7 @@ from tests.limits import full_disk
 from tetflora_addon import storage
 from tetflora_addon.assets import asset_cache
 from tetflora_addon.assets.asset import Asset
-from tetflora_addon.assets.kites import kite_mesh
+from tetflora_addon.assets.measures import kite_mesh
 
 
 @pytest.fixture

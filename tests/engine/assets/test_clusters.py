@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tetflora_addon.assets.clusters import GENERATIONS, SMALL, Hierarchy, hierarchy_of
+from tetflora_addon.assets.patches import GENERATIONS, SMALL, Hierarchy, hierarchy_of
 
 
 def patches(seed: int, count: int, kinds: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

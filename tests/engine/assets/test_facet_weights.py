@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.engine.assets import trees
-from tetflora_addon.assets import facet_weights
+from tetflora_addon.assets import compiled
 from tetflora_addon.assets.asset import COUNTS
 
 
@@ -46,16 +46,16 @@ def test_holes_count_as_such() -> None:
 
 def test_leaves_that_lie_in_a_heap_take_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
     """Facets as large as all of them would meet millions of rays."""
-    most, met = [], facet_weights._View.met
+    most, met = [], compiled._View.met
 
-    def counted(view: facet_weights._View, corners: np.ndarray) -> tuple:
+    def counted(view: compiled._View, corners: np.ndarray) -> tuple:
         found = met(view, corners)
         most.append(len(found[0]) / len(corners))
         return found
 
-    monkeypatch.setattr(facet_weights._View, "met", counted)
+    monkeypatch.setattr(compiled._View, "met", counted)
     matrices = np.tile(np.eye(4), (150, 1, 1))
     heap = trees.source_of(trees.leaves(1, 1), shown=np.zeros(150), matrices=matrices)
     weights = trees.compile_asset(heap).clusters.weights[0]
-    assert max(most) <= 2 * facet_weights.RAYS**2
+    assert max(most) <= 2 * compiled.RAYS**2
     assert weights[0] == pytest.approx(0.1)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.engine import support
 from tests.engine.assets import trees
-from tetflora_addon.assets.kites import kite_mesh
+from tetflora_addon.assets.measures import kite_mesh
 
 
 @pytest.mark.parametrize("kind", sorted(trees.SOURCES))

@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.camera.camera import MOST, blur_margins, circle_of_confusion
-from tetflora_addon.refinement.views import widened_for
+from tetflora_addon.refinement.polygons import Polygons
+from tetflora_addon.refinement.shared_parts import AssetParts
+from tetflora_addon.refinement.visibility import widened_for
 
 CAMERA = support.camera((0, 0, 0), (0, 10, 0), pixels=1000, view=1.0, near=0.05)
 SPHERES = np.array([[0.0, 4.0, 0.0], [0.0, 40.0, 3.0], [1.0, 200.0, 0.0]]), np.array([1.0, 5.0, 20.0])
@@ -92,8 +94,9 @@ def test_the_view_is_widened_by_the_lens() -> None:
     flora, seeds = support.small_flora(), support.grove(9, 2.0)
     camera = support.camera((0, -14, 3), (0, 0, 1.5), pixels=256)
     plants = support.trunks(flora.rows, seeds)
-    sharp = widened_for(camera, 0.04, flora, plants)
+    others = Polygons.empty(), AssetParts.empty()
+    sharp = widened_for(camera, 0.04, flora, plants, *others)
     assert sharp.window == camera.widened(0.04).window
-    blurred = widened_for(replace(camera, lens_radius=0.2, focus=4.0), 0.04, flora, plants)
+    blurred = widened_for(replace(camera, lens_radius=0.2, focus=4.0), 0.04, flora, plants, *others)
     assert blurred.width > sharp.width
     assert blurred.pixel_size == pytest.approx(sharp.pixel_size)

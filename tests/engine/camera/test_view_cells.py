@@ -12,8 +12,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from tetflora_addon.camera.camera import MOST, Camera, blur_margins
-from tetflora_addon.camera.silhouette import expected_pixels
+from tetflora_addon.camera.camera import MOST, Camera, blur_margins, expected_pixels
 from tetflora_addon.camera.view_cells import CLEAR, Around, ViewCells, cell_camera
 from tetflora_addon.refinement.visibility import AlphaBuffer, Buffers
 

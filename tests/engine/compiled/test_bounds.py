@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.compiled.bounds import ring_stretch, unit_bounds, widest_radii
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.growth.branches import Branches
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import bounding_capsules
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import expand, open_subplants
+from tetflora_addon.subplants.rings import Pixels
 from tetflora_addon.subplants.tubes import tube_buffers
-from tetflora_addon.subplants.wood_detail import Pixels
 
 _FLOAT32 = 1e-6  # relative rounding of vertices
 

@@ -15,7 +15,7 @@ from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.growth import WholeBranches
 from tetflora_addon.growth.rows import DEAD_ORDER
-from tetflora_addon.species.habit import with_habit
+from tetflora_addon.species.ages import with_habit
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.species.quality import with_quality
 from tetflora_addon.species.schema import species_from_dict

@@ -19,10 +19,10 @@ from tetflora_addon.compiled.averages import quadratic
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.compiled.orientation import leaf_moments, wood_moments
 from tetflora_addon.growth.axes import axes
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, settled
 from tetflora_addon.growth.growth import branch_counts, children, leaf_counts, radius_at
 from tetflora_addon.growth.rows import DEAD, FORK, LATERAL, SPUR, SPUR_ORDER, without_variation
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.subplants.pieces import Pieces, open_subplants, wood_areas

@@ -14,17 +14,25 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from tests.engine.support import RICH, compiled, expanded, leaves_of, meshes, plants, small, small_flora, whole_of
+from tests.engine.support import (
+    RICH,
+    bounding_cylinders,
+    compiled,
+    expanded,
+    leaves_of,
+    meshes,
+    plants,
+    small,
+    small_flora,
+    whole_of,
+)
 from tetflora_addon.arrays import spread
 from tetflora_addon.compiled.flora import Flora, compile_species
-from tetflora_addon.compiled.measured import fitted, measured
 from tetflora_addon.compiled.placed import extents, placed_samples
-from tetflora_addon.growth.branches import Branches
-from tetflora_addon.growth.crown_shapes import LEAST, MOST, PLAIN, WIDTH, crown_shapes
+from tetflora_addon.compiled.sizes import fitted, measured
 from tetflora_addon.growth.growth import leaf_counts, trunks
 from tetflora_addon.growth.seasons import Season
-from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.refinement.contents import bounding_cylinders
+from tetflora_addon.growth.seeds import LEAST, MOST, PLAIN, WIDTH, Branches, Seeds, crown_shapes
 from tetflora_addon.species.ages import with_age
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.quality import with_quality

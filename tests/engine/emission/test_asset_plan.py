@@ -31,9 +31,9 @@ from tetflora_addon.emission.asset_plan import (
 )
 from tetflora_addon.proxies import asset_facets
 from tetflora_addon.proxies.microsurfaces import Facets
-from tetflora_addon.refinement.asset_parts import AssetParts, PlacedAssets
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
+from tetflora_addon.refinement.shared_parts import AssetParts, PlacedAssets
 
 EXPLICIT, PROXY, HIDDEN = Decision.EXPLICIT, Decision.PROXY, Decision.HIDDEN
 KINDS = ("tree", "varied", "closed")

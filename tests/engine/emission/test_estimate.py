@@ -11,8 +11,8 @@ import pytest
 
 from tests.engine import support
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.compiled.crowns import Crown, CrownParts, crown_of
 from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.compiled.sizes import Crown, CrownParts, crown_of
 from tetflora_addon.emission import budget
 from tetflora_addon.emission import estimate as model
 from tetflora_addon.emission.drawing import HIDDEN_LEAVES, Parts, drawing, drawn_blocks

@@ -14,7 +14,7 @@ from tests import places_files as files
 from tests import places_inventories as inventories
 from tetflora_addon.errors import SceneError
 from tetflora_addon.geodata import table, tables
-from tetflora_addon.geodata.inventories import IMPERIAL, preview, read_inventory
+from tetflora_addon.geodata.inventories import FIELDS, IMPERIAL, preview, read_inventory, read_title, said_of
 from tetflora_addon.geodata.species_names import (
     GENUS,
     KIN,
@@ -25,7 +25,6 @@ from tetflora_addon.geodata.species_names import (
     names_in,
     species_named,
 )
-from tetflora_addon.geodata.titles import FIELDS, read_title, said_of
 
 _CATALOG = Path(__file__).parents[3] / "tetflora_addon" / "catalog"
 

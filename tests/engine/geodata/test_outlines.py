@@ -112,10 +112,9 @@ def test_holes_are_outside_of_the_one_ring():
 @pytest.mark.parametrize("closed", [False, True])
 def test_denser_lines_keep_their_points_and_length(closed):
     line = np.random.default_rng(2).uniform(0.0, 50.0, (6, 2))
-    found = denser(line, 4.0, closed)
-    ends = np.concatenate([found, found[:1]]) if closed else found
-    steps = np.linalg.norm(np.diff(ends, axis=0), axis=1)
-    given = np.concatenate([line, line[:1]]) if closed else line
+    line = np.concatenate([line, line[:1]]) if closed else line
+    found = denser(line, 4.0)
+    steps = np.linalg.norm(np.diff(found, axis=0), axis=1)
     assert steps.max() <= 4.0
-    assert steps.sum() == pytest.approx(np.linalg.norm(np.diff(given, axis=0), axis=1).sum())
+    assert steps.sum() == pytest.approx(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
     assert all((np.abs(found - point).max(axis=1) < 1e-9).any() for point in line)

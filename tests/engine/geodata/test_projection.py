@@ -13,13 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tetflora_addon.errors import SceneError
-from tetflora_addon.geodata.prj import system_in
 from tetflora_addon.geodata.projection import (
     MapOrigin,
     System,
     between,
     from_degrees,
     place_about,
+    system_in,
     system_of,
     to_degrees,
 )

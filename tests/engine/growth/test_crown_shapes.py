@@ -14,10 +14,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.engine.support import RICH, compiled, plants
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.growth.axes import axes
-from tetflora_addon.growth.branches import Branches
-from tetflora_addon.growth.crown_shapes import crown_shapes
 from tetflora_addon.growth.growth import children, trunks
 from tetflora_addon.growth.rows import DEAD_ORDER
+from tetflora_addon.growth.seeds import Branches, crown_shapes
 from tetflora_addon.growth.wind import Wind
 from tetflora_addon.species.ages import with_age
 from tetflora_addon.species.catalog import load_species

@@ -13,8 +13,8 @@ import pytest
 from tests.engine import support
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import SpeciesError
-from tetflora_addon.growth.drawn_lines import MAX_DRAWN, MAX_SEGMENTS, drawn_lines
-from tetflora_addon.refinement.contents import bounding_cylinders, subplant_totals
+from tetflora_addon.growth.rows import MAX_DRAWN, MAX_SEGMENTS, drawn_lines
+from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.species.skeletons import Skeleton, drawn_branches, skeleton_from_edges
 from tetflora_addon.subplants.pieces import open_subplants, wood_areas
@@ -98,7 +98,7 @@ def test_everything_is_inside_the_bound(drawn: int) -> None:
     line = skeleton_from_edges(POINTS[:drawn], RADIUS[:drawn], edges, "a tree")
     one = flora(skeleton=line)
     trunk = support.trunks(one.rows, support.plants(np.arange(20), scale=1.5))
-    center, radius, half = bounding_cylinders(one, trunk)
+    center, radius, half = support.bounding_cylinders(one, trunk)
     for i in range(20):
         pieces = support.expanded(one, trunk.take(np.array([i])))
         axis = trunk.frame[i, :, 2]

@@ -20,12 +20,12 @@ from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.axes import axes
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves, settled
 from tetflora_addon.growth.growth import leaf_counts, trunks
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies.facet_weights import facet_weights, fitting
-from tetflora_addon.refinement.shares import SharedPlants
+from tetflora_addon.refinement.shared_parts import SharedPlants
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 
 SOLIDS, RADIUS, BARE = LEAF_ENVELOPES[1:], 0.3, 0.2

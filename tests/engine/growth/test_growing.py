@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tests.engine.compiled.test_bounds import outside
 from tetflora_addon.compiled.flora import Flora, compile_species
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import branch_counts, children, trunks
 from tetflora_addon.growth.rows import DEAD_ORDER
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.species.ages import with_age
 from tetflora_addon.species.growing import Ages, NodeLaw

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import TetFloraError
-from tetflora_addon.growth.colors import leaf_colors_at
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.growth.seasons import (
     AREA,
     PRESENT,
     Season,
     expected,
+    leaf_colors_at,
     leaf_stages,
     leaf_table,
     plant_years,
@@ -28,8 +28,7 @@ from tetflora_addon.growth.seasons import (
 )
 from tetflora_addon.growth.wind import Wind
 from tetflora_addon.species.schema import species_from_dict
-from tetflora_addon.species.species import Species
-from tetflora_addon.species.year import DAYS, LeafYear, Year
+from tetflora_addon.species.species import DAYS, LeafYear, Species, Year
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import expand
 

@@ -24,8 +24,8 @@ from tetflora_addon.leaves.levels import (
     surface_of,
 )
 from tetflora_addon.leaves.models import LEAF_MODELS, LeafModel, mean_silhouette
-from tetflora_addon.leaves.needles import SPARSE, Needles
 from tetflora_addon.leaves.outlines import distance_to_links
+from tetflora_addon.leaves.surfaces import SPARSE, Needles
 from tetflora_addon.optics import GLOSS
 from tetflora_addon.species import catalog
 

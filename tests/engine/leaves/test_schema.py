@@ -10,11 +10,11 @@ import pytest
 
 from tests.engine import support
 from tetflora_addon.errors import SpeciesError
-from tetflora_addon.leaves.compounds import Compound
+from tetflora_addon.leaves.blades import Compound
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.leaves.models import _PAGES, LEAF_MODELS, LeafModel
-from tetflora_addon.leaves.needles import Needles
 from tetflora_addon.leaves.outlines import Blade
+from tetflora_addon.leaves.surfaces import Needles
 from tetflora_addon.species.schema import species_from_dict
 
 

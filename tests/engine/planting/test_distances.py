@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.engine import support
-from tetflora_addon.compiled.crowns import crown_of
+from tetflora_addon.compiled.sizes import crown_of
 from tetflora_addon.planting.places import place
+from tetflora_addon.planting.plane import Terrain
 from tetflora_addon.planting.rules import CROWN_RADII, Rules, suggested_distance
-from tetflora_addon.planting.terrain import Terrain
 from tetflora_addon.species.catalog import load_species
 
 

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.planting.places import place, without
+from tetflora_addon.planting.plane import Path, Terrain
 from tetflora_addon.planting.rules import Rules
-from tetflora_addon.planting.terrain import Path, Terrain
 
 SQUARE = 20.0 * np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=np.float64)
 PLACED = place(Terrain(SQUARE), Rules(count=200, tilt=0.5))

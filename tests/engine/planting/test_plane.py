@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from tests.engine.planting.test_planting import SIZE, _gaps, _hills, _inside, _least_gap
 from tetflora_addon.planting import plane
-from tetflora_addon.planting.plane import Neighbors, Spacing
-from tetflora_addon.planting.terrain import border_of
+from tetflora_addon.planting.plane import Neighbors, Spacing, border_of
 
 
 @settings(max_examples=25, deadline=None)

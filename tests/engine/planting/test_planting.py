@@ -16,8 +16,8 @@ from tetflora_addon.errors import SceneError
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.planting import plane, site
 from tetflora_addon.planting.places import Placement, new_seeds, place
+from tetflora_addon.planting.plane import Path, Terrain, sampled
 from tetflora_addon.planting.rules import Companion, Rules
-from tetflora_addon.planting.terrain import Path, Terrain, sampled
 
 SIZE = 20.0
 SQUARE = np.array([[[0, 0, 0], [10, 0, 0], [10, 10, 0]], [[0, 0, 0], [10, 10, 0], [0, 10, 0]]], dtype=float)

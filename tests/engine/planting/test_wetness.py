@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tetflora_addon.errors import SceneError
 from tetflora_addon.planting import wetness as wet
-from tetflora_addon.planting.height_grid import cell_for, height_grid
+from tetflora_addon.planting.wetness import cell_for, height_grid
 
 
 def _middles(rows: int, columns: int, cell: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from tetflora_addon.errors import SceneError
 from tetflora_addon.planting.places import place
+from tetflora_addon.planting.plane import Terrain
 from tetflora_addon.planting.rules import Rules
-from tetflora_addon.planting.terrain import Terrain
+from tetflora_addon.planting.site import Limits, Zone, distance_lines, soft_between
 from tetflora_addon.planting.wetness import wet_ground
-from tetflora_addon.planting.zones import Limits, Zone, distance_lines, soft_between
 
 
 def _valley(side: float = 60.0, number: int = 30) -> np.ndarray:

@@ -15,7 +15,7 @@ from tests.engine import support
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.preview import levels, light_plants
-from tetflora_addon.preview.projected import THICK, Projected, drawable, project
+from tetflora_addon.preview.levels import THICK, Projected, drawable, project
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import refine
 from tetflora_addon.refinement.settings import RefinementSettings

@@ -13,12 +13,12 @@ from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.optics import GLOSS
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, STRETCH, subplant_facets
 from tetflora_addon.proxies.primitives import facet_mesh
-from tetflora_addon.refinement.contents import bounding_cylinders, subplant_totals
+from tetflora_addon.refinement.contents import subplant_totals
 
 
 def facets(flora: Flora, subplants: Branches, side: float) -> MeshBuffers:
@@ -101,7 +101,7 @@ def test_facets_stay_by_their_plant(seed: int, side: float, scale: float) -> Non
     plant = trunks(flora.rows, support.plants(seed, scale=scale, position=(3, 4, 5)))
     mesh = facet_mesh(subplant_facets(flora, plant, np.array([side * scale])))
     assume(mesh.polygons)
-    center, radius, half_height = bounding_cylinders(flora, plant)
+    center, radius, half_height = support.bounding_cylinders(flora, plant)
     offset = support.face_centers(mesh) - center
     along = offset @ plant.frame[0, :, 2]
     across = np.linalg.norm(offset - along[:, None] * plant.frame[0, :, 2], axis=1)

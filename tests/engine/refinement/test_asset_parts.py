@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from tests.engine import support
 from tests.engine.assets import trees
 from tetflora_addon.assets.asset import Asset, AssetTable, Instances
-from tetflora_addon.refinement.asset_parts import AssetParts, PlacedAssets, SharedAssets
 from tetflora_addon.refinement.contents import sums
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.refinement.shared_parts import AssetParts, PlacedAssets, SharedAssets
 from tetflora_addon.tetrahedra.geometry import squared_edges
 from tetflora_addon.tetrahedra.roots import view_root
 from tetflora_addon.tetrahedra.tree import TetrahedralTree

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.growth.branches import Branches
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import (
     PlantParts,
     Totals,

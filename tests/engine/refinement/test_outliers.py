@@ -12,8 +12,9 @@ import pytest
 from tests.engine import support
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.refinement.asset_parts import PlacedAssets
-from tetflora_addon.refinement.outliers import FRACTION, MOST, NEAR, far_off, outliers_of
+from tetflora_addon.refinement.loop import FRACTION, MOST, NEAR, far_off, outliers_of
+from tetflora_addon.refinement.polygons import Polygons
+from tetflora_addon.refinement.shared_parts import PlacedAssets
 
 
 def _camera(**other: object) -> Camera:
@@ -36,9 +37,9 @@ def test_one_plant_far_beyond_all_others_is_a_stray(far: tuple) -> None:
     outliers = outliers_of(support.small_flora(), _plants(NEARBY[0], far, *NEARBY[1:]), _camera())
     assert outliers.plants.tolist() == [1]
     assert outliers.away == pytest.approx(np.linalg.norm(far))
-    seeds, polygons, _ = outliers.others(_plants(NEARBY[0], far, *NEARBY[1:]), None, PlacedAssets.none())
+    seeds, polygons, _ = outliers.others(_plants(NEARBY[0], far, *NEARBY[1:]), Polygons.empty(), PlacedAssets.none())
     assert np.array_equal(seeds.position, NEARBY)
-    assert polygons is None
+    assert len(polygons) == 0
 
 
 def test_what_is_seen_is_no_stray() -> None:

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from tests.engine import support
 from tests.engine.refinement.test_loop import check, run
-from tetflora_addon.camera.camera import Camera
-from tetflora_addon.camera.silhouette import expected_pixels
+from tetflora_addon.camera.camera import Camera, expected_pixels
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.rasterize import pixel_rays
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.views import PanoramaBuffer, face_cameras, pixels_per_solid_angle
+from tetflora_addon.refinement.visibility import PanoramaBuffer, face_cameras, pixels_per_solid_angle
 from tetflora_addon.tetrahedra.roots import world_root
 
 SPHERE = (-np.pi, np.pi, -np.pi / 2, np.pi / 2)

@@ -18,7 +18,7 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.polygons import PolygonBlock, kept_polygons, mended, polygon_blocks, polygon_buffers
 from tetflora_addon.emission.shells import proxy_shells
-from tetflora_addon.growth.branches import Branches
+from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.summaries import summarize
 from tetflora_addon.refinement.contents import Contents, InCells, cut, in_the_root, sort_into_children
@@ -27,7 +27,8 @@ from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, area_fractions
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.views import widened_for
+from tetflora_addon.refinement.shared_parts import AssetParts
+from tetflora_addon.refinement.visibility import widened_for
 from tetflora_addon.tetrahedra.roots import view_root
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 
@@ -95,12 +96,15 @@ def sums(polygons: Polygons) -> np.ndarray:
     return np.concatenate([[1], summary.color[0], summary.transmission, summary.moment.ravel()]) * summary.optical_area
 
 
-def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4) -> tuple[TetrahedralTree, InCells]:
+def divided(polygons: Polygons, seed: int, slack: float, rounds: int = 4) -> tuple[TetrahedralTree, InCells]:
     """Polygons in a tree that a camera roots and random choices divide."""
     rng = np.random.default_rng(seed)
     camera = support.camera(rng.uniform(-9, 9, 3), rng.uniform(-3, 3, 3))
     tree = view_root(camera, polygons.bounding_box())
-    loose = None if slack is None else lambda points: np.full(len(points), slack)
+
+    def loose(points: np.ndarray) -> np.ndarray:
+        return np.full(len(points), slack)
+
     held = sort_into_children(tree, in_the_root(polygons), loose)
     for _ in range(rounds):
         nodes = np.unique(held.cell)
@@ -111,9 +115,9 @@ def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4)
     return tree, held
 
 
-@given(SEEDS, st.sampled_from([None, 0.02, 0.5]))
+@given(SEEDS, st.sampled_from([0.0, 0.02, 0.5]))
 @settings(deadline=None, max_examples=25)
-def test_area_color_and_moment_are_exact_under_any_cuts(seed: int, slack: float | None) -> None:
+def test_area_color_and_moment_are_exact_under_any_cuts(seed: int, slack: float) -> None:
     """To 1e-6, as sums over all tetrahedra; totals are those of the fragments, and all is in terminal nodes."""
     polygons = Polygons.everything(placed(thicket(seed), seed))
     tree, held = divided(polygons, seed, slack)
@@ -131,7 +135,7 @@ def test_area_color_and_moment_are_exact_under_any_cuts(seed: int, slack: float 
 @settings(deadline=None, max_examples=15)
 def test_everything_is_on_the_right_side(seed: int) -> None:
     """Every corner of every polygon lies within its tetrahedron's planes, up to the root; within the slack if any."""
-    for slack in (None, 0.1):
+    for slack in (0.0, 0.1):
         tree, held = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, slack)
         polygons, node = held.items, held.cell.astype(np.intp)
         assert (tree.parent[node] >= 0).any()
@@ -139,7 +143,7 @@ def test_everything_is_on_the_right_side(seed: int) -> None:
             parent = np.maximum(tree.parent[node], 0)
             low, high = polygons.distances(tree.planes(parent))
             beyond = np.where(tree.children[parent, 1] == node, -low, high)
-            assert beyond[tree.parent[node] >= 0].max() < 1e-7 + (slack or 0)
+            assert beyond[tree.parent[node] >= 0].max() < 1e-7 + slack
             node = np.where(tree.parent[node] >= 0, parent, node)
 
 
@@ -149,7 +153,7 @@ def test_texture_coordinates_and_attributes_are_interpolated(seed: int) -> None:
     """What was an affine function of the place before is the same function after cuts."""
     one = thicket(seed, 30, fans=False)
     meshes = Meshes([one], np.zeros(1, int), np.eye(4)[None])
-    _, held = divided(Polygons.everything(meshes), seed, None)
+    _, held = divided(Polygons.everything(meshes), seed, 0.0)
     mesh = polygon_buffers(held.items)
     sound(mesh)
     expected = mesh.positions[mesh.corner_verts].astype(np.float64) @ AFFINE.T
@@ -178,7 +182,7 @@ def test_a_cut_face_of_which_all_is_there_is_mended() -> None:
     one = thicket(1)
     meshes = placed(one, 1)
     polygons = Polygons.everything(meshes)
-    _, held = divided(polygons, 1, None)
+    _, held = divided(polygons, 1, 0.0)
     assert len(held) > 2 * len(polygons)
     whole = mended(held.items)
     assert (whole.part == -1).all()
@@ -316,12 +320,14 @@ def test_lens_and_shutter_widen_the_view_for_polygons_alone() -> None:
     meshes, camera = grove(6)
     flora, polygons = support.small_flora(), Polygons.everything(meshes)
     nobody = Branches.empty()
-    sharp = widened_for(camera, 0.04, flora, nobody, polygons)
+    no_assets = AssetParts.empty()
+    sharp = widened_for(camera, 0.04, flora, nobody, polygons, no_assets)
     assert sharp.window == camera.widened(0.04).window
-    blurred = widened_for(replace(camera, lens_radius=0.2, focus=20.0), 0.04, flora, nobody, polygons)
+    blurring = replace(camera, lens_radius=0.2, focus=20.0)
+    blurred = widened_for(blurring, 0.04, flora, nobody, polygons, no_assets)
     assert blurred.width > sharp.width
     empty = polygons.take(slice(0))
-    assert widened_for(replace(camera, lens_radius=0.2, focus=20.0), 0.04, flora, nobody, empty).width == sharp.width
+    assert widened_for(blurring, 0.04, flora, nobody, empty, no_assets).width == sharp.width
 
 
 def rough(number: int = 30, size: float = 40.0) -> Meshes:

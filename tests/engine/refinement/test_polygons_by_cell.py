@@ -16,7 +16,7 @@ from tetflora_addon.refinement.polygons import Polygons
 @settings(deadline=None, max_examples=20)
 def test_holdings_give_and_take(seed: int) -> None:
     """Whatever is taken out and put back, in whatever order, everything is there once, with its own totals."""
-    tree, held = divided(Polygons.everything(placed(thicket(1), 1)), 1, None)
+    tree, held = divided(Polygons.everything(placed(thicket(1), 1)), 1, 0.0)
     rng = np.random.default_rng(seed)
     cell_polygons = PolygonsByCell(held)
     for _ in range(5):

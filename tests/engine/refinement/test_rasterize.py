@@ -5,8 +5,7 @@
 import numpy as np
 import pytest
 
-from tetflora_addon.camera.camera import Camera
-from tetflora_addon.camera.silhouette import silhouette_pixels
+from tetflora_addon.camera.camera import Camera, silhouette_pixels
 from tetflora_addon.refinement import rasterize
 from tetflora_addon.refinement.rasterize import buffer_size, occluder_depth, pixel_rays, tetrahedron_fragments
 from tetflora_addon.tetrahedra.geometry import signed_volume, volume

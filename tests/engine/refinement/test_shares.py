@@ -17,16 +17,14 @@ from tests.engine.growth.test_drawn import flora as drawn_flora
 from tetflora_addon.arrays import Arrays
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.growth.seeds import Branches, Seeds
 from tetflora_addon.growth.wind import Wind
 from tetflora_addon.refinement import shares
 from tetflora_addon.refinement.contents import PlantParts, Totals, bounding_box, subplant_totals, sums
 from tetflora_addon.refinement.loop import refine, step_of
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.shared_parts import LARGE
-from tetflora_addon.refinement.shares import SharedPlants, opened, share_points
+from tetflora_addon.refinement.shared_parts import LARGE, SharedPlants, opened, share_points
 from tetflora_addon.subplants.pieces import expand
 from tetflora_addon.tetrahedra.geometry import squared_edges, volume
 from tetflora_addon.tetrahedra.roots import view_root

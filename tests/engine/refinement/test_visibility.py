@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from tests.engine.support import face_planes
-from tetflora_addon.camera.camera import Camera
-from tetflora_addon.camera.silhouette import silhouette_pixels
+from tetflora_addon.camera.camera import Camera, silhouette_pixels
 from tetflora_addon.refinement.rasterize import buffer_size, occluder_depth, pixel_rays
 from tetflora_addon.refinement.visibility import COARSEST, AlphaBuffer, Buffers
 from tetflora_addon.tetrahedra.roots import view_root

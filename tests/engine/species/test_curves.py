@@ -10,8 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from tetflora_addon.species.curves import Chains, bezier_chains, joined_edges, nurbs_chain, smooth_handles
-from tetflora_addon.species.skeletons import drawn_branches, skeleton_from_edges
+from tetflora_addon.species.skeletons import (
+    Chains,
+    bezier_chains,
+    drawn_branches,
+    joined_edges,
+    nurbs_chain,
+    skeleton_from_edges,
+    smooth_handles,
+)
 
 
 def _chains(*splines: list, cyclic: bool = False) -> Chains:

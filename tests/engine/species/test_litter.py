@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from tests.engine import support
-from tetflora_addon.compiled.crowns import crown_of
 from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.compiled.sizes import crown_of
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.errors import SpeciesError
-from tetflora_addon.growth.drawn_lines import MAX_SEGMENTS, drawn_lines
+from tetflora_addon.growth.rows import MAX_SEGMENTS, drawn_lines
 from tetflora_addon.species.skeletons import MAX_ORDERS, DrawnBranches, Skeleton, drawn_branches, skeleton_from_edges
 
 

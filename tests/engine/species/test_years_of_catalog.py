@@ -26,8 +26,7 @@ from tetflora_addon.growth.seasons import (
     seasonal_rows,
 )
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.species.species import Species
-from tetflora_addon.species.year import DAYS, LeafYear
+from tetflora_addon.species.species import DAYS, LeafYear, Species
 
 #: Species that are the same all year: nothing of them comes and goes that is described.
 CONSTANT = {"agave", "dead_tree", "moss", "palm"}

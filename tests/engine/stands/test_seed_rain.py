@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.stands.change import SeedDispersal, planted
-from tetflora_addon.stands.plants import Plants
+from tetflora_addon.stands.change import Plants, SeedDispersal, planted
 from tetflora_addon.stands.site import StandSite
 from tetflora_addon.stands.traits import StandSpecies, StandTraits
 

@@ -16,11 +16,10 @@ from tetflora_addon import parallel
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.species.ecology import Ecology
-from tetflora_addon.stands.change import grown, planted
+from tetflora_addon.species.species import Ecology
+from tetflora_addon.stands.change import LYING, Records, grown, planted
 from tetflora_addon.stands.grow import StandSettings, begun, grow
 from tetflora_addon.stands.light import Crowns, LightGrid
-from tetflora_addon.stands.plants import LYING, Records
 from tetflora_addon.stands.site import StandSite
 from tetflora_addon.stands.traits import StandSpecies, StandTraits
 
@@ -178,7 +177,7 @@ def test_dense_stands_thin_themselves() -> None:
         thinned.append((len(plants), (traits.mass_factor[plants.species] * plants.basal**2 * plants.height).mean()))
     number, mass = np.log(np.array(thinned)[25:]).T
     assert -1.8 < np.polyfit(number, mass, 1)[0] < -1.2
-    leaves = plants.leaf_area(traits).sum() / 3600.0
+    leaves = (plants.crowns(traits).leaves / traits.extinction[plants.species]).sum() / 3600.0
     assert 4.5 < leaves < 8.0
 
 

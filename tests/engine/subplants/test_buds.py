@@ -12,9 +12,8 @@ from tests.engine.subplants.test_leaf_meshes import check_topology
 from tests.engine.subplants.test_wood_detail import assert_same, even, grown
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts
-from tetflora_addon.subplants.buds import BUD_RINGS, bud_numbers, bud_rings
+from tetflora_addon.subplants.rings import BUD_RINGS, bud_numbers, bud_rings, fineness
 from tetflora_addon.subplants.tubes import tube_buffers
-from tetflora_addon.subplants.wood_detail import fineness
 
 _BUD = {"length": 0.01, "width": 0.5, "lateral": 1.0, "color": [0.3, 0.1, 0.05]}
 

@@ -15,8 +15,7 @@ from tetflora_addon.growth.growth import radius_at
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.subplants.leaf_meshes import LeafCopies, LeafMesh, leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, wood_areas
-from tetflora_addon.subplants.tubes import tube_buffers
-from tetflora_addon.subplants.twigs import twig_buffers
+from tetflora_addon.subplants.tubes import tube_buffers, twig_buffers
 
 
 def check_topology(mesh: MeshBuffers) -> None:
@@ -223,7 +222,8 @@ def test_twigs_show_what_their_tubes_show() -> None:
     flora = support.compiled(support.shipped("birch"))
     pieces = support.grown(flora, support.plants(3, scale=0.3))[1]
     whole = support.whole_of(flora, pieces.take(pieces.branches.row == pieces.branches.row.max()))
-    twigs, tubes = twig_buffers(flora, whole), tube_buffers(flora, [whole])
+    one = np.ones(len(whole), int)
+    twigs, tubes = twig_buffers(flora, whole, one, one), tube_buffers(flora, [whole])
     check_topology(twigs)
     check_attributes(twigs)
     assert twigs.polygons == len(whole)
@@ -241,7 +241,7 @@ def test_twigs_show_what_their_tubes_show() -> None:
     theirs = np.abs(directions @ across.T).sum(axis=1) / 2
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.03)
     np.testing.assert_allclose(ours, theirs, rtol=0.15)  # tubes are bent
-    assert twig_buffers(flora, whole.take(np.zeros(0, int))) is None
+    assert twig_buffers(flora, whole.take(one[:0]), one[:0], one[:0]) is None
 
 
 def test_ribbons_follow_twigs_that_bend() -> None:
@@ -250,7 +250,7 @@ def test_ribbons_follow_twigs_that_bend() -> None:
     pieces = support.grown(flora, support.plants(3, scale=0.3))[1]
     whole = support.whole_of(flora, pieces.take(pieces.branches.row == pieces.branches.row.max() - 1))
     parts = np.clip(np.arange(len(whole)) % 5, 1, whole.lines.segments)
-    ribbons, tubes = twig_buffers(flora, whole, None, parts), tube_buffers(flora, [whole])
+    ribbons, tubes = twig_buffers(flora, whole, np.ones(len(whole)), parts), tube_buffers(flora, [whole])
     check_topology(ribbons)
     check_attributes(ribbons)
     assert ribbons.polygons == parts.sum()
@@ -261,7 +261,8 @@ def test_ribbons_follow_twigs_that_bend() -> None:
     away = np.linalg.norm(ends[np.tile(bent, 2)][:, None] - middles[None], axis=2).min(axis=1)
     np.testing.assert_allclose(away, 0.0, atol=1e-5)
     # Bark runs as far up as on a triangle, as fast everywhere.
-    alone = twig_buffers(flora, whole.take(bent)).attributes["UVMap"][1].reshape(-1, 3, 2)[:, 2, 1]
+    alone = twig_buffers(flora, whole.take(bent), *np.ones((2, bent.sum()), int))
+    alone = alone.attributes["UVMap"][1].reshape(-1, 3, 2)[:, 2, 1]
     up = ribbons.attributes["UVMap"][1][-4 * parts[bent].sum() :].reshape(-1, 4, 2)[:, :, 1]
     part = np.concatenate([np.arange(number) for number in parts[bent]])
     expected = np.stack([part, part, part + 1, part + 1], axis=1) * np.repeat(alone / parts[bent], parts[bent])[:, None]
@@ -277,7 +278,7 @@ def test_wood_says_how_thick_it_is_at_its_base() -> None:
     faces_of = rows["sides"] * (rows["segments"] + rows["rings"])
     for mesh, faces in (
         (tube_buffers(flora, [whole]), faces_of),
-        (twig_buffers(flora, whole), np.ones(len(girth), int)),
+        (twig_buffers(flora, whole, *np.ones((2, len(girth)), int)), np.ones(len(girth), int)),
     ):
         domain, values = mesh.attributes["tf_girth"]
         assert domain == "FACE"

@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tests.engine.growth.test_drawn import flora as drawn_flora
-from tetflora_addon.growth.growth import trunks
-from tetflora_addon.subplants.pieces import chunks, leaf_fraction, open_branches, open_subplants, whole_pieces
+from tetflora_addon.growth.growth import open_branches, trunks
+from tetflora_addon.subplants.pieces import chunks, leaf_fraction, open_subplants, whole_pieces
 
 
 @pytest.mark.parametrize("kind", ["rich", "drawn"])
 def test_pieces_are_all_of_their_branches(kind: str) -> None:
     """From base to tip, end to end, each with its fraction of the leaves; nothing of a branch is on another."""
     flora = support.compiled(support.RICH) if kind == "rich" else drawn_flora()
-    whole, body, grown, parent = open_branches(flora, trunks(flora.rows, support.plants([1, 1, 2])))
+    whole, body, grown, parent = open_branches(flora.rows, trunks(flora.rows, support.plants([1, 1, 2])))
     pieces, owner = whole_pieces(flora.rows, whole)
     assert (np.diff(owner) >= 0).all()
     first = np.flatnonzero(np.diff(owner, prepend=-1))

@@ -17,9 +17,21 @@ from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.growth import WholeBranches, radius_at
 from tetflora_addon.growth.rows import FORK
 from tetflora_addon.subplants.pieces import expand
-from tetflora_addon.subplants.rings import PLACES, buttresses, has_foot, root_number, roots
+from tetflora_addon.subplants.rings import (
+    DEVIATION,
+    MOST_SIDES,
+    PLACES,
+    Pixels,
+    buttresses,
+    fine_sides,
+    fineness,
+    finer,
+    has_foot,
+    root_number,
+    roots,
+    round_up_to,
+)
 from tetflora_addon.subplants.tubes import tube_buffers
-from tetflora_addon.subplants.wood_detail import DEVIATION, MOST_SIDES, Pixels, fine_sides, fineness, finer, round_up_to
 
 
 def even(pixel: float) -> Pixels:

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from tests.engine.support import contains, face_planes
 from tetflora_addon.tetrahedra import geometry
-from tetflora_addon.tetrahedra.subdivision import bisect, longest_edge
+from tetflora_addon.tetrahedra.tree import bisect, longest_edge
 
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 CORNER = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.tetrahedra import geometry
 from tetflora_addon.tetrahedra.roots import view_root
-from tetflora_addon.tetrahedra.subdivision import best_diagonal, bisect, bisect_thrice, divide_by_shape, divide_in_eight
+from tetflora_addon.tetrahedra.tree import best_diagonal, bisect, bisect_thrice, divide_by_shape, divide_in_eight
 
 SEEDS = st.integers(0, 10**9)
 

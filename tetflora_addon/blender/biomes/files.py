@@ -18,7 +18,7 @@ import numpy as np
 from ...errors import SceneError, SpeciesError, quoted
 from ...files import IDENTIFIER_RULE, is_identifier, parse_json, read_whole
 from ...formats import FORMATS
-from ...planting.zones import Limits
+from ...planting.site import Limits
 from ...species.schema import species_from_dict
 from ..file_library import MAX_FILE_BYTES, as_text
 from ..placing.population_data import (

@@ -12,7 +12,7 @@ from mathutils import Vector
 
 from ...arrays import Floats, Integers
 from ...growth.hashing import key_of_seed
-from ...planting.canopy import Sheet
+from ...planting.cover import Sheet
 from ...planting.plane import gradient_noise
 from ..attributes import world_matrix
 from ..materials.soil import SHADED, lay_soil, may_have_soil

@@ -9,8 +9,7 @@ from pathlib import Path
 import bpy
 
 from ...errors import SceneError
-from ...geodata.inventories import preview
-from ...geodata.titles import FIELDS
+from ...geodata.inventories import FIELDS, preview
 from ..declare import HIDDEN, choice, string
 
 _UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")

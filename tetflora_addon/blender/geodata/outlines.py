@@ -14,7 +14,7 @@ import numpy as np
 from ...arrays import Floats
 from ...geodata.outlines import BUILDING, KINDS, WATER, MapFeature, denser, one_ring, read_outlines
 from ...jobs import Progress
-from ...planting.height_grid import HeightGrid
+from ...planting.wetness import HeightGrid
 from ..attributes import members
 from ..materials.nodes import Graph, surface_material
 from ..placing.terrain import HALF_WIDTH

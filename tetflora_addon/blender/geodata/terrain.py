@@ -24,7 +24,7 @@ from ...geodata.grids import ENDINGS, mosaic, read_grid
 from ...geodata.projection import System, between, chosen_system
 from ...geodata.rasters import MAX_CELLS, Raster, checked_size, in_degrees
 from ...jobs import Job, Progress
-from ...planting.height_grid import HeightGrid, cell_for, height_grid
+from ...planting.wetness import HeightGrid, cell_for, height_grid
 from ..attributes import image_pixels, write
 from ..compat import shader_tree
 from ..materials.nodes import Graph

@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats, Floats32, Integers32
-from ...compiled.crowns import crown_of
 from ...compiled.flora import compile_species
+from ...compiled.sizes import crown_of
 from ...errors import SceneError, SpeciesError
 from ...geodata.canopy import checked_canopy, find_trees, heights_above, without_areas
 from ...geodata.inventories import Inventory, read_inventory

@@ -21,7 +21,7 @@ from ...emission.asset_costs import AssetCosts
 from ...emission.asset_plan import OriginalPolicy
 from ...errors import SceneError, TetFloraError
 from ...jobs import Job, Progress, mapped, run_to_end
-from ...refinement.asset_parts import PlacedAssets
+from ...refinement.shared_parts import PlacedAssets
 from ..assets.parts import Target, digest_of, read_source_steps
 from ..assets.places import Places
 from ..results.hiding import hidden_originals, originals_shown

@@ -23,7 +23,7 @@ from ...growth.seeds import Seeds
 from ...growth.wind import Wind
 from ...processes import pool
 from ...refinement.lights import Light
-from ...refinement.outliers import Outliers
+from ...refinement.loop import Outliers
 from ...refinement.polygons import Polygons
 from ...refinement.settings import RefinementSettings
 from ...refinement.statistics import Statistics

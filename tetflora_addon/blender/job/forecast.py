@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ... import memory
 from ...arrays import Floats, Integers
-from ...compiled.crowns import Crown
+from ...compiled.sizes import Crown
 from ...emission.estimate import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of

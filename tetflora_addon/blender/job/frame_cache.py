@@ -17,7 +17,7 @@ import numpy as np
 
 from ...camera.camera import Camera
 from ...camera.view_cells import Around, ViewCells, cell_camera
-from ...growth.crown_shapes import farthest
+from ...growth.seeds import farthest
 from ...species.species import Species
 from ..assets.marks import reach_of
 from ..assets.parts import digest_of

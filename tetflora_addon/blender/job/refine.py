@@ -19,7 +19,7 @@ import numpy as np
 
 from ... import memory
 from ...arrays import Integers, Integers32, Keys, Mask
-from ...assets.kites import kite_mesh
+from ...assets.measures import kite_mesh
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species

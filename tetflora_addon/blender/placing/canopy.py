@@ -13,9 +13,8 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
-from ...growth.crown_shapes import BASE, WIDTH
-from ...planting.canopy import Canopy, Sheet
-from ...planting.cover import Floor, Habitat, Suits, mapping
+from ...growth.seeds import BASE, WIDTH
+from ...planting.cover import Canopy, Floor, Habitat, Sheet, Suits, mapping
 from ..attributes import world_matrix
 from ..scene.ages import crown_kinds, with_sizes
 from ..scene.crowns import crown_for

@@ -21,8 +21,7 @@ from ...errors import SceneError, TetFloraError
 from ...files import is_identifier
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Job, Progress, mapped, part_of
-from ...planting.canopy import Canopy
-from ...planting.cover import FULL, Floor, Habitat, Stratum, covered, tinted
+from ...planting.cover import FULL, Canopy, Floor, Habitat, Stratum, covered, tinted
 from ...species.litter import FALLEN, KIND, leaves_page, shed_share
 from ..materials.snow import add_snow
 from ..materials.soil import SHADED, lay_soil

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 import bpy
 import numpy as np
 
-from ...compiled.crowns import Crown
+from ...compiled.sizes import Crown
 from ...errors import SpeciesError
 from ...planting.rules import suggested_distance
 from ..scene.crowns import crown_for, crown_to_draw

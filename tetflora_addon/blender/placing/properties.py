@@ -7,10 +7,10 @@ from math import pi
 
 import bpy
 
+from ...parameters import FACTOR, LENGTH, within
 from ...planting.rules import Companion, Rules
+from ...planting.site import Limits
 from ...planting.strokes import Brush
-from ...planting.zones import Limits
-from ...setting import FACTOR, LENGTH, within
 from ..declare import FIXED, HIDDEN, boolean, choice, integer, list_of, once, pointer_to, real, string
 from ..runtime import Listeners
 from ..scene.own_ages import MOST_YEARS

@@ -22,9 +22,9 @@ from ...errors import SceneError
 from ...files import parse_json
 from ...planting.cover import Suits
 from ...planting.places import Placement, place, without
+from ...planting.plane import Path, Terrain
 from ...planting.rules import Companion, Rules
-from ...planting.terrain import Path, Terrain
-from ...planting.zones import Zone
+from ...planting.site import Zone
 from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Floats, Floats32
 from ...errors import SceneError
-from ...planting.terrain import Path, Terrain
+from ...planting.plane import Path, Terrain
 from ..attributes import image_pixels, members, mesh_of, read, values_of, world_matrix
 from ..scene.objects import objects_within
 from ..scene.skeletons import spline_chain

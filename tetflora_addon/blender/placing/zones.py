@@ -14,9 +14,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...planting.terrain import Terrain
+from ...planting.plane import Terrain
+from ...planting.site import Limits, Spots, Zone, distance_lines
 from ...planting.wetness import wet_ground
-from ...planting.zones import Limits, Spots, Zone, distance_lines
 from ..settings import BIOME, with_identity
 from .terrain import lines_within, read_ground
 

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import bpy
 
 from ...buffers import MeshBuffers, PointBuffers
-from ...setting import within
+from ...parameters import within
 from ...species.species import Species
 from ..declare import FIXED, boolean, integer, list_of, pointer_to, string
 from ..materials import snow

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from ...arrays import connected
 from ...errors import SpeciesError
-from ...leaves.compounds import Compound
+from ...leaves.blades import Compound
 from ...leaves.models import LeafModel, leaf_model
-from ...leaves.needles import Needles
 from ...leaves.outlines import Blade
+from ...leaves.surfaces import Needles
 from ...species.species import LEAF_KINDS, Species
 from ..attributes import mesh_of
 from ..materials.materials import bark_material, bark_steps, leaf_material

@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import bpy
 
-from ...compiled.crowns import Crown, crown_of, known_crown, prepare
+from ...compiled.sizes import Crown, crown_of, known_crown, prepare
 from ...errors import SpeciesError
 from ...jobs import Job, Progress
 from ...species.species import Species

@@ -16,10 +16,9 @@ import numpy as np
 
 from ...arrays import Floats, Integers, Integers32
 from ...errors import SceneError, TetFloraError, listed
-from ...growth.crown_shapes import crown_shapes
 from ...growth.hashing import child_key, key_of_seed
 from ...growth.seasons import is_gone
-from ...growth.seeds import Seeds
+from ...growth.seeds import Seeds, crown_shapes
 from ...growth.wind import rotation_vectors
 from ..attributes import frames_of, world_matrix
 from ..settings import season_of

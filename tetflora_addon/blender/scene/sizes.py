@@ -20,11 +20,10 @@ import numpy as np
 
 from ...arrays import Floats
 from ...compiled.flora import compile_species
-from ...compiled.measured import fitted, measured
+from ...compiled.sizes import fitted, measured
 from ...errors import SpeciesError
-from ...growth.crown_shapes import PLAIN, THICKNESS, crown_shapes
 from ...growth.growth import radius_at, trunks
-from ...growth.seeds import Seeds
+from ...growth.seeds import PLAIN, THICKNESS, Seeds, crown_shapes
 from ...species.ages import ages_of, with_age
 from ...species.growing import Ages
 from ...species.species import Species

@@ -12,8 +12,15 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers
 from ...errors import SpeciesError
-from ...species.curves import Chains, bezier_chains, joined_edges, nurbs_chain, smooth_handles
-from ...species.skeletons import Skeleton, skeleton_from_edges
+from ...species.skeletons import (
+    Chains,
+    Skeleton,
+    bezier_chains,
+    joined_edges,
+    nurbs_chain,
+    skeleton_from_edges,
+    smooth_handles,
+)
 from ..attributes import frames_of, members, mesh_of, values_of, world_matrix
 
 #: Types of objects that can be the skeleton of a plant.

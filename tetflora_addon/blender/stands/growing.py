@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 from ...arrays import Floats, quaternions
 from ...errors import SceneError, SpeciesError, TetFloraError
 from ...jobs import Job, Progress, part_of
-from ...planting.height_grid import HeightGrid, cell_for, height_grid
-from ...planting.plane import inside_any
+from ...planting.plane import Terrain, inside_any
 from ...planting.site import lines_of_paths
-from ...planting.terrain import Terrain
-from ...planting.wetness import wet_ground
+from ...planting.wetness import HeightGrid, cell_for, height_grid, wet_ground
 from ...species.species import Species
+from ...stands.change import Records
 from ...stands.grow import StandSettings, grow
-from ...stands.plants import Records
 from ...stands.site import StandSite
 from ...stands.traits import StandSpecies
 from ..attributes import write

@@ -4,8 +4,8 @@
 
 import bpy
 
+from ...parameters import within
 from ...planting.rules import Rules
-from ...setting import within
 from ...stands.grow import StandSettings
 from ..declare import FIXED, HIDDEN, boolean, integer, list_of, real, string
 from ..placing.properties import AroundPaths, TetFloraGround

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Floats32
 from ...camera.camera import Camera
-from ...preview.levels import FORMS, Level, Levels, as_shown, colors_of
+from ...preview.levels import FORMS, THICK, Level, Levels, as_shown, colors_of, drawable, project
 from ...preview.light_plants import Shapes
-from ...preview.projected import THICK, drawable, project
 from ...refinement.decisions import Decision
 from ...tetrahedra.geometry import EDGES
 from ..results.collection import UNFINISHED, result_collections

@@ -12,9 +12,9 @@ import bpy
 
 from ...camera.camera import Camera
 from ...errors import TetFloraError
+from ...parameters import within
 from ...preview.levels import Levels
 from ...preview.light_plants import Shapes
-from ...setting import within
 from ..declare import FIXED, HIDDEN, boolean, choice, integer
 from ..runtime import Listeners, redraw
 from ..scene.camera import read_camera
