@@ -20,7 +20,7 @@ from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Branches, Seeds
 from tetflora_addon.growth.wind import Wind
-from tetflora_addon.refinement import shares
+from tetflora_addon.refinement import shared_parts
 from tetflora_addon.refinement.contents import PlantParts, Totals, bounding_box, subplant_totals, sums
 from tetflora_addon.refinement.loop import refine, step_of
 from tetflora_addon.refinement.settings import RefinementSettings
@@ -347,7 +347,7 @@ def test_what_is_asked_of_a_state_of_the_loop_changes_nothing() -> None:
 
 def test_solids_in_front_of_each_other_have_no_more_points_than_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tuft of 5,000 of them had ten million points; one alone has as many as it had, and no area is lost."""
-    monkeypatch.setattr(shares, "MOST_IN_SOLIDS", 5_000)
+    monkeypatch.setattr(shared_parts, "MOST_IN_SOLIDS", 5_000)
     solid = {"length": [2, 0], "thickness": [0.1, 0], "leaves": [90, 0], "leaf_size": [0.1, 0], "leaf_envelope": "box"}
     flora = support.compiled({**support.small(), "orders": [solid]})
     numbers = []
@@ -358,8 +358,8 @@ def test_solids_in_front_of_each_other_have_no_more_points_than_a_limit(monkeypa
         numbers.append(len(leaves))
         area = np.bincount(leaves.part, leaves.leaf, count)
         np.testing.assert_allclose(area, parts.totals.leaf_area, rtol=1e-5)
-        assert np.bincount(leaves.part, minlength=count).min() >= shares.FEWEST_IN_SOLID
-    assert numbers[0] == shares.MOST_IN_SOLID
+        assert np.bincount(leaves.part, minlength=count).min() >= shared_parts.FEWEST_IN_SOLID
+    assert numbers[0] == shared_parts.MOST_IN_SOLID
     assert 4_900 < numbers[1] < 5_100
 
 
