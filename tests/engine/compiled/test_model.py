@@ -171,7 +171,9 @@ def test_laterals_of_a_forked_branch_are_as_many_to_a_length() -> None:
     assert laterals.sum() / 400 == pytest.approx(12 * (0.5 + 2 * 0.5), rel=0.02)
     members = expected_members(flora.species[0])
     assert members.branches[1] == pytest.approx(18)
-    assert members.stems[0] == pytest.approx(3)
+    stems = ((pieces.t0 == 0) & (orders == 0)).sum() / 400
+    assert stems == 3
+    assert members.segments[0] == pytest.approx(stems * flora.rows["segments"][0])
 
 
 @pytest.mark.parametrize("power", [2.0, 2.5, 3.0])
