@@ -252,6 +252,7 @@ _LANES = {
     **dict.fromkeys(("blender/results", "blender/job"), 0.68),
     "planting": 0.78,
     "processes": 0.46,
+    "geodata": 0.82,
     "assets": 0.62,
     "blender/assets": 0.4,
     "blender/scene": 0.6,
