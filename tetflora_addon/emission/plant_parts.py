@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Parts of plants as the frontier draws them: leaves, wood and facets.
 
-A leaf is drawn as itself where a facet would be about as large (`change.Transition`). Branches that are opened are
+A leaf is drawn as itself where a facet would be about as large (`plants.Transition`). Branches that are opened are
 tubes while they are macroscopic, and else one thin triangle each, with the direction and the area of the branch.
 """
 

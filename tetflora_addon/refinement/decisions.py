@@ -101,7 +101,7 @@ def decide(cells: Terminals, transmittance: Floats, settings: RefinementSettings
     A tetrahedron's *contribution* is the number of pixels that its contents change: its pixels × the fraction of them
     that is not hidden × its own opacity. Of leaves wider than ``leaf_limit`` pixels some are drawn as leaves. A
     tetrahedron full of them is divided down to ``block`` pixels to find its hidden parts, and in depth until they are
-    about as large at its far end. Then it is made explicit; `emission.change.Transition` picks the real leaves in it.
+    about as large at its far end. Then it is made explicit; `emission.plants.Transition` picks the real leaves in it.
 
     What crosses the border of the view counts by its visible part. That may be small while the tetrahedron is not: then
     it is divided until the rest is out of view, or all of it would be made as fine as the visible part.

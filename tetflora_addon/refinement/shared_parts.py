@@ -260,7 +260,7 @@ class SharedParts(Generic[Parts]):
 PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
 #: The same of leaves that fill a solid, which cannot be opened: there is a point in each square of so many pixels.
 PIXELS_IN_SOLID, FEWEST_IN_SOLID, MOST_IN_SOLID = 3.0, 16, 2048
-#: Points in all of them together, but for the fewest: thousands may lie in front of each other.
+#: Points in all of them that get theirs at once, but for the fewest: thousands may lie in front of each other.
 MOST_IN_SOLIDS = 1_000_000
 #: Wood that is wider in the view than this part of the image is looked for where it is, whatever share of its plant it
 #: has: such sub-plants are opened at once, and their branches have points so many widths apart, at most so many.

@@ -140,6 +140,21 @@ def test_a_narrow_fisheye_is_no_whole_sphere(kind):
     assert there == [True, False]
 
 
+@pytest.mark.parametrize("sensor", [1.0, 5.0])
+def test_a_fisheye_of_a_few_degrees_sees_what_is_before_it(sensor):
+    """Its first buffer had no pixel within the view: nothing was refined."""
+    scene = bpy.context.scene
+    renders.small_scene(0.8, 4)
+    obj = add_camera(location=(0.0, -40.0, 1.0), rotation=(math.pi / 2.0, 0.0, 0.0))
+    obj.data.type, obj.data.panorama_type = 'PANO', 'FISHEYE_EQUISOLID'
+    obj.data.fisheye_lens, obj.data.sensor_width = 100.0, sensor
+    scene.render.resolution_x = scene.render.resolution_y = 60
+    add_plant("bush")
+    depsgraph().update()
+    statistics = refine.refine(scene, depsgraph())
+    assert statistics.passes > 3
+
+
 def _around():
     """Bushes around a panorama, and a spot that each longitude shows."""
     scene = bpy.context.scene

@@ -17,6 +17,7 @@ from tetflora_addon.blender import preferences
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.species import edits
 from tetflora_addon.blender.species.catalog import OWN_FILES, load_species_file
+from tetflora_addon.blender.species.editor import set_species_value
 from tetflora_addon.species import catalog, schema, skeletons
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -333,3 +334,10 @@ def test_orders_that_cannot_be_read_are_not_edited(orders, action):
     bpy.context.scene.tetflora.species_editor.species = "mine"
     assert bpy.ops.tetflora.edit_orders(action=action) == {'CANCELLED'}
     assert json.loads(edit.text)["orders"] == orders
+
+
+@pytest.mark.parametrize("model", [["kite"], {"kite": 1}, 3, None])
+def test_a_leaf_whose_model_is_no_name_is_that_of_the_file(model):
+    editor = _editor()
+    set_species_value(editor, "leaf", {"model": model})
+    assert editor.leaf_form == "OWN"

@@ -17,6 +17,8 @@ from .motion import exposure, moment, moves
 _NARROW = 1e-9  # of windows that single precision turns into nothing
 #: Half of the angle of view below which a fisheye is no whole sphere, radians.
 _NARROW_FISHEYE = math.pi / 4.0
+#: Radians from the axis that such a part of the sphere has at least.
+_LEAST_HALF = 0.1
 
 
 def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_only: bool = False) -> Camera:
@@ -143,7 +145,8 @@ def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[fl
     if not (angle > 0.0 and half > 0.0):  # nan as well
         return (0.0, 0.0, 0.0, 0.0), width, height
     if half < _NARROW_FISHEYE:  # the whole sphere would have as many more pixels as the view is narrow
-        pixels = max(math.ceil(2.0 * half / angle), 1)
+        # The first buffer of the loop has 32 pixels for each 90°: some have to be in the view.
+        pixels = max(math.ceil(2.0 * max(half, _LEAST_HALF) / angle), 1)
         half = pixels * angle / 2.0
         return (-half, half, -half, half), pixels, pixels
     pixels = max(round(math.pi / angle), 1)

@@ -57,7 +57,7 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
     Raises
     ------
     SpeciesError
-        Another type of object, a mesh with faces, no edges, scale 0, or as `skeleton_from_edges`; the message names the
+        Another type of object, a mesh with faces, no edges, a scale of 0 or above 100,000, or as `skeleton_from_edges`; the message names the
         object.
     """
     if obj.type not in SKELETON_TYPES:
@@ -68,7 +68,9 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
     matrix = world_matrix(obj, depsgraph)
     _, scale, sound = frames_of(matrix[None, :3, :3])
     if not sound[0]:
-        raise SpeciesError(f'"{obj.name}" cannot be the skeleton of a plant: its scale is 0; clear it with Alt S')
+        raise SpeciesError(
+            f'"{obj.name}" cannot be the skeleton of a plant: its scale is 0 or above 100,000; clear it with Alt S'
+        )
     if obj.type == 'MESH':
         (points, edges), line = _of_mesh(obj, depsgraph), None
     else:

@@ -177,7 +177,8 @@ def _form(editor: bpy.types.PropertyGroup, kind: str) -> str:
         return OBJECT_LEAF
     if kind == "blossom" and species_value(editor, kind, None) is None:
         return NO_LEAF
-    return model if (model := form.get("model")) in LEAF_MODELS and "outline" not in form else OWN_LEAF
+    model = form.get("model")  # of a file with errors anything at all
+    return model if isinstance(model, str) and model in LEAF_MODELS and "outline" not in form else OWN_LEAF
 
 
 def _set_form(editor: bpy.types.PropertyGroup, kind: str, identifier: str) -> None:
