@@ -57,8 +57,8 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
     Raises
     ------
     SpeciesError
-        Another type of object, a mesh with faces, no edges, a scale of 0 or above 100,000, or as `skeleton_from_edges`; the message names the
-        object.
+        Another type of object, a mesh with faces, no edges, a scale of 0 or above 100,000, or as
+        `skeleton_from_edges`; the message names the object.
     """
     if obj.type not in SKELETON_TYPES:
         raise SpeciesError(
