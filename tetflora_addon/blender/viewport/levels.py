@@ -194,8 +194,8 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
     preview = find(scene)
     if scene.tetflora.preview.plants == 'NONE' or preview is None or preview.moment == _moment(scene):
         return
-    rendering = depsgraph is None or depsgraph.mode == 'RENDER'  # whose frames are not the artist's
-    if not rendering and preview.seconds < _QUICK and on_main_thread():
+    shown = depsgraph is not None and depsgraph.mode == 'VIEWPORT'  # frames of a render are not the artist's
+    if shown and preview.seconds < _QUICK and on_main_thread():
         read_shapes(scene, depsgraph)
     else:
         schedule()
