@@ -155,7 +155,7 @@ class TETFLORA_PT_layers(SidebarPanel, bpy.types.Panel):
         Button("update_layers", 'FILE_REFRESH').draw(row)
         Button("update_layers", 'MOD_NOISE', "", {"which": 'ACTIVE', "reroll": True}).draw(row)
         row.prop(context.window_manager, "tetflora_points", text="", icon='PARTICLE_POINT')
-        layout.label(text=_status(layer), icon='INFO')
+        layout.label(text=_status(layer, len(group.layers) > 0), icon='INFO')
         if layer is None:
             return
         column = layout.column()
@@ -179,10 +179,10 @@ class TETFLORA_PT_layers(SidebarPanel, bpy.types.Panel):
                 draw_message(context, body, text)
 
 
-def _status(layer: bpy.types.PropertyGroup | None) -> str:
+def _status(layer: bpy.types.PropertyGroup | None, others: bool) -> str:
     """What is due, or wrong, or how many plants there will be: one line, so that no row moves."""
     if layer is None:
-        return "Click + to let something grow"
+        return "Select a layer, or click + to add one" if others else "Click + to let something grow"
     if layer.kind != SCATTER:
         return "Settings have changed: Update" if is_due(layer) else f"{plants_in(layer):,} plants"
     text = points.status(layer)
