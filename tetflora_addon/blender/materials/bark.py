@@ -11,7 +11,7 @@ the slope of u along the surface, which Bump nodes know.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import tau
 from typing import Any
 
@@ -195,14 +195,15 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         scale = given["Scale"] * (girth / _USUAL) ** bark.power
         cells = where["Place"] * graph.xyz(scale, scale, scale / given["Stretch"])
         place = Place(where["Place"], cells, where["Turn"], where["Along"], scale, given["Stretch"], girth)
-        tone, height = bark.pattern(graph, place)
+        pattern = pattern_part(graph, character, place)
+        tone, height = pattern["Tone"], pattern["Height"]
         age = graph.step(where["Perimeter"], given["Smooth Under"], given["Full Over"])
         # Roots, below the base, are thin but as old as the trunk.
         age = graph.math('MAXIMUM', age, graph.step(where["Along"], 0.0, _ROOTS))
         change = (tone / bark.mean - (1.0, 1.0, 1.0)) * (given["Contrast"] * age) + (1.0, 1.0, 1.0)
         color = graph.tinted(given["Color"], change)
         if bark.moss or bark.lichen:
-            color = _overgrown(graph, given, (place, girth, age), color)
+            color = growth_part(graph, color, place, age, given["Moss"], given["Lichen"])
         # Thickness must not be part of the height, whose slope alone is wanted.
         depth = where["Perimeter"] / (scale * tau) * given["Depth"] * age
         bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": depth, "Height": height})
@@ -217,20 +218,42 @@ def bark_group(character: str) -> bpy.types.NodeTree:
     return node_group(f"TetFlora {character.capitalize()} Bark", _VERSION, inputs, outputs, build)
 
 
+def pattern_part(graph: Graph, character: str, place: Place) -> dict[str, Term]:
+    """Group "TetFlora <Character> Bark Pattern": Tone, factors of the color, and Height, in widths of a feature."""
+    given = {field.name: getattr(place, field.name) for field in fields(place)}
+
+    def build(inner: Graph, terms: dict[str, Term]) -> dict[str, Any]:
+        tone, height = _bark(character).pattern(inner, Place(**{name: terms[name.title()] for name in given}))
+        return {"Tone": tone, "Height": height}
+
+    name = f"TetFlora {character.capitalize()} Bark Pattern"
+    inputs = {name.title(): term for name, term in given.items()}
+    return graph.part(name, _VERSION, inputs, (("Tone", 'Color'), ("Height", 'Float')), build)
+
+
 def base_girth(graph: Graph) -> Term:
     """Length around the branch at its base, meters; a usual one where the mesh does not say."""
     girth = graph.attribute("tf_girth", "Fac")
     return (girth < 1e-6) * _USUAL + girth
 
 
-def _overgrown(graph: Graph, given: dict[str, Term], at: tuple[Place, Term, Term], color: Term) -> Term:
-    """Moss where it is damp, lichen where a noise is low: as light as the bark beneath, so that the mean stays."""
-    place, girth, age = at
-    radii = girth / tau
-    noise = graph.noise(place.round * (radii * _PATCHES), 4.0, 0.65)[0]
+def growth_part(graph: Graph, color: Term, place: Place, age: Term, moss: Term, lichen: Term) -> Term:
+    """Group "TetFlora Bark Growth" of all barks: moss where it is damp, lichen where a noise is low.
+
+    Both are as light as the bark beneath, so that the mean stays.
+    """
+    given = {"Color": color, "Round": place.round, "Along": place.along, "Girth": place.girth, "Age": age}
+    given |= {"Moss": moss, "Lichen": lichen}
+    return graph.part("TetFlora Bark Growth", _VERSION, given, (("Color", 'Color'),), _grown)["Color"]
+
+
+def _grown(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
+    age, color = given["Age"], given["Color"]
+    radii = given["Girth"] / tau
+    noise = graph.noise(given["Round"] * (radii * _PATCHES), 4.0, 0.65)[0]
     normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
     damp = graph.step(graph.vector('DOT_PRODUCT', normal, _SHADY), -0.3, 0.9)
-    height = place.along * radii
+    height = given["Along"] * radii
     # The foot is damp all around.
     damp = graph.step(height, _SPLASH, 0.0) * 0.6 + damp * graph.step(height, _MOSSY, 0.0)
     # What does not say how thick it is may be no wood.
@@ -244,7 +267,7 @@ def _overgrown(graph: Graph, given: dict[str, Term], at: tuple[Place, Term, Term
     light = graph.outputs("ShaderNodeRGBToBW", {"Color": color})["Val"]
     for tint, amount in ((_LICHEN, lichen), (_ALGAE, algae), (_MOSS, moss)):
         color = graph.mixed(amount, color, tint * light)
-    return color
+    return {"Color": color}
 
 
 def bark_version(character: str) -> int:

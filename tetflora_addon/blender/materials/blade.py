@@ -120,7 +120,7 @@ def blade_group(kind: str) -> bpy.types.NodeTree:
     outputs = (("Reflected", 'Color'), ("Through", 'Color'), ("Gloss", 'Float'), ("Roughness", 'Float'))
     outputs = (*outputs, ("Normal", 'Vector'))
     name = f"TetFlora {kind.capitalize()} Leaf Blade"
-    return node_group(name, _VERSION, inputs, outputs, lambda graph, given: _built(graph, given, blade))
+    return node_group(name, _VERSION, inputs, outputs, lambda graph, given: _built(graph, given, name, blade))
 
 
 def blade_version(kind: str) -> int:
@@ -128,7 +128,7 @@ def blade_version(kind: str) -> int:
     return 100 * _VERSION + list(BLADES).index(kind)
 
 
-def _built(graph: Graph, given: dict[str, Term], blade: BladeLook) -> dict[str, Any]:
+def _built(graph: Graph, given: dict[str, Term], name: str, blade: BladeLook) -> dict[str, Any]:
     """What the group's outputs are linked to, by name."""
     place = graph.attribute("UVMap", "Vector")
     own = graph.math('FRACT', graph.vector('DOT_PRODUCT', graph.attribute("tf_color", "Vector"), _DIGITS))
@@ -137,7 +137,12 @@ def _built(graph: Graph, given: dict[str, Term], blade: BladeLook) -> dict[str, 
     side = geometry["Backfacing"] * 2.0 + -1.0  # -1 above, 1 below
     noise = _noise(graph, moved, 7.0, 2.0)
     mottled = (noise - 0.5) * given["Mottling"] + 1.0
-    tone, glow, height = _venation(graph, given, blade, place)
+    tone = glow = height = None
+    if blade.veins:
+        asked = {"Place": place} | {key: given[key] for key in ("Veins", "Midrib", "Vein Lines", "Dark Against Light")}
+        outputs = [(output, 'Float') for output in ("Tone", "Glow", "Height")]
+        veins = graph.part(f"{name} Veins", _VERSION, asked, outputs, lambda *at: _venation(*at, blade))
+        tone, glow, height = (veins[output] for output, _ in outputs)
 
     back, through = (_varied(graph, mottled, *line) for line in ((tone, _VEIN_HUE), (glow, _THROUGH_HUE)))
     back = back * paler(side * given["Paler Underside"])
@@ -166,15 +171,9 @@ def sheen(graph: Graph, side: Term, gloss: Term) -> Term:
     return (side * -GLOSSIER + 1.0) * gloss * (facing**5.0 * _GRAZING + _FACING)
 
 
-def _venation(
-    graph: Graph, given: dict[str, Term], blade: BladeLook, place: Term
-) -> tuple[Term | None, Term | None, Term | None]:
-    """Tone of the lines in reflected and in passing light, 0 on average, and the height of the blade, from 0 to 1.
-
-    None where the blade has no veins.
-    """
-    if not blade.veins:
-        return None, None, None
+def _venation(graph: Graph, given: dict[str, Term], blade: BladeLook) -> dict[str, Term]:
+    """Tone of the lines in reflected and in passing light, 0 on average, and the height of the blade, from 0 to 1."""
+    place = given["Place"]
     u, v, _ = graph.parts(place)
     across, along = u - 0.5, v
     aside = abs(across)
@@ -204,7 +203,7 @@ def _venation(
         net = (graph.step(edge["Distance"], 0.12, 0.02) - _NET_MEAN) * given["Vein Lines"]
         lines, glow = net * 0.35 + lines, net * 0.5 + glow
     blade_only = v > 0.0  # petioles lie below 0 in the UV map
-    return lines * blade_only, glow * blade_only, dome
+    return {"Tone": lines * blade_only, "Glow": glow * blade_only, "Height": dome}
 
 
 def _nearest_rib(graph: Graph, aside: Term, along: Term) -> tuple[Term, Term]:

@@ -13,11 +13,10 @@ import bpy
 from ...emission.light import BACK, FRONT
 from ...optics import GLOSS
 from ..compat import disable_bump_correction
-from ..runtime import is_there
 from .bark import bark_group, bark_version, place_group
 from .blade import HAIRY, WAXY, blade_group, blade_version, paler, sheen
 from .microsphere import WHITE, scatter_group
-from .nodes import Graph, Term, surface_material
+from .nodes import Graph, Term, is_own, surface_material
 
 PROXY = "TetFlora proxy"
 SPHERE = "TetFlora microsphere"
@@ -112,17 +111,16 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
 
 def bark_steps(species_name: str, character: str) -> Iterator[None]:
     """What `bark_material` needs and this file has not yet, piece by piece: nodes take some hundredths of a second."""
-    made = []
+    before = set(bpy.data.node_groups.keys())
     try:
         if f"TetFlora {species_name} bark" not in bpy.data.materials:
-            made.append(place_group())
+            place_group()
             yield
-            made.append(bark_group(character))
+            bark_group(character)
             yield
     except GeneratorExit:  # Esc, before there is a material that uses them and goes with the results
-        for group in reversed(made):
-            if is_there(group) and not group.users:
-                bpy.data.node_groups.remove(group)
+        while made := [g for g in bpy.data.node_groups if g.name not in before and is_own(g) and not g.users]:
+            bpy.data.batch_remove(made)  # groups, then those within them
         raise
 
 
