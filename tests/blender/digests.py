@@ -131,6 +131,8 @@ def difference(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any
 
 
 def _difference(before: Any, after: Any, path: str) -> list[str]:
+    if before == after:
+        return []
     if isinstance(before, dict) and isinstance(after, dict):
         keys = sorted(set(before) | set(after), key=str)
         gone = [f"{path}/{k}: gone" for k in keys if k not in after]
@@ -145,7 +147,7 @@ def _difference(before: Any, after: Any, path: str) -> list[str]:
                 for line in _difference(before[k], after[k], f"{path}/{k}")
             ]
         )
-    return [] if before == after else [f"{path}: {before!r} became {after!r}"[:300]]
+    return [f"{path}: {before!r} became {after!r}"[:300]]
 
 
 def _struct(value: Any, depth: int) -> dict[str, Any]:
@@ -159,7 +161,7 @@ def _struct(value: Any, depth: int) -> dict[str, Any]:
             held = getattr(value, prop.name)
         except (AttributeError, TypeError, RuntimeError):
             continue  # what this Blender does not tell here
-        found[prop.name] = _plain(held, prop, depth)
+        found[prop.name] = held if prop.is_itself else _plain(held, prop, depth)
     if bulk:
         found["attributes"] = _bulk(value)
     if isinstance(value, (bpy.types.ID, bpy.types.PropertyGroup)):
@@ -174,6 +176,7 @@ class _Property(NamedTuple):
     type: str
     is_array: bool
     is_flag: bool
+    is_itself: bool  # what it holds needs no rounding, and nothing is within it
 
 
 def _properties(value: Any) -> list[_Property]:
@@ -181,12 +184,16 @@ def _properties(value: Any) -> list[_Property]:
     kind = value.bl_rna.identifier
     if kind not in _known:
         every = (p for p in value.bl_rna.properties if p.identifier not in PASSING)
-        flags = ("is_array", "is_enum_flag")
-        _known[kind] = [_Property(p.identifier, p.type, *(getattr(p, f, False) for f in flags)) for p in every]
+        _known[kind] = [
+            _Property(p.identifier, p.type, array, flag, not (array or flag) and p.type in _ITSELF)
+            for p in every
+            for array, flag in [(getattr(p, "is_array", False), getattr(p, "is_enum_flag", False))]
+        ]
     return _known[kind]
 
 
 _known: dict[str, list[_Property]] = {}
+_ITSELF = {'BOOLEAN', 'INT', 'STRING', 'ENUM'}
 
 
 def _plain(held: Any, prop: _Property, depth: int) -> Any:
@@ -206,6 +213,8 @@ def _plain(held: Any, prop: _Property, depth: int) -> Any:
         if depth >= 6:
             return len(held)
         return {n: _item(item, depth) for n, item in enumerate(held)}
+    if prop.is_array and len(held) and isinstance(held[0], (int, float)):
+        return tuple([round(number, 6) for number in held])
     if prop.is_array:
         return tuple(np.array(held, dtype=float).reshape(-1).round(6).tolist())
     if prop.is_flag:

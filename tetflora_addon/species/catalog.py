@@ -109,10 +109,23 @@ def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
     """
     found: dict[str, SpeciesInfo] = {}
     for folder in (builtin_folder(), *folders):
-        for path, reason in _files(folder):
-            if not reason:
-                found[path.stem] = _info(path, _stamp(path))
+        found |= _listed(folder, _entries(folder))
     return in_order(found)
+
+
+def _entries(folder: Path) -> tuple[tuple[str, int, int, int], ...]:
+    """What a folder holds: names, times, sizes and kinds of its files. A change of any shows here."""
+    try:
+        with os.scandir(folder) as entries:
+            stats = [(entry.name, entry.stat(follow_symlinks=False)) for entry in entries]
+    except (OSError, ValueError):
+        return ()
+    return tuple(sorted((name, stat.st_mtime_ns, stat.st_size, stat.st_mode) for name, stat in stats))
+
+
+@lru_cache(maxsize=64)
+def _listed(folder: Path, _entries: tuple[tuple[str, int, int, int], ...]) -> dict[str, SpeciesInfo]:
+    return {path.stem: _info(path, _stamp(path)) for path, reason in _files(folder) if not reason}
 
 
 def load_species(

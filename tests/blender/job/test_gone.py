@@ -9,7 +9,7 @@ another window, a script, or another add-on.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 
 import bpy
 import pytest
@@ -27,7 +27,7 @@ Steps = Generator[object, object, object]
 
 
 @pytest.fixture
-def scene(clean_file) -> Iterator[bpy.types.Scene]:
+def scene(clean_file) -> bpy.types.Scene:
     """Two plants and a mesh that takes part before a small camera, in a scene that is not the only one."""
     bpy.data.scenes.new("another")
     made = bpy.context.scene
@@ -43,8 +43,7 @@ def scene(clean_file) -> Iterator[bpy.types.Scene]:
     made.view_layers.new("other")
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="Begin")
-    yield made
-    session.clean_file()
+    return made
 
 
 def refining(scene: bpy.types.Scene) -> Steps:

@@ -9,14 +9,13 @@ compared is in `digests`: everything but what Blender's memory of undo does not 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 import pytest
 
 import operators
-from devtools import session
 from tests import places_files
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
@@ -256,11 +255,9 @@ def erase_place() -> None:
 
 
 @pytest.fixture
-def history(clean_file) -> Iterator[None]:
+def history(clean_file) -> None:
     """An empty file, the memory of undo included."""
     bpy.ops.ed.undo_push(message="Begin")
-    yield
-    session.clean_file()
 
 
 def check(operator: str, options: dict) -> None:

@@ -72,6 +72,26 @@ def test_shipped_files_are_all_listed() -> None:
     assert set(list_species()) == SHIPPED
 
 
+def test_folders_are_gone_through_once_until_a_file_in_them_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nothing is drawn, species are listed for each of a scene's plants."""
+    put(tmp_path, "mine.json")
+    list_species([tmp_path])
+    looked = []
+    real = catalog.is_regular
+    monkeypatch.setattr(catalog, "is_regular", lambda path: looked.append(path.stem) or real(path))
+    assert "mine" in list_species([tmp_path])
+    assert looked == []
+    put(tmp_path, "other.json")
+    assert {"mine", "other"} <= set(list_species([tmp_path]))
+    put(tmp_path, "mine.json", name="Another Name")
+    assert list_species([tmp_path])["mine"].name == "Another Name"
+    (tmp_path / "mine.json").unlink()
+    assert set(list_species([tmp_path])) == SHIPPED | {"other"}
+    assert set(looked) == {"mine", "other"}  # not those of the shipped folder
+
+
 def test_a_file_that_goes_away_while_folders_are_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     put(tmp_path, "mine.json")
     real = catalog.is_regular
