@@ -53,6 +53,9 @@ PATIENCE, STARTING = 6, 60
 #: Seconds by the clock after which a run waits for something that does not come; long, as others may be at work beside.
 ASLEEP = 7200.0
 
+#: Whole numbers from here on grow by half. Smaller numbers than the second only keep quotients defined.
+HUNDRED, AS_GOOD_AS_0 = 100, 1e-9
+
 _SWAPS = {
     ast.Add: ("+", "-"), ast.Sub: ("-", "+"), ast.Mult: ("*", "/"), ast.Div: ("/", "*"), ast.FloorDiv: ("//", "*"),
     ast.Mod: ("%", "*"), ast.Pow: ("**", "*"), ast.BitAnd: ("&", "|"), ast.BitOr: ("|", "&"), ast.LShift: ("<<", ">>"),
@@ -79,7 +82,11 @@ class Mutant:
 
 
 class _Finder(ast.NodeVisitor):
-    """All changes of one file that are possible; types, docstrings and texts have none."""
+    """All changes of one file that are possible; types, docstrings and texts have none.
+
+    Nor has what no test could tell, as results stay the same: see `visit_ClassDef`, `visit_keyword`, `visit_Assign` and
+    `visit_Constant`.
+    """
 
     def __init__(self, path: str, source: bytes) -> None:
         self.path, self.source = path, source
@@ -107,6 +114,16 @@ class _Finder(ast.NodeVisitor):
         if at >= 0 and b"#" not in self.source[begin:end]:
             self._add(at, at + len(before), after)
 
+    def visit_ClassDef(self, node: ast.ClassDef) -> None:
+        """Its decorators, as those of functions, decide what a mistake would raise, and how much is remembered."""
+        for statement in node.body:
+            self.visit(statement)
+
+    def visit_keyword(self, node: ast.keyword) -> None:
+        """``strict`` of a zip turns a mistake into an error, and changes no result without one."""
+        if node.arg != "strict":
+            self.generic_visit(node)
+
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         for default in (*node.args.defaults, *filter(None, node.args.kw_defaults)):
             self.visit(default)
@@ -120,7 +137,9 @@ class _Finder(ast.NodeVisitor):
             self.visit(node.value)
 
     def visit_Assign(self, node: ast.Assign) -> None:
-        if not any(isinstance(target, ast.Name) and target.id.startswith("__") for target in node.targets):
+        """Names with two underscores are Python's; a batch or chunk is how work is cut, and results do not know it."""
+        names = [target.id for target in node.targets if isinstance(target, ast.Name)]
+        if not any(name.startswith("__") or name.endswith(("BATCH", "CHUNK")) for name in names):
             self.visit(node.value)
 
     def visit_Raise(self, node: ast.Raise) -> None:
@@ -155,12 +174,16 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_Constant(self, node: ast.Constant) -> None:
+        """A number grows by half, a small whole one by 1: 1 more than a hundred or a thousand is next to nothing.
+
+        What is as good as 0 only keeps a quotient defined; half as much more is as good as 0 again.
+        """
         value = node.value
         if isinstance(value, bool):
             self._add(self._begin(node), self._end(node), str(not value))
         elif isinstance(value, int):
-            self._add(self._begin(node), self._end(node), str(value + 1))
-        elif isinstance(value, float):
+            self._add(self._begin(node), self._end(node), str(value + (1 if value < HUNDRED else value // 2)))
+        elif isinstance(value, float) and (not value or value > AS_GOOD_AS_0):
             self._add(self._begin(node), self._end(node), repr(value * 1.5 if value else 1.0))
 
 

@@ -31,7 +31,7 @@ from ..growth.axes import Axes
 from ..growth.foliage import leaf_keys, leaf_places, place_leaves
 from ..growth.growth import WholeBranches, branch_counts, leaf_counts, radius_at
 from ..growth.hashing import Draw, child_key, uniform
-from ..growth.rows import FORK, ranged
+from ..growth.rows import FORK, SPUR_ORDER, ranged
 from ..growth.seeds import Branches
 
 #: Pixels by which a tube may be off the round and bent branch that it stands for.
@@ -417,8 +417,9 @@ def collars(rows: Table, branches: Branches) -> tuple[Floats, Floats]:
     thickness = np.maximum(ranged(rows, "thickness", row, branches.key, Draw.THICKNESS), 0.1)
     parent = branches.radius * np.where(rows["pipe"][row] > 0, _PIPED, 1.0) / thickness
     length = np.minimum(np.minimum(1.2 * parent, _LONGEST * branches.radius), branches.length / 3.0)
-    grown = (rows["order"][row] > 0) & (rows["order"][row] < 100) & ~rows["continues"][row] & (rows["flare"][row] <= 0)
-    return np.where(grown & ~rows["drawn"][row], _COLLAR, 0.0), np.maximum(length, 1e-9)
+    order, continues = rows["order"][row], rows["continues"][row] | rows["drawn"][row]
+    grown = (order > 0) & (order < SPUR_ORDER) & ~continues & (rows["flare"][row] <= 0)
+    return np.where(grown, _COLLAR, 0.0), np.maximum(length, 1e-9)
 
 
 def has_foot(rows: Table, branches: Branches) -> Mask:

@@ -139,6 +139,14 @@ def test_what_is_no_longer_on_the_trees_is_on_the_ground(name, day):
     assert _on_day(living, day)[0] + patches * _on_day(fallen, day)[0] == pytest.approx(summer, rel=0.03)
 
 
+def test_what_has_rotted_is_brown_of_one_hue():
+    """Lighter and darker, but none redder or bluer than the others."""
+    browns = np.array(_leaves("beech").year.leaf.autumn)
+    assert (np.diff(browns, axis=1) < 0).all()
+    np.testing.assert_allclose(browns / browns[:, :1], np.tile(browns[0] / browns[0, 0], (len(browns), 1)), rtol=0.03)
+    assert 0.05 < browns.mean() < 0.15
+
+
 @pytest.mark.parametrize("name", ["oak", "birch", "maple", "larch", "beech"])
 def test_fallen_leaves_have_the_colors_of_autumn_and_turn_brown_and_are_gone_before_summer(name):
     living, fallen = load_species(name), _leaves(name)

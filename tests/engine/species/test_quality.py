@@ -158,6 +158,8 @@ def test_forks_short_shoots_and_the_pipe_model(quality: float) -> None:
     assert expected_polygons(after) == pytest.approx(quality * expected_polygons(before), rel=TOLERANCE)
     assert leaf_area(after) == pytest.approx(leaf_area(before), rel=0.05)
     assert after.quality == 1
+    # The pipe model itself divides a stem's section among its limbs.
+    assert after.orders[1].thickness == before.orders[1].thickness
 
 
 @pytest.mark.parametrize("quality", [0.0, -1.0, 0.00009, 1001.0, math.inf, math.nan])

@@ -8,6 +8,7 @@ import copy
 import json
 import math
 import random
+import re
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,10 +24,12 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.leaves.models import LEAF_MODELS, MAX_LEAF_POLYGONS, leaf_model
+from tetflora_addon.parameters import keys_of
 from tetflora_addon.species.catalog import list_species, load_species
+from tetflora_addon.species.growing import Ages
 from tetflora_addon.species.schema import MAX_FILE_BYTES, ORDER_KEYS, read_species, species_from_dict
 from tetflora_addon.species.skeletons import MAX_ORDERS
-from tetflora_addon.species.species import CROWN_PROFILES, crown_ratio
+from tetflora_addon.species.species import CROWN_PROFILES, Bud, Dead, Ecology, LeafYear, Range, Year, crown_ratio
 
 
 def refusal(data: Any) -> str:
@@ -389,3 +392,29 @@ def test_documentation_is_current() -> None:
     assert species_docs.updated(text) == text
     for name in ORDER_KEYS:
         assert f"`{name}`" in text
+
+
+def numbers_of(text: str) -> set[float]:
+    return {float(n.replace(",", "").replace("−", "-")) for n in re.findall(r"[−-]?\d[\d,]*(?:\.\d+)?", text)}
+
+
+@pytest.mark.parametrize(
+    ("table", "kind"),
+    [
+        ("`bud`", Bud), ("`dead`", Dead), ("`year`", Year), ("`leaf`, `blossom`", LeafYear), ("`age`", Ages),
+        ("`ecology`", Ecology),
+    ],
+)  # fmt: skip
+def test_tables_of_parts_say_what_the_reader_takes(table: str, kind: type) -> None:
+    """Limits, where a row tells any, and numbers that stand for a key that is left out."""
+    text = species_docs.PAGE.read_text(encoding="utf-8")
+    rows = text.split(f"\n| {table} | contents |\n")[1].split("\n\n")[0].splitlines()[1:]
+    for name, key in keys_of(kind).items():
+        (row,) = [row for row in rows if f"`{name}`" in row.split("|")[1]]
+        told = row.split("|", 2)[2]
+        default = [] if key.needed or not isinstance(key.default, (float, int, tuple, Range)) else key.default
+        default = [default.mean, default.variation] if isinstance(default, Range) else np.ravel(default)
+        if "default" in told and "none" not in told:
+            assert numbers_of(told) >= set(default), row
+        limits = [tuple(map(float, pair)) for pair in re.findall(r"(\d[\d.]*) to (\d[\d.]*\d|\d)", told)]
+        assert not limits or (key.low, key.high) in limits, row

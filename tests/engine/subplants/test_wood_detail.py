@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -13,9 +14,13 @@ from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.averages import tube_perimeter
-from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.growth.growth import WholeBranches, radius_at
-from tetflora_addon.growth.rows import FORK
+from tetflora_addon.growth.rows import DEAD_ORDER, FORK, SPUR_ORDER
+from tetflora_addon.growth.seeds import Branches
+from tetflora_addon.species.catalog import load_species
+from tetflora_addon.species.members import expected_polygons
+from tetflora_addon.species.quality import with_quality
 from tetflora_addon.subplants.pieces import expand
 from tetflora_addon.subplants.rings import (
     DEVIATION,
@@ -23,6 +28,7 @@ from tetflora_addon.subplants.rings import (
     PLACES,
     Pixels,
     buttresses,
+    collars,
     fine_sides,
     fineness,
     finer,
@@ -185,9 +191,9 @@ def test_roots_lead_into_the_ground() -> None:
 
 
 def test_the_estimate_expects_what_near_wood_has() -> None:
-    flora = support.flora()
-    for species in (support.SPECIES.index("ash"), support.SPECIES.index("beech")):
-        for some in grown(flora, species)[:2]:
+    for species in map(load_species, ("ash", "beech")):
+        flora = compile_species([with_quality(species, 50_000.0 / expected_polygons(species))])
+        for some in islice(expand(flora, support.trunks(flora.rows, support.plants([1]))), 2):
             for pixel in (0.004, 0.001):
                 made = tube_buffers(flora, [some], even(pixel)).polygons
                 rows = flora.rows[some.branches.row]
@@ -216,3 +222,13 @@ def test_stems_leave_a_fork_without_a_gap(forks: int) -> None:
     ball = beyond[(away > 0.4 * radius) & (away < 1.5 * radius)]
     ball /= np.linalg.norm(ball, axis=1)[:, None]
     assert np.degrees(np.arccos(np.clip((directions @ ball.T).max(axis=1), -1.0, 1.0))).max() < 30.0
+
+
+def test_only_what_grows_on_living_wood_has_a_collar() -> None:
+    """Neither trunks, nor short shoots and dead branches, nor what flares."""
+    flora = support.compiled(support.RICH)
+    branches = Branches.concatenate([some.branches for some in grown(flora)])
+    order, thicker = flora.rows["order"][branches.row], collars(flora.rows, branches)[0] > 0
+    assert {0, 1, 2, SPUR_ORDER, DEAD_ORDER} <= set(order)
+    assert not thicker[(order == 0) | (order >= SPUR_ORDER)].any()
+    assert thicker[(order == 1) | (order == 2)].any()
