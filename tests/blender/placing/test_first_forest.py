@@ -57,7 +57,7 @@ def test_an_empty_scene_becomes_a_forest_that_can_be_refined():
     assert scene.world is not None
     assert [o.type for o in scene.objects if o.type == 'LIGHT'] == ['LIGHT']
     assert {c.name for c in scene.collection.children} == {"First forest", "TetFlora plants"}
-    scene.render.resolution_x, scene.render.resolution_y = 160, 90
+    scene.render.resolution_x, scene.render.resolution_y = 80, 45
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
 
 

@@ -200,22 +200,22 @@ def test_a_picture_with_motion_blur_is_the_mean_of_pictures_while_the_shutter_is
     scene.render.use_motion_blur, scene.render.motion_blur_position = True, 'CENTER'
     scene.render.motion_blur_shutter = 0.5
     scene.camera.data.lens = 80.0
-    scene.render.resolution_x = scene.render.resolution_y = 128
+    scene.render.resolution_x = scene.render.resolution_y = 96
     scene.render.use_border = scene.render.use_crop_to_border = True  # the middle half shows enough of both
     scene.render.border_min_y, scene.render.border_max_y = 0.25, 0.75
     scene.frame_set(5)
     refine.refine(scene, depsgraph())
-    soft = blurred_render(scene, tmp_path / "soft.png")
+    soft = blurred_render(scene, tmp_path / "soft.png", 96)
     for obj in made(scene):
         obj.data.attributes.remove(obj.data.attributes["velocity"])
-    sharp = blurred_render(scene, tmp_path / "sharp.png")
+    sharp = blurred_render(scene, tmp_path / "sharp.png", 96)
     exposures = []
     for number in range(8):
         at = 5 + ((number + 0.5) / 8 - 0.5) * 0.5
         scene.frame_set(int(at), subframe=at % 1.0)
         scene.render.use_motion_blur = False
         refine.refine(scene, depsgraph())
-        exposures.append(blurred_render(scene, tmp_path / "one.png", samples=16))
+        exposures.append(blurred_render(scene, tmp_path / "one.png", 96, 16))
     truth = np.mean(exposures, axis=0)
     off, still_off = (np.abs(picture - truth).mean() for picture in (soft, sharp))
     assert off < 0.75 * still_off  # what is left is noise: leaves turn while they move
