@@ -69,8 +69,8 @@ SMALL: dict[str, Any] = {
 }  # fmt: skip
 
 
-#: Of one plant of the shipped species in most tests.
-MOST_POLYGONS = 50_000.0
+#: Of one plant of the shipped species in most tests, and where any plant will do.
+MOST_POLYGONS, FEW_POLYGONS = 50_000.0, 25_000.0
 
 
 def shipped(identifier: str) -> dict[str, Any]:
@@ -127,10 +127,15 @@ def described() -> Flora:
 
 
 @cache
-def flora() -> Flora:
+def flora(most: float = MOST_POLYGONS) -> Flora:
     """The same, the largest with fewer polygons: what is true of every plant is true of these, and sooner seen."""
     species = [load_species(name) for name in SPECIES]
-    return compile_species([with_quality(s, min(MOST_POLYGONS / expected_polygons(s), 1.0)) for s in species])
+    return compile_species([with_quality(s, min(most / expected_polygons(s), 1.0)) for s in species])
+
+
+def lean() -> Flora:
+    """The same with fewer still, for what does not depend on how plants are divided."""
+    return flora(FEW_POLYGONS)
 
 
 @cache

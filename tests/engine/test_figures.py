@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from tests.engine import support
+from tests.engine.growth.test_drawn import flora as drawn_flora
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.compiled.sizes import crown_of
 from tetflora_addon.growth.growth import trunks
@@ -41,7 +42,7 @@ from tetflora_addon.subplants.tubes import tube_buffers
 
 KEPT = Path(__file__).parents[1] / "data" / "figures.json"
 #: By which part of itself a sum may differ: machines add up in another order.
-ROUNDING = 1e-6
+ROUNDING = 1e-9
 
 #: All that `support.RICH` has, on a day of the year and at an age.
 PAGE: dict[str, Any] = support.RICH | {
@@ -106,8 +107,21 @@ def meshes(flora: Flora, shapes: np.ndarray | None = None) -> list[Any]:
 def compiled(flora: Flora) -> list[Any]:
     """What is known before plants are grown."""
     names = "bound", "raised_bound", "limb_reach", "averages", "sampled_bound", "orientation", "clumping", "samples"
-    some = trunks(flora.rows, support.plants(np.arange(3)))
-    return [[getattr(flora, name) for name in names], bounding_capsules(flora, some), subplant_totals(flora, some)]
+    return [[getattr(flora, name) for name in (*names, "shaped_totals")], known(flora)]
+
+
+def known(flora: Flora) -> list[Any]:
+    """The same of plants of some shapes, and of each of their branches."""
+    seeds = replace(support.plants([5, 6]), crown=crown_shapes(2, [1.0, 1.4], [0.0, 0.2], 0.3, -0.2, 1.2))
+    some = [trunks(flora.rows, seeds), *(whole.branches for whole in expand(flora, trunks(flora.rows, seeds)))]
+    laws = flora.leaf_areas, flora.leaf_colors, flora.wood_areas, flora.face_counts, flora.one_leaf_area
+    return [[[law(own) for law in laws], bounding_capsules(flora, own), subplant_totals(flora, own)] for own in some]
+
+
+def on_day(day: float) -> list[Any]:
+    """Plants as they are, and as they are expected to be, on a day of the year."""
+    flora = flora_of(rich()).in_year(Season(day=day))
+    return [meshes(flora), known(flora)]
 
 
 def flora_of(species: Species) -> Flora:
@@ -121,8 +135,9 @@ FIGURES: dict[str, Callable[[], Any]] = {
     "crown shapes": lambda: meshes(flora_of(rich()), crown_shapes(2, 1.4, 0.2, 0.3, -0.2, 1.2)),
     "dense": lambda: [meshes(flora_of(replace(rich(), habit=1.0))), crown_of(replace(rich(), habit=1.0))],
     "wind": lambda: meshes(flora_of(rich()).in_wind(Wind(speed=11.0, time=3.3))),
-    **{f"day {day}": lambda day=day: meshes(flora_of(rich()).in_year(Season(day=day))) for day in (20, 118, 293)},
+    **{f"day {day}": lambda day=day: on_day(day) for day in (20, 118, 293)},
     **{f"{years} years": lambda years=years: meshes(flora_of(with_age(rich(), years))) for years in (4, 35, 145)},
+    "drawn": lambda: [drawn_flora().rows, meshes(drawn_flora()), compiled(drawn_flora())],
     "quality": lambda: [with_quality(rich(), factor).orders for factor in (0.3, 3.0)],
     "litter": lambda: [litter_page(rich(), PAGE), leaves_page(rich(), PAGE)],
     "leaf models": lambda: [[model, leaf_kites(model)] for model in LEAF_MODELS.values()],

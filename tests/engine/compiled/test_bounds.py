@@ -54,9 +54,9 @@ def outside(flora: Flora, subplants: Branches) -> float:
 
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_every_vertex_of_many_plants_is_inside_the_bound(species: int) -> None:
-    """As many as sixty thousand polygons make, at most 25."""
-    flora = support.flora()
-    number = min(25, max(1, int(6e4 / flora.polygons[flora.first_row[species]])))
+    """As many as twenty-five thousand polygons make, at most 12."""
+    flora = support.lean()
+    number = min(12, max(1, int(2.5e4 / flora.polygons[flora.first_row[species]])))
     trunk = support.trunks(flora.rows, support.plants(np.arange(number), species))
     assert outside(flora, trunk) < _FLOAT32
 
@@ -64,11 +64,11 @@ def test_every_vertex_of_many_plants_is_inside_the_bound(species: int) -> None:
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_subplants_of_all_orders(species: int) -> None:
     """Every vertex is inside their bounds."""
-    flora = support.flora()
+    flora = support.lean()
     level = support.trunks(flora.rows, support.plants(1, species))
     while len(level):
         level, *_ = open_subplants(flora, level.take(np.s_[:: max(1, len(level) // 12)]))
-        some = level.take(np.s_[:: max(1, len(level) // 4)])
+        some = level.take(np.s_[:: max(1, len(level) // 3)])
         assert outside(flora, some) < _FLOAT32
 
 
@@ -232,7 +232,7 @@ def test_what_is_longer_has_the_larger_bound() -> None:
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_samples_are_inside_the_bound(species: int) -> None:
     """And inside the tighter bound that says how large sub-plants look: points on sub-plants of all orders."""
-    flora = support.flora()
+    flora = support.lean()
     level = support.trunks(flora.rows, support.plants([1, 2, 3], species))
     while len(level):
         some = level.take(np.s_[:: max(1, len(level) // 40)])

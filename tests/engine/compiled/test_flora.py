@@ -19,7 +19,7 @@ from tetflora_addon.subplants.pieces import chunks, open_subplants, wood_areas
 
 def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:
     """By plant: leaves, leaf area, wood area over that of its compiled mean, polygons."""
-    flora = support.flora()
+    flora = support.lean()
     trunk = support.trunks(flora.rows, support.plants(np.arange(count) + 1000, species))
     out: dict[str, list] = {"leaf_count": [], "leaf_area": [], "polygons": [], "wood": [], "wood_expected": []}
     for run in chunks(flora.polygons[trunk.row], 400_000):
@@ -43,8 +43,8 @@ def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_averages_are_those_of_grown_plants(species: int) -> None:
     """Within four standard errors; the wood as a ratio, for it depends on the trunk's size."""
-    flora = support.flora()
-    found = samples_of_plants(species, min(240, int(1.2e6 / flora.polygons[flora.first_row[species]])))
+    flora = support.lean()
+    found = samples_of_plants(species, min(120, int(5e5 / flora.polygons[flora.first_row[species]])))
     row = flora.first_row[species]
     for name in ("leaf_count", "leaf_area", "polygons"):
         expected, values = flora.area_nodes[row, 0] if name == "leaf_area" else getattr(flora, name)[row], found[name]
@@ -105,9 +105,9 @@ def test_colors_are_means_weighted_by_area() -> None:
 
 @pytest.mark.parametrize("species", [support.SPECIES.index(name) for name in support.DENSE], ids=support.DENSE)
 def test_orientation_of_whole_plants(species: int) -> None:
-    flora = support.flora()
-    # A few hundred thousand polygons settle the mean: of what has as many branches as that, six plants.
-    number = int(np.clip(3e5 / flora.polygons[flora.first_row[species]], 6, 12))
+    flora = support.lean()
+    # A hundred thousand polygons or two settle the mean: of what has as many branches as that, six plants.
+    number = int(np.clip(1.5e5 / flora.polygons[flora.first_row[species]], 6, 12))
     trunk, pieces = support.grown(flora, support.plants(np.arange(number), species))
     tubes, leaves = support.meshes(flora, pieces)
     expected = leaf_moments(flora.orientation, trunk).mean(axis=0)
@@ -119,7 +119,7 @@ def test_orientation_of_whole_plants(species: int) -> None:
 @pytest.mark.parametrize("species", [support.SPECIES.index(name) for name in support.DENSE], ids=support.DENSE)
 def test_orientation_of_subplants_at_any_tilt(species: int) -> None:
     """Boughs of many plants, sorted by how steeply they stand, each group against what their axes foretell."""
-    flora = support.flora()
+    flora = support.lean()
     trunk = support.trunks(flora.rows, support.plants(np.arange(8), species))
     boughs, *_ = open_subplants(flora, trunk)
     steepness = np.argsort(boughs.frame[:, 2, 2])
@@ -137,7 +137,7 @@ def test_orientation_of_standing_plants_to_a_hundredth(name: str) -> None:
 
     None bears fruit, of which less shows than its faces have.
     """
-    flora = support.flora()
+    flora = support.lean()
     species = support.SPECIES.index(name)
     number = int(np.clip(1e6 / flora.polygons[flora.first_row[species]], 4, 60))
     boughs, *_ = open_subplants(flora, support.trunks(flora.rows, support.plants(np.arange(number), species)))
@@ -151,7 +151,7 @@ def test_orientation_of_standing_plants_to_a_hundredth(name: str) -> None:
 @pytest.mark.parametrize("name", ["beech", "birch", "bush", "fern", "palm", "willow"])
 def test_orientation_of_branches_turned_any_way(name: str) -> None:
     """Leafy branches turned as no plant of the species has them, sorted by how steeply they stand then."""
-    flora = support.flora()
+    flora = support.lean()
     species = support.SPECIES.index(name)
     some = support.trunks(flora.rows, support.plants(np.arange(100 if name in ("fern", "palm") else 4), species))
     while flora.leaf_count[some.row].mean() > 200:
@@ -178,9 +178,9 @@ def sample_positions(points: Points, subplants: Branches) -> np.ndarray:
 @pytest.mark.parametrize("species", [support.SPECIES.index(name) for name in support.DENSE], ids=support.DENSE)
 def test_sample_points_lie_where_leaves_and_wood_are(species: int) -> None:
     """Mean and spread of height and distance from the trunk, in units of its length."""
-    flora = support.flora()
+    flora = support.lean()
     row = flora.first_row[species]
-    number = int(1.2e6 / flora.polygons[row])
+    number = int(5e5 / flora.polygons[row])
     trunk, pieces = support.grown(flora, support.plants(np.arange(number), species))
     tips = pieces.take(pieces.t1 == 1)
     owner, position, size = support.leaves_of(flora, tips.branches)

@@ -309,3 +309,12 @@ def test_finer_facets_are_more_and_fewer_are_real_beyond_a_higher_limit() -> Non
         drawn(result, camera, limit, originals())[0].meshes.totals.polygons.sum() for limit in (0.05, 0.5, 5.0, 50.0)
     ]
     assert all(a >= b for a, b in pairwise(faces)) and faces[0] > faces[-1]
+
+
+def test_parts_count_with_the_area_that_blocks_light() -> None:
+    """Facets that only tell what is covered, of what is drawn as it is, are twice as large: a quarter as many."""
+    camera, result = scene()
+    placed = result.assets.placed
+    rows = ClusterRows.of(placed.wholes(), np.arange(COUNT) % 2 == 0)
+    kind = PlacedClusters(placed, camera, originals(), 1.0, np.full(COUNT, ""))
+    np.testing.assert_array_equal(kind.optical(rows), rows.totals.optical_area * np.where(rows.shown, 0.25, 1.0))

@@ -60,7 +60,7 @@ def leaves_of(flora: Flora, branches: Branches) -> tuple[np.ndarray, np.ndarray,
 @settings(deadline=None, max_examples=3)
 def test_a_subplant_alone_is_the_same_as_inside_the_whole(species: int, seed: int, pick: int) -> None:
     """One child by its index, one of its children, and so on; then all that grows on it, against the whole plant."""
-    flora = support.flora()
+    flora = support.lean()
     trunk, whole = support.grown(flora, support.plants(seed, species))
     one = trunk
     for order in range(2):
@@ -80,7 +80,7 @@ def test_a_subplant_alone_is_the_same_as_inside_the_whole(species: int, seed: in
 @given(st.lists(seeds_, min_size=2, max_size=6, unique=True), st.randoms(use_true_random=False))
 @settings(deadline=None, max_examples=20)
 def test_order_of_plants_does_not_matter(seeds: list[int], random: Any) -> None:
-    flora = support.flora()
+    flora = support.lean()
     kinds = np.array([random.randrange(len(support.SPECIES)) for _ in seeds])
     places = np.arange(3.0 * len(seeds)).reshape(-1, 3)
     order = np.array(random.sample(range(len(seeds)), len(seeds)))
@@ -172,7 +172,7 @@ def test_moving_a_plant_moves_it() -> None:
 
 
 def test_frames_stay_rotations_and_branches_keep_their_length() -> None:
-    flora = support.flora()
+    flora = support.lean()
     _, pieces = support.grown(flora, support.plants(np.arange(6), np.arange(6) % len(support.SPECIES)))
     lines = axes(flora.rows, pieces.branches)
     for frames in (pieces.branches.frame, lines.frames[:, 0]):
@@ -186,7 +186,7 @@ def test_frames_stay_rotations_and_branches_keep_their_length() -> None:
 
 def test_children_sit_on_their_parents() -> None:
     """At the axis, between the bare part and the tip, no thicker than the parent is there."""
-    flora = support.flora()
+    flora = support.lean()
     trunk = trunks(flora.rows, support.plants(np.arange(30), np.arange(30) % len(support.SPECIES)))
     lines = axes(flora.rows, trunk)
     grown, owner = children(flora.rows, trunk, lines)

@@ -74,7 +74,7 @@ def test_every_vertex_is_inside_its_bound_in_any_wind(
 def test_shipped_species_keep_within_their_bounds_in_a_storm(species: str) -> None:
     number = support.SPECIES.index(species)
     for time in (0.0, 3.7):
-        flora = support.flora().in_wind(Wind(30.0, 1.0, 1.0, time))
+        flora = support.lean().in_wind(Wind(30.0, 1.0, 1.0, time))
         trunk = support.trunks(flora.rows, support.plants([1, 2], number))
         assert outside(flora, trunk) < _FLOAT32
 
@@ -153,7 +153,7 @@ def test_movement_is_continuous(time: float, speed: float, loop: float) -> None:
 def test_nothing_jumps(species: str) -> None:
     """Leaves that turn to the light and boughs that lie level turn with their branch, not over in an instant."""
     number = support.SPECIES.index(species)
-    flora = support.flora().in_wind(Wind(8.0, 0.3, 0.5, 4.3, 0.0, moving=True))
+    flora = support.lean().in_wind(Wind(8.0, 0.3, 0.5, 4.3, 0.0, moving=True))
     tubes, leaves = support.meshes(flora, support.grown(flora, support.plants(3, number))[1])
     for mesh in (*tubes, *leaves):
         assert np.linalg.norm(mesh.attributes["velocity"][1], axis=1).max() < 10.0
@@ -238,7 +238,7 @@ def test_gusts_travel_with_the_wind() -> None:
 @given(WINDS, st.integers(0, 10**6))
 @settings(deadline=None, max_examples=30)
 def test_no_branch_turns_by_more_than_is_said(wind: Wind, seed: int) -> None:
-    flora = support.flora().in_wind(wind)
+    flora = support.lean().in_wind(wind)
     trunks = support.trunks(flora.rows, support.plants(seed + np.arange(100), np.arange(100) % len(support.SPECIES)))
     turn = np.linalg.norm(sway(flora.rows, trunks), axis=1)
     assert (turn <= widest_sway(flora.rows)[trunks.row] * (1 + 1e-12)).all()

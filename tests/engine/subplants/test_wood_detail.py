@@ -73,7 +73,7 @@ def assert_same(one: MeshBuffers, other: MeshBuffers) -> None:
 
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_wood_from_afar_is_the_coarse_tube_to_the_bit(species: int) -> None:
-    flora = support.flora()
+    flora = support.lean()
     whole = grown(flora, species)
     assert_same(tube_buffers(flora, whole), tube_buffers(flora, whole, even(1.0)))
 
@@ -81,7 +81,7 @@ def test_wood_from_afar_is_the_coarse_tube_to_the_bit(species: int) -> None:
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_meshes_of_near_wood(species: int) -> None:
     """Whole pipes, with the surface of coarse ones but for feet, collars, and what bends and flares."""
-    flora = support.flora()
+    flora = support.lean()
     whole = [some.take(np.s_[::7]) for some in grown(flora, species)]
     coarse, near = tube_buffers(flora, whole), tube_buffers(flora, whole, even(0.001))
     check_topology(near)
@@ -143,7 +143,7 @@ def test_joints_become_a_curve_within_the_wood() -> None:
 
 
 def test_near_wood_is_the_same_in_any_order() -> None:
-    flora = support.flora()
+    flora = support.lean()
     whole = grown(flora, 0)[1]
     pixel = even(0.002)
 
