@@ -82,6 +82,9 @@ LTS_LEFT_OUT = placing biomes geodata stands species test_asset_trees.py test_fu
 LTS_DESELECTED = scene/test_wind.py::test_a_picture_with_motion_blur_is_the_mean_of_pictures_while_the_shutter_is_open \
 	$(addprefix results/test_baked_light.py::,test_baked_proxies_are_as_bright_as_lit_ones \
 	test_baked_pictures_have_next_to_no_noise)
+# That data has gone is told alike whatever it was; here it goes by undo, with the file, the scene, all else, the results.
+LTS_DESELECTED += $(addprefix job/test_gone.py::test_a_job_whose_data_goes_says_so_and_leaves_nothing[,\
+	clear keep camera plant mesh leaf view)
 LTS_BLENDER_TESTS = tests/blender tests/packaging $(addprefix --ignore=tests/blender/,$(LTS_LEFT_OUT)) \
 	$(addprefix --deselect=tests/blender/,$(LTS_DESELECTED))
 

@@ -34,7 +34,7 @@ from tetflora_addon.species.ages import with_age
 from tetflora_addon.species.litter import leaves_page, litter_page
 from tetflora_addon.species.quality import with_quality
 from tetflora_addon.species.schema import species_from_dict
-from tetflora_addon.species.species import Species
+from tetflora_addon.species.species import LEAF_ENVELOPES, Species
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import expand
 from tetflora_addon.subplants.rings import Pixels
@@ -124,6 +124,11 @@ def on_day(day: float) -> list[Any]:
     return [meshes(flora), known(flora)]
 
 
+def enveloped(name: str) -> Flora:
+    """Leaves in a solid of a kind."""
+    return support.compiled(support.small(order1={"leaf_envelope": name, "leaf_envelope_radius": 0.4}))
+
+
 def flora_of(species: Species) -> Flora:
     return compile_species([species])
 
@@ -137,11 +142,12 @@ FIGURES: dict[str, Callable[[], Any]] = {
     "wind": lambda: meshes(flora_of(rich()).in_wind(Wind(speed=11.0, time=3.3))),
     **{f"day {day}": lambda day=day: on_day(day) for day in (20, 118, 293)},
     **{f"{years} years": lambda years=years: meshes(flora_of(with_age(rich(), years))) for years in (4, 35, 145)},
+    "envelopes": lambda: [[flora.rows, meshes(flora), compiled(flora)] for flora in map(enveloped, LEAF_ENVELOPES)],
     "drawn": lambda: [drawn_flora().rows, meshes(drawn_flora()), compiled(drawn_flora())],
     "quality": lambda: [with_quality(rich(), factor).orders for factor in (0.3, 3.0)],
     "litter": lambda: [litter_page(rich(), PAGE), leaves_page(rich(), PAGE)],
     "leaf models": lambda: [[model, leaf_kites(model)] for model in LEAF_MODELS.values()],
-    "leaf levels": lambda: [leaf_levels(model, 4) for model in LEAF_MODELS.values()],
+    "leaf levels": lambda: [leaf_levels(model, 3) for model in LEAF_MODELS.values()],
 }
 
 
