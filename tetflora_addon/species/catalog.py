@@ -40,8 +40,7 @@ def info_of(identifier: str, data: Mapping[str, object], path: Path) -> SpeciesI
     return SpeciesInfo(identifier, name or identifier, description, path)
 
 
-@lru_cache(maxsize=512)
-def _info(path: Path, _stamp: tuple[int, int]) -> SpeciesInfo:
+def _info(path: Path) -> SpeciesInfo:
     try:
         data = parse_json(species_file(path))
         return info_of(path.stem, data, path)
@@ -125,7 +124,7 @@ def _entries(folder: Path) -> tuple[tuple[str, int, int, int], ...]:
 
 @lru_cache(maxsize=64)
 def _listed(folder: Path, _entries: tuple[tuple[str, int, int, int], ...]) -> dict[str, SpeciesInfo]:
-    return {path.stem: _info(path, _stamp(path)) for path, reason in _files(folder) if not reason}
+    return {path.stem: _info(path) for path, reason in _files(folder) if not reason}
 
 
 def load_species(
