@@ -17,12 +17,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.engine import support
 from tests.limits import full_disk
 from tetflora_addon import storage
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.proxies import facet_weights
 from tetflora_addon.species.catalog import load_species
+from tetflora_addon.species.schema import species_from_dict
 
 ROOT = Path(__file__).resolve().parents[2]
 TRUTH = np.linspace(0.0, 1.0, 24).reshape(2, 3, 4)
@@ -285,7 +287,8 @@ TABLE = np.ones((2, _ROWS, len(facet_weights.COUNTS)), np.float32)
 
 def test_species_that_are_found_together_are_what_they_are_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(facet_weights, "shipped", dict)
-    some = [load_species(name) for name in ("grass", "flower")]
+    files = {"few": support.small(order2={"leaves": [3, 0]}), "many": support.small(order2={"leaves": [9, 2]})}
+    some = [species_from_dict(data, name, f"{name}.json") for name, data in files.items()]
     found = []
     for species in ([some[0]], [some[1]], some, some[::-1]):
         monkeypatch.setattr(facet_weights, "_found", {})
