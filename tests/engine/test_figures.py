@@ -144,6 +144,7 @@ FIGURES: dict[str, Callable[[], Any]] = {
     **{f"{years} years": lambda years=years: meshes(flora_of(with_age(rich(), years))) for years in (4, 35, 145)},
     "envelopes": lambda: [[flora.rows, meshes(flora), compiled(flora)] for flora in map(enveloped, LEAF_ENVELOPES)],
     "drawn": lambda: [drawn_flora().rows, meshes(drawn_flora()), compiled(drawn_flora())],
+    "drawn, in the wind": lambda: meshes(drawn_flora().in_wind(Wind(speed=11.0, time=3.3))),
     "quality": lambda: [with_quality(rich(), factor).orders for factor in (0.3, 3.0)],
     "litter": lambda: [litter_page(rich(), PAGE), leaves_page(rich(), PAGE)],
     "leaf models": lambda: [[model, leaf_kites(model)] for model in LEAF_MODELS.values()],
