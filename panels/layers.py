@@ -195,9 +195,10 @@ def _status(layer: bpy.types.PropertyGroup | None, others: bool) -> str:
     if layer.kind != SCATTER:
         return "Settings have changed: Update" if is_due(layer) else f"{plants_in(layer):,} plants"
     text = points.status(layer)
+    few = text.partition(", as ")[0]  # a sidebar of usual width has room for no more
     if points.complaints(layer):
-        return f"{text}; see Spacing and Size"
-    return f"Update: {text}" if is_due(layer) else text
+        return f"{few}; see Spacing"
+    return f"Update: {few}" if is_due(layer) else text
 
 
 def _draw_scatter(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) -> None:
