@@ -136,7 +136,7 @@ def first_forest(hand, _scene, found):
 def biome(hand, scene, found):
     """A biome on a hill."""
     build_ground(scene)
-    yield from hand.add_layer("add_biome(biome='birch_pine'")
+    yield from hand.add_layer("add_biome(biome='alpine_treeline'")
     found["layers"] = len(bpy.context.scene.tetflora.layers)
     found["grounds"] = [entry.object.name for entry in bpy.context.scene.tetflora.layers[0].grounds]
 
