@@ -134,6 +134,9 @@ void main() {
   float tall = 0.5 * side * form.y + view.y * wide, half_size = max(max(tall, wide), 1e-6);
   pixels = 2.0 * half_size * view.x / max(gl_Position.w, 1e-6);
   gl_PointSize = max(pixels, 1.5);
+  if (pixels > 200.0) {  // near ones have faces, and cards limit the size of points
+    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  }
   color = look.rgb;
   shape = vec4(tall, form.z * look.a, form.w * look.a, 0.012 * form.y) / half_size;
   low = clamp(form.x / max(form.y, 1e-6), 0.0, 0.95);
@@ -150,7 +153,7 @@ void main() {
     discard;
   }
   float shone = mix(0.6, 0.95, clamp(t + view.y, 0.0, 1.0));
-  fragColor = blender_srgb_to_framebuffer_space(vec4(shone * color, 1.0));
+  fragColor = vec4(pow(shone * color, vec3(2.2)), 1.0);  // linear: the viewport's buffer encodes what it is given
 }
 """
 
