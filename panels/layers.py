@@ -6,7 +6,7 @@ import bpy
 
 from ..operators.layers import grounds_to_plant
 from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
-from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of
+from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of, items
 from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
 from ..tetflora_addon.blender.scene.field_sizes import has_history
 from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in
@@ -89,13 +89,14 @@ class TETFLORA_PT_add_layer(bpy.types.Panel):
         more = f" and {len(grounds) - 1:,} more" if len(grounds) > 1 else ""
         layout.label(text=f"On {grounds[0].name}{more}" if grounds else "Select a mesh to plant on", icon='MESH_GRID')
         pictures = layout.grid_flow(row_major=True, columns=4, even_columns=True, even_rows=True)
-        for info in biomes().values():
+        known = biomes()
+        for identifier, name, _, icon, _ in items():
             cell = pictures.column(align=True)
-            cell.template_icon(icon_of(info), scale=5.0)
+            cell.template_icon(icon if isinstance(icon, int) else 0, scale=5.0)
             row = cell.row(align=True)
-            Button("add_biome", 'NONE', info.name, {"biome": info.identifier}).draw(row)
-            if info.is_own:
-                Button("delete_file", 'TRASH', "", {"biome": True, "identifier": info.identifier}).draw(row)
+            Button("add_biome", 'NONE', name, {"biome": identifier}).draw(row)
+            if identifier in known and known[identifier].is_own:
+                Button("delete_file", 'TRASH', "", {"biome": True, "identifier": identifier}).draw(row)
         layout.separator()
         columns = layout.split()
         draw_buttons(
