@@ -177,7 +177,7 @@ def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
     crowns = CrownPoints(
         (seeds.position - origin).astype(np.float32),
         seeds.frame[:, :, 2].astype(np.float32),
-        forms.astype(np.float32),
+        forms.astype(np.float32, copy=False),
         seeds.species,
         _looks_of_kinds(flora, some),
         some,
@@ -208,12 +208,16 @@ def on_day(shapes: Shapes, flora: Flora) -> Shapes:
     return replace(shapes, crowns=replace(crowns, looks=_looks_of_kinds(flora, crowns.some)))
 
 
-def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> Shapes:
-    """Those plants as crowns and trunks with faces that look largest from a place (3,) in the world."""
+def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes, float]:
+    """Those plants as crowns and trunks with faces that look largest from a place (3,) in the world.
+
+    Also the height over the distance of the least of them: all that look larger have faces.
+    """
     crowns = shapes.crowns
     away = crowns.positions - (eye - shapes.origin).astype(np.float32)
     size = crowns.forms[:, 1] ** 2 / np.maximum(np.einsum("ni,ni->n", away, away), 1e-6)
     some = np.argpartition(size, -most)[-most:] if len(size) > most else np.arange(len(size))
+    least = float(np.sqrt(size[some].min(initial=np.inf)))
     looks, forms, up = crowns.looks[crowns.kinds[some]], crowns.forms[some], crowns.axes[some]
     along = np.where(np.abs(up[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     across = np.cross(up, along)
@@ -223,7 +227,7 @@ def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> Shapes:
     corners = crowns.positions[some], frame, forms[:, :2], widths, _THIN * forms[:, 1], looks[:, :3], looks[:, 4:]
     positions, colors = _crowns(*corners)
     indices = _repeated(_faces(), len(_NORMALS), len(some))
-    return Shapes(positions, colors, indices, len(some), shapes.of, shapes.origin)
+    return Shapes(positions, colors, indices, len(some), shapes.of, shapes.origin), least
 
 
 def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:

@@ -24,7 +24,7 @@ def test_points_have_the_form_and_color_of_the_crowns_with_faces() -> None:
     seeds = support.plants(np.arange(40), 0, rng.uniform(-30.0, 30.0, (40, 3)), rng.uniform(0.5, 1.0, 40))
     seeds = replace(seeds, species=species.astype(np.int32))
     expected, points = light_plants.light_plants(flora, seeds), light_plants.light_plants(flora, seeds, most=10)
-    near = light_plants.nearest(points, np.array([30.0, 0.0, 5.0]), 40)
+    near, _ = light_plants.nearest(points, np.array([30.0, 0.0, 5.0]), 40)
 
     def heights_and_radii(shapes: light_plants.Shapes) -> np.ndarray:
         corners = shapes.positions.reshape(40, -1, 3) + shapes.origin - seeds.position[:, None]
@@ -38,10 +38,11 @@ def test_points_have_the_form_and_color_of_the_crowns_with_faces() -> None:
     colors = (shapes.colors.reshape(40, -1, 3)[:, 9] for shapes in (near, expected))  # of the highest corner
     np.testing.assert_allclose(*colors, atol=0.06)
     eye = np.array([30.0, 0.0, 5.0])
-    some = light_plants.nearest(points, eye, 5)
+    some, least = light_plants.nearest(points, eye, 5)
     angle = forms[:, 1] / np.linalg.norm(seeds.position - eye, axis=1)
     feet = (some.positions.reshape(5, -1, 3)[:, 10:14].mean(axis=1) + some.origin)[:, None] - seeds.position
     assert set(np.linalg.norm(feet, axis=2).argmin(axis=1)) == set(np.argsort(angle)[-5:])
+    assert least == pytest.approx(np.sort(angle)[-5], rel=1e-4)
 
 
 @pytest.mark.parametrize("day", [20.0, 290.0])

@@ -115,6 +115,12 @@ def points(preview: Preview) -> gpu.types.GPUBatch:
     return made
 
 
+def _near(shapes: Shapes, eye: Floats) -> tuple[gpu.types.GPUBatch | None, Floats, float]:
+    """Those with faces as seen from a place (3,), the place, and from which height over the distance on they have."""
+    found, least = nearest(shapes, eye)
+    return plants(found), eye, least
+
+
 def _standing(crowns: CrownPoints) -> gpu.types.GPUVertBuf:
     layout = gpu.types.GPUVertFormat()
     layout.attr_add(id="pos", comp_type='F32', len=3, fetch_mode='FLOAT')
@@ -134,7 +140,7 @@ void main() {
   float tall = 0.5 * side * form.y + view.y * wide, half_size = max(max(tall, wide), 1e-6);
   pixels = 2.0 * half_size * view.x / max(gl_Position.w, 1e-6);
   gl_PointSize = max(pixels, 1.5);
-  if (pixels > 200.0) {  // near ones have faces, and cards limit the size of points
+  if (form.y > eye.w * distance(pos, eye.xyz)) {  // it has faces
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   }
   color = look.rgb;
@@ -166,6 +172,7 @@ def _crown_shader() -> gpu.types.GPUShader:
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant('MAT4', "matrix")
     info.push_constant('VEC4', "view")  # pixels of a meter at a depth of 1, how far one looks down, 0 to 1
+    info.push_constant('VEC4', "eye")  # whence, and from which height over the distance on, plants have faces
     for number, (kind, name) in enumerate((('VEC3', "pos"), ('VEC4', "form"), ('VEC4', "look"))):
         info.vertex_in(number, kind, name)
     info.vertex_out(passed)
@@ -175,7 +182,7 @@ def _crown_shader() -> gpu.types.GPUShader:
     return gpu.shader.create_from_info(info)
 
 
-def _draw_points(made: gpu.types.GPUBatch, origin: Floats) -> None:
+def _draw_points(made: gpu.types.GPUBatch, origin: Floats, eye: Floats, least: float) -> None:
     region, height = bpy.context.region_data, bpy.context.region.height
     shader = _crown_shader()
     with gpu.matrix.push_pop():
@@ -183,6 +190,7 @@ def _draw_points(made: gpu.types.GPUBatch, origin: Floats) -> None:
         shader.uniform_float("matrix", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
         down = abs(region.view_matrix[2][2])
         shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], down, 0.0, 0.0))
+        shader.uniform_float("eye", (*(eye - origin).tolist(), least))
         gpu.state.program_point_size_set(True)
         made.draw(shader)
         gpu.state.program_point_size_set(False)
@@ -239,13 +247,13 @@ def _draw(made: gpu.types.GPUBatch | None, origin: Floats) -> None:
 
 def _draw_plants(preview: Preview) -> None:
     shapes = preview.shapes
-    made, near = _kept(preview, "plants", (preview.made,), lambda: plants(shapes)), None
+    made, near, eye, least = _kept(preview, "plants", (preview.made,), lambda: plants(shapes)), None, None, 0.0
     if shapes.crowns is not None:
         region = bpy.context.region_data
-        eye = region.view_matrix.inverted().translation if region.is_perspective else region.view_location
-        key = preview.made, *(round(part) for part in eye)  # another meter shows others
+        place = region.view_matrix.inverted().translation if region.is_perspective else region.view_location
+        key = preview.made, *(round(part) for part in place)  # another meter shows others
         name = f"near {bpy.context.space_data.as_pointer()}"
-        near = _kept(preview, name, key, lambda: plants(nearest(shapes, np.array(eye))))
+        near, eye, least = _kept(preview, name, key, lambda: _near(shapes, np.array(place)))
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(True)
     gpu.state.face_culling_set('BACK')  # crowns and trunks are closed
@@ -253,7 +261,8 @@ def _draw_plants(preview: Preview) -> None:
     _draw(near, shapes.origin)
     gpu.state.face_culling_set('NONE')
     if shapes.crowns is not None:
-        _draw_points(_kept(preview, "points", (preview.made,), lambda: points(preview)), shapes.origin)
+        dots = _kept(preview, "points", (preview.made,), lambda: points(preview))
+        _draw_points(dots, shapes.origin, eye, least)
     gpu.state.depth_mask_set(False)
 
 
