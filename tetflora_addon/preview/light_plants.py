@@ -217,6 +217,7 @@ def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes
     away = crowns.positions - (eye - shapes.origin).astype(np.float32)
     size = crowns.forms[:, 1] ** 2 / np.maximum(np.einsum("ni,ni->n", away, away), 1e-6)
     some = np.argpartition(size, -most)[-most:] if len(size) > most else np.arange(len(size))
+    some = some[np.argsort(-size[some])]  # the nearest hide what is drawn after them, which then costs little
     least = float(np.sqrt(size[some].min(initial=np.inf)))
     looks, forms, up = crowns.looks[crowns.kinds[some]], crowns.forms[some], crowns.axes[some]
     along = np.where(np.abs(up[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
