@@ -24,22 +24,22 @@ def test_points_have_the_form_and_color_of_the_crowns_with_faces() -> None:
     seeds = support.plants(np.arange(40), 0, rng.uniform(-30.0, 30.0, (40, 3)), rng.uniform(0.5, 1.0, 40))
     seeds = replace(seeds, species=species.astype(np.int32))
     expected, points = light_plants.light_plants(flora, seeds), light_plants.light_plants(flora, seeds, most=10)
-    near, _ = light_plants.nearest(points, np.array([30.0, 0.0, 5.0]), 40)
+    eye, forms = np.array([30.0, 0.0, 5.0]), points.crowns.forms
+    angle = forms[:, 1] / np.linalg.norm(seeds.position - eye, axis=1)
+    order = np.argsort(-angle)
+    near, _ = light_plants.nearest(points, eye, 40)
 
-    def heights_and_radii(shapes: light_plants.Shapes) -> np.ndarray:
-        corners = shapes.positions.reshape(40, -1, 3) + shapes.origin - seeds.position[:, None]
+    def heights_and_radii(shapes: light_plants.Shapes, order: np.ndarray) -> np.ndarray:
+        corners = shapes.positions.reshape(40, -1, 3) + shapes.origin - seeds.position[order, None]
         rings = (corners[:, first : first + 4] for first in (1, 5))
         radii = [np.linalg.norm(ring - ring.mean(axis=1)[:, None], axis=2).mean(axis=1) for ring in rings]
         return np.column_stack([corners[:, 0, 2], corners[:, 9, 2], *radii])
 
-    forms = points.crowns.forms
-    np.testing.assert_allclose(heights_and_radii(near), forms, rtol=1e-3)
-    np.testing.assert_allclose(heights_and_radii(expected), forms, rtol=0.05)  # its trunks lean
-    colors = (shapes.colors.reshape(40, -1, 3)[:, 9] for shapes in (near, expected))  # of the highest corner
-    np.testing.assert_allclose(*colors, atol=0.06)
-    eye = np.array([30.0, 0.0, 5.0])
+    np.testing.assert_allclose(heights_and_radii(near, order), forms[order], rtol=1e-3)  # the largest come first
+    np.testing.assert_allclose(heights_and_radii(expected, np.arange(40)), forms, rtol=0.05)  # its trunks lean
+    top, usual = (shapes.colors.reshape(40, -1, 3)[:, 9] for shapes in (near, expected))  # of the highest corner
+    np.testing.assert_allclose(top, usual[order], atol=0.06)
     some, least = light_plants.nearest(points, eye, 5)
-    angle = forms[:, 1] / np.linalg.norm(seeds.position - eye, axis=1)
     feet = (some.positions.reshape(5, -1, 3)[:, 10:14].mean(axis=1) + some.origin)[:, None] - seeds.position
     assert set(np.linalg.norm(feet, axis=2).argmin(axis=1)) == set(np.argsort(angle)[-5:])
     assert least == pytest.approx(np.sort(angle)[-5], rel=1e-4)
