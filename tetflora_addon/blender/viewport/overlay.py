@@ -166,7 +166,7 @@ void main() {
 
 @cache
 def _crown_shader() -> gpu.types.GPUShader:
-    passed = gpu.types.GPUStageInterfaceInfo("tetflora_crown")
+    passed = gpu.types.GPUStageInterfaceInfo("crown_interface")
     for kind, name in (('VEC3', "color"), ('VEC4', "shape"), ('FLOAT', "low"), ('FLOAT', "pixels")):
         passed.flat(kind, name)
     info = gpu.types.GPUShaderCreateInfo()
