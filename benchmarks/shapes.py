@@ -100,7 +100,7 @@ def steps(ui: Any) -> Iterator[float | None]:
         for frame, value in ((1, first), (4 * FRAMES, last)):
             setattr(year, name, value)
             year.keyframe_insert(name, frame=frame)
-        for frame in range(1, 4 * FRAMES, 3):
+        for frame in range(1, 4 * FRAMES):
             scene.frame_set(frame)
             show()
         made = state.find(scene).made

@@ -13,7 +13,8 @@ import json
 import statistics
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -190,16 +191,39 @@ def _as_in_a_window() -> None:
     refine.forecast_text = lambda _scene, _layer: text
 
 
-def _milliseconds(cls: type, context: Any) -> float | None:
+def _milliseconds(draw: Callable[[], object]) -> float:
     """Median processor time of a draw, after a first one; other work of the machine does not count."""
-    if not drawn(cls, context, _Nothing()):
-        return None
     times = []
-    for _ in range(9):
+    for _ in range(10):
         begin = time.thread_time()
-        drawn(cls, context, _Nothing())
+        draw()
         times.append(time.thread_time() - begin)
-    return 1000.0 * statistics.median(times)
+    return 1000.0 * statistics.median(times[1:])
+
+
+def lists(context: Any) -> dict[str, Callable[[], int]]:
+    """What draws all rows of each list that the scene has, by the list's class and name; it returns how many."""
+    import bpy
+
+    group = context.scene.tetflora
+    stands = [layer.field.tetflora.stand for layer in group.layers if layer.field is not None]
+    species = [*((layer, "mix") for layer in group.layers), *((one, "species") for one in (*stands, group.output))]
+    owners = {"TETFLORA_UL_layers": [(group, "layers")], "TETFLORA_UL_species": species}
+
+    def draw(cls: type, owner: Any, name: str) -> int:
+        own = SimpleNamespace(bitflag_filter_item=1, beside=getattr(cls, "beside", None))
+        if hasattr(cls, "filter_items"):
+            cls.filter_items(own, context, owner, name)
+        entries = getattr(owner, name)
+        for number, item in enumerate(entries):
+            cls.draw_item(own, context, _Nothing(), owner, item, 0, owner, f"{name}_index", number, 0)
+        return len(entries)
+
+    return {
+        f"{kind}.{number}": partial(draw, getattr(bpy.types, kind), *one)
+        for kind, some in owners.items()
+        for number, one in enumerate(some)
+    }
 
 
 def sidebar(panels: list[type]) -> list[type]:
@@ -241,7 +265,8 @@ def figures() -> dict[str, Any]:
     _many()
     _as_in_a_window()
     context = _context()
-    times = {cls.__name__: ms for cls in panels if (ms := _milliseconds(cls, context)) is not None}
+    seen = {cls.__name__: partial(drawn, cls, context, _Nothing()) for cls in panels}
+    times = {name: _milliseconds(draw) for name, draw in {**seen, **lists(context)}.items() if draw()}
     return {
         "panels": len(panels),
         "sidebar_panels": len(sidebar(panels)),

@@ -209,13 +209,14 @@ class TETFLORA_OT_delete_file(Reporting, bpy.types.Operator):
     bl_label = "Delete from My Files"
     bl_options = {'REGISTER'}
 
-    biome: once.boolean("Biome", "The chosen biome instead of the species")
+    biome: once.boolean("Biome", "A biome instead of a species")
+    identifier: once.string("File", "Name of the file without its ending; the shown species or chosen biome if empty")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_confirm(self, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        chosen = context.scene.tetflora.new_biome if self.biome else shown(context)
+        chosen = self.identifier or (context.scene.tetflora.new_biome if self.biome else shown(context))
         return self.done(f"{(library.OWN_FILES if self.biome else OWN_FILES).delete(chosen).name} deleted")
 
 

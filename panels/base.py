@@ -202,8 +202,9 @@ def draw_species(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, ent
     place = "scene"
     if not isinstance(owner.id_data, bpy.types.Scene):
         place = f'blend_data.objects["{bpy.utils.escape_identifier(owner.id_data.name)}"]'
-    given = {"owner": f"{place}.{owner.path_from_id()}", "entries": entries}
-    buttons = (Button("edit_list", action, "", {**given, "action": action}) for action in ('ADD', 'REMOVE'))
+    given = {"owner": f"{place}.{owner.path_from_id()}", "entries": entries, "action": 'REMOVE'}
     row = layout.row()
     row.template_list(TETFLORA_UL_species.__name__, "", owner, entries, owner, f"{entries}_index", rows=2)
-    draw_buttons(row.column(align=True), *buttons)
+    column = row.column(align=True)
+    column.template_icon_view(owner, "add_species", show_labels=True, scale=1.0, scale_popup=5.0)
+    Button("edit_list", 'REMOVE', "", given).draw(column)

@@ -6,7 +6,7 @@ import bpy
 
 from ..operators.layers import grounds_to_plant
 from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
-from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of
+from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of, items
 from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
 from ..tetflora_addon.blender.scene.field_sizes import has_history
 from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in
@@ -81,24 +81,32 @@ class TETFLORA_PT_add_layer(bpy.types.Panel):
     bl_space_type = 'VIEW_3D'
     bl_region_type = 'HEADER'
     bl_options = {'INSTANCED'}
+    bl_ui_units_x = 30
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, group = self.layout, context.scene.tetflora
+        layout = self.layout
         grounds = grounds_to_plant(context)
         more = f" and {len(grounds) - 1:,} more" if len(grounds) > 1 else ""
         layout.label(text=f"On {grounds[0].name}{more}" if grounds else "Select a mesh to plant on", icon='MESH_GRID')
-        layout.template_icon_view(group, "new_biome", show_labels=True, scale=6.0, scale_popup=7.0)
-        row = layout.row(align=True)
-        row.prop(group, "new_biome", text="")
-        Button("delete_file", 'TRASH', "", {"biome": True}).draw(row)
-        Button("add_biome", FALLBACK_ICON, values={"biome": group.new_biome}).draw(layout)
+        pictures = layout.grid_flow(row_major=True, columns=4, even_columns=True, even_rows=True)
+        known = biomes()
+        for identifier, name, _, icon, _ in items():
+            cell = pictures.column(align=True)
+            cell.template_icon(icon if isinstance(icon, int) else 0, scale=5.0)
+            row = cell.row(align=True)
+            Button("add_biome", 'NONE', name, {"biome": identifier}).draw(row)
+            if identifier in known and known[identifier].is_own:
+                Button("delete_file", 'TRASH', "", {"biome": True, "identifier": identifier}).draw(row)
         layout.separator()
-        Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter", {"by_density": True}).draw(layout)
-        Button("grow_stand", 'TIME', "Stand").draw(layout)
-        Button("ground_cover", 'OUTLINER_OB_CURVES').draw(layout)
-        Button("paint_plants", 'BRUSH_DATA').draw(layout)
-        layout.separator()
-        draw_buttons(layout, *IMPORTS)
+        columns = layout.split()
+        draw_buttons(
+            columns.column(),
+            Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter", {"by_density": True}),
+            Button("grow_stand", 'TIME', "Stand"),
+            Button("ground_cover", 'OUTLINER_OB_CURVES'),
+            Button("paint_plants", 'BRUSH_DATA'),
+        )
+        draw_buttons(columns.column(), *IMPORTS)
 
 
 class TETFLORA_MT_layers(bpy.types.Menu):
@@ -144,7 +152,9 @@ class TETFLORA_PT_layers(SidebarPanel, bpy.types.Panel):
         row = layout.row()
         row.template_list(TETFLORA_UL_layers.__name__, "", group, "layers", group, "layers_index", rows=6)
         column = row.column(align=True)
-        column.popover(panel=TETFLORA_PT_add_layer.__name__, text="", icon='ADD')
+        # Not a popover, which would stay after a click until another one beside it.
+        added = column.operator("wm.call_panel", text="", icon='ADD')
+        added.name, added.keep_open = TETFLORA_PT_add_layer.__name__, False
         Button("remove_layer", 'REMOVE', "").draw(column)
         column.separator()
         for direction in ('UP', 'DOWN'):
@@ -186,9 +196,10 @@ def _status(layer: bpy.types.PropertyGroup | None, others: bool) -> str:
     if layer.kind != SCATTER:
         return "Settings have changed: Update" if is_due(layer) else f"{plants_in(layer):,} plants"
     text = points.status(layer)
+    few = text.partition(", as ")[0]  # a sidebar of usual width has room for no more
     if points.complaints(layer):
-        return f"{text}; see Spacing and Size"
-    return f"Update: {text}" if is_due(layer) else text
+        return f"{few}; see Spacing"
+    return f"Update: {few}" if is_due(layer) else text
 
 
 def _draw_scatter(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) -> None:

@@ -53,6 +53,7 @@ class Hand:
             if said in manager.clipboard:
                 break
         else:
+            yield from self.ui.picture("not_found")
             raise LookupError(f"there is no button for {said} among {sorted(seen)}")
         self.ui.move(x, y + above)
         yield 0.1
@@ -61,15 +62,25 @@ class Hand:
         yield 0.5
         return x, y + above
 
-    def add_layer(self, operator):
-        """The + beside the list of layers, above the dots of the points preview, and a button of what it opens."""
-        x, y = yield from self.click("tetflora_points", place=self.beside_lists(), above=148, shift=True)
-        yield 0.5
-        yield from self.ui.picture(f"add_{operator}")
-        below = [(x - 60, b) for b in range(y - 40, 0, -STEP)]  # always in it, or it would close
-        yield from self.click(f"ops.tetflora.{operator}(", place=below)
+    def add_layer(self, button):
+        """The + beside the list of layers, and a button of what it opens around the mouse."""
+        x, y = yield from self.click("TETFLORA_PT_add_layer", place=self.beside_lists())
+        yield 1.5  # pictures are loaded
+        yield from self.ui.picture("add_layer")
+        inside = [(x - 60 - a, b) for a in (0, 120, 240, 360) for b in (*range(y - 20, 0, -STEP), *range(y, 990, STEP))]
+        yield from self.click(f"ops.tetflora.{button}", place=inside)
         yield from self.done()
-        yield from self.key('ESC')  # it stays open while the mouse is in it
+
+    def add_species(self, up):
+        """The + beside the list of species, above the minus, and a picture of the gallery that it opens."""
+        x, y = yield from self.click("ops.tetflora.edit_list(", place=self.beside_lists(), above=20)
+        yield 1.5
+        yield from self.ui.picture("add_species")
+        self.ui.move(x - 571, y + up)
+        yield 0.3
+        self.clicks += 1
+        self.ui.press('LEFTMOUSE')
+        yield 0.5
 
     def beside_lists(self):
         """Where buttons beside lists are."""
@@ -125,7 +136,7 @@ def first_forest(hand, _scene, found):
 def biome(hand, scene, found):
     """A biome on a hill."""
     build_ground(scene)
-    yield from hand.add_layer("add_biome")
+    yield from hand.add_layer("add_biome(biome='alpine_treeline'")
     found["layers"] = len(bpy.context.scene.tetflora.layers)
     found["grounds"] = [entry.object.name for entry in bpy.context.scene.tetflora.layers[0].grounds]
 
@@ -144,7 +155,27 @@ def own_tree(hand, _scene, found):
     found["species"] = len(bpy.context.scene.tetflora.asset_species)
 
 
+def own_ground(hand, _scene, found):
+    """A mixed wood with cover on a ground of one's own, by daylight, and F12."""
+    build_ground(bpy.context.scene)
+    bpy.context.scene.tetflora.populate.mix.clear()
+    bpy.context.scene.tetflora.quality = 'DRAFT'  # the machine of the test is slow; an artist would wait
+    yield from hand.add_layer("populate(")
+    for up in (215, 342):  # pixels, within two rows of pictures
+        yield from hand.add_species(up)
+    yield from hand.click("ops.tetflora.update_layers(")
+    yield from hand.done()
+    yield from hand.add_layer("ground_cover(")
+    yield from hand.click("ops.tetflora.daylight(")
+    yield 1.0
+    layers = bpy.context.scene.tetflora.layers
+    found["species"] = sorted(entry.species for entry in layers[0].mix)
+    found["plants"] = [layer.made for layer in layers]
+    yield from hand.render(found)
+
+
 TASKS = {
+    "own_ground": own_ground,
     "biome": biome,
     "autumn": autumn,
     "own_tree": own_tree,

@@ -12,11 +12,9 @@ sys.path.append(str(Path(__file__).resolve().parents[2]))
 from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
-from panels.layers import TETFLORA_PT_add_layer  # noqa: E402  (found only now)
-from panels.species import TETFLORA_PT_species  # noqa: E402
+from panels.species import TETFLORA_PT_species  # noqa: E402  (found only now)
 
 GALLERIES = {
-    "biomes": (TETFLORA_PT_add_layer, "new_biome", lambda group: (group, "biome_file")),
     "species": (TETFLORA_PT_species, "species_choice", lambda group: (group.species_editor, "species")),
 }
 

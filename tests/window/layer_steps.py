@@ -20,7 +20,7 @@ def steps(ui):
     scene.tetflora.populate.density = 150.0
     yield from ui.show_sidebar("TetFlora")
 
-    # The popover that + opens, and a click on Scatter in it.
+    # What + opens, and a click on Scatter in it.
     with ui.override():
         bpy.ops.wm.call_panel(name="TETFLORA_PT_add_layer", keep_open=False)
     yield 0.5
@@ -80,7 +80,7 @@ def click_in_popover(ui, operator):
     manager, (x, middle) = bpy.context.window_manager, ui.center()
     for y in range(middle + 300, middle - 400, -8):
         manager.clipboard = ""
-        ui.move(x, y)
+        ui.move(x - 60, y)  # in the left of two columns
         yield 0.03
         ui.press('C', ctrl=True)
         yield 0.03

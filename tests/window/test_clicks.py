@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
-STEPS = "click_steps", "clicks", 900
+STEPS = "click_steps", "clicks", 1500
 
 
-@pytest.mark.parametrize(("task", "most"), [("first_forest", 3), ("biome", 5), ("autumn", 2), ("own_tree", 4)])
+@pytest.mark.parametrize(
+    ("task", "most"), [("first_forest", 3), ("own_ground", 12), ("biome", 5), ("autumn", 2), ("own_tree", 4)]
+)
 def test_clicks_are_few(seen: dict, pictures: Path, colors: Callable[[Path], int], task: str, most: int) -> None:
     assert 1 <= seen[task]["clicks"] <= most
     assert colors(pictures / "clicks" / f"{task}.png") > 200
@@ -21,6 +23,14 @@ def test_clicks_are_few(seen: dict, pictures: Path, colors: Callable[[Path], int
 def test_a_first_forest_is_refined_and_rendered(seen: dict) -> None:
     assert seen["first_forest"]["refined"]
     assert seen["first_forest"]["green"] > 0.1
+
+
+def test_a_mixed_wood_with_cover_grows_on_ones_own_ground_and_is_rendered(seen: dict) -> None:
+    found = seen["own_ground"]
+    assert len(set(found["species"])) == 3  # two pictures have added two others
+    assert len(found["plants"]) == 2
+    assert all(found["plants"])
+    assert found["green"] > 0.1
 
 
 def test_a_biome_grows_on_the_hill(seen: dict) -> None:

@@ -10,7 +10,7 @@ import pytest
 STEPS = "gallery_steps", "gallery", 120
 
 
-@pytest.mark.parametrize("gallery", ["biomes", "species"])
+@pytest.mark.parametrize("gallery", ["species"])
 def test_two_pictures_choose_two_things(seen: dict, gallery: str) -> None:
     (one, shown), (other, shown_then) = seen[gallery]
     assert (shown, shown_then) == (one, other)

@@ -3,6 +3,7 @@
 """The only place that knows which Blender this is; every branch asks for a feature, none for a version number."""
 
 from math import pi
+from typing import Any
 
 import bpy
 import gpu
@@ -21,6 +22,11 @@ def eevee_engine() -> str:
     raise LookupError(
         f"This version of Blender has none of the engines {', '.join(EEVEE_ENGINES)} and is not supported"
     )
+
+
+def stored_properties(owner: bpy.types.ID) -> Any | None:
+    """Custom properties in which Blender keeps a datablock's groups, whatever add-ons declare now; None without any."""
+    return owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
 
 
 def shader_tree(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -> bpy.types.NodeTree:

@@ -21,7 +21,7 @@ from .scene.field_sizes import stored_now
 from .scene.skeletons import SKELETON_TYPES
 from .settings import AnimationProperties, RefinementProperties
 from .species import asset_species, editor, edits
-from .species.catalog import SpeciesChoice
+from .species.catalog import SpeciesChoice, gallery_of
 from .stands import properties as stand_properties
 from .viewport import state
 
@@ -92,6 +92,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         "Species that the attribute species of a field's points refers to, starting at 0",
     )
     field_species_index: integer("Active Field Species", options={'HIDDEN', 'SKIP_SAVE'})
+    add_species: gallery_of("field_species", TetFloraFieldEntry)
     stand_year: real(
         "Stand Year",
         "Year of the stand's growth that is shown. Animate it to let the stand grow",
@@ -240,6 +241,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
     preview: pointer_to(state.TetFloraPreview)
     leaf_objects: list_of(TetFloraLeafObject, "Leaf Objects", "Your own meshes in place of a species' leaf")
     leaf_objects_index: integer("Active Leaf Object", options={'HIDDEN', 'SKIP_SAVE'})
+    add_species: gallery_of("leaf_objects", TetFloraLeafObject)
     species_edits: list_of(
         edits.TetFloraSpeciesEdit,
         "Species Edits",

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Table, by_component, columns, dot, spread
+from ..arrays import Arrays, Floats, Integers, Integers32, Keys, Table, by_component, columns, dot, spread
 from ..species.growing import faded
 from ..species.members import dead_vigor
 from . import crown_effects
@@ -56,12 +56,17 @@ def level_azimuth(frame: NDArray[np.floating], sky: NDArray[np.floating] | None 
     return np.arctan2(-dot(frame[:, :, 0], sky)[:, 0], dot(frame[:, :, 1], sky)[:, 0])
 
 
+def trunk_lengths(rows: Table, seeds: Seeds) -> tuple[Integers32, Keys, Floats]:
+    """Rows (n,), keys (n,) and lengths (n,) of the trunks of plants, before crown shapes; meters."""
+    first = np.flatnonzero(np.diff(rows["species"], prepend=-1))  # of each species
+    row = first.astype(np.int32)[seeds.species]
+    key = key_of_seed(np.where(rows["exact"][row], 0, seeds.seed))
+    return row, key, seeds.scale * ranged(rows, "length", row, key, Draw.LENGTH)
+
+
 def trunks(rows: Table, seeds: Seeds) -> Branches:
     """Trunks of plants (order 0)."""
-    first = np.flatnonzero(np.diff(rows["species"], prepend=-1))  # of each species
-    row = first[seeds.species].astype(np.int32)
-    key = key_of_seed(np.where(rows["exact"][row], 0, seeds.seed))
-    length = seeds.scale * ranged(rows, "length", row, key, Draw.LENGTH)
+    row, key, length = trunk_lengths(rows, seeds)
     radius = length * ranged(rows, "thickness", row, key, Draw.THICKNESS)
     straight = rows["phantom"][row] | (rows["envelope"][row] == BOX)
     roll = np.where(straight, 0.0, 2 * np.pi * uniform(key, Draw.ROLL))

@@ -5,13 +5,15 @@
 Nothing is grown. A crown is two rings of corners between its lowest and its highest leaves, as wide as the samples of
 its species; a trunk is two crossed triangles. Every plant has its own length, as its seed says.
 
-Plants of which only the size is known, such as assets, as double cones or boxes for the viewport.
+Plants of which only the size is known, such as assets, as double cones or boxes for the viewport. Of very many, all are
+points with the form of their crowns, and those that look largest have faces.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -19,12 +21,14 @@ from ..arrays import Floats, Floats32, Integers, Integers32
 from ..camera.camera import origin_near
 from ..compiled.flora import Flora
 from ..compiled.placed import extents, outlines
-from ..growth.growth import trunks
+from ..growth.growth import trunk_lengths, trunks
 from ..growth.seeds import Branches, Seeds
 from .levels import as_shown
 
-#: Plants that a preview shows; of more, `thinned` chooses.
+#: Plants that a preview shows as meshes; of more, `thinned` chooses.
 MOST_PLANTS = 50_000
+#: Plants that are crowns with faces; of more, `nearest` chooses.
+MOST_FACES = 10_000
 #: Corners of each of a crown's rings.
 SIDES = 4
 #: Heights of the rings, and of the band around each whose leaves set its width, as fractions of the crown's height.
@@ -35,6 +39,9 @@ _BELOW, _ABOVE, _WITHIN = 0.03, 0.995, 0.85
 _BARE = 0.45
 #: Direction to the light, and the fraction of light in its shade.
 _SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
+#: Radius of a trunk over its length, at least; plants of a species that its looks are taken from.
+_THIN, _SOME = 0.012, 64
+_known: WeakKeyDictionary[Flora, Floats] = WeakKeyDictionary()
 _ANGLE = np.arange(SIDES) * 2.0 * np.pi / SIDES
 _AROUND = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), 0 * _ANGLE], axis=1)
 #: Corners of a plant: the crown's lowest, its rings, its highest, the foot of the trunk, and its middle.
@@ -54,8 +61,20 @@ _NORMALS = np.concatenate(
 
 
 @dataclass(frozen=True)
+class CrownPoints:
+    """Very many plants as points."""
+
+    positions: Floats32  # (n, 3): where they stand, meters from the origin of their `Shapes`
+    axes: Floats32  # (n, 3): unit vectors along trunks
+    forms: Floats32  # (n, 4): heights of the lowest and the highest leaves, radii of the crown's rings in leaf; meters
+    kinds: Integers32  # (n,): rows of ``looks``
+    looks: Floats32  # (k, 7): color of leaves, width of the crown over that in leaf, color of wood; linear RGB
+    some: Seeds | None = None  # some plants of each kind, from which `on_day` takes looks
+
+
+@dataclass(frozen=True)
 class Shapes:
-    """Many plants in one mesh."""
+    """Many plants in one mesh, or as points."""
 
     positions: Floats32  # (v, 3): meters from ``origin``
     colors: Floats32  # (v, 3): as a screen shows them, shaded by a fixed light
@@ -63,50 +82,153 @@ class Shapes:
     plants: int  # plants that are shown
     of: int  # plants that there are
     origin: Floats  # (3,): near most plants, meters, world space
+    crowns: CrownPoints | None = None  # all plants, instead of the mesh
 
 
-def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
+def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_FACES) -> Shapes:
     """Plants as crowns and trunks of some twenty triangles each, in the mean colors of their species.
 
-    Of more than ``most`` plants only some are shown; ``flora`` has the species in the order of ``seeds.identifiers``.
+    More than ``most`` plants are points with the form and color of their crowns, of which `nearest` has the faces;
+    ``flora`` has the species in the order of ``seeds.identifiers``.
     """
+    if len(seeds) > most:
+        return crowns_of(flora, seeds)
     of, origin, trunk = _shown(flora, seeds, most)
     species = flora.rows["species"][trunk.row]
-    profile = np.stack([_profile(flora, int(row)) for row in flora.first_row])[species]  # (n, 6)
-    low, high, *radii = profile.T
+    low, high, *radii = _profiles(flora)[species].T
     length, low, wider, light = outlines(flora, trunk, low, high)
-    wood, leaves = flora.wood_color[trunk.row], flora.leaf_colors(trunk)
-    radii = [radius * wider for radius in radii]
+    leaves, left, wood = _looks(flora, trunk)
+    heights = length[:, None] * np.column_stack([low, high])
+    widths = (length * wider * left)[:, None] * np.column_stack(radii)
+    # The wood's own radius would be less than a pixel in the view of a forest.
+    foot = np.maximum(trunk.radius, _THIN * length)
+    reach = 1.0 + light @ _AROUND[:, :2].T
+    positions, colors = _crowns(trunk.position, trunk.frame, heights, widths, foot, leaves, wood, reach)
+    return Shapes(positions, colors, _repeated(_faces(), len(_NORMALS), len(trunk)), len(trunk), of, origin)
+
+
+def _looks(flora: Flora, trunk: Branches) -> tuple[Floats, Floats, Floats]:
+    """Of plants (n,): colors of crowns (n, 3), linear; their width over that in leaf (n,); colors of wood (n, 3)."""
+    wood, leaves, width = flora.wood_color[trunk.row], flora.leaf_colors(trunk), np.ones(len(trunk))
     if trunk.year is not None:
         left = np.minimum(flora.day.leaf_share(trunk), 1.0)
-        radii = [radius * (_BARE + (1.0 - _BARE) * left) for radius in radii]
+        width = _BARE + (1.0 - _BARE) * left
         leaves = wood + left[:, None] * (leaves - wood)
-    leaves = np.where((flora.leaf_count[trunk.row] > 0)[:, None], leaves, wood)
-    local = np.zeros((len(trunk), len(_NORMALS), 3), np.float32)
-    reach = 1.0 + light @ _AROUND[:, :2].T
-    for ring, radius in zip((_LOWER, _UPPER), radii, strict=True):
+    return np.where((flora.leaf_count[trunk.row] > 0)[:, None], leaves, wood), width, wood
+
+
+def _crowns(
+    feet: Floats,
+    frame: Floats,
+    heights: Floats,
+    widths: Floats,
+    foot: Floats,
+    leaves: Floats,
+    wood: Floats,
+    reach: Floats | float = 1.0,
+) -> tuple[Floats32, Floats32]:
+    """Corners (v, 3) of crowns and trunks, and their colors as a screen shows them.
+
+    Parameters
+    ----------
+    feet, frame : (n, 3), (n, 3, 3) float
+        Where plants stand, and the axes of their trunks.
+    heights : (n, 2) float
+        Of the lowest and the highest leaves, meters.
+    widths : (n, 2) float
+        Radii of the two rings, meters.
+    foot : (n,) float
+        Radius of the trunk, meters.
+    leaves, wood : (n, 3) float
+        Linear RGB.
+    reach : (n, `SIDES`) float
+        Factors on the radii to all sides.
+    """
+    # Of single precision, as screens need no more: seasons go by while one looks on.
+    local = np.zeros((len(feet), len(_NORMALS), 3), np.float32)
+    for ring, radius in zip((_LOWER, _UPPER), widths.T, strict=True):
         local[:, ring] = (radius[:, None] * reach)[:, :, None] * _AROUND
-    # The wood's own radius would be less than a pixel in the view of a forest.
-    local[:, _FOOT] = np.maximum(trunk.radius / length, 0.012)[:, None, None] * _AROUND
+    local[:, _FOOT] = foot[:, None, None] * _AROUND
+    low, high = heights.T
     local[:, _CROWN, 2] = low[:, None] + (high - low)[:, None] * _HEIGHTS
     local[:, -1, 2] = low + 0.5 * (high - low)
-    local *= length[:, None, None].astype(np.float32)
-    # Of single precision, as screens need no more: seasons go by while one looks on.
-    frame = trunk.frame.astype(np.float32)
+    frame = frame.astype(np.float32)
     positions = local @ frame.transpose(0, 2, 1)
-    positions += trunk.position[:, None].astype(np.float32)
+    positions += feet[:, None].astype(np.float32)
     sun = np.einsum("i,nij->nj", (_SUN / np.linalg.norm(_SUN)).astype(np.float32), frame)
     shone = _SHADE + (1.0 - _SHADE) * np.clip(np.einsum("nj,vj->nv", sun, _NORMALS), 0.0, 1.0)
     colors = shone[:, :, None] * leaves[:, None].astype(np.float32)
     colors[:, _FOOT.start :] = shone[:, _FOOT.start :, None] * wood[:, None].astype(np.float32)
-    return Shapes(
-        positions.reshape(-1, 3),
-        as_shown(colors).reshape(-1, 3),
-        _repeated(_faces(), len(_NORMALS), len(trunk)),
-        len(trunk),
-        of,
-        origin,
+    return positions.reshape(-1, 3), as_shown(colors).reshape(-1, 3)
+
+
+def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
+    """All plants as points, as `light_plants` makes many."""
+    origin, rows = origin_near(seeds.position), flora.rows
+    if seeds.crown is None:
+        row, _, length = trunk_lengths(rows, seeds)
+        forms = _profiles(flora).astype(np.float32)[rows["species"][row]] * length.astype(np.float32)[:, None]
+    else:
+        trunk = trunks(rows, seeds)
+        low, high, *radii = _profiles(flora)[rows["species"][trunk.row]].T
+        length, low, wider, _ = outlines(flora, trunk, low, high)
+        forms = np.column_stack([low, high, *(wider * radius for radius in radii)]) * length[:, None]
+    some = _some_of_each(seeds)
+    crowns = CrownPoints(
+        (seeds.position - origin).astype(np.float32),
+        seeds.frame[:, :, 2].astype(np.float32),
+        forms.astype(np.float32, copy=False),
+        seeds.species,
+        _looks_of_kinds(flora, some),
+        some,
     )
+    nothing = np.zeros((0, 3))
+    return Shapes(nothing.astype(np.float32), nothing, nothing.astype(np.int32), len(seeds), len(seeds), origin, crowns)
+
+
+def _some_of_each(seeds: Seeds) -> Seeds:
+    """So many plants of each species, by species; some more than once where there are fewer."""
+    order = np.argsort(seeds.species.astype(np.int16), kind="stable")  # of so few bits it counts instead of comparing
+    number = np.bincount(seeds.species)
+    places = (np.arange(_SOME) + 0.5) / _SOME * number[:, None] + (np.cumsum(number) - number)[:, None]
+    return seeds.take(order[places[number > 0].astype(np.int64).ravel()])
+
+
+def _looks_of_kinds(flora: Flora, some: Seeds) -> Floats32:
+    """`CrownPoints.looks` of the species of a flora: means over plants that `_some_of_each` has chosen."""
+    looks = np.zeros((len(flora.species), 7), np.float32)
+    found = np.column_stack(_looks(flora, trunks(flora.rows, some))).reshape(-1, _SOME, 7)
+    looks[some.species[::_SOME]] = found.mean(axis=1)
+    return looks
+
+
+def on_day(shapes: Shapes, flora: Flora) -> Shapes:
+    """Points of the same plants, which have ``some``, on another day of the year: only their looks differ."""
+    crowns = shapes.crowns
+    return replace(shapes, crowns=replace(crowns, looks=_looks_of_kinds(flora, crowns.some)))
+
+
+def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes, float]:
+    """Those plants as crowns and trunks with faces that look largest from a place (3,) in the world.
+
+    Also the height over the distance of the least of them: all that look larger have faces.
+    """
+    crowns = shapes.crowns
+    away = crowns.positions - (eye - shapes.origin).astype(np.float32)
+    size = crowns.forms[:, 1] ** 2 / np.maximum(np.einsum("ni,ni->n", away, away), 1e-6)
+    some = np.argpartition(size, -most)[-most:] if len(size) > most else np.arange(len(size))
+    some = some[np.argsort(-size[some])]  # the nearest hide what is drawn after them, which then costs little
+    least = float(np.sqrt(size[some].min(initial=np.inf)))
+    looks, forms, up = crowns.looks[crowns.kinds[some]], crowns.forms[some], crowns.axes[some]
+    along = np.where(np.abs(up[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    across = np.cross(up, along)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    frame = np.stack([across, np.cross(up, across), up], axis=2)
+    widths = looks[:, 3:4] * forms[:, 2:]
+    corners = crowns.positions[some], frame, forms[:, :2], widths, _THIN * forms[:, 1], looks[:, :3], looks[:, 4:]
+    positions, colors = _crowns(*corners)
+    indices = _repeated(_faces(), len(_NORMALS), len(some))
+    return Shapes(positions, colors, indices, len(some), shapes.of, shapes.origin), least
 
 
 def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
@@ -132,11 +254,11 @@ def thinned(seeds: Seeds, heights: Floats, most: int = MOST_PLANTS) -> Seeds:
     """
     if len(seeds) <= most:
         return seeds
-    order = np.argsort(seeds.species, kind="stable")  # so that each kind is thinned evenly
+    order = np.argsort(seeds.species.astype(np.int16), kind="stable")  # so that each kind is thinned evenly
     size = (heights[seeds.species] * seeds.scale)[order] ** 2
-    falling = np.sort(size)[::-1]
-    rest = np.cumsum(falling[::-1])[::-1]
-    whole = int(np.argmax((most - np.arange(most)) * falling[:most] <= rest[:most]))  # so many are all shown
+    falling = np.sort(np.partition(size, -most)[-most:])[::-1]
+    rest = size.sum() - np.cumsum(falling) + falling
+    whole = int(np.argmax((most - np.arange(most)) * falling <= rest))  # so many are all shown
     share = np.minimum(size * ((most - whole) / rest[whole]), 1.0)
     places = np.floor(np.cumsum(share))
     return seeds.take(np.sort(order[np.diff(places, prepend=0.0) > 0.0]))
@@ -147,6 +269,14 @@ def _shown(flora: Flora, seeds: Seeds, most: int) -> tuple[int, Floats, Branches
     origin = origin_near(seeds.position)
     some = thinned(seeds, flora.rows["length"][flora.first_row, 0], most).counted_from(origin)
     return len(seeds), origin, trunks(flora.rows, some)
+
+
+def _profiles(flora: Flora) -> Floats:
+    """Of each species (s, 4): lowest and highest leaves, and radii of its crown's rings, for a trunk of length 1."""
+    summer = flora.in_leaf
+    if summer not in _known:
+        _known[summer] = np.stack([_profile(flora, int(row)) for row in flora.first_row])
+    return _known[summer]
 
 
 def _profile(flora: Flora, row: int) -> Floats:
@@ -230,6 +360,17 @@ def joined(parts: Sequence[Shapes]) -> Shapes:
     """Shapes of the same kind, at least one, as one."""
     origin = parts[0].origin
     firsts = np.cumsum([0, *(len(part.positions) for part in parts)]).tolist()
+    points = [part for part in parts if part.crowns is not None]
+    crowns = None
+    if points:
+        kinds = np.cumsum([0, *(len(part.crowns.looks) for part in points)]).tolist()
+        crowns = CrownPoints(
+            np.concatenate([part.crowns.positions + (part.origin - origin).astype(np.float32) for part in points]),
+            np.concatenate([part.crowns.axes for part in points]),
+            np.concatenate([part.crowns.forms for part in points]),
+            np.concatenate([part.crowns.kinds + np.int32(n) for part, n in zip(points, kinds, strict=False)]),
+            np.concatenate([part.crowns.looks for part in points]),
+        )
     return Shapes(
         np.concatenate([(part.positions + (part.origin - origin)).astype(np.float32) for part in parts]),
         np.concatenate([part.colors for part in parts]),
@@ -237,6 +378,7 @@ def joined(parts: Sequence[Shapes]) -> Shapes:
         sum(part.plants for part in parts),
         sum(part.of for part in parts),
         origin,
+        crowns,
     )
 
 

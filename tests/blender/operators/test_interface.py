@@ -10,6 +10,7 @@ import pytest
 
 from devtools import interface
 from devtools.layouts import Layout
+from panels import layers
 from tests.blender.scenes import add_mesh, select
 from tetflora_addon.blender.biomes.layers import active_layer
 
@@ -57,6 +58,35 @@ def test_no_label_of_the_sidebar_is_cut():
         interface.drawn(cls, interface._context(), layout)
     assert {"Quality", "Altitude", "Day of Year", "Angle Tip"} <= set(layout.beside)
     assert {text for text in layout.beside if blf.dimensions(0, text)[0] > 84.0} == set()
+
+
+def test_rows_of_lists_are_drawn_to_be_timed():
+    timed = {bpy.types.TETFLORA_UL_layers, bpy.types.TETFLORA_UL_species}
+    assert set(interface.classes("TETFLORA_UL_")) - timed == {bpy.types.TETFLORA_UL_inventory_columns}  # of a dialog
+    select(add_mesh("ground", size=20.0))
+    bpy.ops.tetflora.populate(count=3, species="bush, birch", min_distance=0.1)
+    bpy.context.scene.tetflora.output.add_species = "oak"
+    rows = {name: draw() for name, draw in interface.lists(interface._context()).items()}
+    assert rows == {"TETFLORA_UL_layers.0": 1, "TETFLORA_UL_species.0": 2, "TETFLORA_UL_species.1": 1}
+
+
+@pytest.mark.parametrize("message", ["", "Too few"])
+def test_the_line_below_the_list_of_layers_is_not_cut(message):
+    """A sidebar of usual width has 206 pixels for it at scale 1: measured in the window."""
+    select(add_mesh("ground", size=20.0))
+    bpy.ops.tetflora.populate(count=3, species="bush", min_distance=0.1)
+    layer = active_layer(bpy.context.scene)
+    layer.message = message
+    said = {layers._status(layer, True)}
+    layer.made = 1_000_000
+    said.add(layers._status(layer, True))
+    layer.count = 2_000_000
+    said.add(layers._status(layer, True))
+    layer.by_density = True
+    said.add(layers._status(layer, True))
+    blf.size(0, 11)
+    assert len(said) == 4
+    assert {text for text in said if blf.dimensions(0, text)[0] > 206.0} == set()
 
 
 def test_the_sidebar_stays_short():

@@ -139,6 +139,20 @@ def test_lists_grow_and_shrink():
     assert len(settings.leaf_objects) == 1
 
 
+def test_a_picture_of_a_gallery_adds_its_species_to_the_list():
+    group, plant = bpy.context.scene.tetflora, add_plant().tetflora
+    lists = (group.populate, "mix"), (group.stand, "species"), (group.output, "species"), (plant, "field_species")
+    for owner, entries in (*lists, (group, "leaf_objects")):
+        owner.add_species = "birch"
+        owner.add_species = "oak"
+        assert [entry.species for entry in getattr(owner, entries)] == ["birch", "oak"]
+        assert getattr(owner, f"{entries}_index") == 1
+        # The button itself shows a plus again, and choosing that adds nothing.
+        assert owner.add_species == "PLUS"
+        owner.add_species = "PLUS"
+        assert len(getattr(owner, entries)) == 2
+
+
 @pytest.mark.parametrize(
     ("name", "says"),
     [

@@ -114,7 +114,7 @@ def test_the_panel_tells_the_plants_that_are_there_or_that_an_update_would_place
     population.count = 33
     assert (status(population), waits(population)) == ("33 plants, as empties", True)
     population.by_density = True
-    assert (status(population), waits(population)) == ("As many plants as fit on the ground", True)
+    assert (status(population), waits(population)) == ("As many plants as fit", True)
     bpy.ops.tetflora.update_layers(which='ACTIVE', forget_erased=True)
     assert (status(population), waits(population)) == (f"{population.made:,} plants, as empties", False)
     bpy.ops.tetflora.duplicate_layer()

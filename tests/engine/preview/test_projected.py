@@ -294,11 +294,13 @@ def test_light_plants_stand_where_plants_do(species: str) -> None:
     assert len(boxes.indices) == 12 * count
 
 
-def test_a_large_forest_is_shown_in_part() -> None:
+def test_of_a_large_forest_bounds_are_shown_in_part_and_all_crowns() -> None:
     seeds = support.grove(100, 2.0)
-    shapes = light_plants.light_plants(support.small_flora(), seeds, most=30)
+    shapes = light_plants.bounds_of_plants(support.small_flora(), seeds, most=30)
     assert 29 <= shapes.plants <= 30
     assert shapes.of == 100
+    shapes = light_plants.light_plants(support.small_flora(), seeds, most=30)
+    assert shapes.plants == shapes.of == len(shapes.crowns.positions) == 100
 
 
 def test_grass_is_thinned_and_not_the_trees_above_it() -> None:

@@ -15,7 +15,7 @@ from ..declare import FIXED, HIDDEN, boolean, choice, integer, list_of, once, po
 from ..runtime import Listeners
 from ..scene.own_ages import MOST_YEARS
 from ..settings import BIOME, FIELD, SCATTER, properties_of, settings_in
-from ..species.catalog import SpeciesChoice, items_for, number_of
+from ..species.catalog import SpeciesChoice, gallery_of, items_for, number_of
 from .distances import SOURCES, choose, follows_species
 from .plant_objects import EMPTIES_UNASKED
 
@@ -298,6 +298,7 @@ class TetFloraLayer(bpy.types.PropertyGroup, settings_in(Limits, Rules, **LIVE),
 
     mix: list_of(TetFloraMixEntry, "Species", "Species to choose from; if empty, the first one of the catalog")
     mix_index: integer("Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+    add_species: gallery_of("mix", TetFloraMixEntry)
 
     min_distance: properties_of(Rules, **_DISTANCE).min_distance
 

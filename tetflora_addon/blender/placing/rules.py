@@ -42,7 +42,8 @@ from .zones import read_zones, zone_values
 BIOME_ONLY = ("gives_way", "slope_softness", "altitude_softness", "path_min", "path_max", "path_softness")
 #: Identity and state of a population; all else are settings, which can be copied and written to files.
 IDENTITY = {
-    *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased", "mix_index"),
+    *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
+    *("mix_index", "add_species"),
     *("distance_from", "covers", "biome", "kind", "field", "source", "data", "shown", "folded"),
     *("limits", "limits_shown"),
     *BIOME_ONLY,

@@ -16,7 +16,7 @@ from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
 from ..scene.looks import LIKE
 from ..settings import switches
-from ..species.catalog import SpeciesChoice
+from ..species.catalog import SpeciesChoice, gallery_of
 from .hiding import adopt_copies
 from .meshes import mesh_steps, point_object
 from .output import (
@@ -329,3 +329,4 @@ class TetFloraOutput(
     )
     species: list_of(TetFloraSpeciesOutput, "Species", "Species with their own pass index, light group or materials")
     species_index: integer("Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+    add_species: gallery_of("species", TetFloraSpeciesOutput)

@@ -186,6 +186,39 @@ def _choose(group: SpeciesChoice, number: int) -> None:
             tell_listeners()
 
 
+def gallery_of(entries: str, kind: type[SpeciesChoice]) -> object:
+    """A choice that is a button in panels, a plus, and opens a gallery of pictures: what is clicked is added to a list.
+
+    Parameters
+    ----------
+    entries : str
+        Name of the list of species in the group of properties to which this is given.
+    kind : type
+        Class of the list's entries.
+    """
+    return once.choice(
+        "Add Species",
+        "Add a species to the list by its picture",
+        lambda _self, _context: _with_plus(items_for(assets=kind.takes_assets)),
+        get=lambda _self: 0,
+        set=lambda self, number: _add_to(self, entries, kind, number),
+        options={'SKIP_SAVE', 'HIDDEN'},
+    )
+
+
+def _with_plus(items: list[Item]) -> list[Item]:
+    return _kept.setdefault(("plus", id(items)), [("PLUS", "Add Species", "", 'ADD', 0), *items])
+
+
+def _add_to(group: bpy.types.PropertyGroup, entries: str, kind: type[SpeciesChoice], number: int) -> None:
+    for identifier, *_, item_number in items_for(assets=kind.takes_assets):
+        if item_number == number and number:
+            added = getattr(group, entries)
+            added.add().species = identifier
+            setattr(group, f"{entries}_index", len(added) - 1)
+            tell_listeners()
+
+
 #: The user's own species.
 OWN_FILES = OwnFiles("species", "species", SpeciesError, species_folders, own_species_folder, tell_listeners)
 

@@ -10,7 +10,7 @@ from ...stands.grow import StandSettings
 from ..declare import FIXED, HIDDEN, boolean, integer, list_of, real, string
 from ..placing.properties import AroundPaths, TetFloraGround
 from ..settings import properties_of, settings_in
-from ..species.catalog import SpeciesChoice
+from ..species.catalog import SpeciesChoice, gallery_of
 
 _RULES = properties_of(Rules, options=set())
 _FACTOR = {"min": 0.0, "max": 1.0, "subtype": 'FACTOR', "options": set()}
@@ -48,6 +48,7 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
     grounds: list_of(TetFloraGround, "Grounds", "Meshes that the stand grows on")
     species: list_of(TetFloraStandEntry, "Species", "Species of the stand; if empty, a mixed forest of central Europe")
     species_index: integer("Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+    add_species: gallery_of("species", TetFloraStandEntry)
 
     years: properties_of(StandSettings, options=set(), default=100).years
     # Woods of a scene end where their ground does.

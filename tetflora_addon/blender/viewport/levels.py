@@ -20,7 +20,17 @@ from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...jobs import Progress, mapped
 from ...preview.levels import Levels, gather
-from ...preview.light_plants import Shapes, bounds_of_plants, joined, light_plants, simple_crowns, thinned
+from ...preview.light_plants import (
+    MOST_FACES,
+    Shapes,
+    bounds_of_plants,
+    crowns_of,
+    joined,
+    light_plants,
+    on_day,
+    simple_crowns,
+    thinned,
+)
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
 from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
@@ -37,7 +47,7 @@ from ..settings import season_of, years_of
 from ..species import edits
 from ..worker import call_in_thread, steps_in_thread
 from . import state
-from .state import camera_now, find, of
+from .state import Preview, camera_now, find, of
 
 _MANY_KINDS = 12  # more are compiled one by one, and kept
 _SOON = 0.2  # seconds from a change of plants to reading them again
@@ -144,7 +154,10 @@ def _grown(
     if years == 0.0 and len(kinds) <= _MANY_KINDS:
         return [make(in_year(scene, compile_for(kinds, scene, depsgraph)), seeds)]
     loaded, out = load_for(kinds, scene, depsgraph, 0.0), []
-    some = thinned(seeds, np.array([species.orders[0].length.mean for species in loaded]))
+    if make is light_plants and len(seeds) > MOST_FACES:
+        make, some = crowns_of, seeds
+    else:
+        some = thinned(seeds, np.array([species.orders[0].length.mean for species in loaded]))
     for number, species in enumerate(loaded):
         own = some.take(np.flatnonzero(some.species == number))
         if len(own):
@@ -196,9 +209,26 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
         return
     shown = depsgraph is not None and depsgraph.mode == 'VIEWPORT'  # frames of a render are not the artist's
     if shown and preview.seconds < _QUICK and on_main_thread():
-        read_shapes(scene, depsgraph)
+        if not _went_by(scene, depsgraph, preview):
+            read_shapes(scene, depsgraph)
     else:
         schedule()
+
+
+def _went_by(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, preview: Preview) -> bool:
+    """Show points of the same plants on another day, where nothing else can have changed; whether that was so."""
+    shapes, moved = preview.shapes, (u for u in depsgraph.updates if u.is_updated_transform or u.is_updated_geometry)
+    others = any(not (isinstance(u.id, bpy.types.Object) and u.id.type in {'CAMERA', 'LIGHT'}) for u in moved)
+    if others or shapes is None or shapes.crowns is None or shapes.crowns.some is None:
+        return False
+    moment = _moment(scene)
+    if moment[1:] != preview.moment[1:] or years_of(scene) > 0.0:
+        return False
+    flora = in_year(scene, compile_for(shapes.crowns.some.identifiers, scene, depsgraph))
+    preview.shapes, preview.moment = on_day(shapes, flora), moment
+    preview.made += 1
+    redraw()
+    return True
 
 
 def _moment(scene: bpy.types.Scene) -> tuple:

@@ -10,6 +10,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from functools import cache
 
 import blf
 import bpy
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from ...arrays import Floats, Floats32
 from ...camera.camera import Camera
 from ...preview.levels import FORMS, THICK, Level, Levels, as_shown, colors_of, drawable, project
-from ...preview.light_plants import Shapes
+from ...preview.light_plants import CrownPoints, Shapes, nearest
 from ...refinement.decisions import Decision
 from ...tetrahedra.geometry import EDGES
 from ..results.collection import UNFINISHED, result_collections
@@ -93,11 +94,106 @@ def translucent(
 
 
 def plants(shapes: Shapes) -> gpu.types.GPUBatch | None:
-    """All plants; None where there are none."""
-    if shapes.plants == 0:
+    """All plants that are a mesh; None where there are none."""
+    if len(shapes.positions) == 0:
         return None
     kind = 'TRIS' if shapes.indices.shape[1] == 3 else 'LINES'
     return batch(kind, shapes.positions, _opaque(shapes.colors, 1.0), shapes.indices)
+
+
+def points(preview: Preview) -> gpu.types.GPUBatch:
+    """All plants as points with the form and color of their crowns; on another day only colors go to the card."""
+    crowns = preview.shapes.crowns
+    standing = _kept(preview, "standing", (id(crowns.positions),), lambda: _standing(crowns))
+    shown = np.column_stack([as_shown(crowns.looks[:, :3]), crowns.looks[:, 3]])
+    layout = gpu.types.GPUVertFormat()
+    layout.attr_add(id="look", comp_type='U8', len=4, fetch_mode='INT_TO_FLOAT_UNIT')
+    looks = gpu.types.GPUVertBuf(layout, len(crowns.kinds))
+    looks.attr_fill("look", np.rint(255.0 * np.clip(shown, 0.0, 1.0)).astype(np.uint8)[crowns.kinds])
+    made = gpu.types.GPUBatch(type='POINTS', buf=standing)
+    made.vertbuf_add(looks)
+    return made
+
+
+def _near(shapes: Shapes, eye: Floats) -> tuple[gpu.types.GPUBatch | None, Floats, float]:
+    """Those with faces as seen from a place (3,), the place, and from which height over the distance on they have."""
+    found, least = nearest(shapes, eye)
+    return plants(found), eye, least
+
+
+def _standing(crowns: CrownPoints) -> gpu.types.GPUVertBuf:
+    layout = gpu.types.GPUVertFormat()
+    layout.attr_add(id="pos", comp_type='F32', len=3, fetch_mode='FLOAT')
+    layout.attr_add(id="form", comp_type='F32', len=4, fetch_mode='FLOAT')
+    buffer = gpu.types.GPUVertBuf(layout, len(crowns.kinds))
+    buffer.attr_fill("pos", np.ascontiguousarray(crowns.positions))
+    buffer.attr_fill("form", np.ascontiguousarray(crowns.forms))
+    return buffer
+
+
+#: A point as high as its plant, and within it the outline of trunk and crown: from the side that of `light_plants`, the
+#: rounder the more one looks from above.
+_VERTEX = """
+void main() {
+  float side = sqrt(max(1.0 - view.y * view.y, 0.0)), wide = max(form.z, form.w) * look.a;
+  gl_Position = matrix * vec4(pos + vec3(0.0, 0.0, 0.5 * form.y), 1.0);
+  float tall = 0.5 * side * form.y + view.y * wide, half_size = max(max(tall, wide), 1e-6);
+  pixels = 2.0 * half_size * view.x / max(gl_Position.w, 1e-6);
+  gl_PointSize = max(pixels, 1.5);
+  if (form.y > eye.w * distance(pos, eye.xyz)) {  // it has faces
+    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  }
+  color = look.rgb;
+  shape = vec4(tall, form.z * look.a, form.w * look.a, 0.012 * form.y) / half_size;
+  low = clamp(form.x / max(form.y, 1e-6), 0.0, 0.95);
+}
+"""
+_FRAGMENT = """
+void main() {
+  float x = abs(2.0 * gl_PointCoord.x - 1.0), y = (1.0 - 2.0 * gl_PointCoord.y) / shape.x;
+  float t = (0.5 * y + 0.5 - low) / (1.0 - low);
+  float wide = t < 0.25 ? shape.y * t / 0.25 : mix(shape.y, shape.z, min((t - 0.25) / 0.4, 1.0));
+  wide = t > 0.65 ? shape.z * (1.0 - t) / 0.35 : wide;
+  wide = mix(max(wide, shape.w), max(shape.y, shape.z) * sqrt(max(1.0 - y * y, 0.0)), view.y);
+  if (pixels > 3.0 && (abs(y) > 1.0 || x > wide)) {
+    discard;
+  }
+  float shone = mix(0.6, 0.95, clamp(t + view.y, 0.0, 1.0));
+  fragColor = vec4(pow(shone * color, vec3(2.2)), 1.0);  // linear: the viewport's buffer encodes what it is given
+}
+"""
+
+
+@cache
+def _crown_shader() -> gpu.types.GPUShader:
+    passed = gpu.types.GPUStageInterfaceInfo("crown_interface")
+    for kind, name in (('VEC3', "color"), ('VEC4', "shape"), ('FLOAT', "low"), ('FLOAT', "pixels")):
+        passed.flat(kind, name)
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant('MAT4', "matrix")
+    info.push_constant('VEC4', "view")  # pixels of a meter at a depth of 1, how far one looks down, 0 to 1
+    info.push_constant('VEC4', "eye")  # whence, and from which height over the distance on, plants have faces
+    for number, (kind, name) in enumerate((('VEC3', "pos"), ('VEC4', "form"), ('VEC4', "look"))):
+        info.vertex_in(number, kind, name)
+    info.vertex_out(passed)
+    info.fragment_out(0, 'VEC4', "fragColor")
+    info.vertex_source(_VERTEX)
+    info.fragment_source(_FRAGMENT)
+    return gpu.shader.create_from_info(info)
+
+
+def _draw_points(made: gpu.types.GPUBatch, origin: Floats, eye: Floats, least: float) -> None:
+    region, height = bpy.context.region_data, bpy.context.region.height
+    shader = _crown_shader()
+    with gpu.matrix.push_pop():
+        gpu.matrix.translate(origin.tolist())
+        shader.uniform_float("matrix", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+        down = abs(region.view_matrix[2][2])
+        shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], down, 0.0, 0.0))
+        shader.uniform_float("eye", (*(eye - origin).tolist(), least))
+        gpu.state.program_point_size_set(True)
+        made.draw(shader)
+        gpu.state.program_point_size_set(False)
 
 
 def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]) -> gpu.types.GPUBatch:
@@ -151,12 +247,22 @@ def _draw(made: gpu.types.GPUBatch | None, origin: Floats) -> None:
 
 def _draw_plants(preview: Preview) -> None:
     shapes = preview.shapes
-    made = _kept(preview, "plants", (preview.made,), lambda: plants(shapes))
+    made, near, eye, least = _kept(preview, "plants", (preview.made,), lambda: plants(shapes)), None, None, 0.0
+    if shapes.crowns is not None:
+        region = bpy.context.region_data
+        place = region.view_matrix.inverted().translation if region.is_perspective else region.view_location
+        key = preview.made, *(round(part) for part in place)  # another meter shows others
+        name = f"near {bpy.context.space_data.as_pointer()}"
+        near, eye, least = _kept(preview, name, key, lambda: _near(shapes, np.array(place)))
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(True)
     gpu.state.face_culling_set('BACK')  # crowns and trunks are closed
     _draw(made, shapes.origin)
+    _draw(near, shapes.origin)
     gpu.state.face_culling_set('NONE')
+    if shapes.crowns is not None:
+        dots = _kept(preview, "points", (preview.made,), lambda: points(preview))
+        _draw_points(dots, shapes.origin, eye, least)
     gpu.state.depth_mask_set(False)
 
 

@@ -139,7 +139,7 @@ def status(population: bpy.types.PropertyGroup) -> str:
     if dots is not None and dots.more and not population.by_density:
         number, known = population.count, True
     if not known:
-        return "As many plants as fit on the ground"
+        return "As many plants as fit"
     made_as = "one field" if makes_field(population, number) else "empties"
     more = "more than " if dots is not None and dots.more and population.by_density else ""
     return f"{more}{number:,} plant{'' if number == 1 else 's'}, as {made_as}"

@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Very many plants as points, and those near as crowns with faces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.engine import support
+from tetflora_addon.growth.seasons import Season
+from tetflora_addon.preview import light_plants
+
+#: Species, and how far to the east.
+KINDS = ("birch", 0.0), ("bush", 40.0)
+
+
+def test_points_have_the_form_and_color_of_the_crowns_with_faces() -> None:
+    """As high and as wide in the same places; those with faces are those that look largest from where one stands."""
+    flora, rng = support.flora(), np.random.default_rng(5)
+    species = rng.permutation(np.repeat([support.SPECIES.index("birch"), support.SPECIES.index("bush")], 20))
+    seeds = support.plants(np.arange(40), 0, rng.uniform(-30.0, 30.0, (40, 3)), rng.uniform(0.5, 1.0, 40))
+    seeds = replace(seeds, species=species.astype(np.int32))
+    expected, points = light_plants.light_plants(flora, seeds), light_plants.light_plants(flora, seeds, most=10)
+    eye, forms = np.array([30.0, 0.0, 5.0]), points.crowns.forms
+    angle = forms[:, 1] / np.linalg.norm(seeds.position - eye, axis=1)
+    order = np.argsort(-angle)
+    near, _ = light_plants.nearest(points, eye, 40)
+
+    def heights_and_radii(shapes: light_plants.Shapes, order: np.ndarray) -> np.ndarray:
+        corners = shapes.positions.reshape(40, -1, 3) + shapes.origin - seeds.position[order, None]
+        rings = (corners[:, first : first + 4] for first in (1, 5))
+        radii = [np.linalg.norm(ring - ring.mean(axis=1)[:, None], axis=2).mean(axis=1) for ring in rings]
+        return np.column_stack([corners[:, 0, 2], corners[:, 9, 2], *radii])
+
+    np.testing.assert_allclose(heights_and_radii(near, order), forms[order], rtol=1e-3)  # the largest come first
+    np.testing.assert_allclose(heights_and_radii(expected, np.arange(40)), forms, rtol=0.05)  # its trunks lean
+    top, usual = (shapes.colors.reshape(40, -1, 3)[:, 9] for shapes in (near, expected))  # of the highest corner
+    np.testing.assert_allclose(top, usual[order], atol=0.06)
+    some, least = light_plants.nearest(points, eye, 5)
+    feet = (some.positions.reshape(5, -1, 3)[:, 10:14].mean(axis=1) + some.origin)[:, None] - seeds.position
+    assert set(np.linalg.norm(feet, axis=2).argmin(axis=1)) == set(np.argsort(angle)[-5:])
+    assert least == pytest.approx(np.sort(angle)[-5], rel=1e-4)
+
+
+@pytest.mark.parametrize("day", [20.0, 290.0])
+def test_on_another_day_points_look_as_if_they_were_made_on_it(day: float) -> None:
+    flora, seeds = (
+        support.flora(),
+        support.plants(np.arange(40), support.SPECIES.index("birch"), np.zeros((40, 3)), 1.0),
+    )
+    points = light_plants.light_plants(flora, seeds, most=10)
+    later = flora.in_year(Season(day))
+    anew, followed = light_plants.light_plants(later, seeds, most=10), light_plants.on_day(points, later)
+    assert np.array_equal(anew.crowns.looks, followed.crowns.looks)
+    assert followed.crowns.positions is points.crowns.positions
+    number = support.SPECIES.index("birch")
+    assert not np.allclose(points.crowns.looks[number], followed.crowns.looks[number], atol=0.01)
+
+
+def test_points_of_two_kinds_are_joined_with_their_looks() -> None:
+    flora, places = support.flora(), np.random.default_rng(6).uniform(-9.0, 9.0, (30, 3))
+    seeds = [support.plants(np.arange(30), support.SPECIES.index(name), places + x, 1.0) for name, x in KINDS]
+    parts = [light_plants.light_plants(flora, one, most=10) for one in seeds]
+    whole = light_plants.joined(parts)
+    looks = [part.crowns.looks[part.crowns.kinds] for part in parts]
+    assert np.array_equal(whole.crowns.looks[whole.crowns.kinds], np.concatenate(looks))
+    feet = np.concatenate([one.position for one in seeds])
+    np.testing.assert_allclose(whole.crowns.positions + whole.origin, feet, atol=1e-3)
+    assert whole.plants == 60
