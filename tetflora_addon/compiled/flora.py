@@ -21,7 +21,7 @@ from ..growth.foliage import YOUTH, envelope_reach
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
 from ..growth.seasons import Season
-from ..growth.seeds import Branches
+from ..growth.seeds import LEAVES, Branches
 from ..growth.wind import Wind, is_windy, widest_sway, windy_rows
 from ..leaves.models import LeafModel
 from ..species.ages import with_habit
@@ -165,7 +165,7 @@ class Flora:
             area = self._at_place(self.area_nodes, subplants) * self._shaped_leaves(subplants)
         else:
             area = self.day.leaf_areas(subplants, self._shaped_leaves(subplants, kinds=True))
-        return fullness(self.rows, subplants) * area * subplants.scale**2
+        return fullness(self.rows, subplants) * area * _leafy(subplants) * subplants.scale**2
 
     def leaf_colors(self, subplants: Branches) -> Floats:
         """Mean linear RGB (n, 3) of the leaves of sub-plants, weighted by area; black where they have none."""
@@ -187,27 +187,24 @@ class Flora:
 
     def face_counts(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of sub-plants, leaves and branches."""
-        row, fixed = subplants.row, self.fixed_faces[subplants.row]
-        faces = self.polygons[row]
-        if subplants.year is not None:
-            faces = faces - self.leaf_faces[row] + self.day.leaf_faces(subplants)
-        counts = fixed + fullness(self.rows, subplants) * (faces - fixed)
-        some = self._shaped(subplants)
-        if len(some):
-            own = subplants.take(some)
-            wood = (self.shaped_totals.faces(own) - 1.0) * (self.polygons - self.leaf_faces)[own.row]
-            counts[some] += wood + (self._leaf_faces(own) - self._leaf_faces(replace(own, crown=None)))
-        return counts
+        return self.branch_faces(subplants) + fullness(self.rows, subplants) * self._leaf_faces(subplants)
 
     def branch_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the branches of sub-plants."""
-        return self.face_counts(subplants) - fullness(self.rows, subplants) * self._leaf_faces(subplants)
+        fixed, wood = self.fixed_faces[subplants.row], (self.polygons - self.leaf_faces)[subplants.row]
+        counts = fixed + fullness(self.rows, subplants) * (wood - fixed)
+        some = self._shaped(subplants)
+        if len(some):
+            counts[some] += (self.shaped_totals.faces(subplants.take(some)) - 1.0) * wood[some]
+        return counts
 
     def _leaf_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the leaves of sub-plants, without their fullness."""
         if subplants.year is not None:
-            return self.day.leaf_faces(subplants, self._shaped_leaves(subplants, faces=True, kinds=True))
-        return self.leaf_faces[subplants.row] * self._shaped_leaves(subplants, faces=True)
+            faces = self.day.leaf_faces(subplants, self._shaped_leaves(subplants, faces=True, kinds=True))
+        else:
+            faces = self.leaf_faces[subplants.row] * self._shaped_leaves(subplants, faces=True)
+        return faces * _leafy(subplants)
 
     @_in_summer
     def shaped_totals(self) -> ShapedTotals:
@@ -240,6 +237,11 @@ class Flora:
     def _at_place(self, nodes: Floats, subplants: Branches) -> Floats:
         """Values at the places of sub-plants between the inside and the outside of the crown."""
         return np.einsum("nk,nk...->n...", quadratic(subplants.outward), nodes[subplants.row])
+
+
+def _leafy(subplants: Branches) -> Floats | float:
+    """Factor (n,) on the numbers of leaves of sub-plants, because of crown shapes."""
+    return 1.0 if subplants.crown is None else subplants.crown[:, LEAVES].astype(np.float64)
 
 
 def compile_species(species: Sequence[Species]) -> Flora:

@@ -22,7 +22,7 @@ from .grown_rows import FADES, NOW, Grown, child_number, fullness_of, grown_node
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .rows import BOX, DEAD, FLARE_RINGS, FORK, LATERAL, SPUR, ranged, varied
 from .seasons import plant_years
-from .seeds import BASE, Branches, Pose, Seeds
+from .seeds import BASE, LEAVES, Branches, Pose, Seeds
 from .wind import axis_and_angle, is_windy, moment, turned_by, turned_vectors
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
@@ -170,6 +170,8 @@ def _started(rows: Table, branches: Branches, sort: int) -> Floats:
 def leaf_counts(rows: Table, branches: Branches) -> Integers:
     """Number (n,) of leaves on branches' own axes, in whole whorls; its expectation is exactly the range's mean."""
     wanted = ranged(rows, "leaves", branches.row, branches.key, Draw.LEAVES) * fullness(rows, branches)
+    if branches.crown is not None:
+        wanted = wanted * branches.crown[:, LEAVES]
     whorl = rows["leaf_whorl"][branches.row]
     return np.floor(wanted / whorl + uniform(branches.key, Draw.LEAVES_ROUND)).astype(np.int64) * whorl
 

@@ -154,15 +154,15 @@ _GAP = 0.6
 #: Error from which on there are fewer needles, needles are flat, and prisms have three sides.
 SPARSE, FLAT, _THREE = 0.05, 0.004, 0.0012
 #: One of so many needles stands for them all where there are fewer; what is not seen of the gaps then.
-_OF, _SPARSE_GAP = 3, 2.4
+_OF, _SPARSE_GAP = 4, 3.2
 #: Radius of shoots over that of needles, and of both at their ends.
 _TAPER = 0.55
 #: Places along a needle and its widths there, for errors above the first number.
 _PROFILES = (
     (SPARSE, (0.0, 1.0), (1.0, 0.0)),
     (FLAT, (0.0, 0.35, 1.0), (0.55, 1.0, 0.0)),
-    (_THREE, (0.0, 0.45, 0.88, 1.0), (0.5, 1.0, 0.8, 0.0)),
-    (0.0, (0.0, 0.3, 0.6, 0.88, 1.0), (0.5, 0.95, 1.0, 0.7, 0.0)),
+    (_THREE, (0.0, 0.6, 1.0), (0.6, 1.0, 0.0)),
+    (0.0, (0.0, 0.4, 0.85, 1.0), (0.5, 1.0, 0.75, 0.0)),
 )
 
 
