@@ -39,7 +39,11 @@ from tetflora_addon.species.quality import with_quality
 from tetflora_addon.subplants.pieces import wood_areas
 
 KINDS = ("rich", "spruce 30", "beech")
-FORMS = ({"width": 2.0, "thickness": 1.5}, {"width": 0.5, "base": 0.5, "leaves": 0.6}, {"base": 0.35, "east": 0.5, "north": -0.4})
+FORMS = (
+    {"width": 2.0, "thickness": 1.5},
+    {"width": 0.5, "base": 0.5, "leaves": 0.6},
+    {"base": 0.35, "east": 0.5, "north": -0.4},
+)
 
 
 @cache
