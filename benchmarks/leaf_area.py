@@ -131,7 +131,8 @@ def expanded_off(identifier: str) -> float:
     plants = trunks(flora.rows, replace(Seeds.upright(EXPANDED), identifiers=(identifier,)))
     kinds = flora.averages.leaf_area[int(plants.row[0]), 1]
     leaves = float(kinds[flora.rows["leaf_kind"] == 0].sum() / kinds.sum())
-    return abs(grown / (leaves * float(flora.leaf_areas(plants).sum())) - 1.0)
+    expected = leaves * one_sided(flora.species[0]) * float(flora.leaf_areas(plants).sum())
+    return abs(grown / expected - 1.0)
 
 
 def crown_gap(identifier: str) -> float:
