@@ -21,7 +21,7 @@ from ..growth.foliage import YOUTH, envelope_reach
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
 from ..growth.seasons import Season
-from ..growth.seeds import LEAVES, Branches
+from ..growth.seeds import Branches
 from ..growth.wind import Wind, is_windy, widest_sway, windy_rows
 from ..leaves.models import LeafModel
 from ..species.ages import with_habit
@@ -165,7 +165,7 @@ class Flora:
             area = self._at_place(self.area_nodes, subplants) * self._shaped_leaves(subplants)
         else:
             area = self.day.leaf_areas(subplants, self._shaped_leaves(subplants, kinds=True))
-        return fullness(self.rows, subplants) * area * _leafy(subplants) * subplants.scale**2
+        return fullness(self.rows, subplants) * area * subplants.scale**2
 
     def leaf_colors(self, subplants: Branches) -> Floats:
         """Mean linear RGB (n, 3) of the leaves of sub-plants, weighted by area; black where they have none."""
@@ -201,10 +201,8 @@ class Flora:
     def _leaf_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the leaves of sub-plants, without their fullness."""
         if subplants.year is not None:
-            faces = self.day.leaf_faces(subplants, self._shaped_leaves(subplants, faces=True, kinds=True))
-        else:
-            faces = self.leaf_faces[subplants.row] * self._shaped_leaves(subplants, faces=True)
-        return faces * _leafy(subplants)
+            return self.day.leaf_faces(subplants, self._shaped_leaves(subplants, faces=True, kinds=True))
+        return self.leaf_faces[subplants.row] * self._shaped_leaves(subplants, faces=True)
 
     @_in_summer
     def shaped_totals(self) -> ShapedTotals:
@@ -237,11 +235,6 @@ class Flora:
     def _at_place(self, nodes: Floats, subplants: Branches) -> Floats:
         """Values at the places of sub-plants between the inside and the outside of the crown."""
         return np.einsum("nk,nk...->n...", quadratic(subplants.outward), nodes[subplants.row])
-
-
-def _leafy(subplants: Branches) -> Floats | float:
-    """Factor (n,) on the numbers of leaves of sub-plants, because of crown shapes."""
-    return 1.0 if subplants.crown is None else subplants.crown[:, LEAVES].astype(np.float64)
 
 
 def compile_species(species: Sequence[Species]) -> Flora:

@@ -42,7 +42,8 @@ def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> t
         Crown shapes.
     """
     own = np.where((rows["phantom"][row] | (rows["envelope"][row] > 0))[:, None], PLAIN, forms)
-    own[are_stools(rows, row), BASE] = 0.0
+    stool = are_stools(rows, row)
+    own[stool, BASE], own[stool, LEAVES] = 0.0, 1.0
     light = own[:, EAST, None] * frame[:, 0] + own[:, NORTH, None] * frame[:, 1]
     crown = np.concatenate([own[:, [WIDTH, BASE]], light, own[:, [LEAVES]]], axis=1)
     return by_component(crown.astype(np.float32)), own[:, THICKNESS]
@@ -152,7 +153,7 @@ def handed_on(parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, a
         By which they are turned, see `growth.turned`.
     """
     out = np.zeros((COLUMNS, len(parent)), np.float32)
-    out[WIDTH], out[LEAVES] = length, parent.crown[:, LEAVES]
+    out[WIDTH], out[LEAVES] = length, parent.crown[:, LEAVES] if sort == LATERAL else 1.0
     if sort == FORK:
         crown = parent.crown.T
         x, y, z = crown[LIGHT]

@@ -118,7 +118,10 @@ def chosen_drawn(rows: Table, plants: Branches, owner: Integers, index: Integers
 def fullness(rows: Table, branches: Branches) -> Floats:
     """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
     vigor, crown = branches.vigor, branches.crown
-    return fullness_of(rows, branches.row, vigor, None if crown is None else vigor / crown[:, 0])
+    if crown is None:
+        return fullness_of(rows, branches.row, vigor)
+    leafy = np.where(rows["order"][branches.row] == 1, crown[:, LEAVES], 1.0)
+    return leafy * fullness_of(rows, branches.row, vigor, vigor / crown[:, 0])
 
 
 def branch_counts(rows: Table, branches: Branches, sort: int = LATERAL) -> Integers:
@@ -170,8 +173,6 @@ def _started(rows: Table, branches: Branches, sort: int) -> Floats:
 def leaf_counts(rows: Table, branches: Branches) -> Integers:
     """Number (n,) of leaves on branches' own axes, in whole whorls; its expectation is exactly the range's mean."""
     wanted = ranged(rows, "leaves", branches.row, branches.key, Draw.LEAVES) * fullness(rows, branches)
-    if branches.crown is not None:
-        wanted = wanted * branches.crown[:, LEAVES]
     whorl = rows["leaf_whorl"][branches.row]
     return np.floor(wanted / whorl + uniform(branches.key, Draw.LEAVES_ROUND)).astype(np.int64) * whorl
 

@@ -49,7 +49,7 @@ class Seeds(Arrays):
 
 #: Columns: factor on the lengths of limbs; bare fraction of the trunk, 0 as described; by which fraction limbs to the
 #: east and to the north are longer, and those opposite shorter; factor on the radius of the trunk, and on the numbers
-#: of leaves of all branches.
+#: of what limbs bear, branches and leaves.
 WIDTH, BASE, EAST, NORTH, THICKNESS, LEAVES = range(6)
 #: A plant as its species describes it.
 PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 1.0])
@@ -119,7 +119,7 @@ class Branches(Arrays):
     #: species.
     year: Floats | None = None
     #: (n, 6): where plants have crown shapes: what trunks and their stems know of these, see `crown_effects`; of all
-    #: others the factor on their length in the first column, that on their leaves in the last, and 0.
+    #: others the factor on their length in the first column, that on what they bear in the last, and 0.
     crown: Floats32 | None = None
 
     @classmethod

@@ -259,11 +259,12 @@ class Measure:
         if wide.any():
             species = self.flora.species[0]
             needs = ecology_of(species if species.aged is None else species.aged[0])
-            shaped = trunks(self.flora.rows, replace(one, scale=scale, crown=forms))
-            drawn = one_sided(species) * self.flora.leaf_areas(shaped)
+            none, every = (forms * np.where(np.arange(forms.shape[1]) == LEAVES, part, 1.0) for part in (0.0, 1.0))
+            plants = (trunks(self.flora.rows, replace(one, scale=scale, crown=form)) for form in (none, every))
+            bare, drawn = (one_sided(species) * self.flora.leaf_areas(plant) for plant in plants)
             wanted = crown_leaves(needs.leaves, *np.where(wide, [sizes.height, sizes.base, sizes.width / 2], 1.0))
-            some = wide & (drawn > 0.0) & (needs.height >= _WOODY)
-            forms[:, LEAVES] = np.where(some, wanted / np.maximum(drawn, 1e-9), 1.0)
+            some = wide & (drawn > bare) & (needs.height >= _WOODY)
+            forms[:, LEAVES] = np.where(some, (wanted - bare) / np.where(some, drawn - bare, 1.0), 1.0)
         return scale, crown_shapes(len(seeds), *forms.T)
 
 
