@@ -77,7 +77,8 @@ class LeafDetail:
 
     def _extent(self, points: NDArray[np.float64], reach: NDArray[np.float64] | float) -> NDArray[np.float64]:
         """Meters (n,) that a pixel spans at what reaches so far around points (n, 3), in view or not."""
-        away = self.camera.distance_to_view(points) - reach
+        moments = self.camera, *self.camera.shutter
+        away = np.min([moment.distance_to_view(points) for moment in moments], axis=0) - reach
         return np.maximum(self.camera.extent_around(points), self.beside * np.maximum(away, 0.0))
 
     def _nearest(self, extent: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:

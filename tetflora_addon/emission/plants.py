@@ -11,7 +11,7 @@ these can be told from what they stand for, finer ones, see `leaf_detail`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,8 @@ from ..compiled.flora import Flora
 from ..growth.axes import axes
 from ..growth.growth import WholeBranches, trunks
 from ..growth.seeds import Branches, Seeds
+from ..leaves.kites import leaf_kites
+from ..leaves.models import LeafModel
 from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..refinement.contents import as_pieces, piece_totals
 from ..refinement.decisions import Decision, explicit_fraction
@@ -37,9 +39,13 @@ from .leaf_detail import TOLERANCE, LeafDetail
 
 #: Pixels from which on a part that lies in explicit tetrahedra in part is opened.
 MIXED = 24.0
-#: Width in pixels up to which real leaves are kites, and the same of those that are solid: a kite that shows as much
-#: on average is half as wide again where it is seen from its front, and has one side, in the light or not.
+#: Width in pixels up to which real leaves are kites, and the same of those that are solid: a kite that shows as much on
+#: average is half as wide again where it is seen from its front, and has one side, in the light or not.
 KITES, SOLID_KITES = 2.0, 0.8
+#: Squared width in pixels for each face from which on leaves with many planes have these, as a spray of shoots: one
+#: kite has the place and the side of none. As kites up to two pixels, near spruces were too bright and coarse (blobs
+#: 4,291 a megapixel there, 2,392 with a tenth of that; ``benchmarks exact --cases edge --species birch,spruce``).
+FACE = 0.15
 #: Meters that a pixel spans at least at leaves and wood out of view, over the distance from it: their shadows are seen.
 BESIDE = 0.02
 
@@ -68,13 +74,13 @@ class Transition:
 
     def of_kites(self, branches: Branches) -> NDArray[np.float64]:
         """Fraction (n,) of the real leaves of branches themselves that are single kites."""
-        return 1.0 - self._fraction(branches, self._own_width * np.where(self._solid, KITES / SOLID_KITES, 1.0), KITES)
+        return 1.0 - self._fraction(branches, self._own_width * KITES / self.kite_widths, KITES)
 
     @property
-    def _solid(self) -> NDArray[np.bool_]:
-        """Rows (r,) whose leaves are solid, as cones and fruit are: half of their surface is never seen."""
-        solid = [[any(form.solid for form in kinds) for kinds in one] for one in self.flora.forms]
-        return np.array(solid)[self.flora.rows["species"], self.flora.rows["leaf_kind"]]
+    def kite_widths(self) -> NDArray[np.float64]:
+        """Width in pixels (r,) up to which the leaves of rows are kites."""
+        limits = [[_kite_width(kinds) for kinds in one] for one in self.flora.forms]
+        return np.array(limits)[self.flora.rows["species"], self.flora.rows["leaf_kind"]]
 
     @property
     def _own_width(self) -> NDArray[np.float64]:
@@ -84,6 +90,14 @@ class Transition:
     def _fraction(self, branches: Branches, widths: NDArray[np.float64], limit: float) -> NDArray[np.float64]:
         width = widths[branches.row] * branches.scale
         return explicit_fraction(width / np.maximum(self.camera.extent_around(branches.position), 1e-300), limit)
+
+
+def _kite_width(forms: Sequence[LeafModel]) -> float:
+    """Width in pixels up to which leaves of one kind are kites."""
+    if any(form.solid for form in forms):  # half of their surface is never seen
+        return SOLID_KITES
+    faces = max((form.polygons for form in forms if len(leaf_kites(form).share) > 1), default=np.inf)
+    return min(KITES, float(np.sqrt(FACE * faces)))
 
 
 @dataclass(frozen=True)

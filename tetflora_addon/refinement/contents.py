@@ -121,11 +121,12 @@ def polygon_totals(polygons: Polygons, width: Floats | None = None) -> Totals:
 
 def sums(totals: Totals, cells: Integers, number: int) -> Totals:
     """Totals of each of a number of cells, from those (n,) of the things in ``cells`` (n,); the width is a mean."""
-    area, fine = totals.area, np.isfinite(totals.width)
-    small = np.where(fine, area, 0.0)
-    total = np.bincount(cells, small, number)
-    width = np.bincount(cells, small * np.where(fine, totals.width, 0.0), number) / np.where(total > 0, total, 1)
-    only_large = (total == 0) & (np.bincount(cells, ~fine, number) > 0)
+    area, width, large = totals.area, totals.width, ~np.isfinite(totals.width)
+    if large.any():
+        area, width = (np.where(large, 0.0, own) for own in (area, width))
+    total = np.bincount(cells, area, number)
+    width = np.bincount(cells, area * width, number) / np.where(total > 0, total, 1)
+    only_large = (total == 0) & (np.bincount(cells[large], minlength=number) > 0)
     return Totals(
         np.bincount(cells, totals.leaf_area, number),
         np.bincount(cells, totals.wood_area, number),

@@ -353,11 +353,13 @@ def _sampled(
     pick = first[owner] + (start[owner] + index) % np.maximum(number[owner], 1)
     local, share = placed_samples(flora, points, branches, owner, pick)
     local = local.astype(np.float32) * branches.length[owner, None].astype(np.float32)
-    frame = branches.frame.astype(np.float32)
-    out = np.take(branches.position, owner, axis=0)
+    frame, columns = branches.frame.astype(np.float32), np.ascontiguousarray(local.T)
+    out = np.empty((len(owner), 3))
     for axis in range(3):
+        place = np.take(branches.position[:, axis], owner)
         for column_ in range(3):
-            out[:, axis] += np.take(frame[:, axis, column_], owner) * local[:, column_]
+            place += np.take(frame[:, axis, column_], owner) * columns[column_]
+        out[:, axis] = place
     return out, share
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -135,6 +136,15 @@ def test_what_is_out_of_view_is_coarse() -> None:
     assert (coarse[some] < fine[some]).all()
     least = tube_faces(flora, whole)
     assert tube_faces(flora, whole, there.wood) - least < 0.2 * (tube_faces(flora, whole, here.wood) - least)
+
+
+def test_what_comes_into_view_while_the_shutter_is_open_is_fine() -> None:
+    """A camera that turns toward leaves sees them as one does that looked there all the time."""
+    flora, camera, _, pieces = near(25.0, pixels=6000)
+    whole = support.whole_of(flora, pieces)
+    aside = support.camera(camera.eye, camera.eye + [0.0, -1.0, 0.0], pixels=6000, view=0.6)
+    here, turns = (Transition(flora, of, 1.0).detail for of in (camera, replace(aside, shutter=(camera,))))
+    assert turns.lengths(whole) == pytest.approx(here.lengths(whole))
 
 
 def test_limits_hold_up_close() -> None:

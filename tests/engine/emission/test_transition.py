@@ -124,9 +124,11 @@ def test_large_leaves_of_a_leader_are_themselves() -> None:
     assert transition.of_branches(leaders).max() < 0.5
 
 
-@pytest.mark.parametrize(("name", "kind", "kites"), [("spruce", "blossom", 0.0), ("beech", "leaf", 1.0)])
+@pytest.mark.parametrize(
+    ("name", "kind", "kites"), [("spruce", "blossom", 0.0), ("spruce", "leaf", 0.0), ("beech", "leaf", 1.0)]
+)
 def test_cones_of_two_pixels_are_no_kites(name: str, kind: str, kites: float) -> None:
-    """What is solid has no plane that could stand for all of its sides; a leaf as wide has."""
+    """What is solid, or a spray of shoots, has no plane that could stand for all of its sides; a leaf as wide has."""
     flora = support.compiled(support.shipped(name))
     bears = (flora.rows["leaf_kind"] == LEAF_KINDS.index(kind)) & (flora.rows["leaves"].sum(axis=1) > 0)
     branch = replace(trunks(flora.rows, support.grove(1, 3.0)), row=np.flatnonzero(bears)[:1])
