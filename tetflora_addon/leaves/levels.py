@@ -35,9 +35,9 @@ _DEARER = 1.35
 _STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
 #: Steps of needles toward an area, the relative thickness from which on one tells how it grows with the thickness, and
 #: the power by which it is taken to grow before: shoots stay, and needles hide more of each other.
-_FITS, _FITTED, _GROWTH = 5, 0.01, 0.75
+_FITS, _FITTED, _GROWTH = 3, 0.01, 0.75
 #: Factors of thickness and width at most, and that of a width by which is seen how the area grows with it.
-_THINNEST, _THICKEST, _WIDER = 0.2, 16.0, 1.5
+_THINNEST, _THICKEST, _WIDER = 0.2, 8.0, 1.5
 #: Needles that hide more of each other than this are scales.
 _SCALES = 0.6
 #: Divisions of closed parts, one more than at most.

@@ -154,7 +154,7 @@ _GAP = 0.6
 #: Error from which on there are fewer needles, needles are flat, and prisms have three sides.
 SPARSE, FLAT, _THREE = 0.05, 0.004, 0.0012
 #: One of so many needles stands for them all where there are fewer; what is not seen of the gaps then.
-_OF, _SPARSE_GAP = 5, 4.0
+_OF, _SPARSE_GAP = 3, 2.4
 #: Radius of shoots over that of needles, and of both at their ends.
 _TAPER = 0.55
 #: Places along a needle and its widths there, for errors above the first number.
