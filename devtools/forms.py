@@ -24,6 +24,7 @@ from tetflora_addon.growth.foliage import leaf_forms, leaf_keys, leaf_places, pl
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts, radius_at, trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalog import load_species
+from tetflora_addon.species.ecology import one_sided
 from tetflora_addon.species.species import LEAF_KINDS
 from tetflora_addon.subplants.pieces import expand
 
@@ -169,6 +170,7 @@ def measures(flora: Flora, seed: int) -> dict[str, float]:
     mean = float(np.average(angle, weights=area))
     low, high = _limb_angles(flora, parts)
     longest = float(np.average(length, weights=number))
+    leaf_area = one_sided(flora.species[0]) * float(area.sum())
     return {
         "height": height,
         "diameter": diameter,
@@ -180,8 +182,8 @@ def measures(flora: Flora, seed: int) -> dict[str, float]:
         "angle_high": high,
         "leaf_length": 100.0 * longest,
         "leaf_slimness": float(np.average(width, weights=number)) / longest,
-        "leaf_area_index": float(area.sum()) / (np.pi / 4 * crown_width**2),
-        "leaf_area_density": float(area.sum()) / (np.pi / 6 * crown_width**2 * depth),
+        "leaf_area_index": leaf_area / (np.pi / 4 * crown_width**2),
+        "leaf_area_density": leaf_area / (np.pi / 6 * crown_width**2 * depth),
         "leaf_inclination": mean,
         "leaf_inclination_spread": float(np.sqrt(np.average((angle - mean) ** 2, weights=area))),
     }

@@ -31,7 +31,7 @@ from ..growth.crown_effects import (
 )
 from ..growth.grown_rows import NOW, fullness_of, living, spread_children
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
-from ..growth.seeds import BASE, MOST, WIDTH, Branches
+from ..growth.seeds import BASE, LEAVES, MOST, WIDTH, Branches
 from ..species.growing import EVEN
 from ..species.species import LEAF_KINDS, Species
 from .averages import Averages, RowLeaves, average, children_sums, quadratic, side_branches
@@ -54,6 +54,7 @@ class ShapedTotals:
     shaped: Mask  # (r,): rows that crown shapes change
     #: (r, b, 3, t): of what follows the power 0, 1 or 2 of the factor on the lengths of limbs, for `_BASES`.
     power: Floats
+    borne: Floats  # (r, b, 3, t): what of that limbs bear
 
     def leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats:
         """Area or number of faces (n,) of leaves of sub-plants over that of plants as described; (n, k) by kind."""
@@ -75,8 +76,9 @@ class ShapedTotals:
         crown, row = subplants.crown.astype(np.float64), subplants.row
         step = crown[:, BASE] / (_BASES[1] - _BASES[0])
         low = np.minimum(step.astype(np.int64), len(_BASES) - 2)
-        part = (step - low)[:, None, None]
-        power = (1 - part) * self.power[row, low] + part * self.power[row, low + 1]
+        part, fewer = (step - low)[:, None, None], 1.0 - crown[:, LEAVES, None, None]
+        power, borne = ((1 - part) * all_[row, low] + part * all_[row, low + 1] for all_ in (self.power, self.borne))
+        power = power - fewer * borne
         square = 1 + (crown[:, LIGHT][:, :2] ** 2).sum(axis=1) / 2
         width = crown[:, WIDTH]
         factors = np.stack([np.ones(len(row)), width, width**2 * square], axis=1)[:, :, None]
@@ -103,13 +105,13 @@ def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTota
     bearing = (rows["next"][:, (LATERAL, DEAD, FORK)] >= 0).any(axis=1)
     solid = rows["phantom"] | rows["drawn"] | (rows["envelope"] > 0)
     shaped = (rows["order"] == 0) & bearing & ~solid & ~are_stools(rows, every)
-    power = np.zeros((len(rows), len(_BASES), 3, _TOTALS))
+    power, borne = np.zeros((2, len(rows), len(_BASES), 3, _TOTALS))
     kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]
     all_leaves = np.concatenate([totals.leaf_area[:, 1] @ kinds, (totals.leaves * polygons) @ kinds], axis=1)
     exact = rows.copy()
     exact["taper"][:, 1] = 0
     for i in np.flatnonzero(shaped)[::-1]:  # stems before what they grow on
-        own = power[i]
+        own, on_limbs = power[i], borne[i]
         own[:, 0, _AREA] += totals.leaf_area[i, 1, i] * kinds[i]
         own[:, 0, _LEAF_FACES] += totals.leaves[i, i] * polygons[i] * kinds[i]
         own[:, 0, _FACES] += totals.fixed_faces[i, i]
@@ -125,9 +127,10 @@ def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTota
             if sort in (FORK, SPUR):
                 one = children_sums(exact, i, int(sort))
             if sort == FORK:
-                stem = power[j] * one.number
-                stem[:, :, _WOOD] = power[j][:, :, _WOOD] * one.wood * (above / stretch)[:, None]
-                own += stem
+                for whole, its in ((own, power[j]), (on_limbs, borne[j])):
+                    stem = its * one.number
+                    stem[:, :, _WOOD] = its[:, :, _WOOD] * one.wood * (above / stretch)[:, None]
+                    whole += stem
             elif sort == SPUR:
                 own[:, 0, _LEAVES] += one.full * leaves
                 own[:, 0, _FACES] += one.number * fixed_faces + one.full * full_faces
@@ -137,15 +140,17 @@ def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTota
                 for b, base in enumerate(_BASES):
                     number, bearing, longer, wood, full, more = _limbs(exact, int(i), int(sort), base)
                     still, grows = (1 - weight) * bearing, weight * longer
-                    own[b, 0, _LEAVES] += still * leaves
-                    own[b, 1, _LEAVES] += grows * leaves
-                    own[b, 0, _FACES] += number * fixed_faces + still * full_faces
-                    own[b, 1, _FACES] += grows * full_faces
-                    own[b, 1, _WOOD] += (wood * fixed_wood + (1 - weight) * full * full_wood) / stretch[b]
-                    own[b, 2, _WOOD] += weight * more * full_wood / stretch[b]
-                    own[b, 0, _SPURS] += still * spurs
-                    own[b, 1, _SPURS] += grows * spurs
-    return ShapedTotals(shaped, power)
+                    own[b, 0, _FACES] += number * fixed_faces
+                    own[b, 1, _WOOD] += wood * fixed_wood / stretch[b]
+                    bears = np.zeros_like(own[b])
+                    bears[0, _LEAVES], bears[1, _LEAVES] = still * leaves, grows * leaves
+                    bears[:2, _FACES] = still * full_faces, grows * full_faces
+                    bears[1:, _WOOD] = np.array([(1 - weight) * full, weight * more]) * full_wood / stretch[b]
+                    bears[:2, _SPURS] = still * spurs, grows * spurs
+                    own[b] += bears
+                    if sort == LATERAL:
+                        on_limbs[b] += bears
+    return ShapedTotals(shaped, power, borne)
 
 
 def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:

@@ -187,21 +187,16 @@ class Flora:
 
     def face_counts(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of sub-plants, leaves and branches."""
-        row, fixed = subplants.row, self.fixed_faces[subplants.row]
-        faces = self.polygons[row]
-        if subplants.year is not None:
-            faces = faces - self.leaf_faces[row] + self.day.leaf_faces(subplants)
-        counts = fixed + fullness(self.rows, subplants) * (faces - fixed)
-        some = self._shaped(subplants)
-        if len(some):
-            own = subplants.take(some)
-            wood = (self.shaped_totals.faces(own) - 1.0) * (self.polygons - self.leaf_faces)[own.row]
-            counts[some] += wood + (self._leaf_faces(own) - self._leaf_faces(replace(own, crown=None)))
-        return counts
+        return self.branch_faces(subplants) + fullness(self.rows, subplants) * self._leaf_faces(subplants)
 
     def branch_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the branches of sub-plants."""
-        return self.face_counts(subplants) - fullness(self.rows, subplants) * self._leaf_faces(subplants)
+        fixed, wood = self.fixed_faces[subplants.row], (self.polygons - self.leaf_faces)[subplants.row]
+        counts = fixed + fullness(self.rows, subplants) * (wood - fixed)
+        some = self._shaped(subplants)
+        if len(some):
+            counts[some] += (self.shaped_totals.faces(subplants.take(some)) - 1.0) * wood[some]
+        return counts
 
     def _leaf_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the leaves of sub-plants, without their fullness."""

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Floats32, Integers, Mask, Table, by_component
 from .rows import DEAD, FORK, LATERAL, SPUR
-from .seeds import BASE, EAST, NORTH, PLAIN, THICKNESS, WIDTH, Branches
+from .seeds import BASE, EAST, LEAVES, NORTH, PLAIN, THICKNESS, WIDTH, Branches
 
-#: Columns of ``crown`` of branches: the first two are those of crown shapes, then the vector (east, north) in the
-#: branch's own axes.
-COLUMNS, LIGHT = 5, slice(2, 5)
+#: Columns of ``crown`` of branches: the first two and the last are those of crown shapes, between them the vector
+#: (east, north) in the branch's own axes.
+COLUMNS, LIGHT = 6, slice(2, 5)
 #: Of their length, what limbs away from the light keep, however much a crown leans.
 _SHORTEST = 0.05
 #: Stems of a stool lean at most so many times as far as described.
@@ -30,7 +30,7 @@ _STEMS = 2.0
 
 
 def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> tuple[Floats32, Floats]:
-    """The column ``crown`` (n, 5) of trunks, and factors (n,) on their radii.
+    """The column ``crown`` (n, 6) of trunks, and factors (n,) on their radii.
 
     Parameters
     ----------
@@ -38,13 +38,14 @@ def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> t
     row : (n,) int
     frame : (n, 3, 3) float64
         Of the trunks.
-    forms : (n, 5) float64
+    forms : (n, 6) float64
         Crown shapes.
     """
     own = np.where((rows["phantom"][row] | (rows["envelope"][row] > 0))[:, None], PLAIN, forms)
-    own[are_stools(rows, row), BASE] = 0.0
+    stool = are_stools(rows, row)
+    own[stool, BASE], own[stool, LEAVES] = 0.0, 1.0
     light = own[:, EAST, None] * frame[:, 0] + own[:, NORTH, None] * frame[:, 1]
-    crown = np.concatenate([own[:, [WIDTH, BASE]], light], axis=1)
+    crown = np.concatenate([own[:, [WIDTH, BASE]], light, own[:, [LEAVES]]], axis=1)
     return by_component(crown.astype(np.float32)), own[:, THICKNESS]
 
 
@@ -140,7 +141,7 @@ def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> 
 
 
 def handed_on(parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, angle: Floats) -> Floats32:
-    """The column ``crown`` (m, 5) of children of a sort.
+    """The column ``crown`` (m, 6) of children of a sort.
 
     Parameters
     ----------
@@ -152,7 +153,7 @@ def handed_on(parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, a
         By which they are turned, see `growth.turned`.
     """
     out = np.zeros((COLUMNS, len(parent)), np.float32)
-    out[WIDTH] = length
+    out[WIDTH], out[LEAVES] = length, parent.crown[:, LEAVES] if sort == LATERAL else 1.0
     if sort == FORK:
         crown = parent.crown.T
         x, y, z = crown[LIGHT]

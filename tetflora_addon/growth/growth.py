@@ -22,7 +22,7 @@ from .grown_rows import FADES, NOW, Grown, child_number, fullness_of, grown_node
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .rows import BOX, DEAD, FLARE_RINGS, FORK, LATERAL, SPUR, ranged, varied
 from .seasons import plant_years
-from .seeds import BASE, Branches, Pose, Seeds
+from .seeds import BASE, LEAVES, Branches, Pose, Seeds
 from .wind import axis_and_angle, is_windy, moment, turned_by, turned_vectors
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
@@ -123,7 +123,10 @@ def chosen_drawn(rows: Table, plants: Branches, owner: Integers, index: Integers
 def fullness(rows: Table, branches: Branches) -> Floats:
     """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
     vigor, crown = branches.vigor, branches.crown
-    return fullness_of(rows, branches.row, vigor, None if crown is None else vigor / crown[:, 0])
+    if crown is None:
+        return fullness_of(rows, branches.row, vigor)
+    leafy = np.where(rows["order"][branches.row] == 1, crown[:, LEAVES], 1.0)
+    return leafy * fullness_of(rows, branches.row, vigor, vigor / crown[:, 0])
 
 
 def branch_counts(rows: Table, branches: Branches, sort: int = LATERAL) -> Integers:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Seeds: all that is stored of a plant before it is needed (paper, section 5).
 
-Beside it some have a crown shape, five numbers by which one plant differs from others of its kind because of how it
+Beside it some have a crown shape, six numbers by which one plant differs from others of its kind because of how it
 grew: a tree of a stand has a narrow crown far up, which leans to where the light is; one that is recorded in an
 inventory has the crown that was measured.
 
@@ -31,7 +31,7 @@ class Seeds(Arrays):
     #: (n, 3, 3): rotation of each plant; its columns are the plant's axes in world space, +z along the upright trunk.
     frame: Floats
     scale: Floats  # (n,): uniform scale, greater than zero
-    crown: Floats | None = None  # (n, 5): crown shapes, see `crown_shapes`; None where all plants are as described
+    crown: Floats | None = None  # (n, 6): crown shapes, see `crown_shapes`; None where all plants are as described
     #: (n, 6): how plants move as a whole: meters a second, then the rotation vector about their foot, radians a second.
     #: None where all stand still.
     motion: Floats | None = None
@@ -48,17 +48,18 @@ class Seeds(Arrays):
 
 
 #: Columns: factor on the lengths of limbs; bare fraction of the trunk, 0 as described; by which fraction limbs to the
-#: east and to the north are longer, and those opposite shorter; factor on the radius of the trunk.
-WIDTH, BASE, EAST, NORTH, THICKNESS = range(5)
+#: east and to the north are longer, and those opposite shorter; factor on the radius of the trunk, and on the numbers
+#: of what limbs bear, branches and leaves.
+WIDTH, BASE, EAST, NORTH, THICKNESS, LEAVES = range(6)
 #: A plant as its species describes it.
-PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0])
+PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 1.0])
 #: Limits of each column.
-LEAST = np.array([0.2, 0.0, -0.8, -0.8, 0.2])
-MOST = np.array([3.0, 0.95, 0.8, 0.8, 5.0])
+LEAST = np.array([0.2, 0.0, -0.8, -0.8, 0.2, 0.01])
+MOST = np.array([3.0, 0.95, 0.8, 0.8, 5.0, 4.0])
 
 
 def farthest(forms: Floats | None) -> Floats | float:
-    """How many times as far as described plants (n,) reach at most, by their crown shapes (n, 5)."""
+    """How many times as far as described plants (n,) reach at most, by their crown shapes (n, 6)."""
     if forms is None:
         return 1.0
     return np.maximum(forms[:, WIDTH] * (1.0 + np.hypot(forms[:, EAST], forms[:, NORTH])), 1.0)
@@ -71,10 +72,11 @@ def crown_shapes(
     east: ArrayLike = 0.0,
     north: ArrayLike = 0.0,
     thickness: ArrayLike = 1.0,
+    leaves: ArrayLike = 1.0,
 ) -> Floats:
-    """Crown shapes (number, 5) of plants, within the limits; each argument is one number or (number,)."""
+    """Crown shapes (number, 6) of plants, within the limits; each argument is one number or (number,)."""
     out = np.empty((number, len(PLAIN)))
-    for k, value in enumerate((width, base, east, north, thickness)):
+    for k, value in enumerate((width, base, east, north, thickness, leaves)):
         out[:, k] = np.clip(value, LEAST[k], MOST[k])
     return out
 
@@ -116,8 +118,8 @@ class Branches(Arrays):
     #: (n, 2): on a day of the year: the day that it is for the plant, and its place among the autumn colors of its
     #: species.
     year: Floats | None = None
-    #: (n, 5): where plants have crown shapes: what trunks and their stems know of these, see `crown_effects`; of all
-    #: others the factor on their length in the first column, and 0.
+    #: (n, 6): where plants have crown shapes: what trunks and their stems know of these, see `crown_effects`; of all
+    #: others the factor on their length in the first column, that on what they bear in the last, and 0.
     crown: Floats32 | None = None
 
     @classmethod

@@ -15,7 +15,7 @@ from threading import Lock
 
 import numpy as np
 
-from ..arrays import Floats, Floats32, Integers
+from ..arrays import Floats, Floats32, Integers, Mask
 from ..optics import needle_color
 from .blades import Compound, blade_surface, compound_surface
 from .bodies import closed_parts, rounded, spined
@@ -38,6 +38,8 @@ _STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
 _FITS, _FITTED, _GROWTH = 3, 0.01, 0.75
 #: Factors of thickness and width at most, and that of a width by which is seen how the area grows with it.
 _THINNEST, _THICKEST, _WIDER = 0.2, 8.0, 1.5
+#: Needles that hide more of each other than this are scales.
+_SCALES = 0.6
 #: Divisions of closed parts, one more than at most.
 _ROUNDEST = 5
 #: Points on each edge of a coarse model at which its distance from the shape is measured.
@@ -156,8 +158,7 @@ def _each_level(model: LeafModel, shape: Shape) -> Iterator[LeafLevel]:
             continue
         if made.polygons > MOST_POLYGONS:
             break
-        stem = made.uv[made.face_offsets[:-1] + 1, 1] < -_STEM
-        stem |= made.uv[made.face_offsets[:-1], 1] < -_STEM
+        stem = _stems(made)
         tint = np.where(stem[:, None], _TINTS[isinstance(shape, Needles)], 1.0).astype(np.float32)
         again = np.where(stem, 0.0, _recollision(shape, made)).astype(np.float32)
         solid = isinstance(shape, Needles) and tolerance <= FLAT
@@ -165,9 +166,29 @@ def _each_level(model: LeafModel, shape: Shape) -> Iterator[LeafLevel]:
         error = made.error
 
 
+def _stems(made: LeafSurface) -> Mask:
+    """Which faces (f,) of a surface are stems."""
+    first = made.face_offsets[:-1]
+    return (made.uv[first, 1] < -_STEM) | (made.uv[first + 1, 1] < -_STEM)
+
+
 def _recollision(shape: Shape, made: LeafSurface) -> float:
     """Probability that light which one of the polygons of a shape scatters meets another."""
     return max(1.0 - shown_area(shape, made) / float(made.areas().mean()), 0.0)
+
+
+@lru_cache(maxsize=128)
+def needle_ratio(model: LeafModel) -> float:
+    """Half of the surface of the needles that a model stands for, over its own area.
+
+    1 for leaves, and for scales that hide each other so much that what is measured of them are their sprays.
+    """
+    if not isinstance(model.shape, Needles):
+        return 1.0
+    made = fitted(model.shape, TOLERANCES[-1], model.area, model.reach)
+    faces = np.linalg.norm(_model_of(made).face_vectors, axis=1) * np.where(made.solid, 0.5, 1.0)
+    scales = _recollision(model.shape, made) > _SCALES
+    return 1.0 if scales else float(faces[~_stems(made)].sum()) / model.area
 
 
 @lru_cache(maxsize=128)

@@ -110,9 +110,11 @@ _TWIGS = 0.25
 _LONGEST = 0.6
 #: Girth of branches follows length as this power, that of stools the stems'; radius of the thinnest tips, meters.
 _STOUT, _STOOL, _TIP = 1.15, 0.7, 0.0012
-#: In a small plant, the topmost limbs are shorter than the crown's shape has them, crowns narrower than their limbs
-#: are long, the shoots of this year bare of branches, and trunks even cones.
-_SHORTER_TOP, _NARROW, _LEADER, _EVEN = 0.5, 0.2, 0.75, 1.3
+#: In a small plant, the topmost limbs are shorter than the crown's shape has them, the shoots of this year bare of
+#: branches, and trunks even cones.
+_SHORTER_TOP, _LEADER, _EVEN = 0.5, 0.75, 1.3
+#: Leaves on twigs of old trees over those when full-grown, at most.
+_FULLER = 2.0
 #: Branches that live for a while, for each of the others, on stems and on limbs; steps in which their number is found.
 _EXTRA, _STEPS = (3.0, 1.5), 14
 #: Meters of height up to which crowns have not closed.
@@ -244,14 +246,15 @@ class _Aged:
         out = self._made()
         if self.stem + 1 >= self.last or self.dead:
             return out
-        # As many leaves above each square meter of ground as when full-grown: young trees have more branches on a
-        # meter than will stay, old ones fewer leaves (leaf areas of McPherson, van Doorn and Peper, 2016).
-        height = self.now[self.stem]
-        width = self.now[self.stem + 1] * (1 - _NARROW * max(1 - height, 0.0))
-        wanted = expected_leaf_area(self.one) * width**2 * self.leafless * min(self.height / _SMALL, 1.0)
-        if height >= 1:
-            self.thin = min(wanted / max(expected_leaf_area(out), 1e-9), 1.0)
+        # Leaves follow the trunk that supplies them (leaf areas of McPherson, van Doorn and Peper, 2016): young trees
+        # have more branches on a meter than will stay, where limbs alone do not bear so much, and fewer leaves where
+        # these bear more.
+        leaves = self.ages.diameters(self.years) ** self.ages.leaves * self.leafless
+        wanted = expected_leaf_area(self.one) * leaves * min(self.height / _SMALL, 1.0)
+        self.thin = min(wanted / max(expected_leaf_area(out), 1e-9), _FULLER)
+        if self.thin < 1 or self.now[self.stem] >= 1:
             return self._made()
+        self.thin = 1.0
         low, high = 0.0, 1.0
         for _ in range(_STEPS):
             self.fresh = (low + high) / 2
@@ -331,6 +334,8 @@ class _Aged:
             return start * now
         if start > _ROSETTE:
             return max(now - (1 - start) * now**0.2, 0.2 * start * now)
+        if now > 1:  # not above the top, however long the bare part was before
+            return now * (1 - (1 - start) ** (now ** (self.ages.base - 1)))
         return start * now**self.ages.base
 
     def _sorts(self, o: int) -> list[tuple[float, Nodes]]:

@@ -36,6 +36,7 @@ class Ages:
     decline: float = limited(0.75, 0.05, 0.99, "fraction of the lifespan from which on it declines")
     base: float = limited(2.0, 1, 10, "the bare part of the trunk grows as this power of the height")
     spread: float = limited(0.72, 0.2, 2, "limbs grow as this power of the diameter of the trunk")
+    leaves: float = limited(1.85, 0.5, 4, "leaf area grows as this power of the diameter of the trunk")
     flowers: float = limited(10.0, 0, 5000, "age from which on it bears short shoots with blossoms, cones or fruit")
     scaled: bool = described(False, "whether it only grows in size, without changing its form")
     source: str = described("", "where the curves are from")

@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, Mask, column, nested
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
+from ..species.ecology import crown_leaves
 from .light import Crowns, LightGrid
 from .site import StandSite
-from .traits import FULL, StandTraits
+from .traits import StandTraits
 
 #: Tangent of the lean from which on a plant counts as lying.
 LYING = 20.0
@@ -135,9 +136,8 @@ class Plants(Arrays):
 
     def crowns(self, traits: StandTraits) -> Crowns:
         """What takes light."""
-        part = (self.height - self.base) / (FULL * self.height)
-        area = np.pi * self.radius**2 * np.minimum(part, 1.0)
-        leaves = area * np.take(traits.leaves * traits.extinction, self.species)
+        leaves = np.take(traits.leaves * traits.extinction, self.species)
+        leaves = crown_leaves(leaves, self.height, self.base, self.radius)
         x = self.x + _ASIDE * self.radius * self.east
         y = self.y + _ASIDE * self.radius * self.north
         return Crowns(x, y, self.radius, self.base, self.height, leaves, np.take(traits.crown_conicity, self.species))

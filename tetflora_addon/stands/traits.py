@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..errors import TetFloraError
 from ..species.ages import ages_of
+from ..species.ecology import ecology_of
 from ..species.species import Ecology, Species
 
 BREAST_HEIGHT = 1.3
@@ -26,49 +26,7 @@ BREAST_HEIGHT = 1.3
 _HEIGHTS, _UPTO = 1000, 1.6
 #: Girth that trunks have at breast height, meters, at least and at most; and that of which its slope is taken.
 _LEAST, _MOST, _SLOPE = 0.004, 0.03, 0.01
-#: Crowns as long as this fraction of the height have all leaves of a free one.
-FULL = 0.75
 _DIGITS = 5
-
-
-@lru_cache(maxsize=256)
-def ecology_of(species: Species) -> Ecology:
-    """What a species needs; without a description, as plants of its size are.
-
-    Heights and basal diameters follow from its orders: what is described is taken to be three quarters as tall as the
-    largest.
-    """
-    if species.ecology is not None:
-        return species.ecology
-    lengths = np.cumprod([order.length.mean for order in species.orders])
-    first = species.orders[0]
-    # Stems of a stool are longer than it; leaves stand up beyond stems that are next to nothing.
-    stool = len(lengths) > 1 and lengths[1] > lengths[0]
-    leaf = max((order.leaf_size.mean for order in species.orders if order.leaves.high > 0), default=0.0)
-    tall = float(lengths[0] + (lengths[1] if stool else 0.0))
-    height = 1.33 * max(tall, leaf)
-    if height < 3.0:
-        # Herbs and low shrubs: the crown is as wide as two thirds of the height, whatever the diameter is.
-        thick = 0.01 * height
-        return Ecology(
-            shade=3.0, fecundity=200.0, dispersal=5.0, height=height, diameter=thick, height_curve=(2.0 / thick, 1.0),
-            crown_width=(0.35 * height, 0.35 * height / thick), crown_conicity=0.0, leaves=2.5,
-            wood_density=300.0, light_use_efficiency=0.3,
-            diameter_increment=thick / 3.0, source="Not published: as plants of this size are",
-        )  # fmt: skip
-    thick = 2.0 * first.thickness.mean * lengths[0] if not stool else 0.02 * height
-    largest = float(np.clip(2.2 * thick, 0.01 * height, 0.06 * height))
-    shrub = height < 9.0
-    return Ecology(
-        height=height,
-        diameter=largest,
-        height_curve=(2.2 / (0.5 * largest), 0.9),
-        crown_width=(0.3 + 0.02 * height, min(20.0, 0.8 * height / largest)),
-        diameter_increment=min(largest / (0.35 * ages_of(species).lifespan), 0.02),
-        light_use_efficiency=0.5 if shrub else 0.9,
-        leaves=4.0 if shrub else 6.0,
-        source="Not published: as plants of this size are",
-    )
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,11 @@ from tetflora_addon.species.quality import with_quality
 from tetflora_addon.subplants.pieces import wood_areas
 
 KINDS = ("rich", "spruce 30", "beech")
-FORMS = ({"width": 2.0, "thickness": 1.5}, {"width": 0.5, "base": 0.5}, {"base": 0.35, "east": 0.5, "north": -0.4})
+FORMS = (
+    {"width": 2.0, "thickness": 1.5},
+    {"width": 0.5, "base": 0.5, "leaves": 0.6},
+    {"base": 0.35, "east": 0.5, "north": -0.4},
+)
 
 
 @cache
@@ -94,7 +98,7 @@ def test_plain_forms_have_the_same_totals_and_samples(kind: str) -> None:
         assert_array_equal(one, other)
 
 
-@given(seed=st.integers(0, 1000), part=st.tuples(*[st.floats(0.0, 1.0)] * 5), kind=st.sampled_from((*KINDS, "small")))
+@given(seed=st.integers(0, 1000), part=st.tuples(*[st.floats(0.0, 1.0)] * 6), kind=st.sampled_from((*KINDS, "small")))
 @settings(max_examples=12, deadline=None)
 def test_all_vertices_are_within_the_bounds(seed: int, part: tuple[float, ...], kind: str) -> None:
     flora = small_flora() if kind == "small" else flora_of(kind, 0.001)

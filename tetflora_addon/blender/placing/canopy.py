@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
-from ...growth.seeds import BASE, WIDTH
+from ...growth.seeds import BASE, LEAVES, WIDTH
 from ...planting.cover import Canopy, Floor, Habitat, Sheet, Suits, mapping
 from ..attributes import world_matrix
 from ..scene.ages import crown_kinds, with_sizes
@@ -67,13 +67,14 @@ def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
 
 
 def _shaped(crowns: Floats, form: Floats | None) -> Floats:
-    """Radius, base, top and leaf area (n, 4) of crowns that have forms (n, 5) of their own."""
+    """Radius, base, top and leaf area (n, 4) of crowns that have forms (n, 6) of their own."""
     if form is None:
         return crowns
     radius, base, top, area = crowns.T
     higher = np.maximum(base, form[:, BASE] * top)
     left = (top - higher) / np.maximum(top - base, 1e-9)
-    return np.stack([radius * form[:, WIDTH], higher, top, area * form[:, WIDTH] * left], axis=1)
+    leaves = area * form[:, WIDTH] * left * form[:, LEAVES]
+    return np.stack([radius * form[:, WIDTH], higher, top, leaves], axis=1)
 
 
 def standing(scene: bpy.types.Scene) -> set[str]:

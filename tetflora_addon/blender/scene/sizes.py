@@ -23,8 +23,9 @@ from ...compiled.flora import compile_species
 from ...compiled.sizes import fitted, measured
 from ...errors import SpeciesError
 from ...growth.growth import radius_at, trunks
-from ...growth.seeds import PLAIN, THICKNESS, Seeds, crown_shapes
+from ...growth.seeds import LEAVES, PLAIN, THICKNESS, Seeds, crown_shapes
 from ...species.ages import ages_of, with_age
+from ...species.ecology import crown_leaves, ecology_of, one_sided
 from ...species.growing import Ages
 from ...species.species import Species
 from .own_ages import MOST_YEARS, Lives, Sizes
@@ -42,6 +43,7 @@ _BREAST, _TALL = 1.3, 1.5  # height of the diameter, and least height of a plant
 _DIES = 0.999  # part of its life after which a plant that dies early no longer grows
 _PLANTS = 32  # that are measured of each class
 _MEASURED = 1  # times that a plant is, to fit it
+_WOODY = 3.0  # meters of height that plants reach whose leaves follow their crowns
 
 
 def heights(species: Species, years: Floats) -> Floats:
@@ -234,7 +236,7 @@ class Measure:
         return self._typical * self.ratios[1]
 
     def fitted(self, seeds: Seeds, sizes: Sizes) -> tuple[Floats, Floats]:
-        """Scales (n,) and crown shapes (n, 5) with which plants have their recorded sizes."""
+        """Scales (n,) and crown shapes (n, 6) with which plants have their recorded sizes."""
         none = np.zeros(len(seeds), np.int32)
         one = replace(seeds, identifiers=("",), species=none, scale=np.ones(len(seeds)), crown=None)
         chance = trunks(self.flora.rows, one).length / self.length
@@ -254,8 +256,16 @@ class Measure:
             place = np.minimum(_BREAST / shaped.length, 0.95)
             own = 2.0 * radius_at(self.flora.rows, shaped, place)
             forms[:, THICKNESS] = np.where(has & (place < 0.95), sizes.diameter / np.maximum(own, 1e-9), 1.0)
-            forms = crown_shapes(len(seeds), *forms.T)
-        return scale, forms
+        if wide.any():
+            species = self.flora.species[0]
+            needs = ecology_of(species if species.aged is None else species.aged[0])
+            none, every = (forms * np.where(np.arange(forms.shape[1]) == LEAVES, part, 1.0) for part in (0.0, 1.0))
+            plants = (trunks(self.flora.rows, replace(one, scale=scale, crown=form)) for form in (none, every))
+            bare, drawn = (one_sided(species) * self.flora.leaf_areas(plant) for plant in plants)
+            wanted = crown_leaves(needs.leaves, *np.where(wide, [sizes.height, sizes.base, sizes.width / 2], 1.0))
+            some = wide & (drawn > bare) & (needs.height >= _WOODY)
+            forms[:, LEAVES] = np.where(some, (wanted - bare) / np.where(some, drawn - bare, 1.0), 1.0)
+        return scale, crown_shapes(len(seeds), *forms.T)
 
 
 @lru_cache(maxsize=512)
