@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether documents can be read: ``python -m devtools.readability`` lists links that lead nowhere, and a README too long.
+"""Whether documents can be read: ``python -m devtools.readability`` lists broken links, and a README that is too long.
 
 Links are those of all Markdown files under version control, to files, pictures and headings of the repository.
 Addresses elsewhere are not asked for. The check runs in ``make lint``.
