@@ -24,7 +24,7 @@ help:
 	@echo 'make test         all tests that need no full Blender, on bpy'
 	@echo 'make quick        the tests that took little time when they were last run, in about a minute'
 	@echo 'make test-lts     tests of what depends on the version of Blender, on Blender 4.5 LTS'
-	@echo 'make lint         style, the rules of the house, and near-copies'
+	@echo 'make lint         style, the rules of the house, links of documents, and near-copies'
 	@echo 'make build        the extension for Blender: dist/tetflora-VERSION.zip'
 	@echo 'make bench        benchmarks against their targets'
 	@echo 'make docs-images  the pictures of the documentation, made anew'
@@ -97,6 +97,7 @@ lint: environment
 	$(PY) -m ruff check . || code=1; \
 	$(PY) -m ruff format --check . || code=1; \
 	$(PY) -m devtools.house || code=1; \
+	$(PY) -m devtools.readability || code=1; \
 	$(PY) -m devtools.duplicates tests benchmarks examples devtools farm || code=1; \
 	exit $$code
 

@@ -11,17 +11,13 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import NAMES
+from devtools.readability import anchors
 
 ROOT = Path(__file__).resolve().parents[2]
 BENCHMARKS = ROOT / "benchmarks"
 #: What benchmarks share.
 SHARED = {"__init__", "__main__", "report", "pictures", "asset_trees"}
 DOCUMENTS = [*sorted((ROOT / "docs").glob("*.md")), *sorted(ROOT.glob("*.md")), ROOT / "Makefile"]
-
-
-def _anchors(path: Path) -> set[str]:
-    headings = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def test_every_file_is_a_benchmark_or_shared() -> None:
@@ -38,7 +34,7 @@ def test_it_has_what_the_runner_asks_for_and_an_answer(name: str) -> None:
     }
     assert {"run", "TARGETS", "QUICK_TARGETS"} <= defined
     document, anchor = NAMES[name][0].split("#")
-    assert anchor in _anchors(ROOT / "docs" / document)
+    assert anchor in anchors((ROOT / "docs" / document).read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
