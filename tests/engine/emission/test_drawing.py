@@ -243,14 +243,29 @@ def test_what_was_off_screen_comes_back_identical() -> None:
 
 
 @cache
-def number_of(most: int | None = None) -> int:
-    """Primitives of the wood, as many as it has or as somebody allows."""
+def drawn_with(most: int | None = None) -> tuple:
+    """The wood with as many primitives as it has or as somebody allows."""
     flora, _, camera, result = wood()
     settings = RefinementSettings() if most is None else RefinementSettings(max_polygons=most)
     detail = fit_to_budget(result, camera, settings)
     options = {"hidden": detail.coarser, "most": detail.most}
-    blocks, facets, _ = support.drawn(flora, result, camera, detail.facet, detail.leaf_limit, **options)
+    return support.drawn(flora, result, camera, detail.facet, detail.leaf_limit, **options)
+
+
+def number_of(most: int | None = None) -> int:
+    """Primitives of the wood."""
+    blocks, facets, _ = drawn_with(most)
     return sum(b.buffers.polygons for b in blocks) + len(facets)
+
+
+@pytest.mark.parametrize("share", [0.8, 0.3, 0.1])
+def test_a_budget_leaves_no_holes(share: float) -> None:
+    """Less memory is coarser, and covers as many pixels as plenty: the sky never shows through a wood."""
+    camera = wood()[2]
+    whole, limited = (
+        np.isfinite(coverage_of(*drawn_with(most), camera).depth).mean() for most in (None, int(share * number_of()))
+    )
+    assert limited == pytest.approx(whole, rel=0.02)
 
 
 @pytest.mark.parametrize("share", [0.8, 0.3, 0.1, 0.02])
