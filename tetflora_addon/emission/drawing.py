@@ -74,6 +74,9 @@ _BESIDE, _THROWN = (0.1, 8.0, 15.0), (0.02, 1.0)
 _OUTSIDE_BATCH = 20_000
 #: Fraction of what a tile may have from which on all that is left counts as hidden.
 _FULL = 0.85
+#: Facets are so many times as large when a tile that was full too soon is drawn again, so many times at most: what is
+#: left out behind a tile that is full are holes, through which the sky is seen.
+_COARSER, _TRIES = 1.2, 12
 #: Part of what a tile may have that is made between two depths, at most.
 _SLAB = 0.06
 #: Part of all that may be drawn which plants out of view have.
@@ -218,8 +221,12 @@ def _drawn_tile(
     tile = _Tile(given, columns)
     if columns is None:
         tile.draw_outside(parts, share)
-    else:
-        tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most)
+        return tile.made(number)
+    for left in reversed(range(_TRIES)):
+        if tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most, bool(left)):
+            break
+        given = replace(given, facet=_COARSER * given.facet, kinds=[kind.coarser(_COARSER) for kind in given.kinds])
+        tile = _Tile(given, columns)
     return tile.made(number)
 
 
@@ -256,14 +263,21 @@ class _Tile:
         ]
         return [*blocks, *facets, *self.frontier.shown]
 
-    def draw(self, parts: Sequence[Arrays], share: float, most: float) -> None:
-        """All parts of a tile, a share of the image, with no more than so many polygons and facets."""
+    def draw(self, parts: Sequence[Arrays], share: float, most: float, may_stop: bool = False) -> bool:
+        """All parts of a tile, a share of the image, with no more than so many polygons and facets.
+
+        Returns whether there was room for all that is seen; if not, it may stop at once.
+        """
         given, frontier = self.given, self.frontier
         if len(given.occluders):
             self.add_shown(given.occluders)
+        full = False
         for slabs in frontier.slabs(parts, _SLAB * most):
+            full |= self.number > _FULL * most
+            if full and may_stop:
+                return False
             for number, (kind, slab) in enumerate(zip(given.kinds, slabs, strict=True)):
-                if self.number > _FULL * most:
+                if full:
                     frontier.hidden[number].append(slab)
                 elif len(slab):
                     side = kind.larger * given.facet * given.camera.extent_around(slab.center)
@@ -273,6 +287,7 @@ class _Tile:
         # What is outside of a tile's own image was part of something inside: it lies near the border.
         self._draw_outside(list(map(Waiting.concatenate, frontier.outside)), self._few(OUTSIDE_A_PIXEL, share, most))
         self._leave_out(self.number - most)
+        return not full
 
     def _leave_out(self, number: float) -> None:
         """Leave out so many things, should there be more than allowed.

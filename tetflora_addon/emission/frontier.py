@@ -76,6 +76,10 @@ class FrontierKind:
     larger = 1.0  # sides of its facets over those of plants
     stays = False  # whether parts that nobody sees may stay as they are: then none of them can stand for others
 
+    def coarser(self, _times: float) -> FrontierKind:
+        """The same, of which what is drawn as itself is so many times as large before it is."""
+        return self
+
     def spheres(self, parts: Arrays) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Middles (n, 3) of spheres around parts, and radii (n,), meters."""
         raise NotImplementedError

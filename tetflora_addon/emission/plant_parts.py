@@ -93,6 +93,11 @@ class GrownPlants(FrontierKind):
     weights: FacetWeights
     lights: Sequence[Light]
 
+    def coarser(self, times: float) -> GrownPlants:
+        """As of `FrontierKind`."""
+        limit, tolerance = times * self.transition.limit, times**2 * self.transition.tolerance
+        return replace(self, transition=replace(self.transition, limit=limit, tolerance=tolerance))
+
     def spheres(self, parts: PlantRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """As of `FrontierKind`."""
         return 0.5 * (parts.start + parts.end), np.hypot(0.5 * length(parts.end - parts.start), parts.beside)
