@@ -222,8 +222,9 @@ def _drawn_tile(
     if columns is None:
         tile.draw_outside(parts, share)
         return tile.made(number)
+    image = (columns[1] - columns[0]) / tile.coverage.width
     for left in reversed(range(_TRIES)):
-        if tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most, bool(left)):
+        if tile.draw(parts, image, share * given.most, left > 0) or not left:
             break
         given = replace(given, facet=_COARSER * given.facet, kinds=[kind.coarser(_COARSER) for kind in given.kinds])
         tile = _Tile(given, columns)

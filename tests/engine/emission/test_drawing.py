@@ -275,6 +275,16 @@ def test_a_budget_holds(share: float) -> None:
     assert 0.5 * most < number_of(most) <= most
 
 
+def test_a_tile_that_never_fits_is_drawn_as_far_as_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rather a part of it than nothing."""
+    monkeypatch.setenv("TETFLORA_THREADS", "1")  # other processes try as often as ever
+    monkeypatch.setattr(subject, "_TRIES", 1)
+    flora, _, camera, result = wood()
+    most = number_of() // 20
+    blocks, facets, _ = support.drawn(flora, result, camera, 0.5, 0.25, most=most)
+    assert 0.5 * most < sum(b.buffers.polygons for b in blocks) + len(facets) <= most
+
+
 def test_less_memory_is_coarser_everywhere() -> None:
     """Error grows evenly: facets grow with the root of what is missing."""
     _, _, camera, result = wood()

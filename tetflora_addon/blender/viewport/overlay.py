@@ -104,7 +104,9 @@ def plants(shapes: Shapes) -> gpu.types.GPUBatch | None:
 def points(preview: Preview) -> gpu.types.GPUBatch:
     """All plants as points with the form and color of their crowns; on another day only colors go to the card."""
     crowns = preview.shapes.crowns
-    standing = _kept(preview, "standing", (id(crowns.positions),), lambda: _standing(crowns))
+    # What is kept holds the array too: another one cannot come to lie at its address.
+    key = (id(crowns.positions),)
+    _, standing = _kept(preview, "standing", key, lambda: (crowns.positions, _standing(crowns)))
     shown = np.column_stack([as_shown(crowns.looks[:, :3]), crowns.looks[:, 3]])
     layout = gpu.types.GPUVertFormat()
     layout.attr_add(id="look", comp_type='U8', len=4, fetch_mode='INT_TO_FLOAT_UNIT')
