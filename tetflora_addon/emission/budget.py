@@ -27,9 +27,6 @@ BYTES_PER_POLYGON = 610
 BYTES_PER_TRIANGLE = 380
 #: Polygons and facets for each pixel that plants cover, about, with facets of a pixel.
 A_PIXEL = 6.0
-#: The same of the densest woods: spruces and birches have 10 at full HD and more in small images. What memory
-#: allows is reckoned with it: once a tile is full nothing more is drawn, and the sky showed through woods.
-DENSEST = 13.0
 #: Polygons and facets that are never too many: facets are finer than asked for as long as there are no more, up to so
 #: many times.
 NEVER_TOO_MANY, FINEST = 1_200_000.0, 3.0
@@ -93,7 +90,7 @@ def fit_to_budget(
     number = primitives(result, camera, settings.facet)
     coarser = float(np.clip(np.sqrt(number / NEVER_TOO_MANY), 1.0 / FINEST, 1.0))
     left = max(most - polygons, 0.01 * most) if np.isfinite(most) else most
-    coarser = max(coarser, float(np.sqrt(DENSEST / A_PIXEL * number / left)))
+    coarser = max(coarser, float(np.sqrt(number / left)))
     return replace(
         detail,
         facet=coarser * settings.facet,

@@ -43,8 +43,8 @@ MIXED = 24.0
 #: average is half as wide again where it is seen from its front, and has one side, in the light or not.
 KITES, SOLID_KITES = 2.0, 0.8
 #: Squared width in pixels for each face from which on leaves with many planes have these, as a spray of shoots: one
-#: kite has the place and the side of none. As kites up to two pixels, near spruces were too bright and coarse (blobs
-#: 4,291 a megapixel there, 2,392 with a tenth of that; ``benchmarks exact --cases edge --species birch,spruce``).
+#: kite has the place and the side of none. As kites up to two pixels, near spruces were too bright and coarse (2,442
+#: blobs a megapixel, 2,129 so; ``benchmarks exact --cases edge --species birch,spruce --seeds 2``).
 FACE = 0.15
 #: Meters that a pixel spans at least at leaves and wood out of view, over the distance from it: their shadows are seen.
 BESIDE = 0.02

@@ -247,7 +247,8 @@ def _read_older(scene: bpy.types.Scene) -> None:
     stored = (stored_properties(scene) or {}).get("tetflora")
     if stored is None or "populations" not in stored:
         return
-    biomes = [{**one.to_dict(), "kind": 1} for one in stored.get("biomes", ())]
+    kinds = scene.tetflora.bl_rna.properties["layers"].fixed_type.properties["kind"].enum_items
+    biomes = [{**one.to_dict(), "kind": kinds[BIOME].value} for one in stored.get("biomes", ())]
     layers = [*stored.get("layers", ()), *stored["populations"]]
     stored["layers"] = biomes + [one.to_dict() for one in layers]
     scene.tetflora.layers_index = len(biomes) + stored.get("populations_index", 0)
