@@ -148,7 +148,7 @@ FIGURES: dict[str, Callable[[], Any]] = {
     "quality": lambda: [with_quality(rich(), factor).orders for factor in (0.3, 3.0)],
     "litter": lambda: [litter_page(rich(), PAGE), leaves_page(rich(), PAGE)],
     "leaf models": lambda: [[model, leaf_kites(model)] for model in LEAF_MODELS.values()],
-    "leaf levels": lambda: [leaf_levels(model, 3) for model in LEAF_MODELS.values()],
+    "leaf levels": lambda: [leaf_levels(model, 3)[:3] for model in LEAF_MODELS.values()],
 }
 
 
