@@ -75,7 +75,12 @@ def preview() -> list[Any]:
     modes = "LEVEL", "VISIBILITY", "FORM", "CONTRIBUTION"
     colors = [colors_of(level, mode, len(levels)) for level in levels for mode in modes]
     shapes = [of(flora(), seeds, 9) for of in (light_plants, bounds_of_plants)]
-    return [[(level.nodes, level.extinction, level.color) for level in levels], colors, shapes, crowns_of(flora(), seeds)]
+    return [
+        [(level.nodes, level.extinction, level.color) for level in levels],
+        colors,
+        shapes,
+        crowns_of(flora(), seeds),
+    ]
 
 
 def expected() -> list[Any]:
