@@ -30,6 +30,9 @@ MAX_UV = 10_000.0
 #: Mean square of the second axis of normals up to which a model is flat, and part of the faces' area that silhouettes
 #: show up to which these hide each other.
 _FLAT_LEAF, _SOLID = 0.02, 0.55
+#: Width of an ovate leaf over the root of its area. With their full width, shoots of pines were drawn one by one in
+#: triangles of a tenth of a pixel: 5.2 million of 1,500 trees at 480 x 270, and 42 primitives a pixel in all.
+_OVATE = 1.13
 #: Directions of silhouettes, and cells along each side of their images.
 _DIRECTIONS, _CELLS = 16, 32
 
@@ -144,8 +147,12 @@ class LeafModel:
 
     @cached_property
     def width(self) -> float:
-        """Extent across the midrib, in units of the leaf's size, which decides on its size in the image."""
-        return float(np.ptp(self.positions[:, [0, 2]], axis=0).max())
+        """Extent across the midrib, in units of the leaf's size, which decides on its size in the image.
+
+        Tufts and shoots of needles reach farther than what they show, and count as wide as an ovate leaf of that area.
+        """
+        across = float(np.ptp(self.positions[:, [0, 2]], axis=0).max())
+        return min(across, _OVATE * float(np.sqrt(self.shown_area)))
 
 
 def fans(model: LeafModel) -> tuple[Integers, Floats]:
