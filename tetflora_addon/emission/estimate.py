@@ -28,9 +28,10 @@ from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
 from .budget import A_PIXEL, BYTES_PER_POLYGON, BYTES_PER_TRIANGLE, FINEST, NEVER_TOO_MANY
 from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, OUTSIDE_A_PIXEL
 from .drawing import NEVER_TOO_MANY as NEVER_TOO_MANY_UNSEEN
+from .frontier import DETAIL
 from .leaf_detail import NEARER, TOLERANCE
 from .plant_parts import BENT, BROAD, SIDES, TUBES, TWIG
-from .plants import KITES
+from .plants import KITES, kite_width
 
 #: Seconds of any refinement, of each plant, and of each polygon or facet.
 SECONDS = 1.0
@@ -43,8 +44,8 @@ BYTES_PER_PLANT = 500.0
 #: Leaves and branches that are looked at, about, how many of them lie in a cell of the image, and how many of a plant
 #: in view for one of a plant that is not.
 _PARTS, _IN_CELL, _IN_VIEW = 4096, 32, 16.0
-#: Layers of leaves in a covered pixel of which something is drawn, about: 7 to 10 in scenes of the tests.
-_LAYERS = 8.5
+#: Layers of leaves in a covered pixel of which something is drawn, about: 11 to 16 in scenes from 20 to 600 m away.
+_LAYERS = 13.0
 #: Leaves count as so much shorter than they are, about, see `leaf_meshes`.
 _SHARE = 0.85
 #: How far twigs are off their chords, in lengths of these: arcs of a radian.
@@ -63,8 +64,13 @@ class Stand:
 
     def in_view(self, camera: Camera) -> Mask:
         """Plants (k,) of which something is in the image, as far as their crowns are upright spheroids."""
-        radius, height = self._of_crowns("radius"), self._of_crowns("height")
+        radius, height = self.radius, self._of_crowns("height")
         return camera.distance_to_view(self.foot + height[:, None] * (0.0, 0.0, 0.5)) < radius
+
+    @property
+    def radius(self) -> Floats:
+        """Radius (k,) of crowns, meters."""
+        return self._of_crowns("radius")
 
     def _of_crowns(self, name: str) -> Floats:
         return np.array([getattr(crown, name) for crown in self.crowns])[self.which] * self.scale
@@ -75,7 +81,7 @@ class Stand:
         Plants are turned any way. More stand for one that is near and in view.
         """
         away = np.linalg.norm(self.foot - camera.eye, axis=1)
-        size = np.maximum(self._of_crowns("radius"), self._of_crowns("height"))
+        size = np.maximum(self.radius, self._of_crowns("height"))
         # Places and scales without a number, or with one too large, are for Refine to tell; here they count as nothing.
         there = np.isfinite(away + size)
         away, size = (np.where(there, of, 0.0) for of in (away, size))
@@ -170,15 +176,16 @@ def _number(
     inside = _inside(parts, camera, extent)
     leaves = np.where(inside | (parts.form < 0), 0.0, parts.number) / HIDDEN_LEAVES
     beside = stand.in_view(camera)[plant]
+    layers, kites = _layers(stand, parts, plant, extent), _kites(stand.crowns, parts, stand.which[plant])[inside]
     parts = parts.take(inside)
     extent, whole = extent[inside], whole[inside]
     area, wide, wood = parts.area / extent**2, parts.width / extent, parts.form < 0
-    drawn, covered = _drawn(parts, camera, parts.number * area)
+    drawn, covered = _drawn(parts, camera, parts.number * area, layers[inside])
     coarser = _coarser(covered, pixels, settings.facet)
     facet = (coarser * settings.facet) ** 2
     # Leaves are facets, kites, or have their polygons; branches are triangles, or tubes.
     real = explicit_fraction(wide, coarser * settings.leaf_limit)
-    leaf = (1.0 - real) * np.minimum(area / facet, 1.0) + real * (1.0 + (whole - 1.0) * explicit_fraction(wide, KITES))
+    leaf = (1.0 - real) * np.minimum(area / facet, 1.0) + real * (1.0 + (whole - 1.0) * explicit_fraction(wide, kites))
     tube = np.where(wide < BROAD, np.minimum(parts.sides, SIDES) * parts.segments, whole)
     tubes = explicit_fraction(wide, TUBES)
     drawn = np.where(wood & (wide >= BROAD), 1.0, drawn)
@@ -227,11 +234,30 @@ def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, cam
     return out
 
 
-def _drawn(parts: CrownParts, camera: Camera, pixels: Floats) -> tuple[Floats, float]:
+def _kites(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers) -> Floats:
+    """Width in pixels (n,) up to which leaves are kites."""
+    out = np.full(len(parts), KITES)
+    for number, crown in enumerate(crowns):
+        widths = np.array([KITES if form is None else kite_width([form]) for form in (*crown.forms, None)])
+        own = (which == number) & (parts.form >= 0)
+        out[own] = widths[parts.form[own]]
+    return out
+
+
+def _layers(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) -> Floats:
+    """Layers of leaves (n,) that are drawn where parts are: parts of a crown that are small are drawn as a whole."""
+    radius = np.maximum(stand.radius, 1e-9)
+    # Of plants that stand for others as well, the leaves of one.
+    area = np.bincount(plant, parts.number * parts.area, len(radius)) * (len(radius) / max(stand.number, 1))
+    through = area / (np.pi * radius**2)
+    return _LAYERS + through[plant] * np.minimum(DETAIL * extent / (2.0 * radius[plant]), 1.0)
+
+
+def _drawn(parts: CrownParts, camera: Camera, pixels: Floats, most: Floats) -> tuple[Floats, float]:
     """Fraction (n,) that is drawn of parts (n,) that have so many pixels (n,) in all, and the pixels that they cover.
 
-    In each cell of the image parts lie one behind the other. So many layers of them are drawn as a pixel has facets;
-    the farther behind, the fewer are seen.
+    In each cell of the image parts lie one behind the other. So many layers (n,) of them are drawn; the farther behind,
+    the fewer are seen.
     """
     if not len(parts):
         return np.zeros(0), 0.0
@@ -253,7 +279,8 @@ def _drawn(parts: CrownParts, camera: Camera, pixels: Floats) -> tuple[Floats, f
     every = np.bincount(own, layers, len(size))
     before = np.cumsum(layers) - layers - (np.cumsum(every) - every)[own]
     drawn = np.empty(len(parts))
-    drawn[order] = np.exp(-before / _LAYERS) * -np.expm1(-layers / _LAYERS) * _LAYERS / layers
+    most = most[order]
+    drawn[order] = np.exp(-before / most) * -np.expm1(-layers / most) * most / layers
     # A layer of what is turned all ways covers a part of its area.
     return drawn, float(-(size * np.expm1(-LEVEL * every)).sum())
 

@@ -79,7 +79,7 @@ class Transition:
     @property
     def kite_widths(self) -> NDArray[np.float64]:
         """Width in pixels (r,) up to which the leaves of rows are kites."""
-        limits = [[_kite_width(kinds) for kinds in one] for one in self.flora.forms]
+        limits = [[kite_width(kinds) for kinds in one] for one in self.flora.forms]
         return np.array(limits)[self.flora.rows["species"], self.flora.rows["leaf_kind"]]
 
     @property
@@ -92,7 +92,7 @@ class Transition:
         return explicit_fraction(width / np.maximum(self.camera.extent_around(branches.position), 1e-300), limit)
 
 
-def _kite_width(forms: Sequence[LeafModel]) -> float:
+def kite_width(forms: Sequence[LeafModel]) -> float:
     """Width in pixels up to which leaves of one kind are kites."""
     if any(form.solid for form in forms):  # half of their surface is never seen
         return SOLID_KITES
