@@ -27,8 +27,8 @@ BYTES_PER_POLYGON = 610
 BYTES_PER_TRIANGLE = 380
 #: Polygons and facets for each pixel that plants cover, about, with facets of a pixel.
 A_PIXEL = 6.0
-#: Polygons and facets that are never too many: facets are finer than asked for as long as there are no more, up to so
-#: many times.
+#: Polygons and facets that are never too many with the facets of *Final*, see `relative_side`; and how many times finer
+#: facets are at most.
 NEVER_TOO_MANY, FINEST = 1_200_000.0, 3.0
 #: What an expected number may be off by.
 RESERVE = 0.15
@@ -88,7 +88,7 @@ def fit_to_budget(
         return replace(detail, refinement=_fitted_shells(result, most, faces), tolerance=np.inf)
     polygons = float(len(result.cell_polygons.polygons))
     number = primitives(result, camera, settings.facet)
-    coarser = float(np.clip(np.sqrt(number / NEVER_TOO_MANY), 1.0 / FINEST, 1.0))
+    coarser = relative_side(number, settings.facet)
     left = max(most - polygons, 0.01 * most) if np.isfinite(most) else most
     coarser = max(coarser, float(np.sqrt(number / left)))
     return replace(
@@ -99,6 +99,15 @@ def fit_to_budget(
         tolerance=TOLERANCE * max(coarser, 1.0) ** 2,
         most=left,
     )
+
+
+def relative_side(number: float, facet: float) -> float:
+    """Side of facets over that which is asked for, where there would be so many primitives: 1, or less if few.
+
+    What is asked to be coarser than *Final* is so in small images as well: they would take as long otherwise.
+    """
+    few = NEVER_TOO_MANY / max(facet / RefinementSettings().facet, 1.0) ** 2
+    return float(np.clip(np.sqrt(number / few), 1.0 / FINEST, 1.0))
 
 
 def primitives(result: Refinement, camera: Camera, facet: float) -> float:

@@ -25,9 +25,8 @@ from ..leaves.levels import chosen_polygons
 from ..refinement.decisions import explicit_fraction
 from ..refinement.settings import RefinementSettings
 from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
-from .budget import A_PIXEL, BYTES_PER_POLYGON, BYTES_PER_TRIANGLE, FINEST, NEVER_TOO_MANY
-from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, OUTSIDE_A_PIXEL
-from .drawing import NEVER_TOO_MANY as NEVER_TOO_MANY_UNSEEN
+from .budget import A_PIXEL, BYTES_PER_POLYGON, BYTES_PER_TRIANGLE, relative_side
+from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL
 from .frontier import DETAIL
 from .leaf_detail import NEARER, TOLERANCE
 from .plant_parts import BENT, BROAD, SIDES, TUBES, TWIG
@@ -199,7 +198,7 @@ def _number(
         (leaves[beside].sum(), OUTSIDE_A_PIXEL),  # drawn with what is seen of the same plants
         (leaves[~beside].sum(), OUTSIDE_A_PIXEL),
     ):
-        seen += min(float(number), max(a_pixel * pixels, NEVER_TOO_MANY_UNSEEN) / coarser**2)
+        seen += min(float(number), max(a_pixel * pixels, NEVER_TOO_MANY) / coarser**2)
     return seen
 
 
@@ -303,4 +302,4 @@ def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floa
 def _coarser(covered: float, pixels: float, facet: float) -> float:
     """Sides of facets over those that are asked for, as of `budget.fit_to_budget` without limits."""
     number = A_PIXEL * covered / facet**2 + (HIDDEN_A_PIXEL + OUTSIDE_A_PIXEL) * pixels
-    return float(np.clip(np.sqrt(number / NEVER_TOO_MANY), 1.0 / FINEST, 1.0))
+    return relative_side(number, facet)

@@ -75,7 +75,7 @@ def test_needles_hide_as_much_as_the_polygons_that_stand_for_them(species: str) 
 
 @pytest.mark.parametrize("name", catalog.list_species())
 def test_what_counts_as_wide_shows_as_much(name: str) -> None:
-    """Leaves are drawn one by one from a width on: were it that of a shoot's needle tips, they would be far too many."""
+    """Leaves are drawn one by one from a width on: were it the reach of needles, shoots would be far too many."""
     species = catalog.load_species(name)
     for form in (form for kind in range(2) for form in species.forms(kind) if isinstance(form, LeafModel)):
         assert form.shown_area >= 0.75 * form.width**2
