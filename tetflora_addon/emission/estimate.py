@@ -21,6 +21,7 @@ import numpy as np
 from ..arrays import GOLDEN_ANGLE, GOLDEN_TURN, Floats, Integers, Mask, spread
 from ..camera.camera import Camera
 from ..compiled.sizes import LEVEL, Crown, CrownParts
+from ..leaves.kites import leaf_planes
 from ..leaves.levels import chosen_polygons
 from ..refinement.decisions import explicit_fraction
 from ..refinement.settings import RefinementSettings
@@ -30,7 +31,7 @@ from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, NEVER_TOO_MANY, OUTS
 from .frontier import DETAIL
 from .leaf_detail import NEARER, TOLERANCE
 from .plant_parts import BENT, BROAD, SIDES, TUBES, TWIG
-from .plants import KITES, kite_width
+from .plants import kite_widths
 
 #: Seconds of any refinement, of each plant, and of each polygon or facet.
 SECONDS = 1.0
@@ -175,7 +176,8 @@ def _number(
     inside = _inside(parts, camera, extent)
     leaves = np.where(inside | (parts.form < 0), 0.0, parts.number) / HIDDEN_LEAVES
     beside = stand.in_view(camera)[plant]
-    layers, kites = _layers(stand, parts, plant, extent), _kites(stand.crowns, parts, stand.which[plant])[inside]
+    layers = _layers(stand, parts, plant, extent)
+    one, each, planes = _kites(stand.crowns, parts, stand.which[plant])[:, inside]
     parts = parts.take(inside)
     extent, whole = extent[inside], whole[inside]
     area, wide, wood = parts.area / extent**2, parts.width / extent, parts.form < 0
@@ -184,7 +186,8 @@ def _number(
     facet = (coarser * settings.facet) ** 2
     # Leaves are facets, kites, or have their polygons; branches are triangles, or tubes.
     real = explicit_fraction(wide, coarser * settings.leaf_limit)
-    leaf = (1.0 - real) * np.minimum(area / facet, 1.0) + real * (1.0 + (whole - 1.0) * explicit_fraction(wide, kites))
+    faces = 1.0 + (planes - 1.0) * explicit_fraction(wide, one) + (whole - planes) * explicit_fraction(wide, each)
+    leaf = (1.0 - real) * np.minimum(area / facet, 1.0) + real * faces
     tube = np.where(wide < BROAD, np.minimum(parts.sides, SIDES) * parts.segments, whole)
     tubes = explicit_fraction(wide, TUBES)
     drawn = np.where(wood & (wide >= BROAD), 1.0, drawn)
@@ -234,12 +237,13 @@ def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, cam
 
 
 def _kites(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers) -> Floats:
-    """Width in pixels (n,) up to which leaves are kites."""
-    out = np.full(len(parts), KITES)
+    """Widths in pixels up to which leaves are kites, and have one for each plane; how many planes that are (3, n)."""
+    out = np.ones((3, len(parts)))
     for number, crown in enumerate(crowns):
-        widths = np.array([KITES if form is None else kite_width([form]) for form in (*crown.forms, None)])
-        own = (which == number) & (parts.form >= 0)
-        out[own] = widths[parts.form[own]]
+        for kind, form in enumerate(crown.forms):
+            own = (which == number) & (parts.form == kind)
+            if form is not None:
+                out[:, own] = np.array([[*kite_widths([form]), leaf_planes(form).polygons]]).T
     return out
 
 

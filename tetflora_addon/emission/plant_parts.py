@@ -206,7 +206,7 @@ class GrownPlants(FrontierKind):
                 of = whole, owner[left]
                 canvas.add_facets((s, ""), self._of_pieces(pieces.take(left), side, explicit, of, canvas.thin))
             some = whole.take(np.flatnonzero(own & (explicit > 0.0)))
-            given = lambda b: (explicit[b.plant], transition.of_kites(b)), detail.lengths, canvas.thin
+            given = lambda b: (explicit[b.plant], *transition.of_kites(b)), detail.lengths, canvas.thin
             for one in leaf_meshes(flora, s, [some], *given) if len(some) else ():
                 canvas.add_mesh((LEAF_KINDS[one.kind], one.form, s), one.buffers, True)
             # What is a few pixels wide has few sides; of wider wood all is drawn, or its shading would end at holes.

@@ -5,8 +5,8 @@
 A leaf whose width in pixels is below the limit is a facet, one that is wider by `decisions.BAND` is real; in between
 a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
 keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
-Real leaves are single kites first, and have their faces from a few pixels of width on, one after another; where
-these can be told from what they stand for, finer ones, see `leaf_detail`.
+Real leaves are single kites first, those with many planes a kite for each then, and have their faces from a few pixels
+of width on, one after another; where these can be told from what they stand for, finer ones, see `leaf_detail`.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ MIXED = 24.0
 #: Width in pixels up to which real leaves are kites, and the same of those that are solid: a kite that shows as much on
 #: average is half as wide again where it is seen from its front, and has one side, in the light or not.
 KITES, SOLID_KITES = 2.0, 0.8
-#: Squared width in pixels for each face from which on leaves with many planes have these, as a spray of shoots: one
-#: kite has the place and the side of none. As kites up to two pixels, near spruces were too bright and coarse (2,442
+#: Squared width in pixels for each plane from which on leaves with many have a kite for each, as a spray of shoots: one
+#: for all has the place and the side of none. As such up to two pixels, near spruces were too bright and coarse (2,442
 #: blobs a megapixel, 2,129 so; ``benchmarks exact --cases edge --species birch,spruce --seeds 2``).
-FACE = 0.15
+PLANE = 0.15
 #: Meters that a pixel spans at least at leaves and wood out of view, over the distance from it: their shadows are seen.
 BESIDE = 0.02
 
@@ -72,14 +72,15 @@ class Transition:
         """Real fraction (n,) of the leaves that branches themselves bear."""
         return self._fraction(branches, self._own_width, self.limit)
 
-    def of_kites(self, branches: Branches) -> NDArray[np.float64]:
-        """Fraction (n,) of the real leaves of branches themselves that are single kites."""
-        return 1.0 - self._fraction(branches, self._own_width * KITES / self.kite_widths, KITES)
+    def of_kites(self, branches: Branches) -> Iterator[NDArray[np.float64]]:
+        """Fractions (n,) of the real leaves of branches themselves that are single kites, and those or one a plane."""
+        for widths in np.moveaxis(self.kite_widths, -1, 0):
+            yield 1.0 - self._fraction(branches, self._own_width * KITES / widths, KITES)
 
     @property
     def kite_widths(self) -> NDArray[np.float64]:
-        """Width in pixels (r,) up to which the leaves of rows are kites."""
-        limits = [[kite_width(kinds) for kinds in one] for one in self.flora.forms]
+        """Widths in pixels (r, 2) up to which the leaves of rows are kites, and have one for each plane."""
+        limits = [[kite_widths(kinds) for kinds in one] for one in self.flora.forms]
         return np.array(limits)[self.flora.rows["species"], self.flora.rows["leaf_kind"]]
 
     @property
@@ -92,12 +93,12 @@ class Transition:
         return explicit_fraction(width / np.maximum(self.camera.extent_around(branches.position), 1e-300), limit)
 
 
-def kite_width(forms: Sequence[LeafModel]) -> float:
-    """Width in pixels up to which leaves of one kind are kites."""
+def kite_widths(forms: Sequence[LeafModel]) -> tuple[float, float]:
+    """Widths in pixels up to which leaves of one kind are kites, and have one for each plane."""
     if any(form.solid for form in forms):  # half of their surface is never seen
-        return SOLID_KITES
-    faces = max((form.polygons for form in forms if len(leaf_kites(form).share) > 1), default=np.inf)
-    return min(KITES, float(np.sqrt(FACE * faces)))
+        return SOLID_KITES, SOLID_KITES
+    planes = max((len(leaf_kites(form).share) for form in forms), default=1)
+    return (min(KITES, float(np.sqrt(PLANE * planes))) if planes > 1 else KITES), KITES
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,13 @@
 
 A kite is folded along the midrib as the leaf is. A bunch of needles shows many planes: each copy takes one of them at
 random, in proportion to their areas, and has the area that the whole shows: over many leaves, the area that is seen
-from any direction is kept. A kite stays what it is.
+from any direction is kept. A kite stays what it is. Where planes have places of their own in the image, each of them
+is a kite.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -52,32 +53,68 @@ class LeafKites:
 @lru_cache(maxsize=256)
 def leaf_kites(model: LeafModel) -> LeafKites:
     """The kites of a leaf model."""
+    found = _planes_of(model)
+    fan = _fan(model)
+    areas = np.array([one.area for one in found])
+    # A face that is not flat counts as it is drawn.
+    whole = float(fan[1].sum()) if found[0].fold is not None else model.shown_area
+    positions = np.array([_kite(model, whole, one.normal, fan, one.fold or 0.0) for one in found])
+    share = np.cumsum(areas) / areas.sum()
+    return LeafKites(positions, _texture(model, positions), share, _materials_of(model, found))
+
+
+@lru_cache(maxsize=256)
+def leaf_planes(model: LeafModel) -> LeafModel:
+    """A kite for each plane of a leaf model, where it is and as large as it shows; the model where it is as simple."""
+    if model.polygons <= 2 * _PLANES and model.triangles <= 2 * model.polygons:
+        return model
+    found, (points, areas), (face, _) = _planes_of(model), _fan(model), fans(model)
+    whole, positions = sum(one.area for one in found), []
+    for one in found:
+        fan = np.isin(face, one.faces)
+        area = model.shown_area * one.area / whole
+        positions.append(_kite(model, area, one.normal, (points[fan], areas[fan]), one.fold or 0.0))
+    corners = np.array(positions)
+    return replace(
+        leaf_model(corners.reshape(-1, 3), np.arange(4 * len(found)).reshape(-1, 4).tolist()),
+        uv=_texture(model, corners).reshape(-1, 2),
+        material_index=_materials_of(model, found),
+    )
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """Faces of a leaf model that are one sheet."""
+
+    faces: Integers
+    area: float
+    normal: Floats  # (3,)
+    material: int
+    fold: float | None = None  # sine by which halves rise, of a leaf that is one sheet, folded once
+
+
+def _planes_of(model: LeafModel) -> list[_Plane]:
+    """The planes of a leaf model, material by material."""
     vectors = model.face_vectors
     areas = np.linalg.norm(vectors, axis=1)
     normals = vectors / np.maximum(areas, 1e-300)[:, None]
     materials = np.zeros(len(areas), np.int32) if model.material_index is None else model.material_index
-    fan = _fan(model, normals)
-    normal, fold, off = _sheet(*fan)
+    normal, fold, off = _sheet(*_fan(model))
     found = []
     for material in np.unique(materials):
         own = np.flatnonzero((materials == material) & (areas > 0))
         if off < _FOLDED_ONCE and len(own) == len(areas):
-            # A face that is not flat counts as it is drawn.
-            found.append((_kite(model, float(fan[1].sum()), normal, fan, fold), areas.sum(), material))
-            break
+            return [_Plane(own, float(areas.sum()), normal, int(material), fold)]
         for plane in _planes(normals[own], areas[own]):
             turned, size = normals[own][plane], areas[own][plane]
             normal = np.linalg.eigh(np.einsum("f,fi,fj->ij", size, turned, turned))[1][:, 2]
             normal = normal if (size * (turned @ normal)).sum() >= 0.0 else -normal  # to the side of most of them
-            found.append((_kite(model, model.shown_area, normal, fan), size.sum(), material))
-    positions = np.array([corners for corners, _, _ in found])
-    share = np.cumsum([area for _, area, _ in found])
-    return LeafKites(
-        positions,
-        _texture(model, positions),
-        share / share[-1],
-        None if model.material_index is None else np.array([material for *_, material in found], np.int32),
-    )
+            found.append(_Plane(own[plane], float(size.sum()), normal, int(material)))
+    return found
+
+
+def _materials_of(model: LeafModel, found: list[_Plane]) -> Integers32 | None:
+    return None if model.material_index is None else np.array([one.material for one in found], np.int32)
 
 
 def _planes(normals: Floats, areas: Floats) -> list[Integers]:
@@ -93,9 +130,10 @@ def _planes(normals: Floats, areas: Floats) -> list[Integers]:
     return [order[group == one] for one in np.unique(group)]
 
 
-def _fan(model: LeafModel, normals: Floats) -> tuple[Floats, Floats]:
+def _fan(model: LeafModel) -> tuple[Floats, Floats]:
     """Corners (t, 3, 3) and areas (t,) of triangles that fan out over the faces."""
     face, corners = fans(model)
+    normals = model.face_vectors / np.maximum(np.linalg.norm(model.face_vectors, axis=1), 1e-300)[:, None]
     points = np.ascontiguousarray(corners.swapaxes(0, 1))
     # Negative where a face is concave; triangles at the ends of a fan have none.
     vectors = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2

@@ -35,7 +35,7 @@ from ..growth.hashing import Draw, uniform
 from ..growth.seasons import is_seasonal, leaf_colors
 from ..growth.seeds import Branches
 from ..growth.wind import moment
-from ..leaves.kites import KITE, LeafKites, leaf_kites
+from ..leaves.kites import KITE, LeafKites, leaf_kites, leaf_planes
 from ..leaves.levels import LeafLevel, chosen_level, hidden_gloss, leaf_levels
 from ..leaves.models import LeafModel
 from .pieces import Thin, chunks
@@ -243,8 +243,8 @@ def _stepped(pattern: NDArray, step: int, rows: int) -> NDArray:
 
 #: Vertices of leaves that are worked on at a time: some ten megabytes.
 _VERTEX_BATCH = 120_000
-#: The step of leaves that are kites; that of others is their level, 0 for the model of the species.
-_KITE = -1
+#: Steps of leaves that are a kite, and a kite for each plane; that of others is their level, 0 for the species' model.
+_KITE, _PLANES = -2, -1
 #: Leaves change their level at lengths from this fraction of that of the first ones on, each by its own number.
 _EARLIEST = 0.7
 
@@ -262,7 +262,7 @@ def leaf_meshes(
     flora: Flora,
     species: int,
     whole: Sequence[WholeBranches],
-    fractions_of: Callable[[Branches], tuple[Floats, Floats]] | None = None,
+    fractions_of: Callable[[Branches], tuple[Floats, Floats, Floats]] | None = None,
     lengths_of: Callable[[WholeBranches], Floats] | None = None,
     thin: Thin | None = None,
 ) -> Iterator[LeafMesh]:
@@ -275,8 +275,8 @@ def leaf_meshes(
         Index into the flora's species.
     whole : sequence of WholeBranches
     fractions_of : callable, optional
-        Fractions (n,), (n,) of the leaves of branches that are wanted, and of these that are kites; the leaves' own
-        random numbers decide which.
+        Fractions (n,), (n,), (n,) of the leaves of branches that are wanted, and of these that are kites, and kites or
+        a kite for each plane; the leaves' own random numbers decide which.
     lengths_of : callable, optional
         Lengths (n,) of the leaves of branches in the image, in errors that do not show; those of long ones are finer.
     thin : Thin, optional
@@ -305,6 +305,8 @@ def _copies(model: LeafModel, step: int, number: int, transmission: float, movin
         return LevelCopies(leaf_levels(model, step)[step - 1], number, transmission, moving)
     if step == _KITE and not model.textured:
         return KiteCopies(leaf_kites(model), number, transmission, moving, hidden_gloss(model))
+    if step == _PLANES and not model.textured:
+        return LeafCopies(leaf_planes(model), number, transmission, moving, hidden_gloss(model))
     return LeafCopies(model, number, transmission, moving, hidden_gloss(model))
 
 
@@ -318,9 +320,9 @@ def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_LeafBearers]:
 class _LeafBearers:
     """Branches (n,) of one row, and which of their leaves are wanted.
 
-    ``step`` says which: -1 kites, 0 models of the species, from 1 on their levels. ``fraction`` (n,) of the leaves is
-    wanted at all, and of these ``kites`` (n,) as kites; where ``lengths`` (n,) of leaves are given, as of
-    `leaf_meshes`, only those of the step are.
+    ``step`` says which: kites, kites for each plane, 0 models of the species, from 1 on their levels. ``fraction``
+    (n,) of the leaves is wanted at all, and of these those with a random number from ``low`` (n,) to ``high`` (n,);
+    where ``lengths`` (n,) of leaves are given, as of `leaf_meshes`, only those of the step are.
     """
 
     def __init__(
@@ -330,26 +332,28 @@ class _LeafBearers:
         whole: WholeBranches,
         step: int = 0,
         fraction: Floats | None = None,
-        kites: Floats | None = None,
+        low: Floats | None = None,
+        high: Floats | None = None,
         lengths: Floats | None = None,
     ) -> None:
         self.flora, self.whole, self.counts = flora, whole, leaf_counts(flora.rows, whole.branches)
-        self.step, self.fraction, self.kites, self.lengths = step, fraction, kites, lengths
+        self.step, self.fraction, self.low, self.high, self.lengths = step, fraction, low, high, lengths
         self.row = np.array([row])
         self.kind = int(flora.rows["leaf_kind"][row])
         self.forms = flora.forms[int(flora.rows["species"][row])][self.kind]
 
-    def parts(self, fraction: Floats, kites: Floats) -> Iterator[_LeafBearers]:
-        """The branches some of whose leaves are wanted as they are, and those with leaves as kites."""
-        for step, share in ((0, 1.0 - kites), (_KITE, kites)):
-            own = np.flatnonzero((fraction > 0.0) & (share > 0.0))
+    def parts(self, fraction: Floats, kites: Floats, planes: Floats) -> Iterator[_LeafBearers]:
+        """The branches some of whose leaves are wanted as they are, and those with leaves as kites of both kinds."""
+        none, every = np.zeros_like(kites), np.ones_like(kites)
+        for step, low, high in ((0, planes, every), (_PLANES, kites, planes), (_KITE, none, kites)):
+            own = np.flatnonzero((fraction > 0.0) & (low < high))
             if len(own):
-                given = fraction[own], kites[own]
+                given = fraction[own], low[own], high[own]
                 yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given)
 
     def levels(self, lengths: Floats) -> Iterator[_LeafBearers]:
         """The branches by the levels that some of their leaves have; kites stay what they are."""
-        if self.step == _KITE:
+        if self.step < 0:
             yield self
             return
         ends = [[chosen_level(form, lengths * share) for form in self.forms] for share in (_EARLIEST, 1.0)]
@@ -357,7 +361,7 @@ class _LeafBearers:
         for step in range(int(high.max(initial=0)) + 1):
             own = np.flatnonzero((low <= step) & (step <= high))
             if len(own):
-                given = (None if of is None else of[own] for of in (self.fraction, self.kites))
+                given = (None if of is None else of[own] for of in (self.fraction, self.low, self.high))
                 mixed = lengths[own] if (low[own] < high[own]).any() else None
                 yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given, mixed)
 
@@ -426,11 +430,12 @@ class _LeafBearers:
         key = leaf_keys(self.whole.branches.take(part), owner, index)
         kept = np.ones(len(key), bool)
         if self.fraction is not None:
-            wanted, kites, small = self.fraction[part], self.kites[part], self.step == _KITE
+            wanted, low, high = self.fraction[part], self.low[part], self.high[part]
             if (wanted < 1.0).any():
                 kept &= uniform(key, Draw.TRANSITION) < wanted[owner]
-            if (kites < 1.0).any() if small else (kites > 0.0).any():
-                kept &= (uniform(key, Draw.LEAF_KITE) < kites[owner]) == small
+            if (low > 0.0).any() or (high < 1.0).any():
+                number = uniform(key, Draw.LEAF_KITE)
+                kept &= (low[owner] <= number) & (number < high[owner])
         form = leaf_forms(len(self.forms), key) if len(self.forms) > 1 else np.zeros(len(key), np.int64)
         if self.lengths is not None:
             length = self.lengths[part][owner] * (_EARLIEST + (1.0 - _EARLIEST) * uniform(key, Draw.LEAF_LEVEL))

@@ -13,8 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.leaves.kites import LeafKites, leaf_kites
-from tetflora_addon.leaves.models import LEAF_MODELS, LeafModel, leaf_model, mean_silhouette
+from tetflora_addon.leaves.kites import LeafKites, leaf_kites, leaf_planes
+from tetflora_addon.leaves.models import LEAF_MODELS, LeafModel, fans, leaf_model, mean_silhouette
+from tetflora_addon.species.catalog import load_species
 
 #: Faces of a cube, all outward.
 _CUBE = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
@@ -31,6 +32,16 @@ def seen(vectors: np.ndarray, weight: np.ndarray) -> np.ndarray:
     directions = np.random.default_rng(0).normal(size=(200, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     return np.abs(directions @ vectors.T) @ weight
+
+
+def centroid(model: LeafModel) -> np.ndarray:
+    """Of the area of all faces, (3,)."""
+    face, corners = fans(model)
+    vectors = np.cross(corners[1] - corners[0], corners[2] - corners[0]) / 2
+    area = np.einsum(
+        "ci,ci->c", vectors, model.face_vectors[face] / np.linalg.norm(model.face_vectors[face], axis=1)[:, None]
+    )
+    return area @ corners.mean(axis=0) / area.sum()
 
 
 def check(model: LeafModel, spread: float) -> None:
@@ -53,6 +64,20 @@ def check(model: LeafModel, spread: float) -> None:
 @pytest.mark.parametrize("name", LEAF_MODELS)
 def test_kites_show_what_the_model_shows(name: str) -> None:
     check(LEAF_MODELS[name], 0.05)
+
+
+@pytest.mark.parametrize("name", ["spruce", "silver_fir", "larch", "scots_pine"])
+def test_planes_of_shoots_show_what_these_show_where_they_are(name: str) -> None:
+    """Each copy as much as its model, from everywhere: in two triangles a plane, where models have up to 25 a face."""
+    model = load_species(name).forms(0)[0]
+    planes = leaf_planes(model)
+    assert planes.triangles == 2 * planes.polygons <= 10
+    assert planes.area == pytest.approx(model.shown_area, rel=5e-3)
+    ours, whole = (seen(one.face_vectors, np.ones(one.polygons)) for one in (planes, model))
+    assert np.abs(ours - whole).max() <= 0.05 * whole.mean()
+    ours, whole = (centroid(one) for one in (planes, model))
+    assert np.linalg.norm(ours - whole) < 0.05 * model.reach
+    assert planes.reach <= (1.0 + 1e-3) * model.reach
 
 
 @given(st.floats(0.05, 0.6), st.floats(-0.5, 0.5), st.floats(-0.4, 0.4))
