@@ -27,7 +27,7 @@ from ..settings import years_of
 from ..species.edits import species_for
 from .own_ages import Sizes
 from .sizes import at_age, heights, sized
-from .skeletons import age_of, aged_kind, dead_of, is_aged, later, plain_kind, species_of
+from .skeletons import age_of, aged_kind, dead_of, is_aged, is_crowded, later, plain_kind, species_of
 
 #: Classes of a species at most, and years from its death to the last of them.
 MOST, _FALLEN = 12, 40.0
@@ -107,8 +107,8 @@ def relative_heights(identifier: str, years: NDArray[np.floating]) -> Floats:
 
 def kind_species(species: Species, kind: str, years: float = 0.0) -> Species:
     """A species as plants of a kind are after so many years."""
-    age, dead = age_of(kind), dead_of(kind)
-    return at_age(species, age, dead + years) if dead > 0.0 else at_age(species, age + years)
+    age, dead, crowded = age_of(kind), dead_of(kind), is_crowded(kind)
+    return at_age(species, *((age, dead + years) if dead > 0.0 else (age + years, 0.0)), crowded)
 
 
 def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: Floats, many: set[str]) -> Seeds:
