@@ -12,7 +12,7 @@ import pytest
 
 from tests.blender.scenes import add_mesh, depsgraph, select
 from tetflora_addon import errors
-from tetflora_addon.blender.scene.ages import kind_species
+from tetflora_addon.blender.scene.ages import kind_species, plainly_aged
 from tetflora_addon.blender.scene.fields import read_aged_field
 from tetflora_addon.blender.scene.plants import read_asset_plants, read_plants
 from tetflora_addon.blender.scene.sizes import fits_of, measure_of
@@ -224,6 +224,10 @@ def test_trees_of_a_dense_stand_have_its_habit_and_free_ones_have_not():
     assert age_of(kinds[0]) == load_species("beech").ages.full  # tall, but not as thick as an old one
     assert 0.4 < read.crown[0, LEAVES] < 1.5
     assert 0.5 < read.crown[0, THICKNESS] < 1.5
+    plain = plainly_aged(bpy.context.scene, read, None, None)[0]
+    assert set(plain.identifiers) == {"beech"}
+    free = replace(plain.take(np.array([0])), identifiers=("beech",), species=np.zeros(1, np.int32))
+    assert measured(compile_species([load_species("beech")]), free)[1] == pytest.approx(4.8, rel=0.4)
 
 
 def test_trees_keep_their_habit_through_the_years_of_an_animation():
