@@ -38,6 +38,7 @@ NAMES = {
     "places": ("results.md#forests-that-grew", "Do real places arrive as they are?"),
     "forms_published": ("species.md#shipped-species-against-published-figures", "Are trees as they are published?"),
     "leaf_area": ("results.md#leaf-area", "Have trees as many leaves as is measured, and as take their light?"),
+    "light_inside": ("results.md#light-inside-woods", "Is it as dark inside woods as is measured?"),
     "cover_published": ("results.md#plants-up-close", "Does a birch stand cover as much ground as is published?"),
     "shapes": ("results.md#light-shapes-in-the-window", "Do light shapes follow the artist, a million of them too?"),
     "endurance": ("results.md#two-hundred-frames", "Does memory or time grow over many frames?"),

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from devtools import forms
 from devtools.leaf_area import allometry, by_size
 from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, single_seed
+from tetflora_addon.blender.scene.ages import kind_species
 from tetflora_addon.blender.scene.own_ages import Sizes
-from tetflora_addon.blender.scene.sizes import at_age, measure_of, sized
-from tetflora_addon.blender.scene.skeletons import age_of
+from tetflora_addon.blender.scene.sizes import measure_of, sized
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
@@ -118,7 +118,7 @@ def drawn_leaves(identifier: str, plants: Plants, traits: StandTraits, site: Sta
     for number, kind in enumerate(kinds.identifiers):
         own = np.flatnonzero(kinds.species == number)
         if len(own):
-            flora = measure_of(at_age(load_species(identifier), age_of(kind))).flora
+            flora = measure_of(kind_species(load_species(identifier), kind)).flora
             some = replace(kinds.take(own), identifiers=(kind,), species=np.zeros(len(own), np.int32))
             out[own] = one_sided(load_species(identifier)) * flora.leaf_areas(trunks(flora.rows, some))
     return out

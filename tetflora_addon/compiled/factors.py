@@ -76,7 +76,8 @@ class ShapedTotals:
         crown, row = subplants.crown.astype(np.float64), subplants.row
         step = crown[:, BASE] / (_BASES[1] - _BASES[0])
         low = np.minimum(step.astype(np.int64), len(_BASES) - 2)
-        part, fewer = (step - low)[:, None, None], 1.0 - crown[:, LEAVES, None, None]
+        part, fewer = (step - low)[:, None, None], np.tile(1.0 - crown[:, LEAVES, None, None], (1, 1, _TOTALS))
+        fewer[:, :, 2 * KINDS :] = 1.0 - np.sqrt(crown[:, LEAVES, None, None])
         power, borne = ((1 - part) * all_[row, low] + part * all_[row, low + 1] for all_ in (self.power, self.borne))
         power = power - fewer * borne
         square = 1 + (crown[:, LIGHT][:, :2] ** 2).sum(axis=1) / 2

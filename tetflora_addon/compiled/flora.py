@@ -176,7 +176,7 @@ class Flora:
 
     def wood_areas(self, subplants: Branches) -> Floats:
         """Expected surface (n,) of the branches of sub-plants, m²."""
-        row, full = subplants.row, fullness(self.rows, subplants)
+        row, full = subplants.row, fullness(self.rows, subplants, wood=True)
         relative, spurs = self.fixed_wood[row] + full * self.full_wood[row], full * self.spur_wood[row]
         some = self._shaped(subplants)
         if len(some):
@@ -192,7 +192,7 @@ class Flora:
     def branch_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the branches of sub-plants."""
         fixed, wood = self.fixed_faces[subplants.row], (self.polygons - self.leaf_faces)[subplants.row]
-        counts = fixed + fullness(self.rows, subplants) * (wood - fixed)
+        counts = fixed + fullness(self.rows, subplants, wood=True) * (wood - fixed)
         some = self._shaped(subplants)
         if len(some):
             counts[some] += (self.shaped_totals.faces(subplants.take(some)) - 1.0) * wood[some]

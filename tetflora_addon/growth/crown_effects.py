@@ -140,11 +140,12 @@ def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> 
     return np.where(stool, np.minimum(reach, MOST_LEANING), one), np.where(trunk & ~stool, reach, one)
 
 
-def handed_on(parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, angle: Floats) -> Floats32:
+def handed_on(rows: Table, parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, angle: Floats) -> Floats32:
     """The column ``crown`` (m, 6) of children of a sort.
 
     Parameters
     ----------
+    rows : parameter table
     parent : Branches of m
     sort : int
     length : (m,) float64
@@ -153,7 +154,8 @@ def handed_on(parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, a
         By which they are turned, see `growth.turned`.
     """
     out = np.zeros((COLUMNS, len(parent)), np.float32)
-    out[WIDTH], out[LEAVES] = length, parent.crown[:, LEAVES] if sort == LATERAL else 1.0
+    on_limbs = (sort == SPUR) & (rows["order"][parent.row] > 0)
+    out[WIDTH], out[LEAVES] = length, np.where(on_limbs | (sort == LATERAL), parent.crown[:, LEAVES], 1.0)
     if sort == FORK:
         crown = parent.crown.T
         x, y, z = crown[LIGHT]

@@ -120,12 +120,16 @@ def chosen_drawn(rows: Table, plants: Branches, owner: Integers, index: Integers
     return replace(plant, row=row, key=key, vigor=vigor, outward=outward, **where, **size)
 
 
-def fullness(rows: Table, branches: Branches) -> Floats:
-    """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
+def fullness(rows: Table, branches: Branches, wood: bool = False) -> Floats:
+    """Factor (n,) on the numbers of leaves, or of branches: 1 for the longest branches of a crown, less for others.
+
+    What a crown shape has more or less of is half in the number of twigs on limbs and half in that of leaves on each.
+    """
     vigor, crown = branches.vigor, branches.crown
     if crown is None:
         return fullness_of(rows, branches.row, vigor)
-    leafy = np.where(rows["order"][branches.row] == 1, crown[:, LEAVES], 1.0)
+    order, leafy = rows["order"][branches.row], np.sqrt(crown[:, LEAVES].astype(np.float64))
+    leafy = np.where(order == 1, leafy if wood else leafy**2, 1.0 if wood else np.where(order > 1, leafy, 1.0))
     return leafy * fullness_of(rows, branches.row, vigor, vigor / crown[:, 0])
 
 
@@ -141,7 +145,8 @@ def branch_counts(rows: Table, branches: Branches, sort: int = LATERAL) -> Integ
     if crown_effects.are_shaped(rows, branches):
         start = rows["start"][row, DEAD, 0] if sort == DEAD else _started(rows, branches, sort)
         wanted = wanted * crown_effects.count_factors(rows, row, branches.crown[:, BASE], sort, start)
-    nodes = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64)
+    full = fullness(rows, branches, wood=True)
+    nodes = np.floor(wanted * full / whorl + uniform(key, _ROUND[sort])).astype(np.int64)
     grown = living_nodes(rows, branches, sort)
     if grown is not None:
         nodes = np.where(grown.on, grown.number.sum(axis=0), nodes)
@@ -154,7 +159,7 @@ def living_nodes(rows: Table, branches: Branches, sort: int) -> Grown | None:
     if sort == FORK or not rows["growing"][row, sort, NOW].any():
         return None
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
-    wanted = varied(rows["count"][row, sort], key, _COUNT[sort]) * fullness(rows, branches) / whorl
+    wanted = varied(rows["count"][row, sort], key, _COUNT[sort]) * fullness(rows, branches, wood=True) / whorl
     start, draw, ends = rows["start"][row, sort], np.zeros(len(row)), None
     if sort != DEAD:
         draw = signed(key, _START[sort])
@@ -294,7 +299,7 @@ def chosen_children(
         later = Pose(again.position, again.frame, again.sky)
     own = row, parent.plant, key, position, frame, length, radius, parent.scale, vigor, around, sky, later, parent.year
     return Branches(
-        *own, None if parent.crown is None else crown_effects.handed_on(parent, sort, reach, azimuth, angle)
+        *own, None if parent.crown is None else crown_effects.handed_on(rows, parent, sort, reach, azimuth, angle)
     )
 
 

@@ -12,16 +12,16 @@ import pytest
 
 from tests.blender.scenes import add_mesh, depsgraph, select
 from tetflora_addon import errors
-from tetflora_addon.blender.scene.ages import kind_species
+from tetflora_addon.blender.scene.ages import kind_species, plainly_aged
 from tetflora_addon.blender.scene.fields import read_aged_field
 from tetflora_addon.blender.scene.plants import read_asset_plants, read_plants
 from tetflora_addon.blender.scene.sizes import fits_of, measure_of
-from tetflora_addon.blender.scene.skeletons import age_of, dead_of
+from tetflora_addon.blender.scene.skeletons import age_of, dead_of, is_crowded
 from tetflora_addon.blender.species.asset_species import asset_species
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.sizes import measured
 from tetflora_addon.growth.growth import radius_at, trunks
-from tetflora_addon.growth.seeds import BASE, EAST
+from tetflora_addon.growth.seeds import BASE, EAST, LEAVES, THICKNESS
 from tetflora_addon.species.catalog import load_species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -205,6 +205,48 @@ def test_growth_that_is_smooth_has_no_jumps():
         length.append(trunks(compiled(kind).rows, replace(read.take(own), species=np.zeros(1, np.int32))).length[0])
     assert 0.0 <= np.diff(ages).min() <= np.diff(ages).max() < 1.5
     assert np.abs(np.diff(np.log(length))).max() < 0.1
+
+
+def test_trees_of_a_dense_stand_have_its_habit_and_free_ones_have_not():
+    """A free beech with its limbs cut short to the crown of a stand has next to no twigs."""
+    field_of(
+        3,
+        kinds=("beech",),
+        seed=('INT', np.arange(3)),
+        tf_height=('FLOAT', 21.0),
+        tf_diameter=('FLOAT', [0.24, 0.24, 0.7]),
+        tf_crown_width=('FLOAT', [4.8, 4.8, 16.0]),
+        tf_crown_base=('FLOAT', [13.0, 2.0, 2.0]),
+    )
+    read = plants()
+    kinds = [read.identifiers[n] for n in read.species]
+    assert [is_crowded(kind) for kind in kinds] == [True, False, False]
+    assert age_of(kinds[0]) == load_species("beech").ages.full  # tall, but not as thick as an old one
+    assert 0.4 < read.crown[0, LEAVES] < 1.5
+    assert 0.5 < read.crown[0, THICKNESS] < 1.5
+    plain = plainly_aged(bpy.context.scene, read, None, None)[0]
+    assert set(plain.identifiers) == {"beech"}
+    free = replace(plain.take(np.array([0])), identifiers=("beech",), species=np.zeros(1, np.int32))
+    assert measured(compile_species([load_species("beech")]), free)[1] == pytest.approx(4.8, rel=0.4)
+
+
+def test_trees_keep_their_habit_through_the_years_of_an_animation():
+    years = np.tile([10.0, 40.0, 80.0], 2)
+    obj = field_of(
+        6,
+        kinds=("beech",),
+        tf_plant=('INT', [0, 0, 0, 1, 1, 1]),
+        tf_year=('FLOAT', years),
+        seed=('INT', [0, 0, 0, 1, 1, 1]),
+        tf_height=('FLOAT', [4.0, 14.0, 20.0, 4.0, 14.0, 20.0]),
+        tf_crown_width=('FLOAT', [2.5, 3.5, 4.5, 2.5, 8.0, 14.0]),
+        tf_crown_base=('FLOAT', [0.5, 7.0, 12.0, 0.5, 1.0, 2.0]),
+    )
+    obj.tetflora.stand_smooth = True
+    for year in (12.0, 60.0):
+        obj.tetflora.stand_year = year
+        read = plants()
+        assert [is_crowded(read.identifiers[n]) for n in read.species[np.argsort(read.seed)]] == [True, False]
 
 
 def test_growth_is_smooth_where_the_year_has_keys():

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.engine.support import RICH, compiled, plants
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.growth.axes import axes
-from tetflora_addon.growth.growth import children, trunks
+from tetflora_addon.growth.growth import children, leaf_counts, trunks
 from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.growth.seeds import Branches, crown_shapes
 from tetflora_addon.growth.wind import Wind
@@ -128,6 +128,23 @@ def test_stems_of_shrubs_lean_as_the_form_says_and_stay_as_long() -> None:
     assert_array_equal(narrow.length, stems.length)
     angle, steep = (np.arccos(some.frame[:, 2, 2]) for some in (stems, narrow))
     assert steep.mean() < 0.7 * angle.mean()
+
+
+@pytest.mark.parametrize("kind", ["beech", "spruce 35"])
+def test_what_is_left_of_the_leaves_is_half_in_twigs_and_half_in_leaves_on_each(kind: str) -> None:
+    """A crown with few dense twigs would let the light through between them."""
+    flora, counted = flora_of(kind), []
+    for left in (1.0, 0.25):
+        limbs = stems_and_limbs(flora, leaves=left)[1]
+        limbs = limbs.take(np.flatnonzero(limbs.vigor > 0.3))
+        twigs, _ = children(flora.rows, limbs, axes(flora.rows, limbs))
+        twigs = twigs.take(np.flatnonzero(flora.rows["order"][twigs.row] == 2))
+        leaves = leaf_counts(flora.rows, twigs).mean()
+        counted.append((len(twigs), leaves, flora.leaf_areas(limbs).sum(), flora.leaf_areas(twigs).sum()))
+    twigs, leaves, of_limbs, of_twigs = np.array(counted[1]) / counted[0]
+    assert_allclose((twigs, leaves), 0.5, rtol=0.1)
+    assert_allclose(of_limbs, 0.25, rtol=1e-6)
+    assert_allclose(of_twigs, 0.25, rtol=0.1)
 
 
 @pytest.mark.parametrize("kind", ["birch", "beech"])

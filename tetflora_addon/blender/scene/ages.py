@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers, Integers32
 from ...errors import SpeciesError
-from ...growth.seeds import Seeds
-from ...species.ages import ages_of, stage
+from ...growth.seeds import WIDTH, Seeds
+from ...species.ages import NARROWER, ages_of, stage
 from ...species.species import Species
 from ..settings import years_of
 from ..species.edits import species_for
 from .own_ages import Sizes
 from .sizes import at_age, heights, sized
-from .skeletons import age_of, aged_kind, dead_of, is_aged, later, plain_kind, species_of
+from .skeletons import age_of, aged_kind, dead_of, is_aged, is_crowded, later, plain_kind, species_of
 
 #: Classes of a species at most, and years from its death to the last of them.
 MOST, _FALLEN = 12, 40.0
@@ -79,7 +79,10 @@ def class_ages(species: Species, years: Floats) -> Floats:
 def plainly_aged(
     scene: bpy.types.Scene, seeds: Seeds, ages: Floats | None, sizes: Sizes | None
 ) -> tuple[Seeds, Floats | None]:
-    """As `with_sizes`, with all ages (n,) beside kinds that name none; what died young is old and small."""
+    """As `with_sizes`, with all ages (n,) beside kinds that name none; what died young is old and small.
+
+    Those of a dense stand are free ones with narrow crowns.
+    """
     seeds, ages = with_sizes(scene, seeds, ages, sizes)
     if not any(is_aged(kind) for kind in seeds.identifiers):
         return seeds, ages
@@ -93,6 +96,11 @@ def plainly_aged(
                 smaller[index] = np.divide(*heights(species, np.array([age_of(kind), years[index]])))
     kinds = tuple(plain_kind(kind) for kind in seeds.identifiers)
     found = years[seeds.species] + (0.0 if ages is None else ages)
+    if seeds.crown is not None:
+        close = np.array([is_crowded(kind) for kind in seeds.identifiers])[seeds.species]
+        crown = seeds.crown.copy()
+        crown[close, WIDTH] *= 1.0 - NARROWER
+        seeds = replace(seeds, crown=crown)
     return replace(seeds, identifiers=kinds, scale=seeds.scale * smaller[seeds.species]), found
 
 
@@ -107,8 +115,8 @@ def relative_heights(identifier: str, years: NDArray[np.floating]) -> Floats:
 
 def kind_species(species: Species, kind: str, years: float = 0.0) -> Species:
     """A species as plants of a kind are after so many years."""
-    age, dead = age_of(kind), dead_of(kind)
-    return at_age(species, age, dead + years) if dead > 0.0 else at_age(species, age + years)
+    age, dead, crowded = age_of(kind), dead_of(kind), is_crowded(kind)
+    return at_age(species, *((age, dead + years) if dead > 0.0 else (age + years, 0.0)), crowded)
 
 
 def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: Floats, many: set[str]) -> Seeds:

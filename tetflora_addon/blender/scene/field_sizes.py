@@ -185,7 +185,8 @@ def in_year(
     columns["dead"] = np.where(sizes.dead[b] > 0.0, np.maximum(sizes.dead[b] - left, 0.0), sizes.dead[a])
     if smooth:
         columns["plant"] = records.first[a]
-        columns["lives"] = Lives(now, records.year, sizes.height, sizes.dead, records.first, points.species)
+        own = sizes.height, sizes.width, sizes.base, sizes.dead
+        columns["lives"] = Lives(now, records.year, *own, records.first, points.species)
     return chosen, Sizes(**columns)
 
 

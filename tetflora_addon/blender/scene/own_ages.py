@@ -50,9 +50,11 @@ class Lives:
     """All records (n,) of a history, and the year that is looked at."""
 
     now: float
-    #: year, height, dead: (n,): As of `Sizes`
+    #: year, height, width, base, dead: (n,): As of `Sizes`
     year: Floats
     height: Floats
+    width: Floats
+    base: Floats
     dead: Floats
     first: Integers  # (n,): first record of the same plant; its records follow each other
     species: Integers  # (n,): number of the kind in the field

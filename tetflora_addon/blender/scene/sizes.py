@@ -5,6 +5,10 @@
 A plant that stands still is of the class of heights that is nearest: each is 1.5 times the one below, and the scale
 makes up for what is left. Classes belong to the species alone, so that no plant depends on others.
 
+A plant whose crown is narrow for its height and begins far up grew between neighbors: it is of a dense stand's *habit*,
+with a slim trunk and short limbs, where a free one with its limbs cut short and thinned out would be bare. Taller ones
+than full-grown are old only if they are as thick.
+
 Where a stand grows in an animation, plants must not jump from class to class. There, plants that are born, die and end
 up alike are a *cohort*: one kind, whose age goes on as those of its plants do on the mean; scales make up for the
 difference in height. What a plant belongs to follows from its whole life and not from the present year, so that a frame
@@ -18,18 +22,18 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, Mask
 from ...compiled.flora import compile_species
 from ...compiled.sizes import fitted, measured
 from ...errors import SpeciesError
 from ...growth.growth import radius_at, trunks
 from ...growth.seeds import LEAVES, PLAIN, THICKNESS, Seeds, crown_shapes
-from ...species.ages import ages_of, with_age
+from ...species.ages import BARE, NARROWER, ages_of, with_age, with_habit
 from ...species.ecology import crown_leaves, ecology_of, one_sided
 from ...species.growing import Ages
 from ...species.species import Species
 from .own_ages import MOST_YEARS, Lives, Sizes
-from .skeletons import age_of, aged_kind, dead_of, is_aged, skeleton_object_of, species_of
+from .skeletons import age_of, aged_kind, dead_of, is_aged, is_crowded, skeleton_object_of, species_of
 
 #: Height of a class over that of the one below, and classes below that of full-grown plants.
 _STEP, _BELOW = 1.5, 9
@@ -44,6 +48,9 @@ _DIES = 0.999  # part of its life after which a plant that dies early no longer 
 _PLANTS = 32  # that are measured of each class
 _MEASURED = 1  # times that a plant is, to fit it
 _WOODY = 3.0  # meters of height that plants reach whose leaves follow their crowns
+#: Crown width for the height over that of a free plant below which one grew between neighbors: halfway, by ratio; of
+#: what dense stands leave bare, the part from which on. Least part of the leaves on its twigs: the crown says how many.
+_CROWDED, _RAISED, _LEAFY = (1.0 - NARROWER) ** 0.5, 0.25, 0.5
 
 
 def heights(species: Species, years: Floats) -> Floats:
@@ -61,8 +68,14 @@ def ages_of_heights(species: Species, ratio: Floats) -> Floats:
     return np.where(ratio == 1.0, ages.full, years)
 
 
-def at_age(species: Species, years: float, dead: float = 0.0) -> Species:
-    """A species at an age, full-grown at 0; or so many years after it has died at that age."""
+def at_age(species: Species, years: float, dead: float = 0.0, crowded: bool = False) -> Species:
+    """A species at an age, full-grown at 0; or so many years after it has died at that age; that of a dense stand."""
+    if crowded:
+        free, years = species, years or ages_of(species).full
+        leafy = replace(species, stand_leaves=max(species.stand_leaves, _LEAFY))
+        dense = at_age(replace(with_habit(leafy, 1.0), habit=0.0), years, dead)
+        # Facets hide as much behind others as those of free plants, which were measured.
+        return replace(dense, aged=(free, years if dense.aged is None else dense.aged[1]))
     if dead <= 0.0:
         return with_age(species, years) if years > 0.0 else species
     ages = ages_of(species)
@@ -97,15 +110,15 @@ def sized(
                 continue
             some = sizes.take(own)
             stages, which = np.unique(_stages(species, some, index), axis=0, return_inverse=True)
-            for n, (age, dead) in enumerate(stages.tolist()):
+            for n, (age, dead, crowded) in enumerate(stages.tolist()):
                 here = which.reshape(-1) == n
                 these = own[here]
                 still = some.lives is None or dead
-                measure = measure_of(at_age(species, age)) if still else _grown(species, age)
+                measure = (_still if still else _grown)(species, age, bool(crowded))
                 own_scale, own_crown = measure.fitted(seeds.take(these), some.take(here))
                 scale[these] *= own_scale
                 crown[these], number[these] = own_crown, len(kinds)
-                kinds.append(aged_kind(kind, age, dead))
+                kinds.append(aged_kind(kind, age, dead, bool(crowded)))
             if left is not None:
                 left[own] = 0.0
     plain = (crown == PLAIN).all()
@@ -122,7 +135,7 @@ def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> Float
     for number, kind in enumerate(plain.identifiers):
         own = np.flatnonzero((plain.species == number) & (sizes.height > 0.0))
         if len(own) and is_aged(kind) and not dead_of(kind):
-            flora = measure_of(at_age(find(species_of(kind)), age_of(kind))).flora
+            flora = _still(find(species_of(kind)), age_of(kind), is_crowded(kind)).flora
             one = replace(plain.take(own), identifiers=(kind,), species=np.zeros(len(own), np.int32), crown=crown[own])
             tall, wide = (sizes.height * seeds.scale)[own], (sizes.width * seeds.scale)[own]
             # What has no width keeps that of its kind.
@@ -136,11 +149,11 @@ def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> Float
 def kinds_of_sizes(species: Species, sizes: Sizes) -> list[Species]:
     """A species in all stages that plants of recorded sizes (n,) are shown in when they stand still."""
     stages = np.unique(_stages(species, sizes, 0), axis=0).tolist()
-    return [at_age(species, age, since) for age, dead in stages for since in {0.0, dead}]
+    return [at_age(species, age, since, bool(close)) for age, dead, close in stages for since in {0.0, dead}]
 
 
 def _stages(species: Species, sizes: Sizes, number: int) -> Floats:
-    """Age and years since death (n, 2) of the kind that each plant belongs to.
+    """Age, years since death and whether it is crowded (n, 3), of the kind that each plant belongs to.
 
     ``number`` is that of their kind in the field.
     """
@@ -148,16 +161,42 @@ def _stages(species: Species, sizes: Sizes, number: int) -> Floats:
     full = measure_of(species).height
     dead, height = sizes.dead, np.where(sizes.height > 0.0, sizes.height, full)
     if ages.scaled:
-        return np.tile([ages.full, 0.0], (len(height), 1))
+        return np.tile([ages.full, 0.0, 0.0], (len(height), 1))
     if sizes.lives is None:
-        years, older = _class_ages(species, height / full, 1), _class_ages(species, height / full, 2)
+        ratio = np.where(_thick(species, sizes.diameter), height / full, np.minimum(height / full, 1.0))
+        years, older = (_class_ages(species, ratio, every) for every in (1, 2))
         gone = _SINCE[np.argmin(np.abs(np.log(np.maximum(dead, 0.1)[:, None] / _SINCE)), axis=1)]
     else:
         years = _cohort_ages(species, sizes.lives, number, full)[sizes.plant]
         now, older = sizes.lives.now, _class_ages(species, height / full, 3)  # leafless, they differ less
         gone = np.maximum(now - _DEATHS * np.rint((now - dead) / _DEATHS), 0.01)
     died = dead > 0.0
-    return np.column_stack([np.where(died, older, years), np.where(died, gone, 0.0)])
+    return np.column_stack([np.where(died, older, years), np.where(died, gone, 0.0), _crowded(species, sizes, number)])
+
+
+def _thick(species: Species, diameter: Floats) -> Mask:
+    """Which plants (n,) have trunks as thick as old ones, or of a diameter that is not known."""
+    ages, trunk = ages_of(species), species.orders[0]
+    full = 2.0 * trunk.thickness.mean * trunk.length.mean
+    return (diameter <= 0.0) | (diameter > full * ages.diameters(ages.decline * ages.lifespan) ** 0.5)
+
+
+def _crowded(species: Species, sizes: Sizes, number: int) -> Mask:
+    """Which plants (n,) grew between neighbors, by the crowns that they have at last."""
+    limbs = species.orders[1].length.mean if len(species.orders) > 1 else np.inf
+    if ecology_of(species).height < _WOODY or limbs > 1.0:  # herbs; stools, palms and plants of one axis
+        return np.zeros(len(sizes), bool)
+    measure, life, chosen = measure_of(species), sizes, np.arange(len(sizes))
+    if sizes.lives is not None:
+        life = sizes.lives
+        known = np.flatnonzero((life.species == number) & (life.width > 0.0))
+        last = np.zeros(len(life.year), np.int64)
+        last[life.first[known]] = known  # of several records the last stays
+        chosen = last[sizes.plant]
+    height, width, base = (values[chosen] for values in (life.height, life.width, life.base))
+    low = species.orders[0].branch_start.mean
+    raised = (base <= 0.0) | (base > (low + _RAISED * BARE * (1.0 - low)) * height)
+    return raised & (width > 0.0) & (width * measure.height < _CROWDED * height * measure.width)
 
 
 def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> Floats:
@@ -274,14 +313,18 @@ def measure_of(species: Species) -> Measure:
     return Measure(species)
 
 
-def _grown(species: Species, years: float) -> Measure:
+def _still(species: Species, years: float, crowded: bool) -> Measure:
+    return measure_of(at_age(species, years, 0.0, crowded))
+
+
+def _grown(species: Species, years: float, crowded: bool) -> Measure:
     """The same of a species at some age of an animation, where nothing may jump: between those of two classes."""
     ages = ages_of_heights(species, _classes(species, 1))
     high = int(np.clip(np.searchsorted(ages, years), 1, len(ages) - 1))
     low = ages[high - 1]
     part = float(np.clip(np.log(years / low) / np.log(ages[high] / low), 0.0, 1.0))
-    ends = np.log([measure_of(at_age(species, float(age))).ratios for age in ages[high - 1 : high + 1]])
-    return Measure(at_age(species, years), tuple(np.exp(ends[0] + part * (ends[1] - ends[0])).tolist()))
+    ends = np.log([_still(species, age, crowded).ratios for age in ages[high - 1 : high + 1].tolist()])
+    return Measure(at_age(species, years, 0.0, crowded), tuple(np.exp(ends[0] + part * (ends[1] - ends[0])).tolist()))
 
 
 @lru_cache(maxsize=64)

@@ -31,6 +31,7 @@ _CATMULL_ROM, _POLY, _BEZIER, _NURBS = range(4)  # Blender's numbers for types o
 _DEFAULT_STEPS = 12
 # Neither identifiers of species nor names of objects contain a line break.
 _BREAK = "\n"
+_CROWDED = " crowded"  # behind the age of plants of a dense stand
 
 
 def upright_turn(matrix: Floats) -> float:
@@ -207,14 +208,14 @@ def kind_of_choice(group: bpy.types.PropertyGroup) -> str:
     return group.species if group.skeleton is None else f"{group.species}{_BREAK}{group.skeleton.name_full}"
 
 
-def aged_kind(kind: str, age: float, dead: float = 0.0) -> str:
+def aged_kind(kind: str, age: float, dead: float = 0.0, crowded: bool = False) -> str:
     """The kind of plants of an age in years, or so long after their death at it, from that of full-grown ones.
 
-    The same where the age is 0.
+    The same where the age is 0. ``crowded``: that of a dense stand.
     """
     if age == 0.0:
         return kind
-    end = f"{age!r}{_BREAK}{dead!r}" if dead > 0.0 else f"{age!r}"
+    end = f"{age!r}{_CROWDED * crowded}{f'{_BREAK}{dead!r}' * (dead > 0.0)}"
     return f"{kind}{_BREAK}{end}" if _BREAK in kind else f"{kind}{_BREAK}{_BREAK}{end}"
 
 
@@ -231,7 +232,7 @@ def plain_kind(kind: str) -> str:
 def later(kind: str, years: float) -> str:
     """The kind of plants of an aged kind after so many years."""
     age, dead, plain = age_of(kind), dead_of(kind), plain_kind(kind)
-    return aged_kind(plain, age, dead + years) if dead > 0.0 else aged_kind(plain, age + years)
+    return aged_kind(plain, *((age, dead + years) if dead > 0.0 else (age + years, 0.0)), is_crowded(kind))
 
 
 def species_of(kind: str) -> str:
@@ -247,7 +248,12 @@ def skeleton_object_of(kind: str) -> bpy.types.Object | None:
 
 def age_of(kind: str) -> float:
     """Age of a kind of plant in years; 0 is full-grown."""
-    return float(_part(kind, 2) or 0.0)
+    return float(_part(kind, 2).removesuffix(_CROWDED) or 0.0)
+
+
+def is_crowded(kind: str) -> bool:
+    """Whether plants of a kind are those of a dense stand."""
+    return _part(kind, 2).endswith(_CROWDED)
 
 
 def dead_of(kind: str) -> float:

@@ -322,9 +322,9 @@ def _measuring(species: list[Species], records: Records) -> Job[None]:
     for some in (records.at(records.year.max()), records):
         for number, one in enumerate(species):
             own = some.take(np.flatnonzero(some.species == number))
-            none, pair = np.zeros(len(own)), np.zeros((len(own), 2))
+            pair, own = np.zeros((len(own), 2)), (own.height, own.diameter, own.crown_width, own.crown_base, own.dead)
             with suppress(SpeciesError):
-                for kind in kinds_of_sizes(one, Sizes(own.height, none, none, none, own.dead, pair, pair)):
+                for kind in kinds_of_sizes(one, Sizes(*own, pair, pair)):
                     yield Progress(sum(_GROWING), "Measuring plants")
                     if time.monotonic() > end:
                         return
