@@ -50,6 +50,7 @@ class Variant:
     """A plant that stands for others, in its own space, with scale 1."""
 
     name: str  # an identifier in all formats, different from all others of the forest
+    species: str
     levels: tuple[PlantLevel, ...]
     height: float  # meters
     surfaces: Mapping[str, BakedSurface]  # by the kind of parts

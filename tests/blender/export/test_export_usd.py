@@ -29,10 +29,9 @@ def scene():
     return bpy.context.scene
 
 
-def export(path: Path, **order):
-    return run_to_end(
-        export_steps(scene(), depsgraph(), ExportOrder(path, **{"variants": 2, "polygons": 3000} | order))
-    )
+def export(path: Path, **settings):
+    order = ExportOrder(path, **{"variants": 2, "polygons": 3000, "bake": False} | settings)
+    return run_to_end(export_steps(scene(), depsgraph(), order))
 
 
 def imported(path: Path):
@@ -181,7 +180,7 @@ def test_a_full_disk_leaves_no_half_file(blender, tmp_path, suffix, pxr):
 
 def test_closing_the_steps_leaves_no_half_file(blender, tmp_path, pxr):
     field()
-    steps = export_steps(scene(), depsgraph(), ExportOrder(tmp_path / "f.usdc", 1, polygons=3000))
+    steps = export_steps(scene(), depsgraph(), ExportOrder(tmp_path / "f.usdc", 1, polygons=3000, bake=False))
     for step in steps:
         if "writing" in step.message:
             break

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The plants of a scene as they are exported: read, given to variants, and these made in their levels."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import bpy
@@ -11,12 +11,12 @@ import numpy as np
 from ...arrays import Floats, Integers, Integers32, quaternions
 from ...camera.camera import origin_near
 from ...compiled.flora import Flora
-from ...export.forest import BakedSurface, ForestPart, PointAttributes, Variant, identifiers
+from ...export.forest import ForestPart, PointAttributes, Variant, identifiers
 from ...export.levels import PlantLevel, levels_of
 from ...export.variants import choose_variants
 from ...growth.seeds import Seeds
 from ...jobs import Job, Progress
-from ...species.species import LEAF_KINDS, Species
+from ...species.species import Species
 from ..attributes import world_matrix
 from ..job.contents import compile_for, in_year
 from ..runtime import JobData
@@ -74,7 +74,6 @@ def variants_of(
     kinds: Sequence[PlantKind],
     number_of_levels: int,
     most_polygons: int,
-    surfaces: Mapping[tuple[str, str], BakedSurface],
 ) -> Job[Shown]:
     """Choose variants of all kinds, and make these."""
     variant, scale = np.zeros(len(seeds), np.int32), np.ones(len(seeds))
@@ -95,37 +94,13 @@ def variants_of(
     names = identifiers([name for name, *_ in made])
     variants = []
     for name, (_, own, kind) in zip(names, made, strict=True):
-        looks = {part: surfaces[kind.species.identifier, part] for part in _parts(own)}
         small = tuple(level for level in own if level.polygons <= most_polygons) if most_polygons else own
-        variants.append(Variant(name, small or own[-1:], _height(own), looks))
+        variants.append(Variant(name, kind.species.identifier, small or own[-1:], _height(own), {}))
     return Shown(tuple(variants), variant, scale)
-
-
-def _parts(levels: Sequence[PlantLevel]) -> list[str]:
-    return list(dict.fromkeys(kind for level in levels for kind, _ in level.parts))
 
 
 def _height(levels: Sequence[PlantLevel]) -> float:
     return max(float(mesh.positions[:, 2].max()) for _, mesh in levels[0].parts)
-
-
-def plain_surfaces(kinds: Sequence[PlantKind]) -> dict[tuple[str, str], BakedSurface]:
-    """Materials by identifier of a species and kind of parts, without textures."""
-    found: dict[tuple[str, str], BakedSurface] = {}
-    for species in {kind.species.identifier: kind.species for kind in kinds}.values():
-        flora = next(kind.flora for kind in kinds if kind.species.identifier == species.identifier)
-        for part in ("bark", *LEAF_KINDS):
-            name = identifiers([f"{species.identifier}_{part}"])[0]
-            rows = flora.rows
-            bearing = rows["leaf_kind"] == LEAF_KINDS.index(part) if part != "bark" else np.ones(len(rows), bool)
-            if not bearing.any():
-                continue
-            is_bark = part == "bark"
-            color = flora.wood_color if is_bark else rows["leaf_color"][:, 0]
-            through = 0.0 if is_bark else float(flora.leaf.transmission[bearing].mean())
-            mean, rough = tuple(color[bearing].mean(axis=0).tolist()), 0.9 if is_bark else 0.5
-            found[species.identifier, part] = BakedSurface(name, mean, through, rough, not is_bark)
-    return found
 
 
 def read_plants(data: JobData) -> tuple[list[Source], Seeds, Integers]:

@@ -20,6 +20,7 @@ from ...arrays import Integers
 from ...buffers import MeshBuffers
 from ...errors import TetFloraError
 from ...export.forest import BakedSurface, Forest, ForestPart, PointAttributes, Variant, identifiers
+from ...export.gltf import vertex_normals
 from ..compat import usd
 
 #: In the custom data of an instancer, and the prefix of primvars.
@@ -177,6 +178,9 @@ def _write_mesh(pxr: SimpleNamespace, stage: object, path: str, mesh: MeshBuffer
     made.CreateDoubleSidedAttr(surface.sided)
     ends = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
     made.CreateExtentAttr(_array(pxr, "Vec3f", ends))
+    if mesh.smooth:
+        made.CreateNormalsAttr(_array(pxr, "Vec3f", vertex_normals(mesh)))
+        made.SetNormalsInterpolation(pxr.UsdGeom.Tokens.vertex)
     primvars, types, tokens = pxr.UsdGeom.PrimvarsAPI(made), pxr.Sdf.ValueTypeNames, pxr.UsdGeom.Tokens
     uv, color = (mesh.attributes[name][1] for name in ("UVMap", "tf_color"))
     _add_indexed(pxr, primvars.CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying), "Vec2f", uv)
