@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Forests as glTF: a node for each variant with all of its places, and its levels as nodes beside it.
 
-Sources: Khronos Group, "glTF 2.0 Specification", "EXT_mesh_gpu_instancing" and "MSFT_lod" (github.com/KhronosGroup/glTF,
-extensions/2.0/Vendor). Coordinates are turned so that y is up.
+Coordinates are turned so that y is up.
+
+Sources: Khronos Group, "glTF 2.0 Specification", and "EXT_mesh_gpu_instancing" and "MSFT_lod" beside it
+(github.com/KhronosGroup/glTF, extensions/2.0/Vendor).
 """
 
 from __future__ import annotations
