@@ -50,6 +50,10 @@ class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
         **within(0, 1_000_000, 100_000_000),
     )
 
+    bake: once.boolean(
+        "Bake Materials", "Bake veins, bark and relief with Cycles; otherwise textures have colors and outlines", True
+    )
+
     @property
     def filename_ext(self) -> str:
         """What is added to names without an ending."""
@@ -57,7 +61,7 @@ class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
 
     def steps(self, context: bpy.types.Context) -> Job[Exported]:
         path = self.path if self.path.suffix else self.path.with_suffix(self.format)
-        order = ExportOrder(path, self.variants, self.levels, self.polygons)
+        order = ExportOrder(path, self.variants, self.levels, self.polygons, self.bake)
         return export_steps(context.scene, context.evaluated_depsgraph_get(), order)
 
     def finish(self, context: bpy.types.Context, result: Exported) -> set[str]:

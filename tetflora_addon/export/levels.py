@@ -83,14 +83,19 @@ def levels_of(flora: Flora, seed: Seeds, number: int = 0, like: tuple[PlantLevel
     number : int
         Levels, with the full one; 0 for as many as suit the plant, three to six.
     like : tuple of PlantLevel, optional
-        Levels of another plant of the same kind, whose sizes and corrections hold; measured if there are none.
+        Levels of another plant of the same kind, whose sizes of pixels hold, and whose second level is as much larger;
+        all is measured if there are none.
     """
     grown = list(expand(flora, trunks(flora.rows, replace(seed, scale=np.ones(1), position=np.zeros((1, 3))))))
     back = seed.frame[0].astype(np.float32)
     full = PlantLevel(_parts(flora, grown, back), 0.0)
-    if like:
-        parts = ((_parts(flora, grown, back, level.pixel), level) for level in like[1:])
-        return (full, *(replace(level, parts=_changed(own, level.larger, level.tint)) for own, level in parts))
+    if len(like) > 1:
+        # Of many leaves, corrections are those of all plants of the kind; few are seen beside the level of many.
+        near = replace(like[1], parts=_changed(_parts(flora, grown, back, like[1].pixel), like[1].larger, like[1].tint))
+        grids = _grids(near, like[1].pixel * _LONG, like[-1].pixel)
+        truth = _views(grids, near.parts)
+        rest = (_corrected(flora, grown, back, one.pixel, grids, truth, np.log(one.larger)) for one in like[2:])
+        return (full, near, *rest)
     leaf, count = _leaves(flora, grown)
     first, last = leaf / _LONG, leaf / _LONG * np.sqrt(max(count / _LAST, 4.0))
     steps = number - 1 if number else int(np.clip(round(np.log2(last / first)), _FEWEST, _MOST))
@@ -138,12 +143,18 @@ def _grids(full: PlantLevel, leaf: float, margin: float) -> list[Grid]:
 
 
 def _corrected(
-    flora: Flora, grown: list[WholeBranches], back: Floats, pixel: float, grids: list[Grid], truth: list[PlantView]
+    flora: Flora,
+    grown: list[WholeBranches],
+    back: Floats,
+    pixel: float,
+    grids: list[Grid],
+    truth: list[PlantView],
+    size: float = 0.0,
 ) -> PlantLevel:
     """A level whose leaves are so much larger that it covers as much as the full plant on average over views, and whose
-    colors are so much brighter that what is seen of it has the same mean.
+    colors are so much brighter that what is seen of it has the same mean. It begins with a size, the logarithm of area.
     """
-    wanted, size, tried = sum(view.cover for view in truth), 0.0, []
+    wanted, tried = sum(view.cover for view in truth), []
     plain = _parts(flora, grown, back, pixel)
     for _ in range(_ROUNDS):
         seen = _views(grids, _changed(plain, float(np.exp(size))))

@@ -23,6 +23,7 @@ from ..growth.seeds import BASE, EAST, LEAVES, NORTH, THICKNESS, WIDTH, Seeds
 #: Plants of a kind that are clustered, and that are worked on at a time; how often clusters are moved at most.
 _SAMPLE, _CHUNK, _ROUNDS = 20_000, 100_000, 12
 _SPREAD = 1e-6  # of a feature, below which all plants are alike in it
+_SIZE = 0.5  # weight of the size beside form: plants are scaled, so that only their leaves are of another size
 _DRAW = 1
 
 
@@ -67,7 +68,7 @@ def choose_variants(flora: Flora, seeds: Seeds, most: int) -> Variants:
 
 def _features(flora: Flora, seeds: Seeds, own: Integers) -> tuple[Floats, Floats]:
     """Lengths (m,) of the trunks of some plants (m,), which heights follow, and what they differ in (m, f), each with
-    the same spread.
+    the same spread but for the size.
     """
     length, rows = np.zeros(len(own)), []
     for begin in range(0, len(own), _CHUNK):
@@ -81,7 +82,9 @@ def _features(flora: Flora, seeds: Seeds, own: Integers) -> tuple[Floats, Floats
         rows.append(np.stack(found, axis=1))
     features = np.concatenate(rows)
     spread = features.std(axis=0)
-    return length, features / np.where(spread > _SPREAD, spread, np.inf)
+    features /= np.where(spread > _SPREAD, spread, np.inf)
+    features[:, 0] *= _SIZE
+    return length, features
 
 
 def _sample(seed: Integers) -> Integers:

@@ -192,7 +192,7 @@ def test_help_is_no_error(arguments, capfd):
 
 
 def test_export_writes_a_forest_and_tells_its_levels(forest, tmp_path, capfd):
-    assert _run("export", tmp_path / "f.usda", "--variants", 1, "--polygons", 1000, "--json") == 0
+    assert _run("export", tmp_path / "f.usda", "--variants", 1, "--polygons", 1000, "--flat", "--json") == 0
     figures = _figures(capfd)
     assert (figures["plants"], figures["variants"], figures["path"]) == (2, 1, str(tmp_path / "f.usda"))
     written = [p for p in tmp_path.rglob("*") if p.is_file()]

@@ -48,14 +48,12 @@ def test_crown_shapes_tell_plants_apart():
     seeds = replace(plants(200), species=np.zeros(200, np.int32), scale=np.ones(200))
     wide = np.arange(200) % 2 == 0
     shaped = replace(seeds, crown=crown_shapes(200, width=np.where(wide, 2.5, 0.4)))
-    found = choose_variants(FLORA, shaped, 4)
+    found = choose_variants(FLORA, shaped, 8)
     np.testing.assert_array_equal(wide[found.plants[found.variant]], wide)
 
 
 def test_more_variants_are_more_alike():
     seeds, length = plants(), trunks(FLORA.rows, plants()).length
-    off = [
-        np.abs(np.log(length / length[(f := choose_variants(FLORA, seeds, n)).plants[f.variant]])).mean()
-        for n in (1, 4, 16)
-    ]
+    found = [choose_variants(FLORA, seeds, number) for number in (1, 4, 16)]
+    off = [np.abs(np.log(length / length[one.plants[one.variant]])).mean() for one in found]
     assert off[0] > off[1] > off[2]

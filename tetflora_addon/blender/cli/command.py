@@ -180,6 +180,7 @@ def _parser() -> argparse.ArgumentParser:
     exporting.add_argument("--levels", type=whole, default=0, metavar="N", help="levels of detail, with the full plant")
     about = "leave out levels of detail with more polygons"
     exporting.add_argument("--polygons", type=whole, default=0, metavar="N", help=about)
+    exporting.add_argument("--flat", action="store_true", help="do not bake veins, bark and relief")
     exporting.set_defaults(run=_export)
 
     for command in (refining, render):
@@ -258,7 +259,7 @@ def _stats(_options: argparse.Namespace) -> dict:
 def _export(options: argparse.Namespace) -> dict:
     if options.variants > MOST_VARIANTS or options.levels > LEVELS:
         raise SceneError(f"There are at most {MOST_VARIANTS:,} variants and {LEVELS} levels; give a smaller number")
-    order = ExportOrder(_named(options.path), options.variants, options.levels, options.polygons)
+    order = ExportOrder(_named(options.path), options.variants, options.levels, options.polygons, not options.flat)
     found = run_to_end(export_steps(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), order))
     return asdict(found) | {"path": str(found.path)}
 
