@@ -55,7 +55,7 @@ _TABLE = {
     "proxies": ". species growth assets compiled subplants camera refinement",
     "light": ". compiled tetrahedra camera refinement proxies",
     "emission": ". processes leaves species growth compiled subplants tetrahedra camera refinement proxies light",
-    "export": ". leaves species growth compiled subplants",
+    "export": ". species growth compiled subplants",
     "blender": ". processes growth camera refinement",
     "blender/materials": ". growth light emission blender",
     "blender/species": ". leaves species blender",
@@ -70,8 +70,8 @@ _TABLE = {
     "blender/job": f". processes species growth compiled camera refinement proxies emission {_LOW} {_ASSETS} "
     "blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
-    "blender/export": f". species growth compiled camera planting export {_LOW} blender/placing blender/geodata "
-    "blender/results blender/job",
+    "blender/export": ". species growth compiled camera planting export blender blender/species blender/scene "
+    "blender/placing blender/geodata blender/results blender/job",
     "blender/cli": ". blender blender/scene blender/job blender/export",
     "operators": ". species assets camera refinement preview planting geodata blender blender/species blender/scene "
     f"blender/assets {_HIGH} {_LAND} blender/viewport",

@@ -28,6 +28,8 @@ TYPES = {
     'FLOAT_VECTOR': (np.float32, 3),
     'QUATERNION': (np.float32, 4),
 }
+#: Light that comes from everywhere and is mirrored by a surface (Fresnel), and the surface's index of refraction.
+_MIRRORED = (0.0, 0.0263, 0.0447, 0.061, 0.0918), (1.0, 1.1, 1.2, 1.3, 1.5)
 #: Attributes of points by name, each with its type and values.
 PointAttributes = Mapping[str, tuple[str, NDArray]]
 
@@ -40,9 +42,15 @@ class BakedSurface:
     color: tuple[float, float, float]  # mean, linear RGB
     transmission: float = 0.0
     roughness: float = 0.6
+    gloss: float = 0.0  # fraction of light that is mirrored, mean of directions
     sided: bool = False  # whether both sides of its sheets are seen
     #: Name of a texture, ``color``, ``normal`` or ``roughness``, to its file.
     textures: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def index(self) -> float:
+        """Index of refraction of a smooth surface that mirrors as much, on average over directions."""
+        return float(np.interp(self.gloss, *_MIRRORED))
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,7 @@ def write_gltf(path: Path, forest: Forest) -> Iterator[float]:
         for number, variant in enumerate(forest.variants):
             yield number / len(forest.variants)
             _add_variant(document, forest, number, variant, materials)
-        document.json["extensionsUsed"] = ["EXT_mesh_gpu_instancing", "MSFT_lod"]
+        document.json["extensionsUsed"] = ["EXT_mesh_gpu_instancing", "KHR_materials_ior", "MSFT_lod"]
         document.json["buffers"] = [{"byteLength": document.bytes}]
         told = json.dumps(document.json, separators=(",", ":"), allow_nan=False).encode()
         told += b" " * (-len(told) % 4)
@@ -121,6 +121,7 @@ def _add_material(document: _Document, folder: Path, surface: BakedSurface) -> i
     metallic: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": surface.roughness}
     metallic |= {"baseColorTexture": textures["color"]} if "color" in textures else {}
     made = {"name": surface.name, "pbrMetallicRoughness": metallic, "doubleSided": surface.sided}
+    made["extensions"] = {"KHR_materials_ior": {"ior": surface.index}}
     made |= {"normalTexture": textures["normal"]} if "normal" in textures else {}
     if surface.sided:
         made |= {"alphaMode": "MASK", "alphaCutoff": 0.5, "extras": {"transmission": surface.transmission}}

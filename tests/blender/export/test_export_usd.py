@@ -14,6 +14,7 @@ from devtools import session
 from tests.blender.scenes import add_plant, datablocks, depsgraph
 from tests.limits import full_disk
 from tetflora_addon.blender import compat
+from tetflora_addon.blender.attributes import image_pixels, linear_rgb, values_of
 from tetflora_addon.blender.export.forest import ExportOrder, export_steps
 from tetflora_addon.blender.export.reading import forest_steps
 from tetflora_addon.blender.geodata.origin import Import
@@ -192,3 +193,22 @@ def test_a_folder_that_is_not_there_is_named(blender, tmp_path):
     field()
     with pytest.raises(TetFloraError, match=r"gone does not exist; create it"):
         export(tmp_path / "gone" / "f.usdc")
+
+
+def test_blender_reads_the_plant_with_its_textures(blender, tmp_path, pxr):
+    """Its own importer finds the same surface, and images whose mean is the color of the leaves."""
+    add_plant("one", "bush", 3)
+    run_to_end(export_steps(scene(), depsgraph(), ExportOrder(tmp_path / "f.usdc", 1, 1, bake=True)))
+    assert bpy.data.scenes.keys() == [scene().name]
+    assert not [image for image in bpy.data.images if image.type == 'UV_TEST' or "bake" in image.name]
+    session.clean_file()
+    assert bpy.ops.wm.usd_import(filepath=str(tmp_path / "f.usdc")) == {'FINISHED'}
+    leaf = next(o for o in bpy.data.objects if o.name.startswith("leaf"))
+    assert len(leaf.data.polygons) > 1000
+    images = {Path(image.filepath).name: image for image in bpy.data.images if image.size[0]}
+    assert set(images) == {f"bush_{part}_{kind}.png" for part in ("leaf", "bark") for kind in ("color", "normal")}
+    pixels = linear_rgb(images["bush_leaf_color.png"], image_pixels(images["bush_leaf_color.png"]))
+    shown = image_pixels(images["bush_leaf_color.png"])[..., 3] > 0.5
+    color = values_of(leaf.data.attributes["displayColor"]).mean(axis=0)[:3]
+    np.testing.assert_allclose(pixels[shown].mean(axis=0), color, rtol=0.15)
+    assert pixels[shown].std(axis=0).max() > 0.005  # veins and shades

@@ -53,7 +53,7 @@ def test_gltf_has_all_places_and_levels(forest, tmp_path):
     list(write_gltf(path, forest))
     assert [p.name for p in tmp_path.iterdir()] == ["f.glb"]
     read = pygltflib.GLTF2().load(str(path))
-    assert set(read.extensionsUsed) == {"EXT_mesh_gpu_instancing", "MSFT_lod"}
+    assert set(read.extensionsUsed) == {"EXT_mesh_gpu_instancing", "KHR_materials_ior", "MSFT_lod"}
     (root,) = read.scenes[0].nodes
     node, part = read.nodes[root], forest.stands[0]
     assert node.extensions["MSFT_lod"]["ids"] == [1, 2]

@@ -27,6 +27,7 @@ from ...export.images import (
     within,
 )
 from ...jobs import Job, Progress
+from ...optics import GLOSS
 from ..results.leaf_objects import materials_of
 from ..species.edits import species_for
 from .bake import baked
@@ -52,10 +53,10 @@ class _Look:
         """Mean color (3,) of the faces of the first mesh."""
         return self.meshes[0].attributes["tf_color"][1].mean(axis=0, dtype=np.float64)
 
-    @property
-    def through(self) -> float:
-        """Fraction of light that goes through, mean over faces."""
-        return float(self.meshes[0].attributes["tf_transmission"][1].mean())
+    def mean(self, attribute: str) -> float:
+        """Mean of an attribute of faces; 0 where there is none."""
+        found = self.meshes[0].attributes.get(attribute)
+        return 0.0 if found is None else float(found[1].mean(dtype=np.float64))
 
 
 def with_surfaces(
@@ -107,7 +108,7 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
         material = materials_of(scene, species, look.part, 0)[0]
         low = look.palette.low + np.array([0.0, _ABOVE * is_bark])
         given = (low, look.palette.size, 1.0 if is_bark else _LEAF)
-        images = baked(material, look.color, look.through, TEXELS, *given)
+        images = baked(material, look.color, look.mean("tf_transmission"), TEXELS, *given)
         images = {name: tiled(own) if is_bark else within(own) for name, own in images.items()}
     rough = float(images.pop("roughness", np.full(1, _ROUGH.get(look.part, 0.5))).mean())
     detail = images.get("color", np.ones((TEXELS, TEXELS, 3), np.float32))
@@ -125,4 +126,5 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
         half = png(halved(texels), linear=key == "normal")
         (folder / textures / f"{look.name}_{key}_half.png").write_bytes(half)
     color = tuple(look.color.tolist())
-    return BakedSurface(look.name, color, look.through, rough, not is_bark, names)
+    gloss = 0.0 if is_bark else GLOSS * (1.0 - look.mean("tf_dull"))
+    return BakedSurface(look.name, color, look.mean("tf_transmission"), rough, gloss, not is_bark, names)

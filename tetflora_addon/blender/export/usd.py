@@ -209,6 +209,7 @@ def _write_surface(pxr: SimpleNamespace, stage: object, surface: BakedSurface) -
     shader = pxr.UsdShade.Shader.Define(stage, f"{path}/Surface")
     shader.CreateIdAttr("UsdPreviewSurface")
     shader.CreateInput("roughness", types.Float).Set(surface.roughness)
+    shader.CreateInput("ior", types.Float).Set(surface.index)
     shader.CreateInput("diffuseColor", types.Color3f).Set(pxr.Gf.Vec3f(*surface.color))
     material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
     if not surface.textures:
