@@ -212,3 +212,19 @@ def test_blender_reads_the_plant_with_its_textures(blender, tmp_path, pxr):
     color = values_of(leaf.data.attributes["displayColor"]).mean(axis=0)[:3]
     np.testing.assert_allclose(pixels[shown].mean(axis=0), color, rtol=0.15)
     assert pixels[shown].std(axis=0).max() > 0.005  # veins and shades
+
+
+def test_the_operators_write_and_read(blender, tmp_path, pxr):
+    field()
+    before = sorted_bytes(plants())
+    given = {"variants": 1, "polygons": 3000, "bake": False}
+    path = tmp_path / "forest"
+    assert bpy.ops.tetflora.export_forest(filepath=str(path), format=".usdc", **given) == {'FINISHED'}
+    assert bpy.ops.tetflora.export_forest(filepath=str(path), format=".glb", **given) == {'FINISHED'}
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["forest.glb", "forest.usdc", "forest_textures"]
+    with pytest.raises(RuntimeError, match=r"choose a name that ends in \.usdc"):
+        bpy.ops.tetflora.export_forest(filepath=str(tmp_path / "forest.fbx"), **given)
+    session.clean_file()
+    assert bpy.ops.tetflora.import_inventory(filepath=str(tmp_path / "forest.usdc")) == {'FINISHED'}
+    assert sorted_bytes(plants()) == before
+    assert [layer.field.name for layer in scene().tetflora.layers] == ["Wiesengrund \u68ee"]
