@@ -39,6 +39,7 @@ PIXELS, ANGLE = 1080, np.radians(40.0)
 _CELLS, _FEWEST_CELLS, _MOST_CELLS = 2.0, 160, 700
 _ROUNDS = 5
 _CLOSE = 0.005  # of the cover
+_WIDER = 3.0  # times as wide at most is wood that stands for more: beyond that, branches would be sheets
 _KEPT, _TWIG = 241, 242  # draws of this module
 _WHITE = (1.0, 1.0, 1.0)
 #: Polygons of one kind, as ``'bark'`` or ``'leaf'``.
@@ -242,5 +243,9 @@ def _wood_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Itera
             likely = np.clip(np.pi * branches.radius * branches.length / (_LONG * pixel) ** 2, 1e-4, 1.0)
             some = np.flatnonzero((wide < _WIDE) & (uniform(branches.key, _TWIG) < likely))
             if len(some):
-                made.append(twig_buffers(flora, whole.take(some), 1.0 / likely[some], np.ones(len(some), np.int64)))
+                made.append(
+                    twig_buffers(
+                        flora, whole.take(some), np.minimum(1.0 / likely[some], _WIDER), np.ones(len(some), np.int64)
+                    )
+                )
         yield from (("bark", mesh) for mesh in made if mesh is not None)
