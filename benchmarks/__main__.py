@@ -40,6 +40,7 @@ NAMES = {
     "leaf_area": ("results.md#leaf-area", "Have trees as many leaves as is measured, and as take their light?"),
     "light_inside": ("results.md#light-inside-woods", "Is it as dark inside woods as is measured?"),
     "cover_published": ("results.md#plants-up-close", "Does a birch stand cover as much ground as is published?"),
+    "export": ("results.md#out-of-blender", "Do a million plants come back, and are levels like their plants?"),
     "shapes": ("results.md#light-shapes-in-the-window", "Do light shapes follow the artist, a million of them too?"),
     "endurance": ("results.md#two-hundred-frames", "Does memory or time grow over many frames?"),
     "estimates": ("results.md#what-refining-will-take", "Does refining take what the panel says?"),

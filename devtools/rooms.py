@@ -33,7 +33,7 @@ MAX_LEVELS = 10
 _LOW = "blender blender/materials blender/species blender/scene"
 _ASSETS = "assets blender/assets"
 _HIGH = "blender/results blender/placing blender/job"
-_LAND = "blender/stands blender/geodata blender/biomes"
+_LAND = "blender/stands blender/geodata blender/biomes blender/export"
 #: What each room may import besides itself: folders below ``tetflora_addon`` in words separated by spaces. A dot stands
 #: for the files beside these folders, and ``blender`` alone for the files at the top of that folder.
 _TABLE = {
@@ -55,6 +55,7 @@ _TABLE = {
     "proxies": ". species growth assets compiled subplants camera refinement",
     "light": ". compiled tetrahedra camera refinement proxies",
     "emission": ". processes leaves species growth compiled subplants tetrahedra camera refinement proxies light",
+    "export": ". species growth compiled subplants",
     "blender": ". processes growth camera refinement",
     "blender/materials": ". growth light emission blender",
     "blender/species": ". leaves species blender",
@@ -69,7 +70,9 @@ _TABLE = {
     "blender/job": f". processes species growth compiled camera refinement proxies emission {_LOW} {_ASSETS} "
     "blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
-    "blender/cli": ". blender blender/scene blender/job",
+    "blender/export": ". species growth compiled camera planting export blender blender/species blender/scene "
+    "blender/placing blender/geodata blender/results blender/job",
+    "blender/cli": ". blender blender/scene blender/job blender/export",
     "operators": ". species assets camera refinement preview planting geodata blender blender/species blender/scene "
     f"blender/assets {_HIGH} {_LAND} blender/viewport",
     "panels": f". species blender blender/species blender/scene blender/assets {_HIGH} "

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ..tetflora_addon.blender.file_library import ENDING
 from ..tetflora_addon.blender.placing.plant_objects import plants_of
@@ -262,3 +262,37 @@ class ModalJob(Reporting):
             self._timer = None
             context.window_manager.progress_end()
             context.workspace.status_text_set(None)
+
+
+class FileJob(ModalJob):
+    """Mix-in for jobs on a file that the artist chooses, beside a helper of Blender's, whose ``invoke`` is `browse`."""
+
+    chosen: BoolProperty(options={'HIDDEN', 'SKIP_SAVE'})
+
+    #: Opens the file browser.
+    browse: Callable[..., set[str]]
+    _browsing = False
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self.chosen:
+            return ModalJob.invoke(self, context, event)
+        self._browsing = True
+        return self.browse(context, event)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if not self._browsing or bpy.app.background:
+            return ModalJob.execute(self, context)
+        # Blender frees what the file browser has called: the steps are those of another call, with its undo step.
+        again = getattr(bpy.ops.tetflora, type(self).bl_idname.partition(".")[2])
+        # A menu of species that was never opened has an empty value, which is none of its items.
+        settings = {name: value for name, value in self.as_keywords().items() if value != ""}
+        try:
+            again('INVOKE_DEFAULT', **{**settings, "chosen": True})
+        except RuntimeError as error:  # what that call reported, which must not end as a traceback
+            return self.failed(str(error).strip().removeprefix("Error: "))
+        return {'CANCELLED'}
+
+    @property
+    def path(self) -> Path:
+        """The chosen file."""
+        return Path(bpy.path.abspath(self.filepath))

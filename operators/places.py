@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringProperty
+from bpy.props import CollectionProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ..tetflora_addon.blender.declare import once
+from ..tetflora_addon.blender.export.reading import forest_steps
+from ..tetflora_addon.blender.export.usd import ENDINGS as USD_ENDINGS
 from ..tetflora_addon.blender.geodata.columns import (
     TetFloraInventoryColumn,
     chosen_columns,
@@ -28,10 +30,10 @@ from ..tetflora_addon.geodata.outlines import KINDS
 from ..tetflora_addon.geodata.projection import PLAIN
 from ..tetflora_addon.parameters import within
 from .add import mix_in, parse_weights
-from .base import ModalJob, in_object_mode, select_only
+from .base import FileJob, in_object_mode, select_only
 from .layers import selected_grounds
 
-_LAYERS = ";".join(f"*{ending}" for ending in ENDINGS)
+_LAYERS, _FORESTS = (";".join(f"*{ending}" for ending in endings) for endings in (ENDINGS, USD_ENDINGS))
 
 
 def _file(text: str) -> Path | None:
@@ -48,10 +50,11 @@ def column_row(layout: bpy.types.UILayout, title: str, values: str, translate: b
     return row
 
 
-class _Importing(ModalJob, ImportHelper):
+class _Importing(FileJob, ImportHelper):
     """Mix-in for operators that import a place from a file."""
 
     needs = (in_object_mode,)
+    browse = ImportHelper.invoke
 
     epsg: once.integer(
         "Coordinate System",
@@ -78,33 +81,6 @@ class _Importing(ModalJob, ImportHelper):
         ),
     )
     crop_size: once.real("Side", "Side of the square", 2000.0, **within(1.0, 20_000.0, 500_000.0), unit='LENGTH')
-    chosen: BoolProperty(options={'HIDDEN', 'SKIP_SAVE'})
-
-    _browsing = False
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if self.chosen:
-            return ModalJob.invoke(self, context, event)
-        self._browsing = True
-        return ImportHelper.invoke(self, context, event)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        if not self._browsing or bpy.app.background:
-            return ModalJob.execute(self, context)
-        # Blender frees what the file browser has called: the steps are those of another call, with its undo step.
-        again = getattr(bpy.ops.tetflora, type(self).bl_idname.partition(".")[2])
-        # A menu of species that was never opened has an empty value, which is none of its items.
-        settings = {name: value for name, value in self.as_keywords().items() if value != ""}
-        try:
-            again('INVOKE_DEFAULT', **{**settings, "chosen": True})
-        except RuntimeError as error:  # what that call reported, which must not end as a traceback
-            return self.failed(str(error).strip().removeprefix("Error: "))
-        return {'CANCELLED'}
-
-    @property
-    def path(self) -> Path:
-        """The chosen file."""
-        return Path(bpy.path.abspath(self.filepath))
 
     def order(self, context: bpy.types.Context, **others: Any) -> Import:
         """What is to be imported."""
@@ -172,14 +148,13 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
 
 
 class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
-    """Make a field of the trees of an inventory, CSV or GeoJSON: species, place and sizes of each.
-
-    They stand on the selected meshes, or on imported terrain.
+    """Make a field of the trees of an inventory, CSV or GeoJSON: species, place and sizes of each. They stand on the
+    selected meshes, or on imported terrain. Of USD, make fields of a forest that was exported, or of any points.
     """
 
     bl_label = "Import Tree Inventory"
 
-    filter_glob: StringProperty(default=f"*.csv;*.tsv;*.txt;{_LAYERS}", options={'HIDDEN'})
+    filter_glob: StringProperty(default=f"*.csv;*.tsv;*.txt;{_LAYERS};{_FORESTS}", options={'HIDDEN'})
     units: once.choice(
         "Units",
         "Units of columns that do not name theirs",
@@ -209,7 +184,7 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
     active: IntProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if not self.chosen or self.columns:
+        if not self.chosen or self.columns or self._is_forest:
             return super().invoke(context, event)
         try:
             show_columns(self.table, self.path)
@@ -238,7 +213,13 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
             if (name != "species" or self.unknown == 'SPECIES') and (name != "crop_size" or self.crop == MIDDLE):
                 layout.prop(self, name)
 
+    @property
+    def _is_forest(self) -> bool:
+        return self.path.suffix.lower() in USD_ENDINGS
+
     def steps(self, context: bpy.types.Context) -> Steps:
+        if self._is_forest:
+            return forest_steps(self.order(context), parse_weights(mix_in(context.scene.tetflora.populate)))
         chosen = self.species if self.unknown == 'SPECIES' and self.species != NO_SPECIES else self.unknown
         return inventory_steps(self.order(context), chosen, self.units, self.skip, columns_in(self.columns))
 

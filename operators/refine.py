@@ -4,8 +4,6 @@
 
 import bpy
 
-from ..tetflora_addon import storage
-from ..tetflora_addon.assets import asset_cache
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.job import refine
 from ..tetflora_addon.blender.job.assets import asset_warnings
@@ -199,19 +197,6 @@ class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
         select_only(context, made)
         polygons = sum(len(obj.data.polygons) for obj in made)
         return self.done(f"{counted(len(made), 'mesh object')} of {polygons:,} polygons made")
-
-
-class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
-    """Delete all cached species analysis, and nothing else in the folder. It is computed again when needed."""
-
-    bl_label = "Clear Cache"
-    needs = (need(lambda _: storage.current_folder() is not None, "The cache folder does not exist"),)
-    bl_options = {'REGISTER'}
-
-    def run(self, _context: bpy.types.Context) -> set[str]:
-        return self.done(
-            f"{counted(storage.clear() + asset_cache.clear(), 'file')} deleted from {storage.current_folder()}"
-        )
 
 
 _camera_found = need(

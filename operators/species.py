@@ -9,6 +9,8 @@ import bpy
 from bpy.props import BoolProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
+from ..tetflora_addon import storage
+from ..tetflora_addon.assets import asset_cache
 from ..tetflora_addon.blender.biomes import library
 from ..tetflora_addon.blender.declare import choice, once, string
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
@@ -207,15 +209,25 @@ class TETFLORA_OT_delete_file(Reporting, bpy.types.Operator):
     """
 
     bl_label = "Delete from My Files"
+    told = "cache"
     bl_options = {'REGISTER'}
 
     biome: once.boolean("Biome", "A biome instead of a species")
     identifier: once.string("File", "Name of the file without its ending; the shown species or chosen biome if empty")
+    cache: once.boolean(
+        "Cache",
+        "Delete all cached species analysis, and nothing else in the folder. It is computed again when needed",
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_confirm(self, event)
+        return self.execute(context) if self.cache else context.window_manager.invoke_confirm(self, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
+        if self.cache:
+            if storage.current_folder() is None:
+                return self.refused("The cache folder does not exist")
+            number = storage.clear() + asset_cache.clear()
+            return self.done(f"{counted(number, 'file')} deleted from {storage.current_folder()}")
         chosen = self.identifier or (context.scene.tetflora.new_biome if self.biome else shown(context))
         return self.done(f"{(library.OWN_FILES if self.biome else OWN_FILES).delete(chosen).name} deleted")
 

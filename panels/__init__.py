@@ -17,6 +17,7 @@ _ADDED = (
     ("VIEW3D_PT_overlay_object", outputs.draw_in_overlays),
     ("VIEW3D_MT_add", menus.draw_in_add_menu),
     ("TOPBAR_MT_file_import", places.draw_in_import_menu),
+    ("TOPBAR_MT_file_export", places.draw_in_export_menu),
     ("VIEW3D_MT_object", menus.draw_in_object_menu),
     ("OUTLINER_MT_object", menus.draw_in_outliner),
     ("OUTLINER_MT_collection", menus.draw_in_outliner),

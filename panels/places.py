@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can be imported of real places, also in Blender's File > Import, and the table of an inventory's columns."""
+"""Entries of File > Import and File > Export, real places and forests; and the table of an inventory's columns."""
 
 import bpy
 
@@ -16,7 +16,7 @@ IMPORTS = (
 )
 _ENDINGS = (
     *("Terrain (.tif, .asc, .hgt)", "Canopy Height (.tif, .asc, .xyz)"),
-    *("Tree Inventory (.csv, .geojson)", "Map Outlines (.geojson, .shp, .gpkg)"),
+    *("Tree Inventory (.csv, .geojson, .usd)", "Map Outlines (.geojson, .shp, .gpkg)"),
 )
 
 
@@ -34,3 +34,9 @@ def draw_in_import_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> No
     menu.layout.separator()
     for button, text in zip(IMPORTS, _ENDINGS, strict=True):
         button._replace(text=text).draw(menu.layout)
+
+
+def draw_in_export_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """The entry in Blender's File > Export."""
+    menu.layout.separator()
+    Button("export_forest", 'OUTLINER_OB_FORCE_FIELD', "TetFlora Forest (.usd, .glb, .obj)").draw(menu.layout)

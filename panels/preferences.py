@@ -10,7 +10,7 @@ import bpy
 from ..tetflora_addon import storage
 from ..tetflora_addon.blender.preferences import CACHE_VARIABLE, TetFloraPreferences, species_folders
 from ..tetflora_addon.blender.species.edits import skipped_files
-from .base import draw_properties
+from .base import Button, draw_properties
 
 KEYMAP = "Object Mode"
 PIE = "TETFLORA_MT_pie"
@@ -92,7 +92,7 @@ def _draw_cache(column: bpy.types.UILayout, own: TetFloraPreferences) -> None:
     row = column.row()
     row.active = own.use_cache
     row.prop(own, "cache_folder")
-    column.operator("tetflora.clear_cache")
+    Button("delete_file", 'NONE', "Clear Cache", {"cache": True}).draw(column)
     if storage.last_problem():
         column.label(text=storage.last_problem(), icon='ERROR')
 

@@ -33,7 +33,7 @@ def test_it_lies_where_blender_keeps_what_belongs_to_the_extension(cache, monkey
     assert not cache.current_folder().exists()
     own.use_cache = False
     assert cache.current_folder() is None
-    assert not bpy.ops.tetflora.clear_cache.poll()
+    assert bpy.ops.tetflora.delete_file(cache=True) == {'CANCELLED'}
 
 
 def test_the_environment_has_the_first_word(cache, monkeypatch, tmp_path):
@@ -67,6 +67,6 @@ def test_an_edited_species_is_looked_at_once(cache, tmp_path, monkeypatch):
     facet_weights._of_states.cache_clear()
     monkeypatch.setattr(facet_weights, "fitting", lambda *_: pytest.fail("looked at again"))
     refine.refine(scene, depsgraph())
-    assert bpy.ops.tetflora.clear_cache() == {'FINISHED'}
+    assert bpy.ops.tetflora.delete_file(cache=True) == {'FINISHED'}
     assert [p.name for p in (tmp_path / "cache").iterdir()] == ["notes.txt"]
     assert not kept.exists()

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The only place that knows which Blender this is; every branch asks for a feature, none for a version number."""
 
+from importlib import import_module
 from math import pi
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -107,3 +109,13 @@ def set_node_input(modifier: bpy.types.NodesModifier, identifier: str, value: ob
         getattr(modifier.properties.inputs, identifier).value = value
     else:
         modifier[identifier] = value
+
+
+def usd() -> SimpleNamespace | None:
+    """The modules of USD that Blender brings, by name; None where it was built without them."""
+    bpy.utils.expose_bundled_modules()
+    try:
+        names = ("Gf", "Kind", "Sdf", "Usd", "UsdGeom", "UsdShade", "UsdUtils", "Vt")
+        return SimpleNamespace(**{name: import_module(f"pxr.{name}") for name in names})
+    except ImportError:
+        return None

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from devtools import session
-from operators import places
+from operators import base, places
 from tests import places_files as files
 from tests import places_inventories as inventories
 from tests.blender.digests import difference, everything
@@ -391,7 +391,7 @@ def test_a_refusal_after_the_file_browser_is_a_report(monkeypatch):
         raise RuntimeError("Error: a.tif: it is broken\n")
 
     ops = SimpleNamespace(tetflora=SimpleNamespace(import_terrain=again))
-    monkeypatch.setattr(places, "bpy", SimpleNamespace(app=SimpleNamespace(background=False), ops=ops))
+    monkeypatch.setattr(base, "bpy", SimpleNamespace(app=SimpleNamespace(background=False), ops=ops))
 
     class Browsing:
         bl_idname = places.TETFLORA_OT_import_terrain.bl_idname

@@ -94,7 +94,7 @@ def test_the_page_in_the_preferences_shows_settings_and_the_cache():
     preferences.TetFloraPreferences.draw(page, bpy.context)
     own = preferences.preferences().bl_rna.properties
     assert set(layout.names("prop", 1)) >= {p.identifier for p in own if not p.is_readonly} - {"bl_idname", "rna_type"}
-    assert "tetflora.clear_cache" in layout.names("operator")
+    assert "tetflora.delete_file" in layout.names("operator")
 
 
 DRAWN = [cls for cls in panels.CLASSES if not issubclass(cls, bpy.types.UIList)]

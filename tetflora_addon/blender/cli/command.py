@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``blender scene.blend --command tetflora refine|render|stats``: TetFlora for scripts and render farms.
+"""``blender scene.blend --command tetflora refine|render|stats|export``: TetFlora for scripts and render farms.
 
 Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An error is one line on stderr. With
 ``--json`` the last line on stdout is a JSON object, after Blender's own output.
@@ -21,12 +21,14 @@ import bpy
 
 from ...errors import VALUE, SceneError, TetFloraError, readable
 from ..compat import EEVEE_ENGINES, eevee_engine
+from ..export.forest import LEVELS, MOST_VARIANTS, WRITERS, ExportOrder, export_steps
 from ..job.contents import estimate
 from ..job.refine import refine
 from ..properties import TetFloraScene
 from ..runtime import failed_frames
 from ..saved_files import damaged, write_blend
 from ..scene.camera import read_camera
+from ..worker import run_to_end
 
 #: First, last and step of frames.
 Run = tuple[int, int, int]
@@ -135,7 +137,7 @@ def run(parser: Parser, arguments: Sequence[str]) -> int:
             print(json.dumps(figures), flush=True)
         else:
             for key, value in figures.items():
-                if key != "steps":  # a dozen figures for each pass, for programs
+                if key not in ("steps", "levels"):  # a dozen figures for each pass, for programs
                     print(f"{key.replace('_', ' '):>22}: {_readable(value)}", flush=True)
     except OSError as error:  # into a file on a full disk, or into a program that has ended
         return _fail(f"cannot print the statistics: {error.strerror}", 1)
@@ -147,7 +149,7 @@ def _parser() -> argparse.ArgumentParser:
         prog=f"blender FILE --command {NAME}",
         description="Refine and render the plants of a scene, in the file that Blender has opened.",
     )
-    commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats|export")
 
     refining = commands.add_parser("refine", help="create meshes of the plants for the scene camera")
     refining.add_argument("--cutoff", type=positive, metavar="PIXELS", help="override the Cutoff of the scene")
@@ -172,11 +174,20 @@ def _parser() -> argparse.ArgumentParser:
     )
     stats.set_defaults(run=_stats)
 
+    exporting = commands.add_parser("export", help="write the plants for other programs")
+    exporting.add_argument("path", metavar="PATH", help=f"file to write; its ending is one of {' '.join(WRITERS)}")
+    exporting.add_argument("--variants", type=whole, default=8, metavar="N", help="plants of each species (default: 8)")
+    exporting.add_argument("--levels", type=whole, default=0, metavar="N", help="levels of detail, with the full plant")
+    about = "leave out levels of detail with more polygons"
+    exporting.add_argument("--polygons", type=whole, default=0, metavar="N", help=about)
+    exporting.add_argument("--flat", action="store_true", help="do not bake veins, bark and relief")
+    exporting.set_defaults(run=_export)
+
     for command in (refining, render):
         command.add_argument("--proxies", choices=_choices("proxy_kind"), help="override the proxy kind of the scene")
         about = "override the Lighting of the scene"
         command.add_argument("--baked-light", choices=_choices("baked_light"), help=about)
-    for command in (refining, render, stats):
+    for command in (refining, render, stats, exporting):
         command.add_argument("--json", action="store_true", help="print statistics as a JSON object in the last line")
     return parser
 
@@ -243,6 +254,14 @@ def _render(options: argparse.Namespace) -> dict | None:
 def _stats(_options: argparse.Namespace) -> dict:
     statistics = estimate(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
     return {name: getattr(statistics, name) for name in ("plants", "polygons_full", "instances")}
+
+
+def _export(options: argparse.Namespace) -> dict:
+    if options.variants > MOST_VARIANTS or options.levels > LEVELS:
+        raise SceneError(f"There are at most {MOST_VARIANTS:,} variants and {LEVELS} levels; give a smaller number")
+    order = ExportOrder(_named(options.path), options.variants, options.levels, options.polygons, not options.flat)
+    found = run_to_end(export_steps(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), order))
+    return asdict(found) | {"path": str(found.path)}
 
 
 def _check_file() -> None:

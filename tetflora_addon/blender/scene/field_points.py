@@ -20,6 +20,8 @@ from .own_ages import AGE, MOST_YEARS, sound_ages, stored_ages
 PREFIX = "tf_"
 
 _INTEGERS = {'INT', 'INT8', 'BOOLEAN'}
+#: Seeds may also have 64 bits, as those of instances that have come back from a file.
+_SEEDS = {*_INTEGERS, 'INT32_2D'}
 
 Points = bpy.types.Mesh | bpy.types.PointCloud
 
@@ -98,16 +100,17 @@ def _attribute(obj: bpy.types.Object, points: Points, name: str, kinds: Iterable
 
 
 def _integers(obj: bpy.types.Object, points: Points, name: str, size: int, default: Integers | int) -> Integers:
-    attribute = _attribute(obj, points, name, _INTEGERS)
+    attribute = _attribute(obj, points, name, _SEEDS if name == "seed" else _INTEGERS)
     if attribute is None:
         return np.broadcast_to(np.asarray(default, np.int64), size)
-    return values_of(attribute).astype(np.int64)
+    values = values_of(attribute)
+    return values.view(np.int64)[:, 0] if values.ndim > 1 else values.astype(np.int64)
 
 
 def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> Integers:
     """Stored seeds, hashed where the object has a seed; without stored ones, hashes of the points' ids."""
     roll = obj.tetflora.seed
-    stored = _attribute(obj, points, "seed", _INTEGERS) is not None
+    stored = _attribute(obj, points, "seed", _SEEDS) is not None
     seeds = _integers(obj, points, "seed" if stored else "id", size, np.arange(first, first + size))
     return new_seeds(seeds, roll).astype(np.int64) if roll or not stored else seeds
 

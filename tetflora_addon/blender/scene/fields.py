@@ -18,10 +18,10 @@ from ...arrays import Floats, Integers, Integers32, Keys
 from ...camera.camera import origin_near
 from ...errors import SceneError
 from ...growth.seeds import Seeds
-from ..attributes import write
+from ..attributes import values_of, write
 from ..species.asset_species import find_asset
-from .field_points import FieldPoints, parts_of, placed_frames, read_points, refuse
-from .field_sizes import in_year, read_records, read_sizes, year_curves, year_now
+from .field_points import PREFIX, FieldPoints, parts_of, placed_frames, read_points, refuse
+from .field_sizes import SIZE_ATTRIBUTES, in_year, read_records, read_sizes, year_curves, year_now
 from .objects import geometry_of
 from .own_ages import AGE, Sizes
 from .skeletons import kind_of, kind_of_choice, species_of
@@ -108,6 +108,21 @@ def read_aged_field(
     ages = None if points.age is None else np.tile(points.age, len(matrices))
     seeds = Seeds(kinds, species, points.seeds(keys), place, frame, scale)
     return seeds, ages, None if sizes is None else _placed_sizes(sizes, world)
+
+
+def stored_points(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> dict[str, tuple[str, NDArray]]:
+    """Attributes of the points of a field by name, each with its type and values, as they come from its modifiers.
+
+    Only those by which points are plants; a field made of these, with the same matrix, has the same plants bit by bit.
+    Empty for histories, of which one year is shown, and where a mesh and a point cloud hold points together.
+    """
+    held = geometry_of(obj, depsgraph)  # it owns its parts
+    parts = parts_of(obj, depsgraph, held)
+    if len(parts) != 1 or read_records(obj, parts) is not None:
+        return {}
+    names = {prefix + name for name in (*FIELD_ATTRIBUTES, "id", AGE) for prefix in ("", PREFIX)}
+    found = {a.name: a for a in parts[0].attributes if a.name in {"position", *names, *SIZE_ATTRIBUTES}}
+    return {name: (a.data_type, values_of(a)) for name, a in found.items() if a.domain == 'POINT'}
 
 
 def _placed_sizes(sizes: Sizes, world: Floats) -> Sizes:

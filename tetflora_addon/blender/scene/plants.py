@@ -6,6 +6,8 @@ Plants whose species is an asset do not grow and are read apart, with all of the
 `objects` loop over plants, and only over those that are objects.
 """
 
+from __future__ import annotations
+
 from collections.abc import Container
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -97,9 +99,73 @@ def read_plants(
     return replace(seeds, motion=motion) if motion.any() else seeds, owners, unknown
 
 
+@dataclass(frozen=True)
+class Source:
+    """Plants that one object brings, or single ones of one look."""
+
+    look: str
+    part: Part
+    #: The field whose own points they are; None of instances and single plants.
+    field: bpy.types.Object | None = None
+
+    def without(self, species: Container[str]) -> Source:
+        """The same without plants of some species."""
+        return replace(self, part=_grown(self.part, species))
+
+
+@dataclass
+class _Found:
+    """What takes part, before anybody asks whether its species are known."""
+
+    sources: list[Source]
+    single: dict[str, list[bpy.types.Object]]  # plants that are objects, by look: they come first
+    odd: list[tuple[str, str]]  # names of objects with species that nobody has
+    own: list[bpy.types.Object]  # plants and fields of the view layer
+    copies: list[Copies]
+
+    def nothing(self, scene: bpy.types.Scene) -> SceneError:
+        """The error where no plant is left."""
+        if self.odd:
+            return SceneError(_unknown(self.odd))
+        found, own = self.own or self.copies, self.own
+        off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in self.copies)))
+        hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
+        return NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
+
+
+def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Source]:
+    """What `read_plants` reads, object by object, with ages and recorded sizes as they are stored.
+
+    Raises
+    ------
+    SceneError
+        As `read_plants`, and where nobody has the species of a plant.
+    """
+    found = _find_plants(scene, depsgraph)
+    if found.odd or not found.sources:
+        raise found.nothing(scene)
+    return found.sources
+
+
 def _read_plants(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
+    found = _find_plants(scene, depsgraph)
+    unknown = {species for _, species in found.odd}
+    read = [some for source in found.sources if len((some := source.without(unknown)).part[1])]
+    if not read:
+        raise found.nothing(scene)
+    owners = [(source.part[0], len(source.part[1])) for source in read]
+    owners[: len(found.single)] = [(obj.name, 1) for some in found.single.values() for obj in some]
+    aged = classed(scene, [source.part for source in read])
+    seen = [
+        replace(seeds, identifiers=tuple(with_look(kind, source.look) for kind in seeds.identifiers))
+        for source, (_, seeds) in zip(read, aged, strict=True)
+    ]
+    return merged(seen), tuple(owners), f"Left out {_unknown(found.odd)}" if found.odd else ""
+
+
+def _find_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> _Found:
     known, assets = catalog(), {*asset_species(scene), *gone_species(scene)}
     odd: list[tuple[str, str]] = []  # names of objects, each with a species
     objects = sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full)
@@ -112,43 +178,29 @@ def _read_plants(
     for obj in single:
         if obj.tetflora.species in known:
             alike.setdefault(looks.of(obj), []).append(obj)
-    given: list[tuple[str, Part]] = [
-        (look, (some[0].name, single_plants(some, depsgraph), stored_ages(some), None)) for look, some in alike.items()
+    given = [
+        Source(look, (some[0].name, single_plants(some, depsgraph), stored_ages(some), None))
+        for look, some in alike.items()
     ]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
     for c in enabled:
         if _is_plant(c) and c.owner.tetflora.species not in assets:
-            given.append((looks.of(c.owner, c.instancer), (c.owner.name, *_copied_plants(c))))
+            given.append(Source(looks.of(c.owner, c.instancer), (c.owner.name, *_copied_plants(c))))
     for obj in own:
         if obj.tetflora.is_field and obj.tetflora.enabled:
             part = read_aged_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])
-            given.append((looks.of(obj), (obj.name, *part)))
+            given.append(Source(looks.of(obj), (obj.name, *part), obj))
     for c in enabled:
         if c.owner.tetflora.is_field:
             part = read_aged_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry)
-            given.append((looks.of(c.owner, c.instancer), (c.owner.name, *part)))
-    given = [(look, part) for look, whole in given if len((part := _grown(whole, assets))[1])]
-    for _, (name, seeds, *_) in given:
+            given.append(Source(looks.of(c.owner, c.instancer), (c.owner.name, *part)))
+    sources = [some for source in given if len((some := source.without(assets)).part[1])]
+    for source in sources:
+        name, seeds, *_ = source.part
         kinds = [seeds.identifiers[i] for i in np.flatnonzero(np.bincount(seeds.species)).tolist()]
         odd += [(name, own) for own in dict.fromkeys(map(species_of, kinds)) if own not in known]
-    unknown = {species for _, species in odd}
-    read = [(look, part) for look, whole in given if len((part := _grown(whole, unknown))[1])]
-    if odd and not read:
-        raise SceneError(_unknown(odd))
-    if not read:
-        found = own or copies
-        off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
-        hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
-        raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
-    owners = [(part[0], len(part[1])) for _, part in read]
-    owners[: len(alike)] = [(obj.name, 1) for some in alike.values() for obj in some]
-    aged = classed(scene, [part for _, part in read])
-    seen = [
-        replace(seeds, identifiers=tuple(with_look(kind, look) for kind in seeds.identifiers))
-        for (look, _), (_, seeds) in zip(read, aged, strict=True)
-    ]
-    return _merged(seen), tuple(owners), f"Left out {_unknown(odd)}" if odd else ""
+    return _Found(sources, alike, odd, own, copies)
 
 
 def _is_plant(copies: Copies) -> bool:
@@ -286,7 +338,7 @@ def _placed(names: list[str], kinds: tuple[str, ...], species: Integers32, seeds
     return Seeds(kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
 
 
-def _merged(read: list[Seeds]) -> Seeds:
+def merged(read: list[Seeds]) -> Seeds:
     """Plants of all objects as one, with the kinds that occur."""
     tables = []
     for seeds in read:

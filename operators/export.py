@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Export the plants of a scene to other programs."""
+
+import bpy
+from bpy.props import StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ..tetflora_addon.blender.declare import once
+from ..tetflora_addon.blender.export.forest import (
+    FORMATS,
+    LEVELS,
+    MOST_VARIANTS,
+    WRITERS,
+    Exported,
+    ExportOrder,
+    export_steps,
+)
+from ..tetflora_addon.jobs import Job
+from ..tetflora_addon.parameters import within
+from .base import FileJob, counted, in_object_mode
+
+
+class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
+    """Write all plants that render as instances of a few, in levels of detail, for other renderers and engines.
+
+    Import Tree Inventory reads them back from USD as they were.
+    """
+
+    bl_label = "Export Forest"
+    needs = (in_object_mode,)
+    bl_options = {'REGISTER'}
+    browse = ExportHelper.invoke
+    cancelled = "Cancelled; nothing was written"
+
+    filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in WRITERS), options={'HIDDEN'})
+    format: once.choice("Format", "What the file is for, if its name has no ending", FORMATS)
+    variants: once.integer(
+        "Variants",
+        "Plants of each species that stand for all others. No two plants are alike where there are no more than that",
+        8,
+        **within(1, 64, MOST_VARIANTS),
+    )
+    levels: once.integer(
+        "Levels", "Levels of detail with the full plant; 0 for as many as suit each species", **within(0, high=LEVELS)
+    )
+    polygons: once.integer(
+        "Max Polygons",
+        "Leave out levels of detail with more polygons than this; 0 for none",
+        **within(0, 1_000_000, 100_000_000),
+    )
+
+    bake: once.boolean(
+        "Bake Materials", "Bake veins, bark and relief with Cycles; otherwise textures have colors and outlines", True
+    )
+
+    @property
+    def filename_ext(self) -> str:
+        """What is added to names without an ending."""
+        return self.format
+
+    def steps(self, context: bpy.types.Context) -> Job[Exported]:
+        path = self.path if self.path.suffix else self.path.with_suffix(self.format)
+        order = ExportOrder(path, self.variants, self.levels, self.polygons, self.bake)
+        return export_steps(context.scene, context.evaluated_depsgraph_get(), order)
+
+    def finish(self, context: bpy.types.Context, result: Exported) -> set[str]:
+        made = f"{counted(result.plants, 'plant')} as {counted(result.variants, 'variant')}"
+        return self.done(f"{made} written to {result.path}, {result.megabytes:,.1f} MB")

@@ -1,0 +1,317 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Forests as USD: a PointInstancer for each object with plants, whose prototypes have levels as a variant set.
+
+Primvars tell of each plant what it is: ``species``, an index into the names in the instancer's custom data, ``seed``,
+``age`` and ``height``. What a field needs beyond that, to be the same again bit by bit, is in primvars named
+``tetflora:``. Everything that USD has a place for is there, so that no reader needs to know of TetFlora.
+
+Sources: UsdGeomPointInstancer and UsdPreviewSurface as openusd.org documents them.
+"""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Integers
+from ...buffers import MeshBuffers
+from ...errors import TetFloraError
+from ...export.forest import BakedSurface, Forest, ForestPart, PointAttributes, Variant, identifiers
+from ...export.gltf import vertex_normals
+from ..compat import usd
+
+#: In the custom data of an instancer, and the prefix of primvars.
+KEY, PREFIX = "tetflora", "tetflora:"
+FORMAT = 1
+#: Endings of files.
+ENDINGS = (".usdc", ".usda", ".usd")
+LEVELS = "LOD"
+_TONES = 256.0  # steps of a color, which no display tells apart
+_ARRAYS = {'FLOAT': "Float", 'INT': "Int", 'INT32_2D': "Vec2i", 'FLOAT_VECTOR': "Vec3f", 'QUATERNION': "Quatf"}
+_NAMES = {'FLOAT': "Float", 'INT': "Int", 'INT32_2D': "Int2", 'FLOAT_VECTOR': "Float3", 'QUATERNION': "Quatf"}
+
+
+def library() -> SimpleNamespace:
+    """USD's modules.
+
+    Raises
+    ------
+    TetFloraError
+        This Blender has none.
+    """
+    found = usd()
+    if found is None:
+        raise TetFloraError("This Blender was built without USD; choose glTF or OBJ, or use another build")
+    return found
+
+
+def write_usd(path: Path, forest: Forest) -> Iterator[float]:
+    """Write a file; yields how much of it is done.
+
+    Raises
+    ------
+    TetFloraError
+        It cannot be written.
+    """
+    pxr = library()
+    try:
+        stage = pxr.Usd.Stage.CreateNew(str(path))
+        pxr.UsdGeom.SetStageUpAxis(stage, pxr.UsdGeom.Tokens.z)
+        pxr.UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        root = pxr.UsdGeom.Xform.Define(stage, "/Forest")
+        pxr.Usd.ModelAPI(root).SetKind(pxr.Kind.Tokens.assembly)
+        stage.SetDefaultPrim(root.GetPrim())
+        for surface in forest.surfaces:
+            _write_surface(pxr, stage, surface)
+        # Children of an instancer are drawn as its instances alone, and instancers may share them.
+        names = identifiers([stand.name for stand in forest.stands])
+        home = f"/Forest/{names[0]}/Prototypes"
+        for name, stand in zip(names, forest.stands, strict=True):
+            _write_stand(pxr, stage, f"/Forest/{name}", stand, [f"{home}/{v.name}" for v in forest.variants])
+        pxr.UsdGeom.Scope.Define(stage, home)
+        for number, variant in enumerate(forest.variants):
+            yield number / len(forest.variants)
+            _write_variant(pxr, stage, f"{home}/{variant.name}", variant)
+        if not stage.GetRootLayer().Save():
+            raise OSError("check the free disk space")
+    except (OSError, RuntimeError) as error:
+        raise TetFloraError(f"Cannot write {path.name}: {' '.join(str(error).split())}") from None
+
+
+def _array(pxr: SimpleNamespace, kind: str, values: NDArray) -> object:
+    """An array of USD, ``Vec3f`` for example; quaternions have w last there."""
+    given = np.roll(values, -1, axis=1) if kind.startswith("Quat") else values
+    return getattr(pxr.Vt, f"{kind}Array").FromNumpy(np.ascontiguousarray(given))
+
+
+def _write_stand(pxr: SimpleNamespace, stage: object, path: str, stand: ForestPart, prototypes: list[str]) -> None:
+    instancer = pxr.UsdGeom.PointInstancer.Define(stage, path)
+    instancer.AddTranslateOp().Set(pxr.Gf.Vec3d(*stand.origin.tolist()))
+    # Those that the stand has none of would only cost time.
+    used, index = np.unique(stand.variant, return_inverse=True)
+    for number in used.tolist():
+        instancer.GetPrototypesRel().AddTarget(prototypes[number])
+    instancer.CreateProtoIndicesAttr(_array(pxr, "Int", index.reshape(-1).astype(np.int32)))
+    instancer.CreatePositionsAttr(_array(pxr, "Vec3f", stand.position))
+    instancer.CreateOrientationsAttr(_array(pxr, "Quath", stand.rotation.astype(np.float16)))
+    instancer.CreateScalesAttr(_array(pxr, "Vec3f", np.repeat(stand.scale[:, None], 3, axis=1)))
+    primvars = pxr.UsdGeom.PrimvarsAPI(instancer)
+    columns = _columns(stand)
+    for name, (kind, values) in columns.items():
+        _add(pxr, primvars, name, kind, values)
+    known = {"position": ('FLOAT_VECTOR', stand.position), **{name: columns[name] for name in ("seed", "species")}}
+    stored: dict[str, str] = {}
+    for name, (kind, values) in stand.points.items():
+        same = name in known and known[name][0] == kind and _equal(known[name][1], values)
+        stored[name] = kind if same else f"{kind} {PREFIX}{name}"
+        if not same:
+            _add(pxr, primvars, PREFIX + name, kind, values)
+    instancer.GetPrim().SetCustomDataByKey(
+        KEY,
+        {
+            "format": FORMAT,
+            "name": stand.name,
+            "species": pxr.Vt.StringArray([species for species, _ in stand.kinds]),
+            "forms": pxr.Vt.StringArray([form for _, form in stand.kinds]),
+            "attributes": stored,
+            "matrix": pxr.Gf.Matrix4d(np.asarray(stand.matrix, np.float64).T.tolist()),
+            "object": {
+                key: pxr.Vt.DoubleArray(value) if isinstance(value, list) else value
+                for key, value in stand.settings.items()
+            },
+        },
+    )
+
+
+def _columns(stand: ForestPart) -> dict[str, tuple[str, NDArray]]:
+    """What every plant is, for whoever reads the file."""
+    small = np.array_equal(stand.seed, stand.seed.astype(np.int32))
+    seed = ('INT', stand.seed.astype(np.int32)) if small else ('INT32_2D', halves(stand.seed))
+    return {
+        "species": ('INT', stand.species),
+        "seed": seed,
+        "age": ('FLOAT', stand.age),
+        "height": ('FLOAT', stand.height),
+    }
+
+
+def halves(seed: Integers) -> NDArray[np.int32]:
+    """Seeds (n,) of 64 bits as two numbers each, (n, 2)."""
+    return np.ascontiguousarray(seed, np.int64).view(np.int32).reshape(-1, 2)
+
+
+def _equal(one: NDArray, other: NDArray) -> bool:
+    return one.shape == other.shape and one.tobytes() == np.ascontiguousarray(other, one.dtype).tobytes()
+
+
+def _add(pxr: SimpleNamespace, primvars: object, name: str, kind: str, values: NDArray) -> None:
+    of = getattr(pxr.Sdf.ValueTypeNames, f"{_NAMES[kind]}Array")
+    primvars.CreatePrimvar(name, of, pxr.UsdGeom.Tokens.vertex).Set(_array(pxr, _ARRAYS[kind], values))
+
+
+def _write_variant(pxr: SimpleNamespace, stage: object, path: str, variant: Variant) -> None:
+    top = pxr.UsdGeom.Xform.Define(stage, path)
+    pxr.Usd.ModelAPI(top).SetKind(pxr.Kind.Tokens.component)
+    prim, levels = top.GetPrim(), top.GetPrim().GetVariantSets().AddVariantSet(LEVELS)
+    for number, level in enumerate(variant.levels):
+        levels.AddVariant(f"{LEVELS}{number}")
+        levels.SetVariantSelection(f"{LEVELS}{number}")
+        with levels.GetVariantEditContext():
+            for kind, mesh in level.parts:
+                _write_mesh(pxr, stage, f"{path}/{kind}", mesh, variant.surfaces[kind])
+    levels.SetVariantSelection(f"{LEVELS}0")
+    ends = [level.distance for level in variant.levels[1:]]
+    sizes = [level.screen_size(variant.height) for level in variant.levels]
+    told = {"distances": pxr.Vt.DoubleArray([0.0, *ends]), "screenSizes": pxr.Vt.DoubleArray(sizes)}
+    prim.SetCustomDataByKey(KEY, {**told, "height": variant.height})
+
+
+def _write_mesh(pxr: SimpleNamespace, stage: object, path: str, mesh: MeshBuffers, surface: BakedSurface) -> None:
+    made = pxr.UsdGeom.Mesh.Define(stage, path)
+    made.CreateSubdivisionSchemeAttr(pxr.UsdGeom.Tokens.none)
+    made.CreatePointsAttr(_array(pxr, "Vec3f", mesh.positions))
+    made.CreateFaceVertexCountsAttr(_array(pxr, "Int", np.diff(mesh.face_offsets).astype(np.int32)))
+    made.CreateFaceVertexIndicesAttr(_array(pxr, "Int", mesh.corner_verts))
+    made.CreateDoubleSidedAttr(surface.sided)
+    ends = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
+    made.CreateExtentAttr(_array(pxr, "Vec3f", ends))
+    if mesh.smooth:
+        made.CreateNormalsAttr(_array(pxr, "Vec3f", vertex_normals(mesh)))
+        made.SetNormalsInterpolation(pxr.UsdGeom.Tokens.vertex)
+    primvars, types, tokens = pxr.UsdGeom.PrimvarsAPI(made), pxr.Sdf.ValueTypeNames, pxr.UsdGeom.Tokens
+    uv, color = (mesh.attributes[name][1] for name in ("UVMap", "tf_color"))
+    _add_indexed(pxr, primvars.CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying), "Vec2f", uv)
+    color = np.rint(color * _TONES) / np.float32(_TONES)
+    _add_indexed(pxr, primvars.CreatePrimvar("displayColor", types.Color3fArray, tokens.uniform), "Vec3f", color)
+    material = pxr.UsdShade.Material.Get(stage, _material(surface))
+    pxr.UsdShade.MaterialBindingAPI.Apply(made.GetPrim()).Bind(material)
+
+
+def _add_indexed(pxr: SimpleNamespace, primvar: object, kind: str, values: NDArray) -> None:
+    """Give a primvar its different values, and an index to them: leaves are copies of each other."""
+    same = np.ascontiguousarray(values, np.float32).view([("", np.float32)] * values.shape[1])[:, 0]
+    different, index = np.unique(same, return_inverse=True)
+    primvar.Set(_array(pxr, kind, different.view(np.float32).reshape(-1, values.shape[1])))
+    primvar.SetIndices(_array(pxr, "Int", index.reshape(-1).astype(np.int32)))
+
+
+def _material(surface: BakedSurface) -> str:
+    return f"/Forest/Materials/{surface.name}"
+
+
+def _write_surface(pxr: SimpleNamespace, stage: object, surface: BakedSurface) -> None:
+    types, path = pxr.Sdf.ValueTypeNames, _material(surface)
+    pxr.UsdGeom.Scope.Define(stage, "/Forest/Materials")
+    material = pxr.UsdShade.Material.Define(stage, path)
+    shader = pxr.UsdShade.Shader.Define(stage, f"{path}/Surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("roughness", types.Float).Set(surface.roughness)
+    shader.CreateInput("ior", types.Float).Set(surface.index)
+    shader.CreateInput("diffuseColor", types.Color3f).Set(pxr.Gf.Vec3f(*surface.color))
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+    if not surface.textures:
+        return
+    place = pxr.UsdShade.Shader.Define(stage, f"{path}/Place")
+    place.CreateIdAttr("UsdPrimvarReader_float2")
+    place.CreateInput("varname", types.String).Set("st")
+    for name, file in surface.textures.items():
+        _write_texture(pxr, stage, f"{path}/{name}", name, file, (shader, place))
+
+
+def _write_texture(
+    pxr: SimpleNamespace, stage: object, path: str, name: str, file: str, ends: tuple[object, object]
+) -> None:
+    """A texture between the shaders that use it and that tell its place."""
+    types, (shader, place) = pxr.Sdf.ValueTypeNames, ends
+    image = pxr.UsdShade.Shader.Define(stage, path)
+    image.CreateIdAttr("UsdUVTexture")
+    image.CreateInput("file", types.Asset).Set(f"./{file}")
+    image.CreateInput("wrapS", types.Token).Set("repeat")
+    image.CreateInput("wrapT", types.Token).Set("repeat")
+    image.CreateInput("sourceColorSpace", types.Token).Set("sRGB" if name == "color" else "raw")
+    image.CreateInput("st", types.Float2).ConnectToSource(place.ConnectableAPI(), "result")
+    inputs: Mapping[str, tuple] = {
+        "color": (("diffuseColor", "rgb", types.Color3f), ("opacity", "a", types.Float)),
+        "roughness": (("roughness", "r", types.Float),),
+        "normal": (("normal", "rgb", types.Normal3f),),
+    }
+    if name == "normal":
+        image.CreateInput("scale", types.Float4).Set(pxr.Gf.Vec4f(2.0, 2.0, 2.0, 1.0))
+        image.CreateInput("bias", types.Float4).Set(pxr.Gf.Vec4f(-1.0, -1.0, -1.0, 0.0))
+    if name == "color":  # outlines are cut out, not blended
+        shader.CreateInput("opacityThreshold", types.Float).Set(0.5)
+    for key, output, of in inputs[name]:
+        image.CreateOutput(output, types.Float if len(output) == 1 else types.Float3)
+        shader.CreateInput(key, of).ConnectToSource(image.ConnectableAPI(), output)
+
+
+def read_stands(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
+    """Plants of a file: for each instancer or cloud of points its name, custom data, and attributes of its points.
+
+    Points that TetFlora has not written have the data ``{}``, and attributes in the world: places, and where they are
+    told rotations, scales, and numbers that are named as those of fields.
+
+    Raises
+    ------
+    TetFloraError
+        It is no USD file, or holds no points.
+    """
+    pxr = library()
+    try:
+        stage = pxr.Usd.Stage.Open(str(path))
+    except RuntimeError as error:
+        raise TetFloraError(f"{path.name}: cannot be read: {' '.join(str(error).split())[:200]}") from None
+    number = 0
+    for prim in stage.Traverse():
+        if prim.IsA(pxr.UsdGeom.PointInstancer) or prim.IsA(pxr.UsdGeom.Points):
+            data = dict(prim.GetCustomDataByKey(KEY) or {})
+            points = _own_points(pxr, prim, data) if data else _other_points(pxr, prim)
+            if len(points["position"][1]):
+                number += 1
+                yield str(data.get("name", prim.GetName())), data, points
+    if not number:
+        raise TetFloraError(f"{path.name}: holds no point instancer and no points; export these from the other program")
+
+
+def _own_points(pxr: SimpleNamespace, prim: object, data: dict) -> PointAttributes:
+    primvars, found = pxr.UsdGeom.PrimvarsAPI(prim), {}
+    for name, told in dict(data["attributes"]).items():
+        kind, _, other = str(told).partition(" ")
+        if name == "position" and not other:
+            values = prim.GetAttribute("positions").Get()
+        else:
+            values = primvars.GetPrimvar(other or name).Get()
+        found[name] = kind, _numbers(kind, values)
+    return found
+
+
+def _numbers(kind: str, values: object) -> NDArray:
+    """Values of USD as those of an attribute."""
+    made = np.array(values)
+    return np.ascontiguousarray(np.roll(made, 1, axis=1)) if kind == 'QUATERNION' else made
+
+
+def _other_points(pxr: SimpleNamespace, prim: object) -> PointAttributes:
+    """What a foreign file tells of its points, in the world."""
+    is_instancer = prim.IsA(pxr.UsdGeom.PointInstancer)
+    places = np.array(prim.GetAttribute("positions" if is_instancer else "points").Get() or []).reshape(-1, 3)
+    number = len(places)
+    up = pxr.UsdGeom.GetStageUpAxis(prim.GetStage())
+    world = np.array(pxr.UsdGeom.XformCache().GetLocalToWorldTransform(prim)).T
+    world = world * np.array([pxr.UsdGeom.GetStageMetersPerUnit(prim.GetStage())] * 3 + [1.0])[:, None]
+    if up == pxr.UsdGeom.Tokens.y:
+        world = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]) @ world
+    found = {"position": ('FLOAT_VECTOR', (places @ world[:3, :3].T + world[:3, 3]).astype(np.float32))}
+    primvars = pxr.UsdGeom.PrimvarsAPI(prim)
+    for name, kind in (("seed", 'INT'), ("species", 'INT'), ("age", 'FLOAT'), ("scale", 'FLOAT')):
+        values = primvars.GetPrimvar(name).Get() if primvars.HasPrimvar(name) else None
+        values = None if values is None else np.asarray(values)
+        if values is not None and values.shape == (number,) and values.dtype.kind in "iuf":
+            found[name] = kind, values.astype(np.int32 if kind == 'INT' else np.float32)
+    scales = np.array(prim.GetAttribute("scales").Get() or []) if is_instancer else np.zeros(0)
+    if "scale" not in found and scales.shape == (number, 3):
+        found["scale"] = 'FLOAT', scales.mean(axis=1).astype(np.float32)
+    return found

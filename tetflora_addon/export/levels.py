@@ -1,0 +1,251 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Levels of detail of single plants, by the method that refinement has: leaves are thinned by hashes of their keys.
+
+A level is made for the size that a pixel has at the plant. Leaves that are smaller are fewer and larger, so that their
+area stays, and have the form of kites (`leaves.kites`); wood that is thin is triangles, and of very thin wood fewer
+are wider. Facets hide each other in another way than leaves do, so that the area of each level is corrected by what it
+covers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Integers, Keys, connected, in_axes
+from ..buffers import MeshBuffers, concatenate_buffers
+from ..compiled.flora import Flora
+from ..growth.growth import WholeBranches, leaf_counts, trunks
+from ..growth.hashing import uniform
+from ..growth.seeds import Branches, Seeds
+from ..species.species import LEAF_KINDS
+from ..subplants.leaf_meshes import leaf_meshes
+from ..subplants.pieces import expand
+from ..subplants.tubes import tube_buffers, twig_buffers
+from .views import VIEWS, Grid, PlantView
+
+#: Pixels that a leaf or a twig is long, or wide, where it is not thinned.
+_LONG, _WIDE = 1.7, 1.0
+#: Leaves of the last level, and levels beside the full plant.
+_LAST, _FEWEST, _MOST = 260, 2, 5
+#: Pixels of width from which on wood has four sides, not three.
+_BROAD = 4.0
+#: Pixels to an image's height, and the angle of view over it: where levels take over is told for these.
+PIXELS, ANGLE = 1080, np.radians(40.0)
+#: Cells to a leaf's length in which cover is measured, and the fewest and most along a plant.
+_CELLS, _FEWEST_CELLS, _MOST_CELLS = 2.0, 160, 700
+_ROUNDS = 5
+_CLOSE = 0.005  # of the cover
+_WIDER = 3.0  # times as wide at most is wood that stands for more: beyond that, branches would be sheets
+_KEPT, _TWIG = 241, 242  # draws of this module
+_WHITE = (1.0, 1.0, 1.0)
+#: Polygons of one kind, as ``'bark'`` or ``'leaf'``.
+Parts = tuple[tuple[str, MeshBuffers], ...]
+
+
+@dataclass(frozen=True)
+class PlantLevel:
+    """One level of detail of a plant, in the plant's own space."""
+
+    parts: Parts
+    pixel: float  # meters that a pixel spans at the plant from which on it is enough; 0 of the full plant
+    larger: float = 1.0  # factor on the area of leaves by which they cover what those of the full plant do
+    tint: tuple[float, float, float] = _WHITE  # factors on colors by which the mean is that of the full plant
+    #: How far it is off the full plant: fractions of its cover and of its color, and pixels of its outline.
+    cover: float = 0.0
+    color: float = 0.0
+    outline: float = 0.0
+
+    @property
+    def polygons(self) -> int:
+        """Number of faces."""
+        return sum(mesh.polygons for _, mesh in self.parts)
+
+    @property
+    def distance(self) -> float:
+        """Meters from which on it is enough, for an image as of `PIXELS`."""
+        return self.pixel * PIXELS / (2.0 * np.tan(ANGLE / 2.0))
+
+    def screen_size(self, height: float) -> float:
+        """Part of the image's height that a plant of a height has from there on, as Unity and Unreal count."""
+        return 1.0 if self.pixel == 0.0 else min(height / (self.pixel * PIXELS), 1.0)
+
+
+def levels_of(flora: Flora, seed: Seeds, number: int = 0, like: tuple[PlantLevel, ...] = ()) -> tuple[PlantLevel, ...]:
+    """The levels of a plant of scale 1, the full one first.
+
+    Parameters
+    ----------
+    flora : Flora
+    seed : Seeds of 1
+    number : int
+        Levels, with the full one; 0 for as many as suit the plant, three to six.
+    like : tuple of PlantLevel, optional
+        Levels of another plant of the same kind, whose sizes of pixels hold, and whose second level is as much larger;
+        all is measured if there are none.
+    """
+    grown = list(expand(flora, trunks(flora.rows, replace(seed, scale=np.ones(1), position=np.zeros((1, 3))))))
+    back = seed.frame[0].astype(np.float32)
+    full = PlantLevel(_parts(flora, grown, back), 0.0)
+    if len(like) > 1:
+        # Of many leaves, corrections are those of all plants of the kind; few are seen beside the level of many.
+        near = replace(like[1], parts=_changed(_parts(flora, grown, back, like[1].pixel), like[1].larger, like[1].tint))
+        grids = _grids(near, like[1].pixel * _LONG, like[-1].pixel)
+        truth = _views(grids, near.parts)
+        rest = (_corrected(flora, grown, back, one.pixel, grids, truth, np.log(one.larger)) for one in like[2:])
+        return (full, near, *rest)
+    leaf, count = _leaves(flora, grown)
+    first, last = leaf / _LONG, leaf / _LONG * np.sqrt(max(count / _LAST, 4.0))
+    steps = number - 1 if number else int(np.clip(round(np.log2(last / first)), _FEWEST, _MOST))
+    pixels = first * (last / first) ** (np.arange(1, steps + 1) / max(steps, 1))
+    grids = _grids(full, leaf, pixels[-1] if steps else leaf)
+    truth = _views(grids, full.parts)
+    return (full, *(_corrected(flora, grown, back, pixel, grids, truth) for pixel in pixels.tolist()))
+
+
+def differences(levels: Sequence[PlantLevel]) -> tuple[PlantLevel, ...]:
+    """Levels of a plant with how far each is off the first one, seen anew."""
+    full, *rest = levels
+    points = np.concatenate([mesh.positions for _, mesh in full.parts])
+    margin = 2.0 * max((level.pixel for level in rest), default=1.0)
+    found = [full]
+    cell = float(np.ptp(points, axis=0).max()) / _MOST_CELLS
+    grids = [Grid.around(toward, cell, points, margin) for toward in VIEWS]
+    truth = _views(grids, full.parts)
+    for level in rest:
+        seen = _views(grids, level.parts)
+        cover = sum(view.cover for view in seen) / sum(view.cover for view in truth) - 1.0
+        color = float(np.abs(_mean_color(seen) / _mean_color(truth) - 1.0).max())
+        found.append(replace(level, cover=cover, color=color, outline=_outlines(seen, truth, grids, level.pixel)))
+    return tuple(found)
+
+
+def _leaves(flora: Flora, grown: list[WholeBranches]) -> tuple[float, float]:
+    """Mean length of the leaves of a plant, weighted by area, and their number; of its thinnest wood without any."""
+    sums = np.zeros(3)
+    for whole in grown:
+        count = leaf_counts(flora.rows, whole.branches)
+        size = flora.leaf_reach[whole.branches.row] * whole.branches.scale
+        sums += [(count * size**3).sum(), (count * size**2).sum(), count.sum()]
+    if sums[1] > 0.0:
+        return float(sums[0] / sums[1]), float(sums[2])
+    wood = np.concatenate([whole.branches.length for whole in grown])
+    return float(np.median(wood)), float(len(wood))
+
+
+def _grids(full: PlantLevel, leaf: float, margin: float) -> list[Grid]:
+    points = np.concatenate([mesh.positions for _, mesh in full.parts])
+    extent = float(np.ptp(points, axis=0).max())
+    cell = float(np.clip(leaf / _CELLS, extent / _MOST_CELLS, extent / _FEWEST_CELLS))
+    return [Grid.around(toward, cell, points, 2.0 * margin) for toward in VIEWS]
+
+
+def _corrected(
+    flora: Flora,
+    grown: list[WholeBranches],
+    back: Floats,
+    pixel: float,
+    grids: list[Grid],
+    truth: list[PlantView],
+    size: float = 0.0,
+) -> PlantLevel:
+    """A level whose leaves are so much larger that it covers as much as the full plant on average over views, and whose
+    colors are so much brighter that what is seen of it has the same mean. It begins with a size, the logarithm of area.
+    """
+    wanted, tried = sum(view.cover for view in truth), []
+    plain = _parts(flora, grown, back, pixel)
+    for _ in range(_ROUNDS):
+        seen = _views(grids, _changed(plain, float(np.exp(size))))
+        off = np.log(max(sum(view.cover for view in seen), 1) / wanted)
+        tried.append((abs(off), size, off, seen))
+        if abs(off) < _CLOSE:
+            break
+        # By secants of logarithms; at first, cover follows area a little less than in proportion.
+        slope = 0.6 if len(tried) < 2 else (off - tried[-2][2]) / ((size - tried[-2][1]) or 1.0)
+        size = float(np.clip(size - off / np.clip(slope, 0.2, 1.2), -1.5, 1.5))
+    off, size, _, seen = min(tried, key=lambda one: one[0])
+    larger, tint = float(np.exp(size)), tuple((_mean_color(truth) / np.maximum(_mean_color(seen), 1e-9)).tolist())
+    parts = _changed(plain, larger, tint)
+    color = _mean_color(_views(grids, parts)) / _mean_color(truth)
+    outline = _outlines(seen, truth, grids, pixel)
+    return PlantLevel(parts, pixel, larger, tint, float(np.expm1(off)), float(np.abs(color - 1.0).max()), outline)
+
+
+def _changed(parts: Parts, larger: float, tint: tuple[float, float, float] = _WHITE) -> Parts:
+    """Parts with leaves of so many times the area, each about its first vertex, and factors on all colors."""
+    made = []
+    for kind, mesh in parts:
+        positions, color = mesh.positions, mesh.attributes["tf_color"][1]
+        if kind != "bark":
+            base = positions[connected(len(positions), *mesh.edge_verts.T)]
+            positions = base + np.float32(np.sqrt(larger)) * (positions - base)
+        color = np.clip(color * np.array(tint, np.float32), 0.0, 1.0)
+        attributes = {**mesh.attributes, "tf_color": ("FACE", color)}
+        made.append((kind, replace(mesh, positions=positions, attributes=attributes)))
+    return tuple(made)
+
+
+def _views(grids: list[Grid], parts: Parts) -> list[PlantView]:
+    return [grid.view([mesh for _, mesh in parts]) for grid in grids]
+
+
+def _mean_color(views: list[PlantView]) -> Floats:
+    """Mean color (3,) of what is covered in views."""
+    return np.average([view.color for view in views], axis=0, weights=[max(view.cover, 1) for view in views])
+
+
+def _outlines(seen: list[PlantView], truth: list[PlantView], grids: list[Grid], pixel: float) -> float:
+    """How far outlines are off on average, in pixels."""
+    pairs = zip(seen, truth, grids, strict=True)
+    return float(np.mean([one.outline_off(other) * grid.cell / pixel for one, other, grid in pairs]))
+
+
+def _parts(flora: Flora, grown: list[WholeBranches], back: Floats, pixel: float = 0.0) -> Parts:
+    """Polygons of a plant as they are enough for a size of pixels, turned back into its own space."""
+    found, made = [*_leaf_parts(flora, grown, pixel), *_wood_parts(flora, grown, pixel)], []
+    for kind in dict.fromkeys(kind for kind, _ in found):
+        mesh = concatenate_buffers([mesh for name, mesh in found if name == kind])
+        if mesh is not None:
+            made.append((kind, replace(mesh, positions=in_axes(mesh.positions, back.T))))
+    return tuple(made)
+
+
+def _leaf_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Iterator[tuple[str, MeshBuffers]]:
+    def fractions(branches: Branches) -> tuple[Floats, Floats]:
+        one = np.ones(len(branches))
+        return one, one
+
+    def thin(key: Keys, _place: Floats, _off: Floats, reach: Floats) -> tuple[Integers, Floats]:
+        part = np.clip((reach / (_LONG * pixel)) ** 2, 0.0, 1.0)
+        kept = np.flatnonzero(uniform(key, _KEPT) < part)
+        return kept, 1.0 / part[kept]
+
+    given = (fractions, None, thin) if pixel else ()
+    for mesh in leaf_meshes(flora, 0, grown, *given):
+        yield LEAF_KINDS[mesh.kind], mesh.buffers
+
+
+def _wood_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Iterator[tuple[str, MeshBuffers]]:
+    for whole in grown:
+        if not pixel:
+            made = [tube_buffers(flora, [whole])]
+        else:
+            branches = whole.branches
+            wide = 2.0 * branches.radius / pixel
+            slender, broad = ((wide >= low) & (wide < high) for low, high in ((_WIDE, _BROAD), (_BROAD, np.inf)))
+            made = [
+                tube_buffers(flora, [whole.take(np.flatnonzero(some))], None, sides)
+                for some, sides in ((slender, 3), (broad, 4))
+            ]
+            likely = np.clip(np.pi * branches.radius * branches.length / (_LONG * pixel) ** 2, 1e-4, 1.0)
+            some = np.flatnonzero((wide < _WIDE) & (uniform(branches.key, _TWIG) < likely))
+            if len(some):
+                made.append(
+                    twig_buffers(
+                        flora, whole.take(some), np.minimum(1.0 / likely[some], _WIDER), np.ones(len(some), np.int64)
+                    )
+                )
+        yield from (("bark", mesh) for mesh in made if mesh is not None)
