@@ -40,8 +40,8 @@ class Hand:
         self.ui.press(key)
         yield 0.5
 
-    def click(self, said, kind='UI', place=None, above=0, **keys):
-        """Find a button by what Blender copies of it, and click it, or what is some pixels above it."""
+    def find(self, said, kind='UI', place=None, **keys):
+        """Move to a button, found by what Blender copies of it."""
         manager, seen = bpy.context.window_manager, set()
         for x, y in self._places(kind) if place is None else place:
             manager.clipboard = ""
@@ -51,10 +51,13 @@ class Hand:
             yield 0.03
             seen.add(manager.clipboard)
             if said in manager.clipboard:
-                break
-        else:
-            yield from self.ui.picture("not_found")
-            raise LookupError(f"there is no button for {said} among {sorted(seen)}")
+                return x, y
+        yield from self.ui.picture("not_found")
+        raise LookupError(f"there is no button for {said} among {sorted(seen)}")
+
+    def click(self, said, kind='UI', place=None, above=0, **keys):
+        """Find a button and click it, or what is some pixels above it."""
+        x, y = yield from self.find(said, kind, place, **keys)
         self.ui.move(x, y + above)
         yield 0.1
         self.clicks += 1
