@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Collection
 from urllib.parse import unquote
 
-from . import prose
+from . import prose, result_tables
 from .house import ROOT, files
 
 README, MANUAL = "README.md", "docs/manual"
@@ -99,7 +99,8 @@ def problems() -> list[str]:
     for begin, most in MOST_WORDS.items():
         if (count := length(pages, begin)) > most:
             found.append(f"{begin}: {count:,} words; {most:,} is the most")
-    return found + [line for name, text in pages.items() for line in prose.problems(name, text)]
+    found += [line for name, text in pages.items() for line in prose.problems(name, text)]
+    return found + result_tables.problems()
 
 
 def length(pages: dict[str, str], begin: str) -> int:

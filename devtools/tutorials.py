@@ -26,7 +26,7 @@ WIDTH = 960
 #: Picture of the manual, and the renders that it shows side by side, by their names.
 PICTURES = {
     "own-ground": ("own_ground",),
-    "biome": ("biome",),
+    "biome": ("biome", "biome_autumn"),
     "grown-forest": ("grown_forest_20", "grown_forest_100"),
     "real-place": ("real_place",),
     "own-trees": ("own_trees",),

@@ -21,7 +21,7 @@ from click_steps import Hand
 
 #: Width of the renders; height and samples follow. The pictures of the manual are larger than a test needs.
 WIDTH = int(os.environ.get("TETFLORA_TUTORIAL_WIDTH", "160"))
-SAMPLES = 4 if WIDTH < 400 else 48
+SAMPLES = 4 if WIDTH < 400 else 32
 
 
 def steps(ui):
@@ -99,6 +99,19 @@ class Writer(Hand):
         bpy.context.view_layer.objects.active = objects[-1]
         yield 0.5
 
+    def across(self, *pixels):
+        """Places from top to bottom, by pixels from the right edge of the sidebar."""
+        return self._places('UI', pixels)
+
+    def scroll(self, steps):
+        """Turn the wheel over the sidebar."""
+        self.ui.move(*self.ui.center('UI'))
+        yield 0.3
+        for _ in range(steps):
+            self.ui.press('WHEELDOWNMOUSE')
+            yield 0.1
+        yield 0.5
+
     def look_by_daylight(self):
         """The two buttons below Refine."""
         yield from self.click("ops.tetflora.daylight(")
@@ -112,8 +125,7 @@ class Writer(Hand):
         scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = 'CYCLES', SAMPLES, SAMPLES > 4
         scene.render.resolution_x, scene.render.resolution_y = WIDTH, WIDTH * 9 // 16
         scene.render.resolution_percentage = 100
-        if WIDTH < 400:
-            scene.tetflora.quality = 'DRAFT'
+        scene.tetflora.quality = 'DRAFT' if WIDTH < 400 else 'PREVIEW'  # the machine is slow; an artist would wait
         bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
         self.ui.move(*self.ui.center())
         yield from self.key('F12')
@@ -156,19 +168,33 @@ def own_ground(writer, found):
 
 
 def biome(writer, found):
-    """Two biomes on one ground."""
+    """A biome with more birches and without junipers, in summer and in autumn."""
     yield from writer.delete_all()
-    yield from writer.grid(100.0, 4.0)
-    yield from writer.add_layer("add_biome(biome='meadow'")
-    ground = bpy.context.scene.tetflora.layers[0].grounds[0].object
-    yield from writer.select(ground)
-    yield from writer.add_layer("add_biome(biome='birch_pine'")
-    yield from writer.enter("wetness_range[0]", 0.0) if False else iter(())
+    with writer.ui.override():
+        bpy.ops.tetflora.add_biome('INVOKE_DEFAULT', biome="birch_pine")  # the entry of the Add menu
+    yield from writer.done()
+    layers = bpy.context.scene.tetflora.layers
+    before = {layer.name: layer.made for layer in layers}
+    yield from writer.click("Birches")
+    index = next(n for n, layer in enumerate(layers) if layer.name == "Birches")
+    found["active"] = layers[bpy.context.scene.tetflora.layers_index].name
+    yield from writer.enter(f"layers[{index}].density", 2.0 * layers[index].density)
+    yield from writer.click("ops.tetflora.update_layers(")
+    yield from writer.done()
+    layers = bpy.context.scene.tetflora.layers
+    found["birches"] = [before["Birches"], layers[index].made]
+    index = next(n for n, layer in enumerate(layers) if layer.name == "Junipers")
+    yield from writer.click(f"layers[{index}].shown", place=writer.across(-90, -94), shift=True)
+    found["shown"] = layers[index].shown
     yield from writer.view((0.0, -20.0, 2.0), 20.0, 20.0, 60.0)
     yield from writer.look_by_daylight()
     yield from writer.window()
-    found["layers"] = [(layer.kind, layer.name, layer.made) for layer in bpy.context.scene.tetflora.layers]
-    found["green"] = yield from writer.picture()
+    found["green"] = [(yield from writer.picture())]
+    yield from writer.scroll(10)
+    yield from writer.click("tetflora.year.season", shift=True)
+    yield from writer.key('A')
+    found["season"] = bpy.context.scene.tetflora.year.season
+    found["green"].append((yield from writer.picture("biome_autumn")))
 
 
 def grown_forest(writer, found):
@@ -220,22 +246,40 @@ def own_trees(writer, found):
     tree = model()
     yield from writer.select(tree)
     yield from writer.click("ops.tetflora.use_as_species(", 'PROPERTIES')
-    found["species"] = len(bpy.context.scene.tetflora.asset_species)
     tree.hide_render = True
+    tree.hide_set(True)
     yield from writer.grid(60.0, 1.0)
-    ground = bpy.context.active_object
     yield from writer.add_layer("populate(")
-    yield from writer.done()
-    yield from writer.click("ops.tetflora.edit_list(", place=writer.beside_lists(), above=20)
+    x, y = yield from writer.click("ops.tetflora.edit_list(", place=writer.beside_lists(), above=20)
     yield 1.5
     yield from writer.ui.picture("own_trees_gallery")
-    writer.ui.press('ESC')
+    writer.ui.move(x - 682, y + 89)  # the last picture, after those of the catalog
+    yield 0.3
+    writer.ui.press('LEFTMOUSE')
+    yield 0.5
+    yield from writer.click("Beech")
+    yield from writer.click("ops.tetflora.edit_list(", place=writer.beside_lists())
+    yield from writer.click("ops.tetflora.update_layers(")
+    yield from writer.done()
     layer = bpy.context.scene.tetflora.layers[0]
-    entry = layer.mix[0] if len(layer.mix) else layer.mix.add()
-    entry.species = bpy.context.scene.tetflora.asset_species[0].name if False else entry.species
     found["mix"] = [one.species for one in layer.mix]
-    found["ground"] = ground.name
+    found["plants"] = layer.made
+    with writer.ui.override():
+        bpy.ops.curve.primitive_bezier_curve_add()
+    curve = bpy.context.active_object
+    points = curve.data.splines[0].bezier_points
+    for point, place in zip(points, ((0.0, 0.0, 0.0), (1.5, 0.5, 8.0)), strict=True):
+        point.co = place
+        point.handle_left = (place[0] - 1.0, place[1], place[2] - 2.5)
+        point.handle_right = (place[0] + 1.0, place[1], place[2] + 2.5)
+    curve.location = (0.0, -14.0, 0.0)
+    yield 1.0
+    yield from writer.click("ops.tetflora.use_as_skeleton(", 'PROPERTIES')
+    found["drawn"] = sum(obj.tetflora.skeleton is not None for obj in bpy.context.scene.objects)
+    yield from writer.view((0.0, -14.0, 2.0), 10.0, 20.0, 30.0)
+    yield from writer.look_by_daylight()
     yield from writer.window()
+    found["green"] = yield from writer.picture()
 
 
 def film(writer, found):
