@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Goes through the manual's tutorials in the real window: ``BLENDER=/path/to/blender python -m devtools.tutorials``.
 
-Names of tutorials choose some: ``own_ground biome grown_forest real_place own_trees film``. The renders become
-docs/images/tutorial-NAME.jpg; pictures of the window stay in ``--out``. The steps are tests/window/tutorial_steps.py.
+Names of tutorials choose some: ``own_ground biome grown_forest real_place own_trees film``. The files that they lead to
+are rendered as docs/images/tutorial-NAME.jpg; pictures of the window stay in ``--out``. ``--pictures`` only renders
+files of an earlier run. The steps are tests/window/tutorial_steps.py.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from pathlib import Path
 
 from examples import place
 
-from . import build, window
+from . import build, session, window
 
 STEPS = build.ROOT / "tests" / "window" / "tutorial_steps.py"
 IMAGES = build.ROOT / "docs" / "images"
-WIDTH = 960
+SIZE, SAMPLES = (720, 405), 32
 #: Picture of the manual, and the renders that it shows side by side, by their names.
 PICTURES = {
     "own-ground": ("own_ground",),
@@ -34,7 +35,7 @@ PICTURES = {
 }
 
 
-def run(blender: str, out: Path, home: Path, seconds: float, names: str = "", width: int = WIDTH) -> dict:
+def run(blender: str, out: Path, home: Path, seconds: float, names: str = "") -> dict:
     """Go through tutorials in a window.
 
     Parameters
@@ -49,8 +50,6 @@ def run(blender: str, out: Path, home: Path, seconds: float, names: str = "", wi
         After which Blender is ended.
     names : str, optional
         Tutorials, with commas; all by default.
-    width : int, optional
-        Of the renders, pixels.
 
     Returns
     -------
@@ -59,7 +58,7 @@ def run(blender: str, out: Path, home: Path, seconds: float, names: str = "", wi
     """
     (out / "place").mkdir(parents=True, exist_ok=True)
     place.write(out / "place")
-    os.environ.update(TETFLORA_TUTORIALS=names, TETFLORA_TUTORIAL_WIDTH=str(width))
+    os.environ["TETFLORA_TUTORIALS"] = names
     return window.run_in_window(blender, STEPS, out, seconds, home)
 
 
@@ -74,29 +73,57 @@ def install(blender: str, folder: Path) -> Path:
     return home
 
 
+def render(path: Path) -> None:
+    """Render a file that a tutorial leads to, as a picture beside it."""
+    session.start()
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    scene = bpy.context.scene
+    scene.tetflora.quality = 'PREVIEW'
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
+    scene.render.filepath = str(path.with_suffix(".png"))
+    bpy.ops.render.render(write_still=True)
+
+
+def store(out: Path, name: str, parts: tuple[str, ...]) -> None:
+    """Render the files of a tutorial, if all are there, and store them side by side."""
+    files = [out / f"{part}.blend" for part in parts]
+    if not all(path.exists() for path in files):
+        return
+    for path in files:
+        subprocess.run([sys.executable, "-m", "devtools.tutorials", "--render", str(path)], check=True, cwd=build.ROOT)
+    pictures = [str(path.with_suffix(".png")) for path in files]
+    command = ["montage", *pictures, "-geometry", "+2+2", "-tile", "2x" if len(parts) > 1 else "1x"]
+    subprocess.run([*command, "-strip", "-quality", "84", str(IMAGES / f"tutorial-{name}.jpg")], check=True)
+
+
 def main() -> int:
     """Go through them, and store the pictures of those that are complete; 1 if a step failed."""
     parser = argparse.ArgumentParser(prog="devtools.tutorials", description=__doc__.partition("\n")[0])
     parser.add_argument("names", nargs="*", help="tutorials; all by default")
     parser.add_argument("--out", type=Path, default=build.ROOT / "out" / "tutorials", help="folder of all pictures")
+    parser.add_argument("--pictures", action="store_true", help="only render what an earlier run has left there")
+    parser.add_argument("--render", type=Path, help=argparse.SUPPRESS)
     given = parser.parse_args()
-    blender = os.environ.get("BLENDER")
-    if not blender:
-        print("Set BLENDER=/path/to/blender: tutorials need the window of a full Blender.", file=sys.stderr)
-        return 1
-    with tempfile.TemporaryDirectory(prefix="tetflora-tutorials-") as folder:
-        home = install(blender, Path(folder))
-        result = run(blender, given.out, home, 3600.0, ",".join(given.names))
-    print(json.dumps(result["values"], indent=1))
+    if given.render is not None:
+        render(given.render)
+        return 0
+    result: dict = {"ok": True}
+    if not given.pictures:
+        blender = os.environ.get("BLENDER")
+        if not blender:
+            print("Tutorials are left as they are: set BLENDER=/path/to/blender to go through them.")
+            return 0
+        with tempfile.TemporaryDirectory(prefix="tetflora-tutorials-") as folder:
+            result = run(blender, given.out, install(blender, Path(folder)), 3600.0, ",".join(given.names))
+        print(json.dumps(result["values"], indent=1))
     if not result["ok"]:
         print(result["error"], file=sys.stderr)
-    for name, parts in PICTURES.items():
-        renders = [given.out / f"{part}_render.png" for part in parts]
-        if all(path.exists() for path in renders):
-            half = ("-resize", "50%") if len(parts) > 1 else ()
-            command = ["montage", *map(str, renders), "-geometry", "+2+2", "-tile", "2x" if len(parts) > 1 else "1x"]
-            target = IMAGES / f"tutorial-{name}.jpg"
-            subprocess.run([*command, *half, "-strip", "-quality", "84", str(target)], check=True)
+    chosen = {name.replace("_", "-") for name in given.names} or set(PICTURES)
+    for name in chosen & set(PICTURES):
+        store(given.out, name, PICTURES[name])
     return 0 if result["ok"] else 1
 
 

@@ -97,25 +97,30 @@ class Hand:
 
     def render(self, found):
         """F12, small so that it is soon done; how much of the picture is not one color."""
-        scene, done = bpy.context.scene, []
+        scene = bpy.context.scene
         scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = 'CYCLES', 1, False
         scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 160, 90, 100
+        found["green"] = yield from self.shoot(f"render_{len(self.ui.values)}", 600)
+
+    def shoot(self, name, seconds):
+        """F12 and Esc; a picture of that name, and how much of it is green."""
+        done = []
         bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
         self.ui.move(*self.ui.center())
         yield from self.key('F12')
-        yield from self.ui.until(lambda: done, 600, "render")
+        yield from self.ui.until(lambda: done, seconds, "render")
         yield 1.0
         bpy.app.handlers.render_complete.clear()
-        path = str(self.ui.out_dir / f"render_{len(self.ui.values)}.png")
+        path = str(self.ui.out_dir / f"{name}.png")
         bpy.data.images["Render Result"].save_render(path)
         image = bpy.data.images.load(path)
         pixels = np.zeros(len(image.pixels), dtype=np.float32)
         image.pixels.foreach_get(pixels)
         bpy.data.images.remove(image)
-        red, green, blue, _ = pixels.reshape(-1, 4).T
-        found["green"] = float(((green > 1.05 * red) & (green > 1.05 * blue)).mean())
         self.ui.press('ESC')
         yield 1.0
+        red, green, blue, _ = pixels.reshape(-1, 4).T
+        return float(((green > 1.05 * red) & (green > 1.05 * blue)).mean())
 
     def _places(self, kind, across=()):
         area = next(a for a in self.ui.window.screen.areas if a.type == ('VIEW_3D' if kind == 'UI' else kind))
