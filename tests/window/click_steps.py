@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).resolve().parent))
 
 from forest_steps import build_ground
 
-STEP = 12  # pixels between two looks for a button
+STEP = 17  # pixels between two looks for a button, which is 20 high
 
 
 def steps(ui):
@@ -33,6 +33,7 @@ class Hand:
 
     def __init__(self, ui):
         self.ui, self.clicks = ui, 0
+        self._seen = {}  # where something was, by what Blender copied of it
 
     def key(self, key):
         """Press a key where the mouse is."""
@@ -43,14 +44,18 @@ class Hand:
     def find(self, said, kind='UI', place=None, **keys):
         """Move to a button, found by what Blender copies of it."""
         manager, seen = bpy.context.window_manager, set()
-        for x, y in self._places(kind) if place is None else place:
+        places = self._places(kind) if place is None else place
+        before = [at for text, at in self._seen.items() if said in text] if place is None else []
+        for x, y in (*before, *places):
             manager.clipboard = ""
             self.ui.move(x, y)
             yield 0.03
             self.ui.press('C', ctrl=True, **keys)
             yield 0.03
-            seen.add(manager.clipboard)
-            if said in manager.clipboard:
+            text = manager.clipboard
+            seen.add(text)
+            self._seen[text] = x, y
+            if said in text:
                 return x, y
         yield from self.ui.picture("not_found")
         raise LookupError(f"there is no button for {said} among {sorted(seen)}")
