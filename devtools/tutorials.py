@@ -3,8 +3,8 @@
 """Goes through the manual's tutorials in the real window: ``BLENDER=/path/to/blender python -m devtools.tutorials``.
 
 Names of tutorials choose some: ``own_ground biome grown_forest real_place own_trees film``. The files that they lead to
-are rendered as docs/images/tutorial-NAME.jpg; pictures of the window stay in ``--out``. ``--pictures`` only renders
-files of an earlier run. The steps are tests/window/tutorial_steps.py.
+are rendered as docs/images/tutorial-NAME.jpg; pictures of the window stay in ``--out``. ``--no-mouse`` is fast,
+``--pictures`` only renders files of an earlier run. The steps are tests/window/tutorial_steps.py.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from . import build, session, window
 
 STEPS = build.ROOT / "tests" / "window" / "tutorial_steps.py"
 IMAGES = build.ROOT / "docs" / "images"
-SIZE, SAMPLES = (720, 405), 32
+SIZE, SAMPLES = (640, 360), 24
 #: Picture of the manual, and the renders that it shows side by side, by their names.
 PICTURES = {
     "own-ground": ("own_ground",),
@@ -35,7 +35,7 @@ PICTURES = {
 }
 
 
-def run(blender: str, out: Path, home: Path, seconds: float, names: str = "") -> dict:
+def run(blender: str, out: Path, home: Path, seconds: float, names: str = "", mouse: bool = True) -> dict:
     """Go through tutorials in a window.
 
     Parameters
@@ -50,6 +50,8 @@ def run(blender: str, out: Path, home: Path, seconds: float, names: str = "") ->
         After which Blender is ended.
     names : str, optional
         Tutorials, with commas; all by default.
+    mouse : bool, optional
+        Whether buttons are clicked, instead of calling what they call.
 
     Returns
     -------
@@ -58,7 +60,7 @@ def run(blender: str, out: Path, home: Path, seconds: float, names: str = "") ->
     """
     (out / "place").mkdir(parents=True, exist_ok=True)
     place.write(out / "place")
-    os.environ["TETFLORA_TUTORIALS"] = names
+    os.environ.update(TETFLORA_TUTORIALS=names, TETFLORA_NO_MOUSE="" if mouse else "1")
     return window.run_in_window(blender, STEPS, out, seconds, home)
 
 
@@ -104,6 +106,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="devtools.tutorials", description=__doc__.partition("\n")[0])
     parser.add_argument("names", nargs="*", help="tutorials; all by default")
     parser.add_argument("--out", type=Path, default=build.ROOT / "out" / "tutorials", help="folder of all pictures")
+    parser.add_argument("--no-mouse", action="store_true", help="call what buttons call: a tenth of the time")
     parser.add_argument("--pictures", action="store_true", help="only render what an earlier run has left there")
     parser.add_argument("--render", type=Path, help=argparse.SUPPRESS)
     given = parser.parse_args()
@@ -117,7 +120,8 @@ def main() -> int:
             print("Tutorials are left as they are: set BLENDER=/path/to/blender to go through them.")
             return 0
         with tempfile.TemporaryDirectory(prefix="tetflora-tutorials-") as folder:
-            result = run(blender, given.out, install(blender, Path(folder)), 3600.0, ",".join(given.names))
+            home, names = install(blender, Path(folder)), ",".join(given.names)
+            result = run(blender, given.out, home, 3600.0, names, not given.no_mouse)
         print(json.dumps(result["values"], indent=1))
     if not result["ok"]:
         print(result["error"], file=sys.stderr)

@@ -26,10 +26,10 @@ def test_three_species_with_cover_grow_on_own_ground(seen: dict) -> None:
     assert found["green"] > 0.1
 
 
-def test_a_biome_gets_more_birches_no_junipers_and_autumn(seen: dict) -> None:
+def test_a_biome_gets_fewer_birches_no_junipers_and_autumn(seen: dict) -> None:
     found = seen["biome"]
     before, after = found["birches"]
-    assert found["active"] == "Birches" and after > 1.3 * before
+    assert found["active"] == "Birches" and after < 0.7 * before
     assert not found["shown"]
     assert found["season"] == 'AUTUMN'
     assert found["green"][0] > 0.1
