@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Goes through the manual's tutorials in the real window: ``BLENDER=/path/to/blender python -m devtools.tutorials``.
 
-Names of tutorials choose some: ``own_ground biome grown_forest real_place own_trees film``. The files that they lead to
-are rendered as docs/images/tutorial-NAME.jpg; pictures of the window stay in ``--out``. ``--no-mouse`` is fast,
-``--pictures`` only renders files of an earlier run. The steps are tests/window/tutorial_steps.py.
+Names of tutorials choose some: ``own_ground biome grown_forest real_place own_trees film``. Files that they lead to
+are rendered, or the window is shown, as docs/images/tutorial-NAME.jpg; the rest stays in ``--out``. ``--no-mouse`` is
+fast, ``--pictures`` only renders files of an earlier run. The steps are tests/window/tutorial_steps.py.
 """
 
 from __future__ import annotations
@@ -23,15 +23,12 @@ from . import build, session, window
 
 STEPS = build.ROOT / "tests" / "window" / "tutorial_steps.py"
 IMAGES = build.ROOT / "docs" / "images"
-SIZE, SAMPLES = (640, 360), 24
-#: Picture of the manual, and the renders that it shows side by side, by their names.
+SIZE, SAMPLES = (512, 288), 16
+#: Picture of the manual, and the renders that it shows side by side, by their names; of those not here, the window.
 PICTURES = {
-    "own-ground": ("own_ground",),
-    "biome": ("biome", "biome_autumn"),
-    "grown-forest": ("grown_forest_20", "grown_forest_100"),
-    "real-place": ("real_place",),
+    "grown-forest": ("grown_forest_100",),
     "own-trees": ("own_trees",),
-    "film": ("film_4", "film_25", "film_40", "film_60"),
+    "film": ("film_4",),
 }
 
 
@@ -84,6 +81,7 @@ def render(path: Path) -> None:
     scene = bpy.context.scene
     scene.tetflora.quality = 'PREVIEW'
     scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.render.resolution_percentage = 100
     scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
     scene.render.filepath = str(path.with_suffix(".png"))
     bpy.ops.render.render(write_still=True)
@@ -97,7 +95,7 @@ def store(out: Path, name: str, parts: tuple[str, ...]) -> None:
     for path in files:
         subprocess.run([sys.executable, "-m", "devtools.tutorials", "--render", str(path)], check=True, cwd=build.ROOT)
     pictures = [str(path.with_suffix(".png")) for path in files]
-    command = ["montage", *pictures, "-geometry", "+2+2", "-tile", "2x" if len(parts) > 1 else "1x"]
+    command = ["montage", *pictures, "-geometry", f"{SIZE[0]}x{SIZE[1]}+2+2", "-tile", "2x" if len(parts) > 1 else "1x"]
     subprocess.run([*command, "-strip", "-quality", "84", str(IMAGES / f"tutorial-{name}.jpg")], check=True)
 
 
@@ -125,6 +123,12 @@ def main() -> int:
         print(json.dumps(result["values"], indent=1))
     if not result["ok"]:
         print(result["error"], file=sys.stderr)
+    for name in ("own_ground", "biome"):
+        if (seen := given.out / f"{name}_window.png").exists():
+            target = IMAGES / f"tutorial-{name.replace('_', '-')}.jpg"
+            subprocess.run(
+                ["convert", str(seen), "-resize", "1280x", "-strip", "-quality", "84", str(target)], check=True
+            )
     chosen = {name.replace("_", "-") for name in given.names} or set(PICTURES)
     for name in chosen & set(PICTURES):
         store(given.out, name, PICTURES[name])
