@@ -123,7 +123,7 @@ def main() -> int:
         print(json.dumps(result["values"], indent=1))
     if not result["ok"]:
         print(result["error"], file=sys.stderr)
-    for name in ("own_ground", "biome"):
+    for name in ("own_ground", "biome", "real_place"):
         if (seen := given.out / f"{name}_window.png").exists():
             target = IMAGES / f"tutorial-{name.replace('_', '-')}.jpg"
             subprocess.run(
