@@ -24,10 +24,10 @@ help:
 	@echo 'make test         all tests that need no full Blender, on bpy'
 	@echo 'make quick        the tests that took little time when they were last run, in about a minute'
 	@echo 'make test-lts     tests of what depends on the version of Blender, on Blender 4.5 LTS'
-	@echo 'make lint         style, the rules of the house, links of documents, and near-copies'
+	@echo 'make lint         style, the rules of the house and of documents, and near-copies'
 	@echo 'make build        the extension for Blender: dist/tetflora-VERSION.zip'
 	@echo 'make bench        benchmarks against their targets'
-	@echo 'make docs-images  the pictures of the documentation, made anew'
+	@echo 'make docs-images  the pictures of the documentation, made anew; goes on where it was stopped'
 	@echo 'make clean        removes environments and everything that was made'
 	@echo
 	@echo 'PYTHON=/path/to/python3.13 chooses the Python; otherwise 3.13 or 3.11 is looked for in PATH and pyenv.'
@@ -110,6 +110,7 @@ bench: environment
 docs-images: environment
 	$(PY) -m examples.docs_images
 	$(PY) -m devtools.window_pictures
+	$(PY) -m devtools.tutorials
 
 clean:
 	rm -rf $(VENV) $(LTS_VENV) out dist .pytest_cache .ruff_cache .hypothesis

@@ -52,7 +52,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> dict[str, float] | None:
-    """Measure; see the table in ``docs/results.md`` for what the figures mean."""
+    """Measure; see the table in ``docs/measurements.md`` for what the figures mean."""
     if given.alone:
         print(json.dumps(frame_alone(given.alone)), flush=True)
         return None

@@ -30,7 +30,7 @@ QUICK_TARGETS = TARGETS
 
 
 def run(quick: bool) -> dict[str, float]:
-    """Attack; see ``docs/results.md`` for what the figures mean."""
+    """Attack; see ``docs/measurements.md`` for what the figures mean."""
     part = QUICK if quick else 1.0
     kinds = engine_cases.kinds(round(ENGINE * part)) | scene_cases.kinds(round(BLENDER * part))
     with tempfile.TemporaryDirectory() as folder:

@@ -66,7 +66,7 @@ class Drawn:
 
 
 def run(quick: bool) -> dict[str, float]:
-    """Measure; see the table in ``docs/results.md`` for what the figures mean."""
+    """Measure; see the table in ``docs/measurements.md`` for what the figures mean."""
     scene = bpy.context.scene
     target, toward = build(scene, QUICK_SIZE if quick else SIZE)
     distances = np.geomspace(FAR, NEAR, QUICK_FRAMES if quick else FRAMES)

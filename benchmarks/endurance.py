@@ -59,7 +59,7 @@ def resident_mb() -> float:
 
 
 def run(quick: bool) -> dict[str, float]:
-    """Render the animation, and go the rounds; see ``docs/results.md`` for what the figures mean."""
+    """Render the animation, and go the rounds; see ``docs/measurements.md`` for what the figures mean."""
     from devtools import session
 
     found = _frames(QUICK_FRAMES if quick else FRAMES)

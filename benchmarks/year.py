@@ -75,7 +75,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> dict[str, float]:
-    """Measure; see the table in ``docs/results.md`` for what the figures mean."""
+    """Measure; see the table in ``docs/measurements.md`` for what the figures mean."""
     return measure(given.parts, given.quick, given.keep, time.monotonic() + 60.0 * given.minutes)
 
 

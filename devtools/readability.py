@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether documents can be read: ``python -m devtools.readability`` lists broken links, and a README that is too long.
+"""Whether documents can be read: ``python -m devtools.readability`` lists broken links, long pages and poor sentences.
 
 Links are those of all Markdown files under version control, to files, pictures and headings of the repository.
-Addresses elsewhere are not asked for. The check runs in ``make lint``.
+Addresses elsewhere are not asked for. Rules of language are in devtools/prose.py. The check runs in ``make lint``.
 """
 
 from __future__ import annotations
@@ -15,10 +15,13 @@ from collections import Counter
 from collections.abc import Collection
 from urllib.parse import unquote
 
+from . import prose, result_tables
 from .house import ROOT, files
 
-README = "README.md"
-MOST_WORDS = 600  # of the README: what it is, for whom, and how to get it are read in minutes
+README, MANUAL = "README.md", "docs/manual"
+TUTORIALS = "docs/manual/tutorials.md"
+#: Most words of pages, or of all whose path begins so. Tutorials of the manual are not counted.
+MOST_WORDS = {README: 600, MANUAL: 7_500, "docs/results.md": 1_600, "docs/features.md": 1_600}
 
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _CODE = re.compile(r"^(```|~~~).*?^\1|(?<!`)(`+)(?!`).+?(?<!`)\2(?!`)", re.DOTALL | re.MULTILINE)
@@ -93,16 +96,24 @@ def problems() -> list[str]:
     names = {path.relative_to(ROOT).as_posix(): path for path in files()}
     pages = {name: path.read_text(encoding="utf-8") for name, path in names.items() if path.suffix == ".md"}
     found = broken_links(pages, names)
-    if (count := words(pages[README])) > MOST_WORDS:
-        found.append(f"{README}: {count} words; {MOST_WORDS} is the most, the rest belongs into docs/")
-    return found
+    for begin, most in MOST_WORDS.items():
+        if (count := length(pages, begin)) > most:
+            found.append(f"{begin}: {count:,} words; {most:,} is the most")
+    found += [line for name, text in pages.items() for line in prose.problems(name, text)]
+    return found + result_tables.problems()
+
+
+def length(pages: dict[str, str], begin: str) -> int:
+    """Words of all pages whose path begins so, but for the tutorials."""
+    return sum(words(text) for name, text in pages.items() if name.startswith(begin) and name != TUTORIALS)
 
 
 def main() -> int:
-    """Print the problems, and how long the README is; 1 when there are any problems."""
+    """Print the problems, and how long pages are; 1 when there are any problems."""
     found = problems()
-    count = words((ROOT / README).read_text(encoding="utf-8"))
-    print("\n".join(found) or f"documents: all links lead somewhere; {README} has {count} words")
+    pages = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in files() if path.suffix == ".md"}
+    print("\n".join(found) or "documents: all links lead somewhere, and no sentence breaks a rule")
+    print(", ".join(f"{begin}: {length(pages, begin):,} words" for begin in MOST_WORDS))
     return bool(found)
 
 

@@ -21,7 +21,7 @@ from typing import Any
 LARGEST = 300_000  # bytes
 TABS = 24  # pixels at the sidebar's right edge with the names of its tabs
 
-WINDOWS = ("first-forest", "populated", "add-menu", "progress", "refined", "previewed")  # pictures of all of it
+WINDOWS = ("first-forest", "add-menu")  # pictures of all of it
 
 # The panel of each picture, and its sections that are open.
 PANELS = {
@@ -31,8 +31,6 @@ PANELS = {
     "season": ("TETFLORA_PT_season",),
     "animation": ("TETFLORA_PT_render", "Animation", "Leaf Objects"),
     "output": ("TETFLORA_PT_view_layer", "Ray Visibility", "By Species"),
-    "preview": ("TETFLORA_PT_developer", "Levels"),
-    "statistics": ("TETFLORA_PT_developer", "Passes"),
     "species": ("TETFLORA_PT_species", "Name, Leaf and Bark"),
     "stand": ("TETFLORA_PT_layers", "Site", "Where"),
     "layers": ("TETFLORA_PT_layers", "Where", "Spacing and Size"),
@@ -40,7 +38,7 @@ PANELS = {
 
 
 def steps(ui: Any) -> Iterator[float | None]:
-    """Inside Blender: populate, refine, and show the panels one after the other."""
+    """Inside Blender: populate, and show the panels one after the other."""
     import bpy
 
     yield from ui.show_sidebar("TetFlora")
@@ -59,29 +57,15 @@ def steps(ui: Any) -> Iterator[float | None]:
     yield from ui.show_sidebar("TetFlora")
     with ui.override():
         bpy.ops.tetflora.populate('INVOKE_DEFAULT')
-    yield from ui.until(lambda: not ui.window.modal_operators, 20, "plants")
-    yield from ui.picture("populated")
+    yield from ui.until(lambda: not ui.window.modal_operators, 120, "plants")
     with ui.override():
-        bpy.ops.wm.call_menu(name="VIEW3D_MT_add")
-    yield 0.5
-    # The last entry is ours; up wraps around, right opens it.
-    for key in ('UP_ARROW', 'RIGHT_ARROW'):
-        ui.press(key)
-        yield 0.5
-    yield from ui.picture("add-menu")
-    for _ in range(2):
-        ui.press('ESC')
-        yield 0.5
-    with ui.override():
-        bpy.ops.tetflora.refine('INVOKE_DEFAULT')
+        bpy.ops.wm.call_menu(name="TETFLORA_MT_add_plant")
     yield 1.0
-    (ui.out_dir / "progress.request").touch()  # answered while the job runs
-    yield from ui.until(lambda: scene.tetflora.statistics != "", 120, "refinement")
+    yield from ui.picture("add-menu")
+    ui.press('ESC')
+    yield 0.5
     for obj in bpy.context.selected_objects:
         obj.select_set(False)
-    yield from ui.picture("refined")
-    yield from _preview(ui, scene)
-
     plant = next(obj for obj in scene.objects if obj.tetflora.is_plant)
     plant.select_set(True)
     bpy.context.view_layer.objects.active = plant
@@ -89,7 +73,7 @@ def steps(ui: Any) -> Iterator[float | None]:
     leaf.species = "broadleaf_tree"
     own = scene.tetflora.output.species.add()
     own.species = "conifer"
-    scene.tetflora.species_editor.shown = bpy.context.preferences.view.show_developer_ui = True
+    scene.tetflora.species_editor.shown = True
     registered = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
     for cls in registered:
         if 'INSTANCED' in getattr(cls, "bl_options", ()):
@@ -102,7 +86,7 @@ def steps(ui: Any) -> Iterator[float | None]:
             scene.tetflora.layers_index = 0
             with ui.override():
                 bpy.ops.tetflora.ground_cover('INVOKE_DEFAULT')
-            yield from ui.until(lambda: not ui.window.modal_operators, 60, "cover")
+            yield from ui.until(lambda: not ui.window.modal_operators, 300, "cover")
         panel = _brush_panel() if shown == "brush" else next(cls for cls in registered if cls.__name__ == shown)
         opened = _register_open(panel, name, sections)
         yield from ui.show_sidebar("TetFlora")
@@ -110,27 +94,6 @@ def steps(ui: Any) -> Iterator[float | None]:
         bpy.utils.unregister_class(opened)
     region = next(r for r in ui.area().regions if r.type == 'UI')
     ui.values["sidebar"] = [region.x, region.y, region.width, region.height]
-
-
-def _preview(ui: Any, scene: Any) -> Iterator[float | None]:
-    """Levels as clouds in the middle of the picture, and the plants as light proxies."""
-    import bpy
-
-    settings, output = scene.tetflora.preview, scene.tetflora.output
-    output.show_viewport = False
-    with ui.override():
-        bpy.ops.tetflora.preview_levels('INVOKE_DEFAULT')
-    yield 1.0
-
-    def done() -> bool:
-        return not any(op.bl_idname == "TETFLORA_OT_preview_levels" for op in ui.window.modal_operators)
-
-    yield from ui.until(done, 120, "levels")
-    settings.plants = 'LIGHT'
-    settings.level, settings.projected = min(settings.level, 4), False
-    yield 2.0
-    yield from ui.picture("previewed")
-    settings.plants, output.show_viewport = 'NONE', True
 
 
 def _stand(ui: Any, scene: Any) -> Iterator[float | None]:
@@ -143,7 +106,7 @@ def _stand(ui: Any, scene: Any) -> Iterator[float | None]:
     bpy.data.objects["Hill"].select_set(True)
     with ui.override():
         bpy.ops.tetflora.grow_stand('INVOKE_DEFAULT')
-    yield from ui.until(lambda: not ui.window.modal_operators, 60, "stand")
+    yield from ui.until(lambda: not ui.window.modal_operators, 300, "stand")
     bpy.context.active_object.tetflora.stand_year = 60.0
     yield 1.0
 
@@ -246,7 +209,7 @@ def main() -> int:
         install = [blender, "-b", "--command", "extension", "install-file", "-r", "user_default", "-e", archive]
         environment = {**os.environ, "BLENDER_USER_RESOURCES": str(home)}
         subprocess.run(install, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        result = window.run_in_window(blender, Path(__file__), out, 600, home)
+        result = window.run_in_window(blender, Path(__file__), out, 1200, home)
         if not result["ok"]:
             print(result["error"], json.dumps(result["values"]), file=sys.stderr)
             return 1

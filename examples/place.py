@@ -46,7 +46,7 @@ def write(folder: Path) -> None:
     along = np.arange(0.0, SIDE, _STEP) + _STEP / 2.0
     x, y = np.meshgrid(along, along[::-1])
     (folder / "elevation.asc").write_text(files.ascii_grid(height(x, y), _STEP, EAST, NORTH))
-    (folder / "elevation.prj").write_text('PROJCS["ETRS_1989_UTM_Zone_32N"]')
+    (folder / "elevation.prj").write_text("EPSG:25832")
     (folder / "trees.csv").write_text(_inventory(rng), encoding="utf-8")
     along = np.arange(SIDE) + 0.5
     x, y = np.meshgrid(along, along[::-1])

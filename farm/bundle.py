@@ -249,7 +249,7 @@ def _write_files(folder: Path) -> None:
     version = _manifest(EXTENSION)["version"]
     write_zip(folder / f"tetflora-{version}.zip")
     shutil.copyfile(Path(__file__).with_name("installer.py"), folder / template.INSTALLER)
-    for own in species_folders():
+    for own in reversed(species_folders()):  # files of an earlier folder replace those of a later one
         for path in sorted(p for p in own.glob("*.json") if p.is_file() and p.stat().st_size <= _LARGEST_SPECIES):
             (folder / "species").mkdir(exist_ok=True)
             shutil.copyfile(path, folder / "species" / path.name)

@@ -37,7 +37,7 @@ def install(folder: Path) -> None:
         sys.exit(f"tetflora: error: cannot install {zips[0].name}; see Blender's message above")
     _choose_graphics_cards()
     bpy.ops.wm.save_userpref()
-    species = Path(bpy.utils.extension_path_user(PACKAGE, path="species", create=True))
+    species = Path(bpy.utils.user_resource('DATAFILES', path="tetflora", create=True))
     for path in sorted(folder.glob("species/*.json")):
         shutil.copyfile(path, species / path.name)
     print(f"tetflora: {zips[0].name} installed in {home}", flush=True)

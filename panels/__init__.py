@@ -6,7 +6,7 @@ import bpy
 
 from ..tetflora_addon.blender.job import render
 from ..tetflora_addon.blender.runtime import classes_in
-from . import base, layers, menus, outputs, places, plants, preferences, refine, season, species, tools
+from . import base, help, layers, menus, outputs, places, plants, preferences, refine, season, species, tools
 
 # In the order of registration, which is that of the panels in the tab: as an artist works, a panel after its parent.
 _MODULES = (base, refine, layers, plants, season, places, species, outputs, menus)
@@ -31,6 +31,7 @@ def register() -> None:
     _register()
     preferences.register()
     tools.register()
+    help.register()
     for name, draw in _ADDED:
         getattr(bpy.types, name).append(draw)
     render.nothing_refined.append(menus.open_nothing_refined)
@@ -41,6 +42,7 @@ def unregister() -> None:
     render.nothing_refined.remove(menus.open_nothing_refined)
     for name, draw in reversed(_ADDED):
         getattr(bpy.types, name).remove(draw)
+    help.unregister()
     tools.unregister()
     preferences.unregister()
     _unregister()

@@ -9,9 +9,19 @@ import bpy
 from bpy.utils import units
 
 from ..tetflora_addon.blender.species.catalog import FALLBACK_ICON, icon_of
+from .help import draw_help
 
 
-class SidebarPanel:
+class _Helped:
+    """Mix-in for panels with a page in the manual, which a button in the header opens."""
+
+    manual: str  # path of the page below docs, and its heading
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        draw_help(self.layout, self.manual)
+
+
+class SidebarPanel(_Helped):
     """Mix-in for panels in the 3D view's sidebar."""
 
     bl_space_type = 'VIEW_3D'
@@ -19,7 +29,7 @@ class SidebarPanel:
     bl_category = "TetFlora"
 
 
-class PropertiesPanel:
+class PropertiesPanel(_Helped):
     """Mix-in for panels in the Properties editor; ``bl_context`` names the tab."""
 
     bl_space_type = 'PROPERTIES'

@@ -144,6 +144,7 @@ class TETFLORA_PT_layers(SidebarPanel, bpy.types.Panel):
     """Layers."""
 
     bl_label = "Layers"
+    manual = "manual/landscapes.md#layers"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = split_layout(self), context.scene

@@ -19,6 +19,7 @@ class TETFLORA_PT_render(PropertiesPanel, bpy.types.Panel):
     """How finely plants are refined, and as what."""
 
     bl_label = "TetFlora"
+    manual = "manual/rendering.md#detail"
     bl_context = "render"
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -49,6 +50,7 @@ class TETFLORA_PT_output(PropertiesPanel, bpy.types.Panel):
     """What becomes of results."""
 
     bl_label = "TetFlora Results"
+    manual = "manual/rendering.md#output"
     bl_context = "output"
     bl_options = {'DEFAULT_CLOSED'}
 
@@ -66,6 +68,7 @@ class TETFLORA_PT_view_layer(PropertiesPanel, bpy.types.Panel):
     """Rays, pass indices, light groups and materials of results, of all and by species."""
 
     bl_label = "TetFlora Results"
+    manual = "manual/rendering.md#output"
     bl_context = "view_layer"
     bl_options = {'DEFAULT_CLOSED'}
 
@@ -96,6 +99,7 @@ class TETFLORA_PT_developer(PropertiesPanel, bpy.types.Panel):
     """Levels of refinement in viewports and figures of the last one; with Developer Extras in the preferences."""
 
     bl_label = "TetFlora Statistics"
+    manual = "manual/rendering.md#preview-and-statistics"
     bl_context = "render"
     bl_options = {'DEFAULT_CLOSED'}
 

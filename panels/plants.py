@@ -21,6 +21,7 @@ class TETFLORA_PT_plant(SidebarPanel, bpy.types.Panel):
     """The active plant."""
 
     bl_label = "Plant"
+    manual = "manual/plants.md#single-plants"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -50,6 +51,7 @@ class TETFLORA_PT_object(PropertiesPanel, bpy.types.Panel):
     """What the active object is: a plant, a field, ground, an asset."""
 
     bl_label = "TetFlora"
+    manual = "manual/models.md"
     bl_context = "object"
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -11,6 +11,7 @@ from ..tetflora_addon import storage
 from ..tetflora_addon.blender.preferences import CACHE_VARIABLE, TetFloraPreferences, species_folders
 from ..tetflora_addon.blender.species.edits import skipped_files
 from .base import Button, draw_properties
+from .help import draw_help
 
 KEYMAP = "Object Mode"
 PIE = "TETFLORA_MT_pie"
@@ -81,7 +82,9 @@ def _draw(self: TetFloraPreferences, context: bpy.types.Context) -> None:
         layout.label(text=text, icon='ERROR')
     draw_properties(layout, self, "threads", "new_quality", "max_memory", "kept_memory")
     _draw_cache(layout.column(), self)
-    layout.operator("tetflora.write_report", icon='TEXT')
+    row = layout.row(align=True)
+    row.operator("tetflora.write_report", icon='TEXT')
+    draw_help(row, "manual/troubleshooting.md")
     _draw_keys(layout.column(), context)
 
 

@@ -20,6 +20,7 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
     """Refine: above the others, because it is what one comes back to."""
 
     bl_label = "Refine"
+    manual = "manual/rendering.md#refine"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

@@ -14,6 +14,7 @@ class TETFLORA_PT_season(SidebarPanel, bpy.types.Panel):
     """The day of the year, the years that have passed, and the wind."""
 
     bl_label = "Season and Wind"
+    manual = "manual/seasons.md#seasons"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, year, wind = split_layout(self), context.scene.tetflora.year, context.scene.tetflora.wind
@@ -38,6 +39,7 @@ class TETFLORA_PT_scene(PropertiesPanel, bpy.types.Panel):
     """Where on Earth the scene lies, how seasons spread, and how the wind blows."""
 
     bl_label = "TetFlora"
+    manual = "manual/seasons.md#seasons"
     bl_context = "scene"
     bl_options = {'DEFAULT_CLOSED'}
 

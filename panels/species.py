@@ -49,6 +49,7 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
     """Species."""
 
     bl_label = "Species Editor"
+    manual = "manual/seasons.md#species-editor"
     bl_category = "Species"
 
     @classmethod

@@ -3,8 +3,8 @@
 """Makes the paper's figures and tables: ``python -m examples.paper [FIGURE ...]`` (``make results`` makes all).
 
 Without names it makes what this commit has not made yet, so that it goes on where it was stopped. Each figure is made
-in a process of its own. Images go to docs/images, tables into docs/results.md, records, single images and the
-frames of the animation to out/paper.
+in a process of its own. Images go to docs/images, tables into docs/results.md, their records to docs/results/paper,
+single images and the frames of the animation to out/paper.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from devtools import session
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT, IMAGES, PAGE = ROOT / "out" / "paper", ROOT / "docs" / "images", ROOT / "docs" / "results.md"
+RECORDS = ROOT / "docs" / "results" / "paper"
 
 #: Modules by the name that the command line knows them by, and what they make.
 FIGURES = {
@@ -45,6 +46,7 @@ def make(name: str) -> None:
 
     OUT.mkdir(parents=True, exist_ok=True)
     IMAGES.mkdir(parents=True, exist_ok=True)
+    RECORDS.mkdir(parents=True, exist_ok=True)
     _record(name).unlink(missing_ok=True)  # what is interrupted has not been made
     start = time.perf_counter()
     figures = importlib.import_module(f"{__package__}.{name}").make(OUT, IMAGES, small=False)
@@ -58,7 +60,7 @@ def is_made(name: str) -> bool:
 
 
 def _record(name: str) -> Path:
-    return OUT / f"{name}.json"
+    return RECORDS / f"{name}.json"
 
 
 def _commit() -> str:
@@ -102,7 +104,7 @@ def main() -> int:
     if not failed:
         from .tables import write_tables
 
-        write_tables(OUT, PAGE)
+        write_tables(RECORDS, PAGE)
         say(f"Pictures are in {IMAGES.relative_to(ROOT)}, tables in {PAGE.relative_to(ROOT)}, the rest in out/paper")
     return 1 if failed else 0
 

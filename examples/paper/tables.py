@@ -9,9 +9,10 @@ records of the figures, never from a hand.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable
 from pathlib import Path
+
+from devtools.result_tables import put
 
 Figures = dict[str, float]
 #: What a row is about, what the paper says of it, and what was measured, from the figures of a record.
@@ -150,9 +151,9 @@ def write_tables(out: Path, page: Path) -> None:
     every = {f"{name}.{key}": value for name, record in records.items() for key, value in record["figures"].items()}
     for name, (sources, rows) in TABLES.items():
         if all(source in records for source in sources):
-            text = _put(text, name, table(rows, every | records[sources[0]]["figures"]))
+            text = put(text, name, table(rows, every | records[sources[0]]["figures"]))
     if records:
-        text = _put(text, "machine", _machine(records))
+        text = put(text, "machine", _machine(records))
     page.write_text(text, encoding="utf-8")
 
 
@@ -167,12 +168,3 @@ def _machine(records: dict[str, dict]) -> str:
     last = list(records.values())[-1]
     minutes = sum(record["figures"]["seconds"] for record in records.values()) / 60
     return f"{last['machine']}, Blender {last['blender']}; {len(records)} figures in {minutes:.0f} minutes."
-
-
-def _put(text: str, name: str, content: str) -> str:
-    """Put something between the comments that name it."""
-    begin, end = f"<!-- measured: {name} -->", "<!-- end -->"
-    found = re.compile(f"({re.escape(begin)}\n).*?(\n{re.escape(end)})", re.DOTALL)
-    if not found.search(text):
-        raise ValueError(f"the page has no {begin} … {end} to write a table to")
-    return found.sub(lambda match: f"{match[1]}\n{content}\n{match[2]}", text, count=1)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The manual keeps step with what the artist sees: settings, buttons, options of the command line."""
+"""The manual keeps step with what the artist sees: settings, labels, options of the command line."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import re
 import pytest
 
 from devtools import build
+from devtools import labels as screen
 from farm import write_job
 from tetflora_addon.blender import preferences, properties
 from tetflora_addon.blender.cli.command import main
@@ -19,12 +20,21 @@ from tetflora_addon.blender.settings import TetFloraWind, TetFloraYear
 from tetflora_addon.blender.stands.properties import TetFloraStand, TetFloraStandEntry
 from tetflora_addon.blender.viewport import state
 
-MANUAL = (build.ROOT / "docs" / "manual.md").read_text(encoding="utf-8")
+PAGES = {
+    path.name: path.read_text(encoding="utf-8")
+    for path in (build.ROOT / "docs" / "manual.md", *sorted((build.ROOT / "docs" / "manual").glob("*.md")))
+}
+MANUAL = "\n".join(PAGES.values())
 
 # What the manual sets in bold or italics, as it does with labels; "Add > First Forest" holds two of them.
 LABELS = {
     label for _, text in re.findall(r"(\*\*?)([^*|]+?)\1", MANUAL) for label in " ".join(text.split()).split(" > ")
 }
+
+#: Bold words that are keys, buttons with a sign, and pages' own emphasis.
+KEYS = re.compile(r"(?:(?:Alt|Ctrl|Shift) ?)*(?:F\d+|[A-Z]|Esc|Return|Tab|Home|Shift|\[|\])")
+SIGNS = {"+", "−", "?", "⌄"}
+OTHERS = {"Bold", "for the active camera", "Inventories", "Canopy height", "Outlines"}
 
 GROUPS = (
     properties.TetFloraScene,
@@ -50,6 +60,14 @@ def test_every_setting_is_explained(clean_file, group):
     shown = {p.name for p in settings if p.type != 'POINTER' or p.fixed_type not in {g.bl_rna for g in GROUPS}}
     assert shown
     assert sorted(shown - LABELS - {"Name"}) == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_bold_label_is_on_the_screen(page):
+    known = screen.labels()
+    for text in sorted({" ".join(bold.split()) for bold in re.findall(r"\*\*([^*]+?)\*\*", PAGES[page])}):
+        label = text.removeprefix("⌄ ")
+        assert label in known | SIGNS | OTHERS or KEYS.fullmatch(label), label
 
 
 def test_every_default_is_the_one_that_is_told(clean_file):

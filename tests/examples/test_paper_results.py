@@ -182,14 +182,14 @@ def test_page_without_a_place_for_a_table_is_refused(tmp_path):
 def test_the_documentation_has_a_place_for_each_table_and_all_pictures():
     page = PAGE.read_text(encoding="utf-8")
     for name in (*tables.TABLES, "machine"):
-        assert tables._put(page, name, "here") != page
+        assert tables.put(page, name, "here") != page
     for picture in re.findall(r"\(images/([\w.-]+)\)", page):
         assert (IMAGES / picture).stat().st_size <= (2e6 if picture.endswith(".mp4") else 5e5), picture
 
 
 def test_only_what_this_commit_has_not_made_is_made(tmp_path, monkeypatch):
     command = importlib.import_module("examples.paper.__main__")
-    monkeypatch.setattr(command, "OUT", tmp_path)
+    monkeypatch.setattr(command, "RECORDS", tmp_path)
     monkeypatch.setattr(command, "_commit", lambda: "abc")
     assert not command.is_made("figure8")
     _records(tmp_path, {"figure8": {}})

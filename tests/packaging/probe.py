@@ -5,13 +5,14 @@
     python probe.py OUT.json ZIP                  bpy wheel: installs the zip first
     blender -b -P probe.py -- OUT.json            full Blender: TetFlora is installed and enabled already
 
-Writes ``{"installed", "enabled", "warnings", "added", "left", "commands"}``.
+Writes ``{"installed", "enabled", "warnings", "added", "left", "commands", "kept"}``, the last only for a zip.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -64,6 +65,16 @@ def watch_commands(balance: dict[str, int]) -> None:
     bpy.utils.register_cli_command, bpy.utils.unregister_cli_command = counted_register, counted_unregister
 
 
+def kept_when_removed(remove: Callable[[], int]) -> dict[str, bool]:
+    """Whether a file of the user's own species, and one in the extension's folder, are there after it is removed."""
+    own = sys.modules[f"{PACKAGE}.tetflora_addon.blender.preferences"].own_species_folder() / "mine.json"
+    inside = Path(bpy.utils.extension_path_user(PACKAGE, path="species", create=True)) / "mine.json"
+    for path in (own, inside):
+        path.write_text("{}", encoding="utf-8")
+    addon_utils.disable(PACKAGE, default_set=True)
+    return {"removed": remove() == 0, "own": own.exists(), "inside": inside.exists()}
+
+
 def main(out: str, archive: str | None = None) -> None:
     """Install if asked to, enable, disable, and write what was seen."""
     result: dict = {}
@@ -88,7 +99,10 @@ def main(out: str, archive: str | None = None) -> None:
     result["lost"] = sorted(before - visible_state())
     # A second life: what register() leaves in modules must not be in the way.
     result["enabled_again"] = addon_utils.enable(PACKAGE, default_set=True) is not None
-    addon_utils.disable(PACKAGE, default_set=True)
+    if archive:
+        result["kept"] = kept_when_removed(lambda: bl_extension_cli.cli_extension_handler(["remove", "tetflora"]))
+    else:
+        addon_utils.disable(PACKAGE, default_set=True)
     Path(out).write_text(json.dumps(result, indent=1), encoding="utf-8")
 
 

@@ -51,5 +51,9 @@ def test_disabling_leaves_nothing(seen: dict) -> None:
     assert seen["lost"] == []
 
 
+def test_own_species_stay_when_it_is_removed(seen: dict) -> None:
+    assert seen["kept"] == {"removed": True, "own": True, "inside": False}
+
+
 def test_enables_a_second_time(seen: dict) -> None:
     assert seen["enabled_again"]

@@ -15,6 +15,8 @@ from devtools import build, rooms
 
 AT_THE_ROOT = {"__init__.py", "blender_manifest.toml", "LICENSE"}
 FOLDERS = {"tetflora_addon", "operators", "panels"}
+# The manual, which the buttons for help open.
+HELP = {"docs/manual.md", *(f"docs/manual/{path.name}" for path in (build.ROOT / "docs" / "manual").glob("*.md"))}
 KINDS = {".py", ".json", ".svg", ".png", ".jpg", ".dat"}
 LARGEST = 2_200_000  # species have pictures of four seasons, biomes one each
 
@@ -30,14 +32,14 @@ def test_only_what_is_meant(names: list[PurePosixPath]) -> None:
     strangers = [
         str(name)
         for name in names
-        if not (str(name) in AT_THE_ROOT or (name.parts[0] in FOLDERS and name.suffix in KINDS))
+        if not (str(name) in AT_THE_ROOT or str(name) in HELP or (name.parts[0] in FOLDERS and name.suffix in KINDS))
         or any(part.startswith(".") or part == "__pycache__" for part in name.parts)
     ]
     assert strangers == []
 
 
 def test_nothing_is_missing(names: list[PurePosixPath]) -> None:
-    expected = {PurePosixPath(name) for name in AT_THE_ROOT}
+    expected = {PurePosixPath(name) for name in AT_THE_ROOT | HELP}
     for folder in FOLDERS:
         for path in (build.ROOT / folder).rglob("*"):
             if path.is_file() and path.suffix in KINDS and "__pycache__" not in path.parts:

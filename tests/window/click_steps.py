@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).resolve().parent))
 
 from forest_steps import build_ground
 
-STEP = 12  # pixels between two looks for a button
+STEP = 17  # pixels between two looks for a button, which is 20 high
 
 
 def steps(ui):
@@ -33,6 +33,7 @@ class Hand:
 
     def __init__(self, ui):
         self.ui, self.clicks = ui, 0
+        self._seen = {}  # where something was, by what Blender copied of it
 
     def key(self, key):
         """Press a key where the mouse is."""
@@ -40,21 +41,28 @@ class Hand:
         self.ui.press(key)
         yield 0.5
 
-    def click(self, said, kind='UI', place=None, above=0, **keys):
-        """Find a button by what Blender copies of it, and click it, or what is some pixels above it."""
+    def find(self, said, kind='UI', place=None, **keys):
+        """Move to a button, found by what Blender copies of it."""
         manager, seen = bpy.context.window_manager, set()
-        for x, y in self._places(kind) if place is None else place:
+        places = self._places(kind) if place is None else place
+        before = [at for text, at in self._seen.items() if said in text] if place is None else []
+        for x, y in (*before, *places):
             manager.clipboard = ""
             self.ui.move(x, y)
             yield 0.03
             self.ui.press('C', ctrl=True, **keys)
             yield 0.03
-            seen.add(manager.clipboard)
-            if said in manager.clipboard:
-                break
-        else:
-            yield from self.ui.picture("not_found")
-            raise LookupError(f"there is no button for {said} among {sorted(seen)}")
+            text = manager.clipboard
+            seen.add(text)
+            self._seen[text] = x, y
+            if said in text:
+                return x, y
+        yield from self.ui.picture("not_found")
+        raise LookupError(f"there is no button for {said} among {sorted(seen)}")
+
+    def click(self, said, kind='UI', place=None, above=0, **keys):
+        """Find a button and click it, or what is some pixels above it."""
+        x, y = yield from self.find(said, kind, place, **keys)
         self.ui.move(x, y + above)
         yield 0.1
         self.clicks += 1
@@ -94,25 +102,30 @@ class Hand:
 
     def render(self, found):
         """F12, small so that it is soon done; how much of the picture is not one color."""
-        scene, done = bpy.context.scene, []
+        scene = bpy.context.scene
         scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = 'CYCLES', 1, False
         scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 160, 90, 100
+        found["green"] = yield from self.shoot(f"render_{len(self.ui.values)}", 600)
+
+    def shoot(self, name, seconds):
+        """F12 and Esc; a picture of that name, and how much of it is green."""
+        done = []
         bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
         self.ui.move(*self.ui.center())
         yield from self.key('F12')
-        yield from self.ui.until(lambda: done, 600, "render")
+        yield from self.ui.until(lambda: done, seconds, "render")
         yield 1.0
         bpy.app.handlers.render_complete.clear()
-        path = str(self.ui.out_dir / f"render_{len(self.ui.values)}.png")
+        path = str(self.ui.out_dir / f"{name}.png")
         bpy.data.images["Render Result"].save_render(path)
         image = bpy.data.images.load(path)
         pixels = np.zeros(len(image.pixels), dtype=np.float32)
         image.pixels.foreach_get(pixels)
         bpy.data.images.remove(image)
-        red, green, blue, _ = pixels.reshape(-1, 4).T
-        found["green"] = float(((green > 1.05 * red) & (green > 1.05 * blue)).mean())
         self.ui.press('ESC')
         yield 1.0
+        red, green, blue, _ = pixels.reshape(-1, 4).T
+        return float(((green > 1.05 * red) & (green > 1.05 * blue)).mean())
 
     def _places(self, kind, across=()):
         area = next(a for a in self.ui.window.screen.areas if a.type == ('VIEW_3D' if kind == 'UI' else kind))

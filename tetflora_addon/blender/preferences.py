@@ -30,7 +30,8 @@ def _use_cache(_preferences: object = None, _context: object = None) -> None:
     if chosen:
         storage.set_folder(None if chosen.lower() == "off" else Path(chosen).absolute())
     else:
-        storage.set_folder(_folder("cache") if own is not None and own.use_cache else None)
+        used = own is not None and own.use_cache
+        storage.set_folder((_chosen("cache") or _extension_folder("cache")) if used else None)
 
 
 class TetFloraPreferences(bpy.types.AddonPreferences):
@@ -40,9 +41,9 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
 
     species_folder: string(
         "Species Folder",
-        "Folder of your own species files (*.json); if empty, a folder beside your Blender settings. A file here "
-        "replaces a built-in species of the same file name. Scenes store only the names of species: everyone who "
-        "renders a scene needs the same files",
+        "Folder of your own species files (*.json); if empty, datafiles/tetflora beside your Blender settings, which "
+        "stays when the extension is removed. A file here replaces a built-in species of the same file name. Scenes "
+        "store only the names of species: everyone who renders a scene needs the same files",
         subtype='DIR_PATH',
     )
     new_quality: choice(
@@ -95,40 +96,51 @@ def preferences() -> TetFloraPreferences | None:
 
 
 def species_folders() -> tuple[Path, ...]:
-    """Existing folders of the user's own species, for the catalog's functions; none outside of an extension."""
-    folder = _folder("species")
-    return (folder,) if folder is not None and folder.is_dir() else ()
+    """Existing folders of the user's own species, for the catalog's functions; none outside of an extension.
+
+    Without a Species Folder in the preferences, that of the extension comes second: species used to be saved there.
+    """
+    own = preferences()
+    if own is None:
+        return ()
+    folders = (_chosen("species"),) if own.species_folder else (_lasting_folder(), _extension_folder("species"))
+    return tuple(folder for folder in folders if folder is not None and folder.is_dir())
 
 
 def own_species_folder() -> Path:
-    """The folder that the user's own species are saved in, created if missing.
+    """The folder that the user's own species are saved in, created if missing; removing the extension leaves it alone.
 
     Raises
     ------
     SpeciesError
         It cannot be created, or TetFlora is not installed as an extension.
     """
+    if preferences() is None:
+        raise SpeciesError("No folder for your own species; install TetFlora as an extension")
+    folder = _chosen("species") or _lasting_folder()
     try:
-        folder = _folder("species", create=True)
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise SpeciesError(f"Cannot create the species folder: {error}. Choose another in the preferences") from None
-    if folder is None:
-        raise SpeciesError("No folder for your own species; set a Species Folder in the TetFlora preferences")
     return folder
 
 
-def _folder(name: str, create: bool = False) -> Path | None:
-    """The folder in the preferences, or one of the extension that updates keep; None outside of an extension."""
-    own = preferences()
-    if own is None:
-        return None
-    if chosen := getattr(own, f"{name}_folder"):
-        return Path(bpy.path.abspath(chosen))
+def _chosen(name: str) -> Path | None:
+    """The folder in the preferences, if there is one."""
+    chosen = getattr(preferences(), f"{name}_folder", "")
+    return Path(bpy.path.abspath(chosen)) if chosen else None
+
+
+def _lasting_folder() -> Path:
+    """The folder of the user's own files that Blender neither updates nor deletes with the extension."""
+    return Path(bpy.utils.user_resource('DATAFILES', path="tetflora"))
+
+
+def _extension_folder(name: str) -> Path | None:
+    """A folder of the extension, which updates keep and its removal deletes; None for an add-on of the old kind."""
     try:
-        return Path(bpy.utils.extension_path_user(ROOT_PACKAGE, path=name, create=create))
-    except ValueError:  # an add-on of the old kind
+        return Path(bpy.utils.extension_path_user(ROOT_PACKAGE, path=name))
+    except ValueError:
         return None
 
 

@@ -103,11 +103,11 @@ def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
     Parameters
     ----------
     folders : sequence of Path
-        Folders of the user's own; a file there replaces a shipped one of the same name. Missing folders are passed
-        over, and so are files that `odd_files` names.
+        Folders of the user's own; a file there replaces a shipped one of the same name, and one of a later folder.
+        Missing folders are passed over, and so are files that `odd_files` names.
     """
     found: dict[str, SpeciesInfo] = {}
-    for folder in (builtin_folder(), *folders):
+    for folder in (builtin_folder(), *reversed(folders)):
         found |= _listed(folder, _entries(folder))
     return in_order(found)
 

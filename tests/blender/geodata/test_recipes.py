@@ -19,12 +19,12 @@ from tetflora_addon.geodata.inventories import preview
 from tetflora_addon.geodata.projection import System, to_degrees
 
 pytestmark = pytest.mark.usefixtures("clean_file")
-MANUAL = (build.ROOT / "docs" / "manual.md").read_text(encoding="utf-8")
+TUTORIALS = (build.ROOT / "docs" / "manual" / "tutorials.md").read_text(encoding="utf-8")
 
 
 def _recipe(title):
     """The steps of a recipe as one line each."""
-    text = MANUAL.split(f"### {title}\n")[1].split("\n### ")[0]
+    text = re.split(r"\n##+ ", TUTORIALS.split(f"### {title}\n")[1])[0]
     return [" ".join(step.split()) for step in re.split(r"\n\d\. ", text)[1:]]
 
 

@@ -16,7 +16,7 @@ from tetflora_addon.blender.compat import shader_tree
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/manual.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/manual/tutorials.md"])
 def test_own_ground_is_lit(page, tmp_path):
     text = " ".join((ROOT / page).read_text(encoding="utf-8").split())
     assert "Click **Daylight** for a sun and a sky" in text

@@ -87,7 +87,7 @@ def biomes() -> dict[str, BiomeInfo]:
     now = time.monotonic()
     if _seen is None or now - _seen[0] >= _TRUSTED:
         found = {}
-        for folder in (builtin_folder(), *_own_folders()):
+        for folder in (builtin_folder(), *reversed(_own_folders())):
             for path in sorted(folder.glob("*" + ENDING)) if folder.is_dir() else ():
                 if is_identifier(path.stem) and is_regular(path):
                     found[path.stem] = _info(path)
