@@ -214,9 +214,9 @@ def _parts(flora: Flora, grown: list[WholeBranches], back: Floats, pixel: float 
 
 
 def _leaf_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Iterator[tuple[str, MeshBuffers]]:
-    def fractions(branches: Branches) -> tuple[Floats, Floats]:
+    def fractions(branches: Branches) -> tuple[Floats, Floats, Floats]:
         one = np.ones(len(branches))
-        return one, one
+        return one, one, one
 
     def thin(key: Keys, _place: Floats, _off: Floats, reach: Floats) -> tuple[Integers, Floats]:
         part = np.clip((reach / (_LONG * pixel)) ** 2, 0.0, 1.0)
