@@ -19,7 +19,7 @@ from devtools.formats import set_format
 
 FOLDER = session.ROOT / "tetflora_addon" / "catalog" / "thumbnails"
 SIDE, SAMPLES, SEED = 128, 96, 11
-COLORS = 128  # of a palette
+COLORS = 96  # of a palette
 LARGEST = 12_000  # bytes
 #: Days of the seasons that have images of their own, and the least change of a plant's pixels, display values of 255.
 DAYS = {"spring": 125.0, "summer": 196.0, "autumn": 293.0, "winter": 20.0}
