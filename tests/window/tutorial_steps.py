@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The manual's tutorials, step by step in the window; tests/window/test_tutorials.py judges them.
+"""The manual's tutorials, step by step in the window, as devtools/tutorials.py starts them.
 
 Buttons and settings of TetFlora are clicked and typed into; without the mouse (TETFLORA_NO_MOUSE), for pictures, their
 operators are called and properties set instead, which takes a tenth of the time. What is Blender's own (adding a mesh,
