@@ -192,15 +192,15 @@ def test_help_is_no_error(arguments, capfd):
 
 
 def test_export_writes_a_forest_and_tells_its_levels(forest, tmp_path, capfd):
-    assert _run("export", tmp_path / "f.usda", "--variants", 1, "--polygons", 1000, "--flat", "--json") == 0
+    assert _run("export", tmp_path / "f.obj", "--variants", 1, "--polygons", 1000, "--flat", "--json") == 0
     figures = _figures(capfd)
-    assert (figures["plants"], figures["variants"], figures["path"]) == (2, 1, str(tmp_path / "f.usda"))
+    assert (figures["plants"], figures["variants"], figures["path"]) == (2, 1, str(tmp_path / "f.obj"))
     written = [p for p in tmp_path.rglob("*") if p.is_file()]
-    assert {p.suffix for p in written} == {".usda", ".png"}
+    assert {p.suffix for p in written} == {".csv", ".mtl", ".obj", ".png"}
     assert figures["megabytes"] == pytest.approx(sum(p.stat().st_size for p in written) / 1e6)
     polygons = [level["polygons"] for level in figures["levels"]]
     assert polygons == sorted(polygons, reverse=True) and 0 < polygons[0] <= 1000
     assert _run("export", tmp_path / "f.xyz") == 1
     assert 'choose a name that ends in' in capfd.readouterr().err
-    assert _run("export", tmp_path / "f.usda", "--levels", 9) == 1
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["f.usda", "f_textures"]
+    assert _run("export", tmp_path / "f.obj", "--levels", 9) == 1
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["f.csv", "f.mtl", "f.obj", "f_textures"]
