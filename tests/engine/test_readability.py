@@ -133,7 +133,7 @@ def test_good_sentences_and_code_pass(text: str) -> None:
 
 def test_tables_of_results_are_those_of_the_records(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     page = tmp_path / "results.md"
-    page.write_text(result_tables.PAGE.read_text("utf-8").replace("62 to 91", "61 to 91"), "utf-8")
+    page.write_text(result_tables.PAGE.read_text("utf-8").replace("40, 25, 24", "40, 25, 23"), "utf-8")
     monkeypatch.setattr(result_tables, "PAGE", page)
     assert [line.split(";")[0] for line in result_tables.problems()] == [
         "docs/results.md: tables are not those of docs/results"
