@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from tests.engine import support
-from tests.engine.figures import Figures, check
+from tests.engine.figures import ROUNDING, Figures, check
 from tests.engine.growth.test_drawn import flora as drawn_flora
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.compiled.sizes import crown_of
@@ -114,4 +114,5 @@ FIGURES: Figures = {
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_plants_are_what_they_were(name: str) -> None:
-    check(__name__, name, FIGURES[name]())
+    # Clumping is measured along rays: machines round those otherwise that graze something.
+    check(__name__, name, FIGURES[name](), 1e-3 if name == "compiled" else ROUNDING)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is decided and drawn of a small wood changes where a commit says so, and not by accident."""
+"""What is shown and expected of a small wood changes where a commit says so, and not by accident."""
 
 from __future__ import annotations
 
@@ -12,16 +12,13 @@ import numpy as np
 import pytest
 
 from tests.engine import support
-from tests.engine.emission.test_drawing import SUN
 from tests.engine.figures import Figures, check
-from tests.engine.refinement.test_loop import FAST, run
+from tests.engine.refinement.test_loop import FAST
 from tests.engine.test_figures import rich
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.compiled.sizes import crown_of
-from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.estimate import Stand, estimate
-from tetflora_addon.growth.seasons import Season
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.preview.levels import colors_of, gather, thinned
 from tetflora_addon.preview.light_plants import bounds_of_plants, crowns_of, light_plants
@@ -49,22 +46,6 @@ def view(kind: str) -> Camera:
         return support.camera((0, -9, 2.5), (0, 0, 1.2), pixels=40, view=sides[kind], kind=kind)
     around = support.camera((0, -9, 2.5), (0, 0, 1.2), pixels=40)
     return replace(around, kind=kind, window=(-np.pi, np.pi, -np.pi / 2, np.pi / 2), width=96, height=48)
-
-
-def drawn(kind: str, day: float | None = None, **options: Any) -> list[Any]:
-    """A wood of two species before a camera: what the loop decides, and what is drawn of it by a quality's settings."""
-    grown = flora() if day is None else flora().in_year(Season(day=day))
-    seeds = support.grove(9, 1.8, np.arange(9) % 2)
-    camera, settings = view(kind), RefinementSettings(**options)
-    _, result = run(grown, seeds, camera)
-    result = replace(result, lights=(SUN,))
-    detail = fit_to_budget(result, camera, settings)
-    blocks, facets, seen = support.drawn(
-        grown, detail.refinement, camera, detail.facet, detail.leaf_limit, hidden=detail.coarser, most=detail.most
-    )
-    order = np.lexsort(facets.center.T)
-    decided = result.decision, result.transmittance, result.totals, result.rank
-    return [decided, detail.coarser, [block.buffers for block in blocks], facets.take(order), seen[order]]
 
 
 def preview() -> list[Any]:
@@ -96,13 +77,7 @@ def expected() -> list[Any]:
     return [crowns, [crown.seen for crown in crowns], figures]
 
 
-FIGURES: Figures = {
-    **{f"drawn, {kind}": lambda kind=kind: drawn(kind) for kind in ("PERSP", "ORTHO", "PANO")},
-    "drawn in winter": lambda: drawn("PERSP", 20.0),
-    "drawn with a limit": lambda: drawn("PERSP", max_polygons=1500),
-    "preview": preview,
-    "expected": expected,
-}
+FIGURES: Figures = {"preview": preview, "expected": expected}
 
 
 @pytest.mark.parametrize("name", FIGURES)
