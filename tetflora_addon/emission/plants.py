@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +78,7 @@ class Transition:
         for widths in np.moveaxis(self.kite_widths, -1, 0):
             yield 1.0 - self._fraction(branches, self._own_width * KITES / widths, KITES)
 
-    @property
+    @cached_property
     def kite_widths(self) -> NDArray[np.float64]:
         """Widths in pixels (r, 2) up to which the leaves of rows are kites, and have one for each plane."""
         limits = [[kite_widths(kinds) for kinds in one] for one in self.flora.forms]

@@ -93,7 +93,7 @@ class Forest:
     """Everything that is written."""
 
     variants: tuple[Variant, ...]
-    stands: tuple[ForestPart, ...]
+    parts: tuple[ForestPart, ...]
 
     @property
     def surfaces(self) -> list[BakedSurface]:
@@ -102,7 +102,7 @@ class Forest:
         return list(found.values())
 
     def __len__(self) -> int:
-        return sum(map(len, self.stands))
+        return sum(map(len, self.parts))
 
 
 def identifiers(names: Sequence[str]) -> list[str]:

@@ -151,7 +151,7 @@ def _add_variant(document: _Document, forest: Forest, number: int, variant: Vari
 
 def _places(document: _Document, forest: Forest, number: int) -> dict[str, int] | None:
     """Accessors of the plants that a variant shows; None where it shows none."""
-    chosen = [(part, np.flatnonzero(part.variant == number)) for part in forest.stands]
+    chosen = [(part, np.flatnonzero(part.variant == number)) for part in forest.parts]
     chosen = [(part, own) for part, own in chosen if len(own)]
     if not chosen:
         return None

@@ -43,7 +43,7 @@ def write_obj(path: Path, forest: Forest) -> Iterator[float]:
     with path.with_suffix(".csv").open("w", encoding="utf-8") as file:
         file.write("variant,x,y,z,qw,qx,qy,qz,scale,species,seed,age,height\n")
         names = np.array([variant.name for variant in forest.variants])
-        for part in forest.stands:
+        for part in forest.parts:
             place, turn = (part.origin + part.position).T, part.rotation.T
             kinds = np.array([species for species, _ in part.kinds])[part.species]
             numbers = part.seed, part.age, part.height

@@ -55,7 +55,7 @@ def test_gltf_has_all_places_and_levels(forest, tmp_path):
     read = pygltflib.GLTF2().load(str(path))
     assert set(read.extensionsUsed) == {"EXT_mesh_gpu_instancing", "KHR_materials_ior", "MSFT_lod"}
     (root,) = read.scenes[0].nodes
-    node, part = read.nodes[root], forest.stands[0]
+    node, part = read.nodes[root], forest.parts[0]
     assert node.extensions["MSFT_lod"]["ids"] == [1, 2]
     assert len(node.extras["MSFT_screencoverage"]) == 3
     given = node.extensions["EXT_mesh_gpu_instancing"]["attributes"]
@@ -94,7 +94,7 @@ def test_obj_has_each_level_and_a_table_of_places(forest, tmp_path):
     assert len(rows) == NUMBER
     first = dict(zip(head.split(","), rows[1].split(","), strict=True))
     assert (first["variant"], first["species"], first["seed"], first["scale"]) == ("bush_1", "bush", "-5", "2")
-    assert float(first["x"]) == pytest.approx(1000.0 + forest.stands[0].position[1, 0])
+    assert float(first["x"]) == pytest.approx(1000.0 + forest.parts[0].position[1, 0])
     assert "newmtl bush_leaf" in (tmp_path / "f.mtl").read_text()
 
 

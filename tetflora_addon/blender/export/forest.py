@@ -12,7 +12,7 @@ from ...export.obj import write_obj
 from ...jobs import Job, Progress, part_of
 from ..runtime import JobData, job
 from ..worker import steps_in_thread
-from .gather import kinds_of, read_plants, stands_of, variants_of
+from .gather import forest_parts, kinds_of, read_plants, variants_of
 from .surfaces import with_surfaces
 from .usd import ENDINGS, write_usd
 
@@ -64,15 +64,15 @@ def export_steps(data: JobData, order: ExportOrder) -> Job[Exported]:
         raise TetFloraError(f'"{order.path.name}": choose a name that ends in {", ".join(WRITERS)}')
     with written_whole(order.path) as folder:
         yield Progress(0.0, "reading plants")
-        sources, seeds, _ = read_plants(data)
+        sources, seeds = read_plants(data)
         kinds = yield from part_of(kinds_of(data, seeds, order.variants), 0.05, 0.15)
         shown = yield from part_of(variants_of(seeds, kinds, order.levels, order.polygons), 0.15, 0.65)
         textures = f"{identifiers([order.path.stem])[0]}_textures"
         given = data.scene, shown.variants, folder, textures, order.bake
         variants = yield from part_of(with_surfaces(*given), 0.65, 0.75)
         data.check()
-        stands = yield from part_of(stands_of(data, sources, seeds, shown), 0.75, 0.8)
-        forest = Forest(variants, stands)
+        parts = yield from part_of(forest_parts(data, sources, seeds, shown), 0.75, 0.8)
+        forest = Forest(variants, parts)
         progress = Progress(0.8, f"writing {order.path.name}")
         steps = (Progress(0.8 + 0.2 * part, progress.message) for part in writer(folder / order.path.name, forest))
         yield from steps_in_thread(steps, progress)

@@ -103,26 +103,27 @@ def _height(levels: Sequence[PlantLevel]) -> float:
     return max(float(mesh.positions[:, 2].max()) for _, mesh in levels[0].parts)
 
 
-def read_plants(data: JobData) -> tuple[list[Source], Seeds, Integers]:
-    """Plants object by object, all of them with their kinds, and where those of each object begin."""
+def read_plants(data: JobData) -> tuple[list[Source], Seeds]:
+    """Plants object by object, and all of them, one after another, with their kinds."""
     sources = read_sources(data.scene, data.depsgraph)
     aged = classed(data.scene, [source.part for source in sources])
-    firsts = np.cumsum([0, *(len(seeds) for _, seeds in aged)])
-    return sources, merged([seeds for _, seeds in aged]), firsts
+    return sources, merged([seeds for _, seeds in aged])
 
 
-def stands_of(data: JobData, sources: Sequence[Source], seeds: Seeds, shown: Shown) -> Job[tuple[ForestPart, ...]]:
+def forest_parts(data: JobData, sources: Sequence[Source], seeds: Seeds, shown: Shown) -> Job[tuple[ForestPart, ...]]:
     """Plants of each object as they are written."""
     made, first = [], 0
     for number, source in enumerate(sources):
         yield Progress(number / len(sources), f'plants of "{source.part[0]}"')
         some = slice(first, first + len(source.part[1]))
-        made.append(_stand(data.depsgraph, source, seeds.take(some), shown.variant[some], shown.scale[some], shown))
+        made.append(
+            _forest_part(data.depsgraph, source, seeds.take(some), shown.variant[some], shown.scale[some], shown)
+        )
         first = some.stop
     return tuple(made)
 
 
-def _stand(
+def _forest_part(
     depsgraph: bpy.types.Depsgraph, source: Source, grown: Seeds, variant: Integers32, scale: Floats, shown: Shown
 ) -> ForestPart:
     name, seeds, ages, sizes = source.part

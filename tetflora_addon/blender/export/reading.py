@@ -16,7 +16,7 @@ from ...planting.rules import species_by_weight
 from ..attributes import write
 from ..geodata.origin import Import, Imported, Steps, importing
 from ..placing.plant_objects import link_field
-from .usd import FORMAT, read_stands
+from .usd import FORMAT, read_parts
 
 _SPECIES, _SEED = 1, 2
 _TRANSFORM = {"rotation_mode", "location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale"}
@@ -40,7 +40,7 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
     made: list[bpy.types.Object] = []
     whole, missing, number = False, [], 0
     try:
-        for name, data, points in read_stands(order.path):
+        for name, data, points in read_parts(order.path):
             if data and int(data.get("format", 0)) > FORMAT:
                 raise SceneError(f"{order.what}was written by a newer TetFlora; update the extension")
             points, kinds = (points, _kinds(data)) if data else _completed(points, mix)
@@ -63,7 +63,7 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
 
 
 def _kinds(data: Mapping) -> list[tuple[str, str]]:
-    """Species that an exported stand counts through, each with the name of the object of its form."""
+    """Species that an exported part counts through, each with the name of the object of its form."""
     return list(zip(map(str, data["species"]), map(str, data["forms"]), strict=True))
 
 

@@ -67,10 +67,10 @@ def write_usd(path: Path, forest: Forest) -> Iterator[float]:
         for surface in forest.surfaces:
             _write_surface(pxr, stage, surface)
         # Children of an instancer are drawn as its instances alone, and instancers may share them.
-        names = identifiers([stand.name for stand in forest.stands])
+        names = identifiers([part.name for part in forest.parts])
         home = f"/Forest/{names[0]}/Prototypes"
-        for name, stand in zip(names, forest.stands, strict=True):
-            _write_stand(pxr, stage, f"/Forest/{name}", stand, [f"{home}/{v.name}" for v in forest.variants])
+        for name, part in zip(names, forest.parts, strict=True):
+            _write_part(pxr, stage, f"/Forest/{name}", part, [f"{home}/{v.name}" for v in forest.variants])
         pxr.UsdGeom.Scope.Define(stage, home)
         for number, variant in enumerate(forest.variants):
             yield number / len(forest.variants)
@@ -87,24 +87,24 @@ def _array(pxr: SimpleNamespace, kind: str, values: NDArray) -> object:
     return getattr(pxr.Vt, f"{kind}Array").FromNumpy(np.ascontiguousarray(given))
 
 
-def _write_stand(pxr: SimpleNamespace, stage: object, path: str, stand: ForestPart, prototypes: list[str]) -> None:
+def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart, prototypes: list[str]) -> None:
     instancer = pxr.UsdGeom.PointInstancer.Define(stage, path)
-    instancer.AddTranslateOp().Set(pxr.Gf.Vec3d(*stand.origin.tolist()))
-    # Those that the stand has none of would only cost time.
-    used, index = np.unique(stand.variant, return_inverse=True)
+    instancer.AddTranslateOp().Set(pxr.Gf.Vec3d(*part.origin.tolist()))
+    # Those that the part has none of would only cost time.
+    used, index = np.unique(part.variant, return_inverse=True)
     for number in used.tolist():
         instancer.GetPrototypesRel().AddTarget(prototypes[number])
     instancer.CreateProtoIndicesAttr(_array(pxr, "Int", index.reshape(-1).astype(np.int32)))
-    instancer.CreatePositionsAttr(_array(pxr, "Vec3f", stand.position))
-    instancer.CreateOrientationsAttr(_array(pxr, "Quath", stand.rotation.astype(np.float16)))
-    instancer.CreateScalesAttr(_array(pxr, "Vec3f", np.repeat(stand.scale[:, None], 3, axis=1)))
+    instancer.CreatePositionsAttr(_array(pxr, "Vec3f", part.position))
+    instancer.CreateOrientationsAttr(_array(pxr, "Quath", part.rotation.astype(np.float16)))
+    instancer.CreateScalesAttr(_array(pxr, "Vec3f", np.repeat(part.scale[:, None], 3, axis=1)))
     primvars = pxr.UsdGeom.PrimvarsAPI(instancer)
-    columns = _columns(stand)
+    columns = _columns(part)
     for name, (kind, values) in columns.items():
         _add(pxr, primvars, name, kind, values)
-    known = {"position": ('FLOAT_VECTOR', stand.position), **{name: columns[name] for name in ("seed", "species")}}
+    known = {"position": ('FLOAT_VECTOR', part.position), **{name: columns[name] for name in ("seed", "species")}}
     stored: dict[str, str] = {}
-    for name, (kind, values) in stand.points.items():
+    for name, (kind, values) in part.points.items():
         same = name in known and known[name][0] == kind and _equal(known[name][1], values)
         stored[name] = kind if same else f"{kind} {PREFIX}{name}"
         if not same:
@@ -113,28 +113,28 @@ def _write_stand(pxr: SimpleNamespace, stage: object, path: str, stand: ForestPa
         KEY,
         {
             "format": FORMAT,
-            "name": stand.name,
-            "species": pxr.Vt.StringArray([species for species, _ in stand.kinds]),
-            "forms": pxr.Vt.StringArray([form for _, form in stand.kinds]),
+            "name": part.name,
+            "species": pxr.Vt.StringArray([species for species, _ in part.kinds]),
+            "forms": pxr.Vt.StringArray([form for _, form in part.kinds]),
             "attributes": stored,
-            "matrix": pxr.Gf.Matrix4d(np.asarray(stand.matrix, np.float64).T.tolist()),
+            "matrix": pxr.Gf.Matrix4d(np.asarray(part.matrix, np.float64).T.tolist()),
             "object": {
                 key: pxr.Vt.DoubleArray(value) if isinstance(value, list) else value
-                for key, value in stand.settings.items()
+                for key, value in part.settings.items()
             },
         },
     )
 
 
-def _columns(stand: ForestPart) -> dict[str, tuple[str, NDArray]]:
+def _columns(part: ForestPart) -> dict[str, tuple[str, NDArray]]:
     """What every plant is, for whoever reads the file."""
-    small = np.array_equal(stand.seed, stand.seed.astype(np.int32))
-    seed = ('INT', stand.seed.astype(np.int32)) if small else ('INT32_2D', halves(stand.seed))
+    small = np.array_equal(part.seed, part.seed.astype(np.int32))
+    seed = ('INT', part.seed.astype(np.int32)) if small else ('INT32_2D', halves(part.seed))
     return {
-        "species": ('INT', stand.species),
+        "species": ('INT', part.species),
         "seed": seed,
-        "age": ('FLOAT', stand.age),
-        "height": ('FLOAT', stand.height),
+        "age": ('FLOAT', part.age),
+        "height": ('FLOAT', part.height),
     }
 
 
@@ -248,7 +248,7 @@ def _write_texture(
         shader.CreateInput(key, of).ConnectToSource(image.ConnectableAPI(), output)
 
 
-def read_stands(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
+def read_parts(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
     """Plants of a file: for each instancer or cloud of points its name, custom data, and attributes of its points.
 
     Points that TetFlora has not written have the data ``{}``, and attributes in the world: places, and where they are
