@@ -19,13 +19,18 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, in_axes, spread
 from ..camera.camera import Camera, circle_of_confusion
+from ..parallel import blocks
 
 #: Pixels around the image that count as part of it: the filter of a renderer reaches there.
 MARGIN = 2
 #: Side of the cells of the image, pixels, each of which goes its own way from front to back.
 CELL = 24
 #: Pairs of a triangle and a pixel of its box that are tested together: some 100 bytes each.
-PAIRS_BATCH = 1 << 20
+PAIRS_BATCH = 1 << 16
+#: Polygons that are projected and tested together: their numbers stay in the cache.
+_POLYGONS = 1 << 14
+#: Columns, rows and depths (k, n) of the corners of polygons.
+Projected = tuple[NDArray, NDArray, NDArray]
 #: How much nearer than what it hides something is, over the depth of that: as far as several eyes count.
 _NEARER = 1.0
 
@@ -101,8 +106,8 @@ class Coverage:
         place, reach = np.stack([column, row], axis=1), reach + self.blur(center, depth)[:, None]
         low, high = place - reach, place + reach
         if camera.kind != "ORTHO":
-            around = near <= camera.near if camera.kind == "PERSP" else near <= 0.0
-            outside = around & (camera.distance_to_view(center) > radius)
+            around = np.flatnonzero(near <= camera.near if camera.kind == "PERSP" else near <= 0.0)
+            outside = around[camera.distance_to_view(center[around]) > radius[around]]
             low[around], high[around] = -np.inf, np.inf
             high[outside] = -np.inf
         if camera.kind == "PANO":
@@ -122,6 +127,23 @@ class Coverage:
         low = np.where(ahead[:, None], np.maximum(np.minimum(a.low, b.low), within.low), within.low)
         high = np.where(ahead[:, None], np.minimum(np.maximum(a.high, b.high), within.high), within.high)
         return Footprints(low, high, np.where(ahead, np.maximum(np.minimum(a.near, b.near), within.near), within.near))
+
+    def tested(
+        self, corners: NDArray[np.floating], wider: float
+    ) -> tuple[Footprints, NDArray[np.bool_], list[Projected]]:
+        """Footprints, wider by so many pixels, of polygons with corners (n, k, 3), which are hidden, and where the
+        corners of the others lie.
+        """
+        prints, hidden, drawn = [self.of_corners(corners[:0])[0]], [np.zeros(0, bool)], []
+        for block in blocks(len(corners), _POLYGONS):
+            own, *places = self.of_corners(corners[block])
+            own = replace(own, low=own.low - np.float32(wider), high=own.high + np.float32(wider))
+            behind = self.hidden(own)
+            prints.append(own)
+            hidden.append(behind)
+            seen = np.flatnonzero(~behind)
+            drawn.append(tuple(place[:, seen] for place in places))
+        return Footprints.concatenate(prints), np.concatenate(hidden), drawn
 
     def of_corners(self, corners: NDArray[np.floating]) -> tuple[Footprints, NDArray, NDArray, NDArray]:
         """Footprints of polygons with corners (n, k, 3), and the columns, rows and depths (k, n) of these."""

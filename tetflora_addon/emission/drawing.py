@@ -42,7 +42,7 @@ from .shade import Shade
 TILE, AROUND = 240, 64
 #: Pixels by which what was made is tested as if it were wider: full pixels are open beside their centers. With none,
 #: 8.3 % of 16 points in each pixel of a wood see what counts as hidden; with .12 they are 7.5 %, so 6.7 %.
-_WIDER = np.float32(0.25)
+_WIDER = 0.25
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
 MERGED = (4.0, 16.0, 64.0)
 #: The same of those that are hidden when they are about to be made.
@@ -296,6 +296,8 @@ class _Tile:
         First go facets that nobody sees, then the smallest faces in the image, at last facets that are seen; of facets
         all alike by a hash.
         """
+        if number <= 0.0:
+            return
         extent_around = self.given.camera.extent_around
 
         def size(mesh: MeshBuffers) -> NDArray[np.float64]:
@@ -335,14 +337,14 @@ class _Tile:
             self._waiting.append((whose, facets, triangle_corners(facets)))
 
     def thin(
-        self, key: Keys, place: NDArray[np.floating], away: NDArray[np.floating], radius: NDArray[np.floating]
+        self, key: Keys, center: NDArray[np.floating], radius: NDArray[np.floating]
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """As of `Canvas`."""
         times, left = np.ones(len(key)), np.arange(len(key))
-        place = place.astype(np.float32)
+        center = center.astype(np.float32)
         for more in SOONER:
-            reach = away[left] + np.sqrt(more) * radius[left]
-            left = left[self.coverage.hidden(self.coverage.of_spheres(gathered(place, left), reach))]
+            reach = np.sqrt(more) * radius[left]
+            left = left[self.coverage.hidden(self.coverage.of_spheres(gathered(center, left), reach))]
             times[left] = more
         kept = np.flatnonzero(uniform(key, _THIN) < 1.0 / times)
         return kept, times[kept]
@@ -373,13 +375,14 @@ class _Tile:
     def _cover(self) -> None:
         """Let what was made cover the image and test it; few stand for what is hidden."""
         waiting, self._waiting = self._waiting, []
-        tested = [self.coverage.of_corners(corners) for _, _, corners in waiting]
-        for _, *drawn in tested:
-            self._fill(*drawn)
+        tested = [self.coverage.tested(corners, _WIDER) for _, _, corners in waiting]
+        for *_, drawn in tested:
+            for polygons in drawn:
+                self._fill(*polygons)
         lost: dict[Whose, list[tuple[Facets, NDArray[np.float64]]]] = {}
-        for (what, made, corners), (prints, *_) in zip(waiting, tested, strict=True):
-            prints = replace(prints, low=prints.low - _WIDER, high=prints.high + _WIDER)
-            gone = self.coverage.hidden(prints)
+        for (what, made, corners), (prints, gone, _) in zip(waiting, tested, strict=True):
+            seen = np.flatnonzero(~gone)
+            gone[seen] = self.coverage.hidden(prints.take(seen))
             some = np.flatnonzero(gone)
             number = uniform(_keys_of(corners[some, 0]), _MERGE)
             likely = np.flatnonzero(number < max(0.5, self._left))

@@ -63,7 +63,7 @@ class Canvas(Protocol):
         """A mesh of a species, without faces behind full pixels if it is culled."""
 
     def thin(
-        self, key: Keys, place: NDArray[np.floating], away: NDArray[np.floating], radius: NDArray[np.floating]
+        self, key: Keys, center: NDArray[np.floating], radius: NDArray[np.floating]
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """As of `pieces.Thin`: few large ones are made in the place of many that are hidden already."""
 

@@ -167,6 +167,13 @@ class Leaves(Arrays):
     sky: NDArray[np.floating]  # (3,) or (n, 3) float32: where that is; with the branch in the wind
     stages: Stages | None = None  # on a day of the year; None where all are as in summer
 
+    def take(self, index: Integers) -> Leaves:
+        """As of `Arrays`; what is the same for all stays so."""
+        light = self.light if len(self.light) < len(self.key) else self.light[index]
+        sky = self.sky if self.sky.ndim == 1 else gathered(self.sky, index)
+        own = (gathered(of, index) for of in (self.branch, self.key, self.position, self.frame, self.size))
+        return Leaves(*own, light, sky, None if self.stages is None else self.stages.take(index))
+
 
 def leaf_keys(branches: Branches, owner: Integers, index: Integers) -> Keys:
     """Hash keys (m,) of leaves given by branch and index."""

@@ -242,15 +242,17 @@ def _leaves_of_subplants(
     facet = np.maximum(side**2, one)
     owner, index, key, area = facet_numbers(subplants.key, all_, facet, _FACET_PATH, _LEAF_COUNT, explicit)
     pick, place, base, area = _picked(flora, points, subplants, owner, index, key, area)
-    if thin is not None:
-        kept, times = thin(key, place, flora.leaf_reach[subplants.row[owner]] * subplants.scale[owner], _reach(area))
-        owner, key, pick, place, base = (gathered(of, kept) for of in (owner, key, pick, place, base))
-        area = times * area[kept]
     leaf_row = points.row[pick]
     frame = products(base, gathered(points.frame, pick).astype(np.float64))
     frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
     half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
     center = place + half_leaf[:, None] * frame[:, :, 1]
+    if thin is not None:
+        kept, times = thin(key, center, _reach(area))
+        owner, key, pick, leaf_row, center, frame = (
+            gathered(of, kept) for of in (owner, key, pick, leaf_row, center, frame)
+        )
+        area = times * area[kept]
     across, along = _in_a_face(flora, leaf_row, key, frame)
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
@@ -305,11 +307,6 @@ def _leaves_of_pieces(
     start = leaf_start(rows, branches)
     areas = piece_leaves(flora, pieces)[1]
     owner, index, key, area, t = _along(flora, pieces, areas, facet, start, _FACET_PATH, _LEAF_COUNT, explicit)
-    if thin is not None and not rows["envelope"][row].any():
-        near = flora.leaf_reach[row[owner]] * branches.scale[owner]
-        kept, times = thin(key, _on_axis(pieces, owner, t), near, _reach(area))
-        owner, index, key, t = (of[kept] for of in (owner, index, key, t))
-        area = times * area[kept]
     if whole is None:
         bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # many pieces get no facet
         own, of = branches.take(bearers), np.searchsorted(bearers, owner)
@@ -319,6 +316,10 @@ def _leaves_of_pieces(
     leaves = place_leaves(rows, own, lines, of, index, key, t)
     frame = settled(rows, row[owner], leaves.frame, leaves.light, leaves.sky)
     center = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
+    if thin is not None and not rows["envelope"][row].any():
+        kept, times = thin(key, center, _reach(area))
+        owner, index, key, t, center, frame = (gathered(of, kept) for of in (owner, index, key, t, center, frame))
+        leaves, area = leaves.take(kept), times * area[kept]
     across, along = _in_a_face(flora, row[owner], key, frame)
     places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
     many = area / one.clip(1e-300)[owner]
@@ -345,7 +346,7 @@ def _wood_of_subplants(
     owner, index, key, area = facet_numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, explicit)
     pick, center, base, area = _picked(flora, points, subplants, owner, index, key, area)
     if thin is not None:
-        kept, times = thin(key, center, np.zeros(len(key)), STRETCH * _reach(area))
+        kept, times = thin(key, center, STRETCH * _reach(area))
         owner, key, pick, center, base = (gathered(of, kept) for of in (owner, key, pick, center, base))
         area = times * area[kept]
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Floats32, Integers, Integers32, Keys, spread
+from ..arrays import Floats, Floats32, Integers, Integers32, Keys, gathered, spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.foliage import (
@@ -101,6 +101,18 @@ class LeafCopies:
             self.velocity[new] = _placed(shape, *motion, size)
         self.color[new] = color[:, None]
 
+    def spheres(self, position: Floats, frame: Floats32, size: Floats) -> tuple[Floats, Floats]:
+        """Middles (n, 3) and radii (n,) of spheres that hold copies, placed as by `add`, whichever shape they have."""
+        corners = self._corners()
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+        reach = float(np.linalg.norm(corners - middle, axis=1).max())
+        middle = sum(frame[:, :, axis] * np.float32(middle[axis]) for axis in range(3))
+        return position + size[:, None] * middle, reach * size
+
+    def _corners(self) -> Floats:
+        """Vertices (m, 3) of all shapes that copies may have."""
+        return self.model.positions
+
     def _shapes(self, key: Keys, new: slice) -> Floats32:
         """Vertices (v, 3, n or 1) of copies with keys (n,) before they are placed."""
         return self.model.positions.astype(np.float32)[:, :, None]
@@ -160,6 +172,9 @@ class KiteCopies(LeafCopies):
         self.kites = kites
         self.plane = np.zeros(number, np.int8)
 
+    def _corners(self) -> Floats:
+        return self.kites.positions.reshape(-1, 3)
+
     def _shapes(self, key: Keys, new: slice) -> Floats32:
         self.plane[new] = self.kites.chosen(uniform(key, Draw.LEAF_PLANE))
         return self.kites.positions.astype(np.float32).transpose(1, 2, 0)[:, :, self.plane[new]]
@@ -185,6 +200,9 @@ class LevelCopies(LeafCopies):
     def __init__(self, level: LeafLevel, number: int, transmission: float, moving: bool = False) -> None:
         super().__init__(level.model, number, transmission, moving)
         self.level, self.shapes = level, level.shapes.transpose(1, 2, 0)
+
+    def _corners(self) -> Floats:
+        return self.level.shapes.reshape(-1, 3)
 
     def _shapes(self, key: Keys, new: slice) -> Floats32:
         variants = self.shapes.shape[2]
@@ -289,9 +307,10 @@ def leaf_meshes(
     for kind, step in sorted({(group.kind, group.step) for group in groups}):
         own = [group for group in groups if (group.kind, group.step) == (kind, step)]
         forms = flora.forms[species][kind]
-        numbers = sum(group.numbers() for group in own)
-        for form in np.flatnonzero(numbers):
-            given = int(numbers[form]), float(flora.leaf.transmission[own[0].row[0]]), moment(flora.rows) > 0
+        # Room for all of them in each form: what is not written takes no memory.
+        number = sum(int(group.counts.sum()) for group in own)
+        for form in range(len(forms)):
+            given = number, float(flora.leaf.transmission[own[0].row[0]]), moment(flora.rows) > 0
             copies = _copies(forms[form], step, *given)
             for group in own:
                 group.add(copies, int(form), thin)
@@ -365,29 +384,19 @@ class _LeafBearers:
                 mixed = lengths[own] if (low[own] < high[own]).any() else None
                 yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given, mixed)
 
-    def numbers(self) -> Integers:
-        """How many leaves there are of each form."""
-        if len(self.forms) == 1 and self.fraction is None and self.lengths is None and not is_seasonal(self.flora.rows):
-            return np.array([self.counts.sum()])
-        out = np.zeros(len(self.forms), np.int64)
-        for part in self._chunks(1):
-            out += np.bincount(self._leaves(part)[3], minlength=len(self.forms))
-        return out
-
     def add(self, copies: LeafCopies, form: int, thin: Thin | None) -> None:
         """Place all leaves of one of the forms that are worth it."""
         rows, vertices = self.flora.rows, len(copies.model.positions)
         for bearers, counts, owner, index, key in self._runs(form, vertices):
             t, larger = leaf_places(rows, bearers.branches, owner, index, counts, key), None
-            if thin is not None and not rows["envelope"][self.row[0]]:
-                reach = self.flora.leaf_reach[self.row[0]] * np.take(bearers.branches.scale, owner)
-                kept, times = thin(key, bearers.lines.at(owner, t)[0], np.zeros(len(t)), reach)
-                owner, index, key, t = (np.take(of, kept) for of in (owner, index, key, t))
-                larger = np.sqrt(times)
             leaves = place_leaves(rows, bearers.branches, bearers.lines, owner, index, key, t)
             frame = in_wind(
                 rows, bearers.branches, leaves, settled(rows, self.row, leaves.frame, leaves.light, leaves.sky)
             )
+            if thin is not None and not rows["envelope"][self.row[0]]:
+                kept, times = thin(key, *copies.spheres(leaves.position, frame, leaves.size))
+                owner, index, key, t, frame = (gathered(of, kept) for of in (owner, index, key, t, frame))
+                leaves, larger = leaves.take(kept), np.sqrt(times)
             gradient = rows["gradient"][self.row[0]]
             places = (outwardness(rows, bearers.branches, owner, t), youth(rows, self.row, t)) if gradient else ()
             motion = None

@@ -20,9 +20,9 @@ from ..growth.foliage import leaf_start, outwardness
 from ..growth.growth import WholeBranches, open_branches
 from ..growth.seeds import Branches
 
-#: What of leaves or facets is worth making, before it is made. Given keys (m,), places (m, 3), how far they may be from
-#: there and their own radii (m,), meters: which (k,) are made, and how many times as large the area (k,) of each is.
-Thin = Callable[[Keys, Floats, Floats, Floats], tuple[Integers, Floats]]
+#: What of leaves or facets is worth making, before it is made. Given keys (m,), middles (m, 3) and radii (m,), meters:
+#: which (k,) are made, and how many times as large the area (k,) of each is.
+Thin = Callable[[Keys, Floats, Floats], tuple[Integers, Floats]]
 
 
 @dataclass(frozen=True)
