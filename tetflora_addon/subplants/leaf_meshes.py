@@ -32,7 +32,7 @@ from ..growth.foliage import (
 )
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
-from ..growth.seasons import is_seasonal, leaf_colors
+from ..growth.seasons import leaf_colors
 from ..growth.seeds import Branches
 from ..growth.wind import moment
 from ..leaves.kites import KITE, LeafKites, leaf_kites, leaf_planes
