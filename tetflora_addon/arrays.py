@@ -167,9 +167,11 @@ def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
         index = np.flatnonzero(index)
     if array.ndim == 1:
         return np.take(array, index)
-    # As np.moveaxis, which takes as long as arithmetic on a thousand numbers.
-    picked = np.take(array.transpose(*range(1, array.ndim), 0), index, axis=-1)
-    return picked.transpose(-1, *range(array.ndim - 1))
+    # As it lies in memory: numpy would copy all of it first. Not np.moveaxis, which takes as long as arithmetic on a
+    # thousand numbers.
+    order = sorted(range(1, array.ndim), key=array.strides.__getitem__, reverse=True)
+    picked = np.take(array.transpose(*order, 0), index, axis=-1)
+    return picked.transpose(-1, *(order.index(axis) for axis in range(1, array.ndim)))
 
 
 def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -333,7 +333,7 @@ def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_LeafBearers]:
     """Those of branches that bear leaves, row by row."""
     row = whole.branches.row
     for one in np.unique(row[flora.rows["leaves"][row].sum(axis=1) > 0]).tolist():
-        yield _LeafBearers(flora, one, whole.take(np.flatnonzero(row == one)))
+        yield _LeafBearers(flora, one, whole.take(row == one))
 
 
 class _LeafBearers:
@@ -365,8 +365,8 @@ class _LeafBearers:
         """The branches some of whose leaves are wanted as they are, and those with leaves as kites of both kinds."""
         none, every = np.zeros_like(kites), np.ones_like(kites)
         for step, low, high in ((0, planes, every), (_PLANES, kites, planes), (_KITE, none, kites)):
-            own = np.flatnonzero((fraction > 0.0) & (low < high))
-            if len(own):
+            own = (fraction > 0.0) & (low < high)
+            if own.any():
                 given = fraction[own], low[own], high[own]
                 yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given)
 
