@@ -250,22 +250,22 @@ def own_ground(writer, found):
 
 
 def biome(writer, found):
-    """A biome with fewer birches and without junipers, in summer and in autumn."""
+    """A biome with more junipers and without ground cover, in summer and in autumn."""
     yield from writer.delete_all()
     with writer.ui.override():
         bpy.ops.tetflora.add_biome('INVOKE_DEFAULT', biome="birch_pine")  # the entry of the Add menu
     yield from writer.done()
     layers = bpy.context.scene.tetflora.layers
     before = {layer.name: layer.made for layer in layers}
-    yield from writer.click("Birches")
-    index = next(n for n, layer in enumerate(layers) if layer.name == "Birches")
+    yield from writer.click("Junipers")
+    index = next(n for n, layer in enumerate(layers) if layer.name == "Junipers")
     found["active"] = layers[bpy.context.scene.tetflora.layers_index].name
-    yield from writer.enter(f"layers[{index}].density", 0.5 * layers[index].density)
+    yield from writer.enter(f"layers[{index}].density", 2.0 * layers[index].density)
     yield from writer.click("ops.tetflora.update_layers(")
     yield from writer.done()
     layers = bpy.context.scene.tetflora.layers
-    found["birches"] = [before["Birches"], layers[index].made]
-    index = next(n for n, layer in enumerate(layers) if layer.name == "Junipers")
+    found["junipers"] = [before["Junipers"], layers[index].made]
+    index = next(n for n, layer in enumerate(layers) if layer.name == "Ground cover")
     yield from writer.click(f"layers[{index}].shown", place=writer.across(-90, -94), shift=True)
     found["shown"] = layers[index].shown
     yield from writer.view((0.0, -20.0, 2.0), 20.0, 20.0, 60.0)

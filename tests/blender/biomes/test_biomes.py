@@ -125,6 +125,18 @@ def test_shipped_biomes_are_sound(path):
     assert biome.description and library.biomes()[path.stem].name == biome.name
 
 
+@pytest.mark.parametrize(
+    "name", ["alpine_treeline", "beech_fern", "birch_pine", "oak_savanna", "riparian_willow", "spruce_forest"]
+)
+def test_trees_of_woods_compete(name):
+    """No tree of a shipped wood is merely placed, and what lies under them fell from the species that grow there."""
+    biome = files.read_biome(library.builtin_folder() / f"{name}.json")
+    grown = {part["species"] for layer in biome.layers if layer["kind"] == "stand" for part in layer["species"]}
+    placed = {part["species"] for layer in biome.layers if layer["kind"] == "population" for part in layer["species"]}
+    shed_by = {part["shed_by"] for layer in biome.layers for part in layer["species"] if part.get("shed_by")}
+    assert grown and grown.isdisjoint(placed) and shed_by <= grown
+
+
 def test_there_are_twelve():
     """And the panel always has one to add, whatever the file says."""
     assert len(SHIPPED) == 12
