@@ -84,7 +84,7 @@ def test_places_and_looks_are_those_of_the_facets() -> None:
 
 
 def test_what_nobody_sees_keeps_out_as_much_light_from_above_as_its_leaves() -> None:
-    """Leaves of beeches lie level: of spheres, which are as wide from all sides, the same shadow would be 40 % lighter."""
+    """Leaves of beeches lie level: spheres, which are as wide from all sides, would have less of a shadow."""
     flora, view = compile_species([load_species("beech")]), camera()
     seeds = support.plants(list(range(1, 5)))
     plants = trunks(flora.rows, replace(seeds, species=np.zeros(4, np.int32)))
