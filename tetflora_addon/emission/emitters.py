@@ -131,20 +131,13 @@ def as_triangles(facets: Facets, _seen: bool) -> Primitive:
 
 @dataclass(frozen=True)
 class AsSpheres:
-    """The form of *Microspheres*, and of *Automatic*, where ``seen_too`` is False and what is seen becomes triangles.
-
-    In the fidelity benchmark facets come closer to the plants wherever they are seen. Hidden proxies only cast shadows
-    and light other plants; spheres do that as well with a third of the memory.
-    """
+    """The form of *Microspheres*."""
 
     camera: Camera
     disc: float
-    seen_too: bool
 
     def __call__(self, facets: Facets, seen: bool) -> Primitive:
-        """Spheres or triangles."""
-        if seen and not self.seen_too:
-            return triangles_of(facets)
+        """Spheres."""
         return spheres_of(facets, self.camera if seen else None, self.disc)
 
 
@@ -153,15 +146,11 @@ def _triangles_everywhere(_camera: Camera, _disc: float) -> FacetConverter:
 
 
 def _spheres_everywhere(camera: Camera, disc: float) -> FacetConverter:
-    return AsSpheres(camera, disc, seen_too=True)
-
-
-def _spheres_where_hidden(camera: Camera, disc: float) -> FacetConverter:
-    return AsSpheres(camera, disc, seen_too=False)
+    return AsSpheres(camera, disc)
 
 
 def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
-    """Facets as the form of the drawing has made them: triangles, spheres, or triangles where they are seen."""
+    """Facets as the form of the drawing has made them: triangles or spheres."""
     for parts in refined.facet_parts():
         triangles = [some for some, _ in parts if isinstance(some, Triangles)]
         spheres = [some for some, _ in parts if isinstance(some, Spheres)]
@@ -205,8 +194,9 @@ def _baked_spheres(refined: EmissionInput, light: BakedLight, first_sheet: int) 
 
 MICROSURFACES = ProxyEmitter(facet_blocks, _triangles_everywhere, _baked_facets)
 MICROSPHERES = ProxyEmitter(facet_blocks, _spheres_everywhere, _baked_spheres)
-#: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
-AUTOMATIC = ProxyEmitter(facet_blocks, _spheres_where_hidden, _baked_facets)
+#: Facets, also where nobody sees them: leaves lie level, and facets as level keep out more of the light from above
+#: than spheres, which are as wide from all sides. With these, a beech wood had 1.6 times the light inside.
+AUTOMATIC = MICROSURFACES
 #: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because
 #: their shape shows.
 SHELLS = ProxyEmitter(shell_blocks, None, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)

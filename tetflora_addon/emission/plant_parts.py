@@ -23,7 +23,7 @@ from ..growth.axes import Axes, axes
 from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Branches
-from ..proxies.facet_weights import FacetWeights
+from ..proxies.facet_weights import FacetWeights, leaf_shares
 from ..proxies.hotspots import LightRatios, light_ratios
 from ..proxies.microsurfaces import Facets, piece_facets, subplant_facets
 from ..refinement.contents import PlantParts, as_pieces
@@ -182,7 +182,7 @@ class GrownPlants(FrontierKind):
         thin: Thin | None = None,
     ) -> Facets:
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
-        weight = self.weights.of_subplants(branches.row, count, self._share(branches))
+        weight = self.weights.of_subplants(branches.row, count, leaf_shares(self.flora, branches))
         lit = None if thin is None else self._lit(branches, leaf)
         return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, lit, thin)
 
@@ -251,7 +251,7 @@ class GrownPlants(FrontierKind):
         flora, branches = self.flora, pieces.branches if whole is None else whole[0].branches
         leaf = np.maximum(side, np.sqrt(flora.one_leaf_area(branches)))
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
-        weight = self.weights.of_pieces(branches.row, count, self._share(branches))
+        weight = self.weights.of_pieces(branches.row, count, leaf_shares(self.flora, branches))
         if whole is None:
             return piece_facets(flora, pieces, leaf, side, weight, explicit)
         own = (of[whole[1]] for of in (leaf, side, weight, explicit))
@@ -259,10 +259,6 @@ class GrownPlants(FrontierKind):
 
     def _optical(self, branches: Branches) -> NDArray[np.float64]:
         return self.flora.leaf_areas(branches) + self.flora.wood_areas(branches) / 2
-
-    def _share(self, branches: Branches) -> NDArray[np.float64] | None:
-        """Part (n,) of their leaves that branches have on the day; None in summer."""
-        return None if branches.year is None else self.flora.day.leaf_share(branches)
 
     def _lit(self, branches: Branches, side: NDArray[np.float64]) -> LightRatios:
         """Light on facets of sides (n,) over that on the leaves of branches."""

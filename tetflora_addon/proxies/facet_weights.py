@@ -39,7 +39,7 @@ from ..compiled.rays import PlantElements, basis, elements_of
 from ..growth.foliage import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
-from ..growth.seeds import Branches, Seeds
+from ..growth.seeds import LEAVES, WIDTH, Branches, Seeds
 from ..jobs import mapped, run_to_end
 from ..refinement.contents import piece_totals, subplant_totals
 from ..species.ages import ages_of, with_age
@@ -486,12 +486,30 @@ _LOWEST_WEIGHT, _HIGHEST_WEIGHT = 0.02, 1.8
 Known = Callable[[Flora, int], Floats]
 
 
+def leaf_shares(flora: Flora, subplants: Branches) -> Floats | None:
+    """Leaves (n,) of sub-plants over those with which they were measured, on their day; None where all have as many.
+
+    Those of a dense stand have fewer on each twig; in narrow crowns, seen as a whole, they lie the closer together.
+    """
+    share = None if subplants.year is None else flora.day.leaf_share(subplants)
+    leafiness = np.array([one.leafiness for one in flora.species])[flora.species_of(subplants.row)]
+    if not (leafiness < 1.0).any():
+        return share
+    if subplants.crown is not None:
+        rows, row, crown = flora.rows, subplants.row, subplants.crown.astype(np.float64)
+        whole = (rows["order"][row] == 0) & ~rows["continues"][row] & (leafiness < 1.0)
+        leafiness = np.where(whole, leafiness * crown[:, LEAVES] / np.maximum(crown[:, WIDTH], 1e-3) ** 2, leafiness)
+    leafiness = np.minimum(leafiness, 1.0)
+    return leafiness if share is None else share * leafiness
+
+
 def states_of(flora: Flora, number: int) -> tuple[int, ...]:
-    """Indices of `SHARES` between which plants of a species are on the day of a flora; those in summer have all."""
-    if flora.day is None:
-        return (0,)
-    low, high = flora.day.share_range(flora.rows, number)
-    shares = np.array(SHARES)
+    """Indices of `SHARES` between which plants of a species are on the day of a flora; those in summer have all.
+
+    Those of a dense stand have fewer at all times.
+    """
+    low, high = (1.0, 1.0) if flora.day is None else flora.day.share_range(flora.rows, number)
+    low, shares = low * flora.species[number].leafiness, np.array(SHARES)
     first = int(np.flatnonzero(shares >= min(high, 1.0) - 1e-9)[-1])
     last = int(np.flatnonzero(shares <= low + 1e-9)[0])
     return tuple(range(first, last + 1))
@@ -500,7 +518,7 @@ def states_of(flora: Flora, number: int) -> tuple[int, ...]:
 def variants(species: Species) -> Iterator[tuple[str, Flora]]:
     """All variants of a species of which weights are needed on any day and at any age, each with a name."""
     plain = compile_species([species])
-    shares = SHARES if species.year is not None else SHARES[:1]
+    shares = SHARES if species.year is not None else SHARES[:2]
     for share in shares:
         yield f"{species.identifier} {share:g}", _with_leaves(plain.species[0], share)
     for years in ages_measured(species):

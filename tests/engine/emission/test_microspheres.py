@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,9 +14,21 @@ from tests.engine.emission.test_emission import scene
 from tetflora_addon.arrays import unit
 from tetflora_addon.buffers import MeshBuffers, PointBuffers
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.emission.emitters import AsSpheres, as_triangles, facet_blocks
-from tetflora_addon.proxies.microsurfaces import Facets
-from tetflora_addon.proxies.primitives import LEAST_COVER, facet_mesh, facing, joined, sphere_points, spheres_of
+from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.emission.emitters import AUTOMATIC, AsSpheres, as_triangles, facet_blocks
+from tetflora_addon.growth.growth import trunks
+from tetflora_addon.proxies.microsurfaces import Facets, subplant_facets
+from tetflora_addon.proxies.primitives import (
+    LEAST_COVER,
+    Spheres,
+    Triangles,
+    facet_mesh,
+    facing,
+    joined,
+    sphere_points,
+    spheres_of,
+)
+from tetflora_addon.species.catalog import load_species
 
 EYE = np.array([2.0, -30.0, 4.0])
 
@@ -69,22 +83,39 @@ def test_places_and_looks_are_those_of_the_facets() -> None:
         assert (values == expected.astype(np.float32)).all()
 
 
+def test_what_nobody_sees_keeps_out_as_much_light_from_above_as_its_leaves() -> None:
+    """Leaves of beeches lie level: spheres, which are as wide from all sides, would have less of a shadow."""
+    flora, view = compile_species([load_species("beech")]), camera()
+    seeds = support.plants(list(range(1, 5)))
+    plants = trunks(flora.rows, replace(seeds, species=np.zeros(4, np.int32)))
+    facets = subplant_facets(flora, plants, np.full(4, 0.3))
+    facets = facets.take(np.flatnonzero(facets.transmission > 0))
+    shadow = (facets.side**2 * np.abs(facets.normal[:, 2])).sum()
+
+    def of(drawn: Triangles | Spheres) -> float:
+        if isinstance(drawn, Spheres):
+            return discs(drawn.radius).sum()
+        a, b = (drawn.corners[:, k, :2] - drawn.corners[:, 0, :2] for k in (1, 2))
+        return 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()
+
+    assert of(AUTOMATIC.form(view, np.pi)(facets, False)) == pytest.approx(shadow, rel=1e-4)
+    assert of(AsSpheres(view, np.pi)(facets, False)) < 0.75 * shadow
+
+
 def test_a_refinement_has_a_sphere_for_each_facet() -> None:
-    """Where all are spheres as many as facets; where only hidden ones are, triangles where they are seen."""
     flora, _, view, result = scene()
     made = {}
     for name, form in (
-        ("all", AsSpheres(view, np.pi, True)),
-        ("hidden", AsSpheres(view, np.pi, False)),
+        ("all", AsSpheres(view, np.pi)),
         ("none", as_triangles),
     ):
         refined = support.refined(flora, result, view, form=form)
         list(refined.mesh_blocks())
         made[name] = list(facet_blocks(refined))
     numbers = {name: sum(block.polygons for block in blocks) for name, blocks in made.items()}
-    assert numbers["all"] == numbers["hidden"] == numbers["none"] > 1000
+    assert numbers["all"] == numbers["none"] > 1000
     kinds = {name: {type(block) for block in blocks} for name, blocks in made.items()}
-    assert kinds == {"all": {PointBuffers}, "hidden": {PointBuffers, MeshBuffers}, "none": {MeshBuffers}}
+    assert kinds == {"all": {PointBuffers}, "none": {MeshBuffers}}
     area = sum(support.face_areas(block).sum() for block in made["none"])
     cover = sum(discs(block.radius).sum() for block in made["all"])
     assert 0.2 * area < cover < 0.6 * area

@@ -20,6 +20,7 @@ from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, piece_facets, sub
 from tetflora_addon.proxies.primitives import facet_mesh
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterize import occluder_depth
+from tetflora_addon.species.ages import ages_of, with_habit
 from tetflora_addon.species.catalog import list_species, load_species
 from tetflora_addon.subplants.pieces import open_subplants
 
@@ -54,11 +55,13 @@ def as_facets(flora: Flora, seeds, opened: int, side: float, weights: subject.Fa
         some, _, pieces, _ = open_subplants(flora, some)
         totals = piece_totals(flora, pieces)
         whole = (totals.leaf_area + totals.wood_area / 2) / np.maximum(pieces.t1 - pieces.t0, 1e-12)
-        weight = None if weights is None else weights.of_pieces(pieces.branches.row, whole / side**2)
+        share = subject.leaf_shares(flora, pieces.branches)
+        weight = None if weights is None else weights.of_pieces(pieces.branches.row, whole / side**2, share)
         out.append(piece_facets(flora, pieces, np.full(len(pieces), side), weight=weight))
     totals = subplant_totals(flora, some)
     area = totals.leaf_area + totals.wood_area / 2
-    weight = None if weights is None else weights.of_subplants(some.row, area / side**2)
+    share = subject.leaf_shares(flora, some)
+    weight = None if weights is None else weights.of_subplants(some.row, area / side**2, share)
     out.append(subplant_facets(flora, some, np.full(len(some), side), weight=weight))
     return [triangles(facet_mesh(f)) for f in out if len(f)]
 
@@ -79,6 +82,27 @@ def test_opened_plants_of_other_seeds_are_as_opaque(identifier: str) -> None:
     error = abs(np.mean(fitted) - np.mean(truth)) / np.mean(truth)
     assert error < 0.08
     assert error < abs(np.mean(full) - np.mean(truth)) / np.mean(truth)
+
+
+@pytest.mark.parametrize("opened", [0, 1])
+def test_trees_of_a_dense_stand_are_as_opaque(opened: int) -> None:
+    """They have fewer leaves on each twig, so less hides; in a narrow crown their limbs hide each other the more."""
+    free = load_species("beech")
+    dense = replace(with_habit(free, 1.0), habit=0.0, aged=(free, ages_of(free).full))
+    ratios = {}
+    for leafiness in (1.0, free.stand_leaves):
+        flora = compile_species([replace(dense, leafiness=leafiness)])
+        weights, real, facets = subject.facet_weights(flora), [], []
+        for seed in (901, 905, 907):
+            seeds = replace(support.plants(seed), crown=np.array([[0.6, 0.5, 0.0, 0.0, 1.0, 0.7]]))
+            grown = [triangles(block.buffers) for block in expanded_blocks(flora, seeds)]
+            reach = float(max(np.abs(part[..., :2]).max() for part in grown))
+            top = max(part[..., 2].max() for part in grown)
+            for out, made in ((real, grown), (facets, as_facets(flora, seeds, opened, reach / 10, weights))):
+                # Tipped over, so that most rays come from above.
+                out.append(blocked([part[..., [0, 2, 1]] + [0.0, reach - top, reach] for part in made], reach))
+        ratios[leafiness] = np.mean(facets) / np.mean(real)
+    assert ratios[free.stand_leaves] == pytest.approx(1.0, abs=0.05)
 
 
 def test_tables_of_shipped_species_are_those_of_today() -> None:

@@ -74,8 +74,9 @@ def at_age(species: Species, years: float, dead: float = 0.0, crowded: bool = Fa
         free, years = species, years or ages_of(species).full
         leafy = replace(species, stand_leaves=max(species.stand_leaves, _LEAFY))
         dense = at_age(replace(with_habit(leafy, 1.0), habit=0.0), years, dead)
-        # Facets hide as much behind others as those of free plants, which were measured.
-        return replace(dense, aged=(free, years if dense.aged is None else dense.aged[1]))
+        # Facets hide as much behind others as those of free plants with as many leaves, which were measured.
+        leafiness = 1.0 if dead > 0.0 else leafy.stand_leaves
+        return replace(dense, aged=(free, years if dense.aged is None else dense.aged[1]), leafiness=leafiness)
     if dead <= 0.0:
         return with_age(species, years) if years > 0.0 else species
     ages = ages_of(species)
