@@ -5,8 +5,6 @@
 Files are read as those of strangers: one that is damaged, packed, too large or points beyond itself counts as absent.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import fields

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A forest as it leaves: variants in levels of detail, and where plants show them; and the folder that it goes to."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import uuid

@@ -8,8 +8,6 @@ Sources: Khronos Group, "glTF 2.0 Specification", and "EXT_mesh_gpu_instancing" 
 (github.com/KhronosGroup/glTF, extensions/2.0/Vendor).
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Callable, Iterator

@@ -9,8 +9,6 @@ color.
 Source of the file format: W3C, "Portable Network Graphics (PNG) Specification (Third Edition)".
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Sequence

@@ -8,8 +8,6 @@ are wider. Facets hide each other in another way than leaves do, so that the are
 covers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 

@@ -8,8 +8,6 @@ dead branches. Children follow their parents in the table. Each branch drawn by 
 segments with frames. Angles are in radians.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -7,8 +7,6 @@ where they are, and each part keeps its area. What is open, such as stalks, stay
 areoles that are spread evenly over closed parts.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -6,8 +6,6 @@ The model of a species is the coarsest level and stays as it is. Each finer leve
 stands for, in lengths of the leaf, and is drawn where the one before it would be off by more than a part of a pixel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache

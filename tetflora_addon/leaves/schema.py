@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading leaves from a species file: polygons, models and outlines, which are checked field by field."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

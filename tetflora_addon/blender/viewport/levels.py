@@ -5,8 +5,6 @@
 Without a window, plants are read only on request, and the only handlers are those for loading.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Generator
 from dataclasses import replace
