@@ -5,6 +5,8 @@
 A leaf model lies with its base at the origin, its midrib along +y, one unit long, its upper side toward +z.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
