@@ -5,9 +5,8 @@
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
-from ..tetflora_addon.blender.biomes.adding import BiomeResult, add_biome_steps
+from ..tetflora_addon.blender.biomes.adding import BiomeResult, add_biome_steps, make_land
 from ..tetflora_addon.blender.biomes.files import import_biome, read_biome
-from ..tetflora_addon.blender.biomes.ground import make_land
 from ..tetflora_addon.blender.biomes.layers import active_layer
 from ..tetflora_addon.blender.biomes.library import BIOMES, NO_BIOME, biomes
 from ..tetflora_addon.blender.declare import boolean, once

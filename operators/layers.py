@@ -7,10 +7,9 @@ from contextlib import closing
 import bpy
 from bpy.props import StringProperty
 
-from ..tetflora_addon.blender.biomes.adding import plant_biome_steps, remove_biome
+from ..tetflora_addon.blender.biomes.adding import lay_biome_soil, plant_biome_steps, remove_biome
 from ..tetflora_addon.blender.biomes.files import active_biome, find_biome, saved_populations
 from ..tetflora_addon.blender.biomes.files import save_biome as save_biome_file
-from ..tetflora_addon.blender.biomes.ground import lay_biome_soil
 from ..tetflora_addon.blender.biomes.layers import (
     active_layer,
     children_of,

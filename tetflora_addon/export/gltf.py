@@ -21,7 +21,7 @@ from ..arrays import Floats32, Integers
 from ..buffers import MeshBuffers
 from ..errors import TetFloraError
 from .forest import BakedSurface, Forest, ForestPart, Variant
-from .views import triangles
+from .levels import triangles
 
 _FLOAT, _BYTE, _INT = 5126, 5121, 5125
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}

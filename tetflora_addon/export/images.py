@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Floats32, Integers, srgb_of
 from ..buffers import MeshBuffers
-from .levels import PlantLevel
-from .views import triangles
+from .levels import PlantLevel, triangles
 
 #: Texels to a side of a cell, and by which part of these its content is within it, so that what lies beside an outline
 #: is of its color in coarser levels of the texture.

@@ -23,9 +23,17 @@ from ..settings import check_limits
 from ..worker import run_to_end
 from .canopy import not_of_covers
 from .distances import SQUARE, distance_of, painted_weights
-from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
-from .plant_objects import PAINTED_MARK, add_field, add_plants_steps, plants_of
+from .plant_objects import (
+    PAINTED_MARK,
+    add_field,
+    add_plants_steps,
+    add_points,
+    editable,
+    plants_of,
+    positions,
+    take_points,
+)
 from .populations import own_number, own_objects
 from .properties import MOST_PAINTED_EMPTIES
 from .rules import note_erased
