@@ -108,11 +108,7 @@ def levels_of(flora: Flora, seed: Seeds, number: int = 0, like: tuple[PlantLevel
 def differences(levels: Sequence[PlantLevel]) -> tuple[PlantLevel, ...]:
     """Levels of a plant with how far each is off the first one, seen anew."""
     full, *rest = levels
-    points = np.concatenate([mesh.positions for _, mesh in full.parts])
-    margin = 2.0 * max((level.pixel for level in rest), default=1.0)
-    found = [full]
-    cell = float(np.ptp(points, axis=0).max()) / _MOST_CELLS
-    grids = [Grid.around(toward, cell, points, margin) for toward in VIEWS]
+    found, grids = [full], _grids(full, 0.0, max((level.pixel for level in rest), default=0.5))
     truth = _views(grids, full.parts)
     for level in rest:
         seen = _views(grids, level.parts)
@@ -351,12 +347,17 @@ def _least(parts: Sequence[Floats32]) -> Floats32:
     return np.minimum(np.minimum(parts[0], parts[1]), parts[2])
 
 
-def triangles(mesh: MeshBuffers) -> tuple[Integers, Integers]:
-    """Faces (t,) of the triangles that fan out over those of a mesh, and the vertices (t, 3) of these."""
+def corner_triangles(mesh: MeshBuffers) -> tuple[Integers, Integers]:
+    """Faces (t,) of the triangles that fan out over those of a mesh, and the corners (t, 3) of these."""
     size = np.diff(mesh.face_offsets)
     owner, index = spread(np.maximum(size - 2, 0).astype(np.int64))
     first = mesh.face_offsets[owner]
-    corner = np.stack([first, first + index + 1, first + index + 2], axis=1)
+    return owner, np.stack([first, first + index + 1, first + index + 2], axis=1)
+
+
+def triangles(mesh: MeshBuffers) -> tuple[Integers, Integers]:
+    """The same with the vertices (t, 3) of the triangles."""
+    owner, corner = corner_triangles(mesh)
     return owner, mesh.corner_verts[corner]
 
 
