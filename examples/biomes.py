@@ -106,7 +106,7 @@ VIEWS = {
 def build(identifier: str, view: View) -> None:
     """Fill an empty scene with a biome, its land, sun and sky."""
     from tetflora_addon.blender.biomes import adding, files
-    from tetflora_addon.blender.placing.zones import biomes_in
+    from tetflora_addon.blender.placing.rules import biomes_in
     from tetflora_addon.blender.worker import run_to_end
 
     scene = bpy.context.scene

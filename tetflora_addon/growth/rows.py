@@ -112,13 +112,14 @@ LATERAL, FORK, SPUR, DEAD = range(4)
 
 SPUR_ORDER, DEAD_ORDER = 100, 101
 BOX = LEAF_ENVELOPES.index("box")
-#: Keys of orders that the table has in other columns.
-_ELSEWHERE = {
-    "branches", "branch_start", "spurs", "spur_start", "forks", "fork_at", "fork_angle", "fork_levels",
-    "leaf_envelope", "leaf_envelope_radius", "leaf_inclination",
-}  # fmt: skip
-#: The others, which are columns of the same name, and what these hold.
-_COLUMNS = {name: key for name, key in keys_of(Order).items() if name not in _ELSEWHERE}
+#: Columns that are keys of an order; what they hold follows from its fields.
+_NAMES = (
+    "length thickness taper curvature attraction angle azimuth leaves leaf_start leaf_size leaf_angle leaf_azimuth "
+    "leaf_light curvature_tip count_by_length angle_tip spray flare pipe leaf_spray leaf_droop leaf_size_tip "
+    "leaf_size_young leaf_light_tip branch_color leaf_color leaf_color_tip leaf_color_young segments sides whorl "
+    "leaf_whorl crown leaf_kind"
+)
+_COLUMNS = {name: keys_of(Order)[name] for name in _NAMES.split()}
 _FORMS = {
     "range": (np.float64, (2,)), "number": (np.float64,), "integer": (np.int64,), "choice": (np.int64,),
     "color": (np.float64, (2, 3)), "rgb": (np.float64, (3,)),

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
 from tetflora_addon.blender.biomes import adding, files, library
 from tetflora_addon.blender.file_library import as_text
-from tetflora_addon.blender.placing import populations, zones
+from tetflora_addon.blender.placing import populations, rules
 from tetflora_addon.blender.preferences import preferences
 from tetflora_addon.blender.species.edits import catalog
 from tetflora_addon.blender.stands.growing import keep_year
@@ -85,7 +85,7 @@ def small(**changes) -> files.Biome:
 
 
 def biomes():
-    return zones.biomes_in(scene())
+    return rules.biomes_in(scene())
 
 
 def add(biome: files.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.BiomeResult:

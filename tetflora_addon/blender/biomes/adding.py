@@ -32,9 +32,8 @@ from ..materials.soil import SHADED, lay_soil, may_have_soil
 from ..placing.cover import fallen_from
 from ..placing.population_data import fill_population, set_setting
 from ..placing.populations import add_population, free_name, make_plants_steps, own_objects, remove_layer, restored
-from ..placing.rules import set_grounds
+from ..placing.rules import biomes_in, set_grounds
 from ..placing.terrain import grid_mesh, read_ground
-from ..placing.zones import biomes_in
 from ..runtime import GoneError, JobData, is_there, job
 from ..scene.crowns import crown_for
 from ..scene.field_sizes import has_history

@@ -294,7 +294,7 @@ def _none_left(off: bool, fields: list[str], hidden: int) -> str:
             "or their collections in the Outliner"
         )
     return (
-        "No plants to render; add some with Add > TetFlora Plant, or with Populate in the TetFlora tab of the sidebar"
+        "No plants to render; add some with Add > TetFlora Plant, or with + under Layers in the sidebar's TetFlora tab"
     )
 
 
