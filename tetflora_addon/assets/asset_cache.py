@@ -52,10 +52,7 @@ def keep(asset: Asset) -> None:
 def clear() -> int:
     """Delete all compiled assets of this user in the folder, and drop those in memory; returns how many files.
 
-    Raises
-    ------
-    TetFloraError
-        As `storage.clear`.
+    Errors are those of `storage.clear`.
     """
     forget()
     used = storage.current_folder()

@@ -124,10 +124,7 @@ def zoned(
 ) -> Terrain:
     """A ground with the zones of a layer, a population or a stand, in its weights: as they are at the corners.
 
-    Raises
-    ------
-    SceneError
-        As `read_zones`.
+    Errors are those of `read_zones`.
     """
     zones = read_zones(depsgraph, owner, grounds)
     if not zones:

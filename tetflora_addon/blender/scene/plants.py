@@ -299,13 +299,7 @@ def _none_left(off: bool, fields: list[str], hidden: int) -> str:
 
 
 def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:
-    """Plants that are objects, in their order.
-
-    Raises
-    ------
-    SceneError
-        As `read_plants`.
-    """
+    """Plants that are objects, in their order. Errors are those of `read_plants`."""
     groups = [obj.tetflora for obj in plants]
     names, own = [obj.name for obj in plants], [kind_of_choice(group) for group in groups]
     _check_species(list(zip(names, own, strict=True)))
