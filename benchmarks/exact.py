@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devtools.formats import set_format
-from tetflora_addon.blender.biomes import adding, files, ground, library
+from tetflora_addon.blender.biomes import adding, files, library
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.job.contents import read_scene
 from tetflora_addon.blender.materials import snow
@@ -546,7 +546,7 @@ def _made(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 def biome(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, Any]:
     """A shipped biome on a hectare, seen at the height of the eye from the edge, in one of the qualities."""
     chosen = files.read_biome(library.builtin_folder() / f"{spec['case']}.json")
-    land = ground.make_land(scene, chosen.ground)
+    land = adding.make_land(scene, chosen.ground)
     bpy.context.view_layer.update()
     run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), chosen, [land]))
     forest.add_light(scene)

@@ -22,7 +22,7 @@ from devtools import session
 from tests.blender.scenes import depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.export.forest import Exported, ExportOrder, export_steps
-from tetflora_addon.blender.export.reading import forest_steps
+from tetflora_addon.blender.export.usd import forest_steps
 from tetflora_addon.blender.geodata.origin import Import
 from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.scene.plants import read_plants

@@ -117,7 +117,7 @@ def _plant(scene, name: str) -> None:
     import bpy
 
     from tests.blender.scenes import add_camera, add_plant
-    from tetflora_addon.blender.biomes import adding, files, ground, library
+    from tetflora_addon.blender.biomes import adding, files, library
     from tetflora_addon.blender.worker import run_to_end
 
     if name in STANDS:
@@ -127,7 +127,7 @@ def _plant(scene, name: str) -> None:
         add_camera(location=(0.0, 0.0, EYES))
         return
     biome = files.read_biome(library.builtin_folder() / f"{name}.json")
-    land = ground.make_land(scene, biome.ground)
+    land = adding.make_land(scene, biome.ground)
     bpy.context.view_layer.update()
     run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
     depsgraph = bpy.context.evaluated_depsgraph_get()

@@ -105,18 +105,18 @@ VIEWS = {
 
 def build(identifier: str, view: View) -> None:
     """Fill an empty scene with a biome, its land, sun and sky."""
-    from tetflora_addon.blender.biomes import adding, files, ground
-    from tetflora_addon.blender.placing.zones import biomes_in
+    from tetflora_addon.blender.biomes import adding, files
+    from tetflora_addon.blender.placing.rules import biomes_in
     from tetflora_addon.blender.worker import run_to_end
 
     scene = bpy.context.scene
     biome = files.read_biome(SHIPPED / f"{identifier}.json")
-    land = ground.make_land(scene, biome.ground)
+    land = adding.make_land(scene, biome.ground)
     if view.beside:
         other = files.read_biome(SHIPPED / f"{view.beside}.json")
         _add(run_to_end, adding, scene, replace(other, layers=[o for o in other.layers if o["kind"] == "cover"]), land)
     added = _add(run_to_end, adding, scene, biome, land)
-    around = _around(biome, ground)
+    around = _around(biome, adding)
     scene.collection.objects.link(around)
     tall = [layer for layer in biome.layers if layer["kind"] != "cover"]
     if tall:
@@ -127,10 +127,10 @@ def build(identifier: str, view: View) -> None:
     if view.beside:
         run_to_end(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biomes_in(scene)[0]))
     if view.water:
-        _brook(scene, ground, biome, view.water)
+        _brook(scene, adding, biome, view.water)
     print(identifier, ", ".join(f"{name} {number:,}" for name, number in added.layers), *added.bare, flush=True)
     eye, ahead = (
-        Vector((x, y, z + float(ground.heights(np.array(x), np.array(y), biome.ground))))
+        Vector((x, y, z + float(adding.heights(np.array(x), np.array(y), biome.ground))))
         for x, y, z in (_clear(scene, view), view.ahead)
     )
     stage.camera(scene, eye, ahead, lens=view.lens, near=0.05)
@@ -179,21 +179,21 @@ def _add(run_to_end, adding, scene, biome, land):
     return run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
 
 
-def _around(biome: object, ground: object) -> bpy.types.Object:
+def _around(biome: object, adding: object) -> bpy.types.Object:
     """The same land around the hectare."""
-    mesh, _, _ = grid("Ground", _LAND, 4.0, ground.SIDE, lambda x, y: ground.heights(x, y, biome.ground))
+    mesh, _, _ = grid("Ground", _LAND, 4.0, adding.SIDE, lambda x, y: adding.heights(x, y, biome.ground))
     around = bpy.data.objects.new("Ground", mesh)
     around.tetflora.is_occluder = True
     return around
 
 
-def _brook(scene: bpy.types.Scene, ground: object, biome: object, deep: float) -> None:
+def _brook(scene: bpy.types.Scene, adding: object, biome: object, deep: float) -> None:
     """Water in the bed of a valley, which falls as the bed does."""
     from tetflora_addon.blender.compat import shader_tree
 
     along = np.linspace(-0.5 * _LAND, 0.5 * _LAND, 300)
-    middle = ground.brook(along)
-    bed = ground.heights(along, middle, biome.ground) + deep
+    middle = adding.brook(along)
+    bed = adding.heights(along, middle, biome.ground) + deep
     points = np.concatenate([np.stack([along, middle + side, bed], axis=1) for side in (-4.0, 4.0)])
     first = np.arange(len(along) - 1)
     faces = np.stack([first, first + 1, first + len(along) + 1, first + len(along)], axis=1)

@@ -124,7 +124,7 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
 
 
 def _activate_ground(scene: bpy.types.Scene) -> None:
-    """Select the ground, so that Populate and the brush go on from there, and not the startup's hidden cube."""
+    """Select the ground, so that Scatter and the brush go on from there, and not the startup's hidden cube."""
     layer = scene.view_layers[0]
     layer.update()  # what was just linked is not in it before
     ground = next((obj for obj in layer.objects if obj.tetflora.is_occluder), None)
@@ -185,7 +185,7 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
     def finish(self, context: bpy.types.Context, result: PlacedPlants) -> set[str]:
         grounds = grounds_to_plant(context)
         select_only(context, [*result.objects, *grounds])
-        # The terrain stays selected and active, so that Populate can follow Populate.
+        # The terrain stays selected and active, so that one Scatter can follow another.
         context.view_layer.objects.active = grounds[0]
         show_shapes(context.scene)
         return tell_placed(self, result)

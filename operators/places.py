@@ -10,8 +10,8 @@ from bpy.props import CollectionProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ..tetflora_addon.blender.declare import once
-from ..tetflora_addon.blender.export.reading import forest_steps
 from ..tetflora_addon.blender.export.usd import ENDINGS as USD_ENDINGS
+from ..tetflora_addon.blender.export.usd import forest_steps
 from ..tetflora_addon.blender.geodata.columns import (
     TetFloraInventoryColumn,
     chosen_columns,

@@ -6,14 +6,16 @@ import bpy
 
 from ..tetflora_addon.blender.biomes.layers import active_layer, children_of, forget_gone
 from ..tetflora_addon.blender.declare import choice, once
-from ..tetflora_addon.blender.placing.field_edits import assign_field_species, editable, reseed_field
 from ..tetflora_addon.blender.placing.ground import DropResult, drop_steps
 from ..tetflora_addon.blender.placing.plant_objects import (
+    assign_field_species,
     assign_species,
+    editable,
     plants_of,
     remove_fields,
     remove_plants,
     reseed,
+    reseed_field,
 )
 from ..tetflora_addon.blender.placing.populations import own_objects, recount
 from ..tetflora_addon.blender.scene.fields import fields_of, stored_size

@@ -54,5 +54,5 @@ class TETFLORA_PT_scene(PropertiesPanel, bpy.types.Panel):
             draw_message(context, layout, str(error))
             return
         if place is not None:
-            where = f"{place.east:,.0f}, {place.north:,.0f} of " if place.system.code >= 0 else ""
+            where = f"{place.east:,.0f}, {place.north:,.0f} of " if place.system.epsg >= 0 else ""
             draw_below(layout, f"{where}{place.system.name}", "Origin")

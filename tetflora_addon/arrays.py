@@ -11,8 +11,6 @@ room to spare and is changed in place, for few columns that are looked at all th
 columns that nobody looks at before all is done.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache

@@ -6,8 +6,6 @@ What they name comes from files of anybody, so that texts are made `readable`, a
 told.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from typing import Any

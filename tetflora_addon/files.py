@@ -6,8 +6,6 @@ All that goes wrong is an `OSError` with a text for the user. Links are never fo
 in a folder that several users share, one of them could lead another one's program anywhere. Folders above may be links.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Formats of what TetFlora writes: the number that each has, and the place for steps from one to the next."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

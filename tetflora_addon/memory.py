@@ -6,8 +6,6 @@ Only the standard library: Linux has files for it, macOS and Windows are asked t
 tell is None, and then nothing is limited that the artist has not limited.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import os

@@ -7,8 +7,6 @@ surfaces of the albedo w sends on w (1 − p) / (1 − p w) (Smolander and Stenb
 radiation budget of uniform broadleaved and coniferous canopies", 2005).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -6,8 +6,6 @@ What a block gives must not depend on other blocks, and blocks must not depend o
 results, to the bit.
 """
 
-from __future__ import annotations
-
 import os
 import threading
 from collections import deque

@@ -54,7 +54,7 @@ def meters(low: float, soft: float, high: float | None = None) -> dict[str, Any]
 
 Rgb = tuple[float, float, float]
 Declared = TypeVar("Declared")
-#: How fields are written, by their annotations.
+#: How fields are written, by their annotations as text: files that declare any have these evaluated late.
 KINDS = {
     "Range": "range", "float": "number", "int": "integer", "str": "text", "bool": "truth", "Color": "color",
     "Rgb": "rgb", "Rgb | None": "rgb", "tuple[float, float]": "pair",

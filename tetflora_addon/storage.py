@@ -9,8 +9,6 @@ count as absent, and none is taken for larger than the result that is looked for
 once on stderr and stops nothing. `memoized` does the same in memory for functions of arrays.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

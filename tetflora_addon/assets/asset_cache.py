@@ -5,8 +5,6 @@
 Files are read as those of strangers: one that is damaged, packed, too large or points beyond itself counts as absent.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import fields
@@ -54,10 +52,7 @@ def keep(asset: Asset) -> None:
 def clear() -> int:
     """Delete all compiled assets of this user in the folder, and drop those in memory; returns how many files.
 
-    Raises
-    ------
-    TetFloraError
-        As `storage.clear`.
+    Errors are those of `storage.clear`.
     """
     forget()
     used = storage.current_folder()

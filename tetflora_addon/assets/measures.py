@@ -6,8 +6,6 @@ A run is of whole clusters without children. What it takes does not grow with th
 Leaves are kites as well, which are drawn for a leaf of very few pixels, as for those of species (`leaves.kites`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

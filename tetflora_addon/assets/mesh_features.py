@@ -6,8 +6,6 @@ A species says which of its polygons are leaves. Of other meshes only the connec
 vertices at the same place are merged: many files split them at seams.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -9,8 +9,6 @@ cluster is longest and half of the triangles are on either side (a k-d tree; Ben
 eight children.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ Every total is kept by the row that contributes it, so that colors and fractions
 how far outside in the crown a sub-plant sits is known at three places, `NODES`, and quadratic between them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter

@@ -7,8 +7,6 @@ volume is a cylinder about the branch's axis for a branch of unit length; what d
 thickness) is a pad.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

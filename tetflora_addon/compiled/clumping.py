@@ -14,8 +14,6 @@ once, by rays through a few plants that are divided into tetrahedra of several s
 nothing in truth shall on the mean pass through the tetrahedra. What is fitted is what is seen: whole stacks of cells.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -11,8 +11,6 @@ On a day of the year there are totals in summer by kind of leaf, times what the 
 those of `growth.seasons`; nothing is measured anew for a day.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

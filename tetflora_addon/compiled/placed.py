@@ -7,8 +7,6 @@ what is on the limb away from there, as it does when plants grow. Where limbs ar
 stand for more, but all together for as much as is expected.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

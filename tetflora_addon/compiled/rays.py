@@ -7,8 +7,6 @@ lemmas in topology", 1960): the order of a point's coordinates within the cube t
 for the meshes of grown plants and are much faster, because only what lies in the way of a ray gets corners.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

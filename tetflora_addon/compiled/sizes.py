@@ -144,10 +144,7 @@ def crown_of(species: Species) -> Crown:
 def prepare(species: Species) -> None:
     """Find the mean crown of a species, and how finely its leaves may be drawn: what an estimate may have to wait for.
 
-    Raises
-    ------
-    SpeciesError
-        As `crown_of`.
+    Errors are those of `crown_of`.
     """
     for form in crown_of(species).forms:
         if form is not None:

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A forest as it leaves: variants in levels of detail, and where plants show them; and the folder that it goes to."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import uuid
@@ -20,14 +18,6 @@ from ..errors import TetFloraError
 from ..files import PART, replace
 from .levels import PlantLevel
 
-#: Types of attributes, as Blender names them, and how many numbers of which type a value has.
-TYPES = {
-    'FLOAT': (np.float32, 1),
-    'INT': (np.int32, 1),
-    'INT32_2D': (np.int32, 2),
-    'FLOAT_VECTOR': (np.float32, 3),
-    'QUATERNION': (np.float32, 4),
-}
 #: Light that comes from everywhere and is mirrored by a surface (Fresnel), and the surface's index of refraction.
 _MIRRORED = (0.0, 0.0263, 0.0447, 0.061, 0.0918), (1.0, 1.1, 1.2, 1.3, 1.5)
 #: Attributes of points by name, each with its type and values.

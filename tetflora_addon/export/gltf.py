@@ -8,8 +8,6 @@ Sources: Khronos Group, "glTF 2.0 Specification", and "EXT_mesh_gpu_instancing" 
 (github.com/KhronosGroup/glTF, extensions/2.0/Vendor).
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Callable, Iterator
@@ -19,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats32, Integers
+from ..arrays import Floats32
 from ..buffers import MeshBuffers
 from ..errors import TetFloraError
 from .forest import BakedSurface, Forest, ForestPart, Variant
-from .views import triangles
+from .levels import corner_triangles, triangles
 
 _FLOAT, _BYTE, _INT = 5126, 5121, 5125
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -175,7 +173,8 @@ def _places(document: _Document, forest: Forest, number: int) -> dict[str, int] 
 
 def _primitive(document: _Document, mesh: MeshBuffers, material: int) -> dict[str, Any]:
     """Triangles with a vertex for each corner that has a place, a normal and texture coordinates of its own."""
-    corners, owner = _corners(mesh)
+    owner, corner = corner_triangles(mesh)
+    corners, owner = corner.reshape(-1), np.repeat(owner, 3)
     rows = np.column_stack([mesh.corner_verts[corners], mesh.attributes["UVMap"][1][corners].view(np.int32)])
     normal = vertex_normals(mesh)[mesh.corner_verts[corners]] if mesh.smooth else _normals(mesh)[owner]
     rows = rows if mesh.smooth else np.column_stack([rows, owner])
@@ -190,19 +189,6 @@ def _primitive(document: _Document, mesh: MeshBuffers, material: int) -> dict[st
     }
     indices = document.accessor(index.reshape(-1).astype(np.uint32), _INDICES)
     return {"attributes": attributes, "indices": indices, "material": material}
-
-
-def _corners(mesh: MeshBuffers) -> tuple[Integers, Integers]:
-    """Corners (3 t,) of the triangles of a mesh, one triangle after the other, and their faces (3 t,)."""
-    numbered = MeshBuffers(
-        mesh.positions,
-        mesh.edge_verts,
-        np.arange(len(mesh.corner_verts), dtype=np.int32),
-        mesh.corner_edges,
-        mesh.face_offsets,
-    )
-    owner, corner = triangles(numbered)
-    return corner.reshape(-1), np.repeat(owner, 3)
 
 
 def _normals(mesh: MeshBuffers) -> Floats32:

@@ -9,8 +9,6 @@ color.
 Source of the file format: W3C, "Portable Network Graphics (PNG) Specification (Third Edition)".
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Sequence
@@ -21,8 +19,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Floats32, Integers, srgb_of
 from ..buffers import MeshBuffers
-from .levels import PlantLevel
-from .views import triangles
+from .levels import PlantLevel, corner_triangles
 
 #: Texels to a side of a cell, and by which part of these its content is within it, so that what lies beside an outline
 #: is of its color in coarser levels of the texture.
@@ -89,7 +86,7 @@ def in_atlas(level: PlantLevel, palettes: dict[str, Palette]) -> PlantLevel:
 
 def outline(palette: Palette, mesh: MeshBuffers, faces: int = 4000) -> NDArray[np.bool_]:
     """Texels (t, t) of a cell that some faces of a mesh cover."""
-    owner, corner = _corner_triangles(mesh)
+    owner, corner = corner_triangles(mesh)
     some = owner < faces
     uv = palette.placed(mesh.attributes["UVMap"][1], np.zeros(len(mesh.corner_verts), np.int64))[corner[some]]
     shown = np.zeros((TEXELS, TEXELS), bool)
@@ -102,12 +99,6 @@ def outline(palette: Palette, mesh: MeshBuffers, faces: int = 4000) -> NDArray[n
         inside = np.all([s >= -0.5 for s in sides], axis=0) | np.all([s <= 0.5 for s in sides], axis=0)
         shown[y[inside], x[inside]] = True
     return grown(shown, 2)
-
-
-def _corner_triangles(mesh: MeshBuffers) -> tuple[Integers, Integers]:
-    """As `views.triangles`, with corners in the place of vertices."""
-    corners = np.arange(len(mesh.corner_verts), dtype=np.int32)
-    return triangles(replace(mesh, corner_verts=corners))
 
 
 def grown(shown: NDArray[np.bool_], texels: int) -> NDArray[np.bool_]:

@@ -6,8 +6,6 @@ For programs that have no instances in their files, and for pictures of single p
 levels take over are comments.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO

@@ -8,8 +8,6 @@ maximum intercluster distance", 1985), and the plant nearest to the middle of a 
 by its nearest variant, scaled to its own height.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

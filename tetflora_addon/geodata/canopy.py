@@ -8,8 +8,6 @@ Sensing 70 (5), 2004: crown width over height of mixed stands. Crowns are waters
 highest neighbor, and from a summit that is no top to the top that hides it. Nothing loops over cells or trees.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 

@@ -83,10 +83,7 @@ def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
 def place_of_image(path: Path) -> Raster:
     """Where the pixels of an image lie, as a raster of one value: a TIFF by its tags, others by world files.
 
-    Raises
-    ------
-    OSError, SceneError
-        As `read_tiff`.
+    Errors are those of `read_tiff`.
     """
     check_regular(path)
     if path.suffix.lower() not in (".tif", ".tiff"):

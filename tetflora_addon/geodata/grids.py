@@ -4,8 +4,6 @@
 several tiles as one.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Generator, Sequence
 from dataclasses import replace

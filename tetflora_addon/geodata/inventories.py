@@ -6,8 +6,6 @@ What a column holds follows from the words in its title, which are in `titles.js
 it hides them: ``crownDiameterM``, ``hauteurenm``, ``TREE_HEIGH`` of a shapefile, whose names end after ten letters.
 """
 
-from __future__ import annotations
-
 import datetime
 import math
 import re

@@ -6,8 +6,6 @@ Formats are those of RFC 7946 and 8142, the ESRI Shapefile Technical Description
 1.3 (OGC 12-128r17) with the well-known binary of OGC 06-103r4.
 """
 
-from __future__ import annotations
-
 import sqlite3
 import struct
 from collections.abc import Iterator

@@ -4,8 +4,6 @@
 words of what others call kinds of things, or by the name of their layer.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

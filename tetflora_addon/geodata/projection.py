@@ -16,8 +16,6 @@ Files tell systems in well-known text of both kinds, ArcInfo's older words and k
 full becomes the system of the EPSG code that has the same figures, or one by itself.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress

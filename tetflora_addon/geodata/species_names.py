@@ -9,8 +9,6 @@ and Italian first. A genus that is not in the catalog stands for its nearest kin
 where German and Dutch join words: ``Sumpfeiche`` is an oak, ``pseudoacacia`` no acacia.
 """
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Container, Iterator, Sequence

@@ -4,8 +4,6 @@
 cells say: numbers as people write them, with units, as ranges, or as words for nothing, and places.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -9,8 +9,6 @@ is narrower. Of shrubs, whose stems grow from a stool, the form changes how far 
 that fill a solid, have no crown shapes.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

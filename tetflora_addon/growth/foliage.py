@@ -9,8 +9,6 @@ below the leaf, between where leaves begin and the tip: leaves are as many on an
 that all that is known of them along the branch holds for solids too.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

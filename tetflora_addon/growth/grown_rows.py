@@ -12,8 +12,6 @@ its number and place for life. Which numbers those are depends on the places alo
 very top and nothing goes but at the very base; how many there are is exact on average.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

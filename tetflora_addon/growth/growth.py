@@ -6,8 +6,6 @@ A branch is also a *sub-plant*: it and all that grows on it. Functions take any 
 `WholeBranches` have their axes with them, from which wood and leaves are made; each axis is computed once.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

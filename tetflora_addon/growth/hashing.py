@@ -8,8 +8,6 @@ spread more evenly than by chance, so that few of them give good means: stratifi
 "Sampling Techniques", 1977).
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 import numpy as np

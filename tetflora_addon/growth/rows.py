@@ -8,8 +8,6 @@ dead branches. Children follow their parents in the table. Each branch drawn by 
 segments with frames. Angles are in radians.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -18,14 +16,13 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Keys, Table, perpendicular
 from ..errors import SpeciesError
+from ..parameters import keys_of
 from ..species.growing import EVEN
 from ..species.members import expected_forks, least_length, part_segments
 from ..species.skeletons import DrawnBranches, drawn_branches
 from ..species.species import (
-    CROWN_PROFILES,
     LEAF_ENVELOPES,
     LEAF_INCLINATIONS,
-    LEAF_KINDS,
     Dead,
     Order,
     Range,
@@ -115,28 +112,26 @@ LATERAL, FORK, SPUR, DEAD = range(4)
 
 SPUR_ORDER, DEAD_ORDER = 100, 101
 BOX = LEAF_ENVELOPES.index("box")
-_RANGES = (
-    "length", "thickness", "taper", "curvature", "attraction", "angle", "azimuth",
-    "leaves", "leaf_start", "leaf_size", "leaf_angle", "leaf_azimuth", "leaf_light",
-)  # fmt: skip
-_DEGREES = {"curvature", "curvature_tip", "attraction", "angle", "angle_tip", "azimuth", "leaf_angle", "leaf_azimuth"}
-_NUMBERS = (
-    "curvature_tip", "count_by_length", "angle_tip", "spray", "flare", "pipe",
-    "leaf_spray", "leaf_droop", "leaf_size_tip", "leaf_size_young", "leaf_light_tip",
-)  # fmt: skip
-_INTEGERS = ("segments", "sides", "whorl", "leaf_whorl")
+#: Columns that are keys of an order; what they hold follows from its fields.
+_NAMES = (
+    "length thickness taper curvature attraction angle azimuth leaves leaf_start leaf_size leaf_angle leaf_azimuth "
+    "leaf_light curvature_tip count_by_length angle_tip spray flare pipe leaf_spray leaf_droop leaf_size_tip "
+    "leaf_size_young leaf_light_tip branch_color leaf_color leaf_color_tip leaf_color_young segments sides whorl "
+    "leaf_whorl crown leaf_kind"
+)
+_COLUMNS = {name: keys_of(Order)[name] for name in _NAMES.split()}
+_FORMS = {
+    "range": (np.float64, (2,)), "number": (np.float64,), "integer": (np.int64,), "choice": (np.int64,),
+    "color": (np.float64, (2, 3)), "rgb": (np.float64, (3,)),
+}  # fmt: skip
 #: Where a flared base gets rings of its own, fractions of the length; as far as they lie on the first segment.
 FLARE_RINGS = (0.012, 0.035, 0.08)
 # A fork that no pipe model describes keeps the cross-section.
 _FORK_POWER = 2.0
 
 ROW_DTYPE = np.dtype(
-    [(name, np.float64, (2,)) for name in _RANGES]
-    + [(name, np.float64) for name in _NUMBERS]
-    + [(name, np.float64, (2, 3)) for name in ("branch_color", "leaf_color")]
-    + [(name, np.float64, (3,)) for name in ("leaf_color_tip", "leaf_color_young")]
-    + [(name, np.int64) for name in _INTEGERS]
-    + [(name, np.int64) for name in ("crown", "leaf_kind", "species", "order", "rings")]
+    [(name, *_FORMS[key.kind]) for name, key in _COLUMNS.items()]
+    + [(name, np.int64) for name in ("species", "order", "rings")]
     + [("envelope", np.int64), ("envelope_radius", np.float64), ("inclination", np.int64)]
     + [("next", np.int32, (4,)), ("count", np.float64, (4, 2)), ("start", np.float64, (4, 2))]
     + [("fraction", np.float64, (4, 2)), ("part", np.float64, (2,))]
@@ -288,15 +283,13 @@ def _drawn_rows(one: Species, drawn: DrawnLines, number: int, first: int, begin:
 def _row(order: Order, species: int, number: int) -> np.void:
     """Row of an order whose branches do not fork."""
     row = np.zeros((), dtype=ROW_DTYPE)
-    for name in (*_RANGES, *_NUMBERS, *_INTEGERS):
-        value = np.asarray(getattr(order, name), dtype=np.float64)
-        row[name] = np.radians(value) if name in _DEGREES else value
-    row["branch_color"], row["leaf_color"] = order.branch_color, order.leaf_color
-    row["leaf_color_tip"], row["leaf_color_young"] = order.leaf_color_tip, order.leaf_color_young
+    for name, key in _COLUMNS.items():
+        value = getattr(order, name)
+        value = key.choices.index(value) if key.choices else value
+        row[name] = np.radians(value) if key.unit == "degrees" else value
     sizes, colors = {order.leaf_size_tip, order.leaf_size_young}, {order.leaf_color_tip, order.leaf_color_young}
     row["gradient"] = sizes != {1.0} or colors != {order.leaf_color.mean}
     row["sunlit"] = order.leaf_light_tip != order.leaf_light.mean
-    row["crown"], row["leaf_kind"] = CROWN_PROFILES.index(order.crown), LEAF_KINDS.index(order.leaf_kind)
     row["envelope"] = LEAF_ENVELOPES.index(order.leaf_envelope)
     row["envelope_radius"] = order.leaf_envelope_radius if row["envelope"] else 0.0
     row["inclination"] = LEAF_INCLINATIONS.index(order.leaf_inclination)

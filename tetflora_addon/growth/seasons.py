@@ -11,8 +11,6 @@ anything. Branches of such a flora have a ``year``: the day that it is for their
 among the autumn colors of its species. Colors of leaves and branches are as the day has them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache

@@ -13,8 +13,6 @@ Rows of a flora in the wind have the columns of `WIND_COLUMNS` besides; others h
 anything.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

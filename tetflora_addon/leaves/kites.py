@@ -8,8 +8,6 @@ from any direction is kept. A kite stays what it is. Where planes have places of
 is a kite.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 

@@ -6,8 +6,6 @@ The model of a species is the coarsest level and stays as it is. Each finer leve
 stands for, in lengths of the leaf, and is drawn where the one before it would be off by more than a part of a pixel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -18,8 +16,7 @@ import numpy as np
 from ..arrays import Floats, Floats32, Integers, Mask
 from ..optics import needle_color
 from .blades import Compound, blade_surface, compound_surface
-from .bodies import closed_parts, rounded, spined
-from .models import LeafModel, mean_silhouette
+from .models import LeafModel, closed_parts, mean_silhouette, rounded, spined
 from .outlines import Blade, distance_to_links
 from .surfaces import FLAT, SPARSE, LeafSurface, Needles, needle_surface
 

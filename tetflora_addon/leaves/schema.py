@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading leaves from a species file: polygons, models and outlines, which are checked field by field."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -12,9 +10,8 @@ import numpy as np
 from ..errors import SpeciesError, quoted
 from ..parameters import FileReader
 from .blades import Compound, check_outline
-from .bodies import closed_parts
 from .levels import TOLERANCES, fitted, shown_area, surface_of
-from .models import LEAF_MODELS, OUTLINES, LeafModel, Spines, leaf_model
+from .models import LEAF_MODELS, OUTLINES, LeafModel, Spines, closed_parts, leaf_model
 from .outlines import Blade
 from .surfaces import Needles
 

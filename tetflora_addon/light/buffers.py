@@ -8,8 +8,6 @@ front of any point is a cumulative sum; the light that tetrahedra scatter to it 
 are blended between the four nearest pixels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ Light that tetrahedra scatter to others is gathered in the same 24 buffers, orde
 of the geometric series that the last ones begin. No factor scales any of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -11,8 +11,6 @@ plane term, in the forms of `docs/architecture.md`. White surfaces in light of r
 have radiance 1.
 """
 
-from __future__ import annotations
-
 from itertools import permutations, product
 
 import numpy as np

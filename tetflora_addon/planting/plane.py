@@ -6,8 +6,6 @@ Points are kept apart by grids whose cells are as large as the distance. Noise c
 a seed gives the same clumps everywhere. Plants may stand on triangles, masks on them, and areas, paths and borders.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

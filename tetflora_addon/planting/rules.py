@@ -5,8 +5,6 @@
 Rules that nothing can follow are refused, with the setting's name and what to do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from math import degrees, floor, inf, isfinite, log10, pi, radians, sqrt

@@ -7,8 +7,6 @@ is a mask times limits along slope, altitude, wetness and the distance from line
 gets what these leave: shares of all zones of a ground add up to 1 at most.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum

@@ -8,8 +8,6 @@ stroke does hardly depends on how fast the mouse was. A cell is planted whole or
 cells whose candidate falls into the circle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum

@@ -11,8 +11,6 @@ contributing area model of basin hydrology", Hydrological Sciences Bulletin 24, 
 The ground is a regular grid of heights: what water, light and growth ask of it is asked of neighboring cells.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from hashlib import blake2b
 

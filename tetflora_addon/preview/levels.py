@@ -15,8 +15,6 @@ sign against three), or two opposite edges (two against two). This is the ray on
 parallel rays the barycentric coordinates of their direction take the eye's place.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from dataclasses import dataclass
 from functools import partial

@@ -9,8 +9,6 @@ Plants of which only the size is known, such as assets, as double cones or boxes
 points with the form of their crowns, and those that look largest have faces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary

@@ -5,8 +5,6 @@
 Both ends are this very code in the same installation, so pickles are never read from anybody else.
 """
 
-from __future__ import annotations
-
 import io
 import pickle
 import struct

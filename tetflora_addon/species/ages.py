@@ -13,8 +13,6 @@ densely; so leaf area falls with the crown's projection, and with the crown's vo
 asks for light, as birches do, has fewer leaves on its twigs as well.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from math import prod

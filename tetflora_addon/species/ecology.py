@@ -5,8 +5,6 @@
 Stands take light by the leaf area that is told here, and plants of recorded sizes are drawn with it: one truth.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

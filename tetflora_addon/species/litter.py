@@ -10,8 +10,6 @@ spring. What is on the ground on a day is what is no longer on the trees, leaf b
 patch appear as those of the tree fall.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial

@@ -6,8 +6,6 @@ The same numbers as those that a compiled species holds, for readers of files an
 them before anything is compiled.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

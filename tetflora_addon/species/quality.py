@@ -9,8 +9,6 @@ that their area is kept, branches thicken so that the surface of their order is.
 earlier than plants lose members; bends are adjusted so that the tips of branches stay where they were.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -5,8 +5,6 @@
 `docs/species.md` is written from the fields of `Order` and of the leaves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

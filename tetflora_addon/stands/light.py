@@ -16,8 +16,6 @@ Crowns are looked up, not drawn: radius and middle are rounded to a fraction of 
 a run of a table.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple

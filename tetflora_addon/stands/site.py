@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where a stand grows: ground, soil and climate on a grid, and how well a species does there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,8 +7,6 @@ that seedlings have one too. Results of exponentials are rounded once, here: all
 is the same on every machine.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

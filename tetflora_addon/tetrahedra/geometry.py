@@ -6,8 +6,6 @@ A *tetrahedron* is ``(4, 3)`` float64; face ``i`` is the one opposite vertex ``i
 edges from vertex 0 to vertices 1, 2 and 3 form a right-handed system.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Floats

@@ -16,8 +16,6 @@ parts a from b and c from d; the planes of the corners do the rest. Every child 
 after three bisections. Faces are divided at the middles of their edges whatever the diagonal, so neighbors conform.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

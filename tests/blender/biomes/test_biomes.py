@@ -16,9 +16,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
-from tetflora_addon.blender.biomes import adding, files, ground, library
+from tetflora_addon.blender.biomes import adding, files, library
 from tetflora_addon.blender.file_library import as_text
-from tetflora_addon.blender.placing import populations, zones
+from tetflora_addon.blender.placing import populations, rules
 from tetflora_addon.blender.preferences import preferences
 from tetflora_addon.blender.species.edits import catalog
 from tetflora_addon.blender.stands.growing import keep_year
@@ -85,7 +85,7 @@ def small(**changes) -> files.Biome:
 
 
 def biomes():
-    return zones.biomes_in(scene())
+    return rules.biomes_in(scene())
 
 
 def add(biome: files.Biome, *grounds: bpy.types.Object, seed: int = 0) -> adding.BiomeResult:
@@ -412,7 +412,7 @@ def test_nothing_is_left_of_what_fails(monkeypatch):
 
 def test_the_button_makes_land_where_there_is_none(monkeypatch):
     """On the selected ground otherwise; the startup's cube is none."""
-    monkeypatch.setattr(ground, "SIDE", 8.0)
+    monkeypatch.setattr(adding, "SIDE", 8.0)
     path = library.OWN_FILES.place("small")
     path.write_text(as_text(SMALL), encoding="utf-8")
     library.look_again()
@@ -429,7 +429,7 @@ def test_the_button_makes_land_where_there_is_none(monkeypatch):
 def test_masks_and_paths_are_saved_by_their_names_and_found_again():
     """As between two shots of one film; where a name is missing, the layer has no such limit."""
     land = add_mesh("land", size=20.0)
-    roads = ground.make_line(scene(), "roads", [land])
+    roads = adding.make_line(scene(), "roads", [land])
     population = populations.add_population(scene(), [land], name="Trees")
     population.paths, population.vertex_group, population.uv_layer = roads, "meadow", "Map"
     population.mix.add().species = "bush"

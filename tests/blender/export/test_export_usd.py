@@ -16,7 +16,7 @@ from tests.limits import full_disk
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.attributes import image_pixels, linear_rgb, values_of
 from tetflora_addon.blender.export.forest import ExportOrder, export_steps
-from tetflora_addon.blender.export.reading import forest_steps
+from tetflora_addon.blender.export.usd import forest_steps
 from tetflora_addon.blender.geodata.origin import Import
 from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.scene.plants import read_plants

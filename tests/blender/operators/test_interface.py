@@ -13,6 +13,7 @@ from devtools.layouts import Layout
 from panels import layers
 from tests.blender.scenes import add_mesh, select
 from tetflora_addon.blender.biomes.layers import active_layer
+from tetflora_addon.blender.geodata.origin import KEY
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -58,6 +59,16 @@ def test_no_label_of_the_sidebar_is_cut():
         interface.drawn(cls, interface._context(), layout)
     assert {"Quality", "Altitude", "Day of Year", "Angle Tip"} <= set(layout.beside)
     assert {text for text in layout.beside if blf.dimensions(0, text)[0] > 84.0} == set()
+
+
+@pytest.mark.parametrize(
+    ("epsg", "text"), [(25832, "500,000, 5,300,000 of EPSG:25832"), (-1, "the plane about 50.00000, 9.00000")]
+)
+def test_the_scene_tab_says_where_on_earth_the_scene_lies(epsg, text):
+    bpy.context.scene[KEY] = {"epsg": epsg, "longitude": 9.0, "latitude": 50.0, "east": 5e5, "north": 5.3e6}
+    layout = Layout()
+    interface.drawn(bpy.types.TETFLORA_PT_scene, interface._context(), layout)
+    assert text in [options.get("text") for name, _, options in layout.drawn if name == "label"]
 
 
 def test_rows_of_lists_are_drawn_to_be_timed():

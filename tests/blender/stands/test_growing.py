@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from operators.growing import TETFLORA_OT_keep_year
+from operators.layers import TETFLORA_OT_keep_year
 from tests.blender.scenes import add_mesh, depsgraph, select
 from tetflora_addon import errors
 from tetflora_addon.blender.placing.brush import Standing

@@ -11,8 +11,7 @@ import pytest
 
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import compile_species
-from tetflora_addon.export.levels import ANGLE, PIXELS, differences, levels_of
-from tetflora_addon.export.views import Grid
+from tetflora_addon.export.levels import ANGLE, PIXELS, Grid, differences, levels_of
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalog import load_species
 

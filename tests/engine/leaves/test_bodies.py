@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tetflora_addon.leaves.bodies import closed_parts, rounded
 from tetflora_addon.leaves.levels import coarse_error, leaf_levels, level_errors
-from tetflora_addon.leaves.models import LeafModel, leaf_model
+from tetflora_addon.leaves.models import LeafModel, closed_parts, leaf_model, rounded
 from tetflora_addon.species import catalog
 
 CORNERS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)

@@ -342,12 +342,7 @@ def measure_again(depsgraph: bpy.types.Depsgraph, entry: TetFloraAssetSpecies) -
 def measure_all(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, identifiers: Iterable[str]) -> None:
     """Measure those assets anew that plants are to be placed of, and whose size has changed.
 
-    What has no faces any more stays as it was.
-
-    Raises
-    ------
-    SceneError
-        As `places.variants_of`.
+    What has no faces any more stays as it was. Errors are those of `places.variants_of`.
     """
     known = asset_species(scene)
     for identifier in identifiers:

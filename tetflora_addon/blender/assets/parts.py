@@ -345,11 +345,7 @@ def digest_of(target: Target, depsgraph: bpy.types.Depsgraph) -> str:
     """Hexadecimal digest of all that a target shows: meshes, their attributes, materials and images, and places.
 
     Names of objects do not count, and of images in files only which file it is, how long and how old.
-
-    Raises
-    ------
-    SceneError
-        As `parts.parts_of`.
+    Errors are those of `parts.parts_of`.
     """
     parts, _ = target.parts(depsgraph)
     return digest_of_parts(parts, depsgraph)

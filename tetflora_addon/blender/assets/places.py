@@ -95,11 +95,7 @@ def plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list
     """Places of plants whose species is an asset, by the variants of each.
 
     An object stands as it is turned and scaled in the scene, at the place of the plant instead of its own.
-
-    Raises
-    ------
-    SceneError
-        As `read_places`.
+    Errors are those of `read_places`.
     """
     read = read_asset_plants(scene, depsgraph)
     if not read:

@@ -35,8 +35,7 @@ from ..placing.population_data import (
     value_for,
 )
 from ..placing.properties import TetFloraLayer
-from ..placing.rules import active_population, grounds_of
-from ..placing.zones import MASK, limits_of_zone
+from ..placing.rules import MASK, active_population, grounds_of, limits_of_zone
 from ..settings import BIOME, SCATTER, active_in, with_identity
 from ..species.edits import find_edit, new_identifier, species_data
 from ..stands.growing import is_stand

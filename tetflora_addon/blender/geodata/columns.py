@@ -33,13 +33,7 @@ class TetFloraInventoryColumn(bpy.types.PropertyGroup):
 
 
 def show_columns(table: bpy.types.bpy_prop_collection, path: Path) -> None:
-    """Fill a table with the columns of a file.
-
-    Raises
-    ------
-    OSError, SceneError
-        As `preview`.
-    """
+    """Fill a table with the columns of a file. Errors are those of `preview`."""
     for column in preview(path):
         row = table.add()
         row.name, row.field, row.values = column.title, column.field.upper() or 'NONE', ", ".join(column.values)

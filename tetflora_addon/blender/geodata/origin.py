@@ -135,13 +135,7 @@ class Import:
         return place or place_about(system, points.min(axis=0), points.max(axis=0), self.what)
 
     def local(self, place: MapOrigin, points: Floats, system: System) -> Floats:
-        """Meters from the scene's origin, (n, 2), of points of the file.
-
-        Raises
-        ------
-        SceneError
-            As `MapOrigin.local`.
-        """
+        """Meters from the scene's origin, (n, 2), of points of the file. Errors are those of `MapOrigin.local`."""
         return place.local(points, self.known(place, system), self.what)
 
     @staticmethod

@@ -186,10 +186,7 @@ def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera, moving: bool =
 def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
     """Count plants, polygons of the expanded scene and instances of assets, without growing or reading any.
 
-    Raises
-    ------
-    TetFloraError
-        As `read_scene` and `compile_for`.
+    Errors are those of `read_scene` and `compile_for`.
     """
     given = read_scene(scene, depsgraph)
     if given.unknown:  # who counts in advance wants to know it

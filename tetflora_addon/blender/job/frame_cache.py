@@ -165,12 +165,7 @@ def add_to_digest(content: hashlib._Hash, value: object) -> None:
 def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: SceneContents | None = None) -> Camera:
     """The active camera, or the one of its cell if it moves and the scene shares results between frames.
 
-    Cells are larger where the contents given are far from them.
-
-    Raises
-    ------
-    SceneError
-        As `scene.camera.read_camera`.
+    Cells are larger where the contents given are far from them. Errors are those of `scene.camera.read_camera`.
     """
     camera, settings = read_camera(scene, depsgraph, region_only=True), scene.tetflora
     if not (settings.share_frames and camera_moves(scene)) or wind_of(scene) is not None:
@@ -229,10 +224,7 @@ def key_of(
 ) -> str:
     """Digest of all that results for view layers depend on, with their camera and contents.
 
-    Raises
-    ------
-    TetFloraError
-        As `scene_digest`.
+    Errors are those of `scene_digest`.
     """
     content = hashlib.sha256(scene_digest(scene, depsgraph, camera, given).encode())
     add_to_digest(content, [scene.name, *(layer.name for layer in layers)])

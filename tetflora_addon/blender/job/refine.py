@@ -467,12 +467,7 @@ def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: ob
 def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, Refinement]:
     """Camera and tetrahedra after refinement, without making anything; for images of the partition.
 
-    Both count from the camera's `origin`.
-
-    Raises
-    ------
-    TetFloraError
-        As `refine_steps`.
+    Both count from the camera's `origin`. Errors are those of `refine_steps`.
     """
     camera = read_camera(scene, depsgraph).local()
     given = read_scene(scene, depsgraph).counted_from(camera.origin)

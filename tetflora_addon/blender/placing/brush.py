@@ -23,9 +23,17 @@ from ..settings import check_limits
 from ..worker import run_to_end
 from .canopy import not_of_covers
 from .distances import SQUARE, distance_of, painted_weights
-from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
-from .plant_objects import PAINTED_MARK, add_field, add_plants_steps, plants_of
+from .plant_objects import (
+    PAINTED_MARK,
+    add_field,
+    add_plants_steps,
+    add_points,
+    editable,
+    plants_of,
+    positions,
+    take_points,
+)
 from .populations import own_number, own_objects
 from .properties import MOST_PAINTED_EMPTIES
 from .rules import note_erased
@@ -51,7 +59,7 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
     check_limits(settings, "Brush")
     mix = painted_weights(scene)
     if not sum(mix.values()) > 0.0:
-        raise SceneError("No species has a weight above 0; raise a weight in the Populate panel")
+        raise SceneError("No species has a weight above 0; raise a weight in the list of species under Layers")
     brush = Brush(
         radius=settings.radius,
         density=settings.density / SQUARE,
@@ -64,7 +72,7 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
     if strokes.too_many(brush):
         raise SceneError(
             f"A brush with a radius of {settings.radius:g} m and {settings.density:g} plants per 100 m² is too large; "
-            "lower Radius or Density, or use Populate"
+            "lower Radius or Density, or use Scatter"
         )
     return brush, tuple(mix)
 

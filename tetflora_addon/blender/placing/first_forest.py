@@ -251,7 +251,7 @@ def _camera() -> bpy.types.Object:
 
 
 def _settings(scene: bpy.types.Scene) -> None:
-    """Quick settings for Refine and renders, and the species of the forest for Populate and the brush."""
+    """Quick settings for Refine and renders, and the species of the forest for new layers and the brush."""
     scene.tetflora.quality = 'DRAFT'
     mix, known_species = scene.tetflora.populate.mix, catalog()
     for layer in LAYERS if not mix else ():

@@ -20,7 +20,7 @@ from ..attributes import read, write
 from ..materials.nodes import is_ours
 from ..runtime import JobData, job
 from ..species.asset_species import asset_of
-from .field_edits import own_mesh, positions
+from .plant_objects import own_mesh, positions
 
 _FEW = 8  # objects of which all are asked; of more only those whose boxes the ray meets
 _ABOVE = 1e-3  # meters above a plant's foot from which it falls, so that rounding does not let it through the ground
@@ -158,7 +158,7 @@ def drop_steps(
     plants : sequence of bpy.types.Object
         Plants that are objects.
     fields : sequence of bpy.types.Object
-        Whose points are plants, all `field_edits.editable`.
+        Whose points are plants, all `plant_objects.editable`.
 
     Raises
     ------

@@ -208,12 +208,7 @@ def reroll_steps(
 ) -> Job[PlacedPlants]:
     """Place a population anew with another seed, which follows from the one that it has.
 
-    Closing the steps, or an error, leaves the seed as it was as well.
-
-    Raises
-    ------
-    SceneError
-        As `make_plants_steps`.
+    Closing the steps, or an error, leaves the seed as it was as well. Errors are those of `make_plants_steps`.
     """
     with restored(scene):
         # A hash and not the next number: populations with neighboring seeds would follow each other's arrangements.

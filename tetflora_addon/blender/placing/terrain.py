@@ -252,9 +252,7 @@ def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> Floats:
 def _luminance(image: bpy.types.Image) -> Floats32:
     """Gray values of an image, (h, w), the first row at the bottom."""
     if image.source == 'TILED':
-        raise SceneError(
-            f'The image "{image.name}" has UDIM tiles, which Populate does not support; use a single image'
-        )
+        raise SceneError(f'The image "{image.name}" has UDIM tiles, which layers do not support; use a single image')
     if not (all(image.size) and image.channels):
         raise SceneError(
             f'Cannot load the image "{image.name}" from "{image.filepath}"; find it with '

@@ -125,9 +125,7 @@ def read_sizes(obj: bpy.types.Object, parts: Sequence[Points]) -> Sizes | None:
         refuse(obj, bad, f"{name} that is not from {least:g} to {most:,.0f}")
         found.append(values[:, :2] if values.ndim > 1 else values)
     *rest, fit = found
-    order = (HEIGHT, "tf_diameter", "tf_crown_width", "tf_crown_base", "tf_dead", OFFSET)
-    by_name = dict(zip(names, rest, strict=False))
-    return Sizes(*(by_name[name] for name in order), np.where(fit > 0.0, fit, 1.0))
+    return Sizes(*rest, np.where(fit > 0.0, fit, 1.0))  # in the order of the names
 
 
 def read_records(obj: bpy.types.Object, parts: Sequence[Points]) -> History | None:

@@ -294,18 +294,12 @@ def _none_left(off: bool, fields: list[str], hidden: int) -> str:
             "or their collections in the Outliner"
         )
     return (
-        "No plants to render; add some with Add > TetFlora Plant, or with Populate in the TetFlora tab of the sidebar"
+        "No plants to render; add some with Add > TetFlora Plant, or with + under Layers in the sidebar's TetFlora tab"
     )
 
 
 def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:
-    """Plants that are objects, in their order.
-
-    Raises
-    ------
-    SceneError
-        As `read_plants`.
-    """
+    """Plants that are objects, in their order. Errors are those of `read_plants`."""
     groups = [obj.tetflora for obj in plants]
     names, own = [obj.name for obj in plants], [kind_of_choice(group) for group in groups]
     _check_species(list(zip(names, own, strict=True)))

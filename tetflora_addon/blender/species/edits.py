@@ -257,7 +257,7 @@ def _decoded(text: bytes | str, name: str) -> dict[str, Any]:
 
 
 def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[dict[str, Any]], None]) -> None:
-    """Change a species in this file; the catalog's file stays as it is.
+    """Change a species in this file; the catalog's file stays as it is. Errors are those of `species_data`.
 
     Parameters
     ----------
@@ -265,11 +265,6 @@ def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[di
         Receives the edit if no scene of the file has one yet.
     change : callable
         Changes the decoded JSON that it is given. What comes of it need not be valid; `problem_of` tells.
-
-    Raises
-    ------
-    SpeciesError
-        As `species_data`.
     """
     data = copy.deepcopy(species_data(scene, identifier))
     change(data)

@@ -24,9 +24,8 @@ from ...stands.site import StandSite
 from ...stands.traits import StandSpecies
 from ..attributes import write
 from ..placing.plant_objects import link_field
-from ..placing.rules import digest
+from ..placing.rules import digest, zone_values, zoned
 from ..placing.terrain import read_ground
-from ..placing.zones import zone_values, zoned
 from ..runtime import JobData, is_there, job
 from ..scene.field_points import read_points
 from ..scene.field_sizes import (
@@ -301,7 +300,7 @@ def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types
             )
         raise SceneError(
             "Nothing is left of the stand: no plant is 1 m tall; grow it longer, plant more, or change "
-            "the species, Warmth or Moisture"
+            "the species, Degree Days or Moisture"
         )
     progress = Progress(sum(_GROWING), "Measuring plants")
     columns = yield from call_in_thread(progress, _columns, records, site, corner)

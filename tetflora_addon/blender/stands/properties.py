@@ -43,7 +43,7 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
     is_grown: boolean("Stand", "This field was grown as a stand", **HIDDEN)
     last_year: real("Last Year", "Year of the stand's last record", **HIDDEN)
     plants: integer("Plants in Its Year", **HIDDEN)
-    grown_by: string("Grown By", **HIDDEN)  # `layers.stand_settings_now` of when it was grown
+    grown_by: string("Grown By", **HIDDEN)  # `growing.stand_settings_now` of when it was grown
     biome: string("Biome", **HIDDEN)  # ``uid`` of the biome of which it is a layer
     grounds: list_of(TetFloraGround, "Grounds", "Meshes that the stand grows on")
     species: list_of(TetFloraStandEntry, "Species", "Species of the stand; if empty, a mixed forest of central Europe")

@@ -5,8 +5,6 @@
 Without a window, plants are read only on request, and the only handlers are those for loading.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Generator
 from dataclasses import replace
@@ -58,10 +56,7 @@ _QUICK = 0.3  # seconds that reading may take for plants to follow the timeline 
 def level_steps(data: JobData) -> Generator[Progress, None, Levels]:
     """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
 
-    Raises
-    ------
-    TetFloraError
-        As `job.refine_steps`.
+    Errors are those of `job.refine_steps`.
     """
     scene, depsgraph = data.scene, data.depsgraph
     data.add_objects([*taking_part(scene), *([] if scene.camera is None else [scene.camera])])

@@ -16,8 +16,7 @@ from mathutils import Matrix, Vector
 
 from ...arrays import Floats
 from ..job.render import render_errors
-from ..placing.field_edits import positions
-from ..placing.plant_objects import plants_of
+from ..placing.plant_objects import plants_of, positions
 from ..results.proxy_kinds import few_bounces
 from ..runtime import Outlook
 from ..scene.crowns import crown_to_draw
