@@ -91,12 +91,12 @@ class Hand:
     def shoot(self, name, seconds):
         """F12 and Esc; a picture of that name, and how much of it is green."""
         done = []
-        bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
+        bpy.app.handlers.render_complete.append(end := lambda *_: done.append(True))
         self.ui.move(*self.ui.center())
         yield from self.key('F12')
         yield from self.ui.until(lambda: done, seconds, "render")
         yield 1.0
-        bpy.app.handlers.render_complete.clear()
+        bpy.app.handlers.render_complete.remove(end)
         path = str(self.ui.out_dir / f"{name}.png")
         bpy.data.images["Render Result"].save_render(path)
         image = bpy.data.images.load(path)

@@ -149,6 +149,17 @@ def test_closing_the_job_leaves_the_scene_as_it_was(steps):
     assert datablocks() == before
 
 
+def test_closing_the_job_before_a_material_is_used_leaves_none():
+    scene = _forest()
+    before = datablocks()
+    running = refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
+    while datablocks()["materials"] == before["materials"]:
+        next(running)
+    assert datablocks()["meshes"] == before["meshes"]
+    running.close()
+    assert datablocks() == before
+
+
 def test_closing_the_job_in_the_middle_of_a_pass_does_not_wait_for_it(monkeypatch):
     """As Esc does: the pass goes on in its thread until it notices, and the scene is as it was at once."""
     scene = _forest()
