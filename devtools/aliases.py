@@ -65,6 +65,8 @@ def alias(package: str) -> None:
     RuntimeError
         Some of them were imported already, as other modules than Blender's.
     """
+    if any(isinstance(finder, _Aliases) and finder.package == package for finder in sys.meta_path):
+        return
     if found := _imported():
         raise RuntimeError(f"{found[0]} was imported before {package} was given its name; start Blender first")
     sys.meta_path.insert(0, _Aliases(package))

@@ -46,8 +46,8 @@ def screen() -> Iterator[str]:
         server.wait(timeout=10)
 
 
-def _answer(folder: Path, environment: dict[str, str]) -> None:
-    for request in folder.glob("*.request"):
+def _answer(folders: list[Path], environment: dict[str, str]) -> None:
+    for request in (path for folder in folders for path in folder.glob("*.request")):
         picture = request.with_suffix(".png")
         subprocess.run(["import", "-window", "root", str(picture)], env=environment, check=False, timeout=60)
         request.unlink()
@@ -56,16 +56,20 @@ def _answer(folder: Path, environment: dict[str, str]) -> None:
 def run_in_window(
     blender: str, script_path: Path, out_dir: Path, timeout: float = 180.0, resources: Path | None = None
 ) -> dict:
-    """Open Blender's window, run a script in it, close it.
+    """Run one script; see `run_scripts`."""
+    return run_scripts(blender, {script_path: out_dir}, timeout, resources)[0]
+
+
+def run_scripts(blender: str, scripts: dict[Path, Path], timeout: float, resources: Path | None = None) -> list[dict]:
+    """Open Blender's window, run scripts in it, close it.
 
     Parameters
     ----------
     blender : str
         The executable of a full Blender.
-    script_path : Path
-        A Python file with a generator function ``steps(ui)``; see devtools/window_driver.py for what ``ui`` does.
-    out_dir : Path
-        Receives ``result.json``, ``blender.log`` and a ``<name>.png`` for each picture.
+    scripts : dict of Path to Path
+        Python files with a generator function ``steps(ui)``; see devtools/window_driver.py for what ``ui`` does. For
+        each a folder, which receives ``result.json`` and a ``<name>.png`` for each picture; the first ``blender.log``.
     timeout : float
         Seconds after which Blender is ended.
     resources : Path, optional
@@ -74,40 +78,43 @@ def run_in_window(
 
     Returns
     -------
-    dict
-        ``{"ok": bool, "error": str or None, "values": dict, "pictures": [str]}``; ``ok`` is false when the script
-        raised, when Blender ended early, or when time was up.
+    list of dict
+        Of each ``{"ok": bool, "error": str or None, "values": dict, "pictures": [str]}``; ``ok`` is false when the
+        script raised, when Blender ended early, or when time was up.
     """
-    out_dir.mkdir(parents=True, exist_ok=True)
-    for old in [*out_dir.glob("*.request"), out_dir / "result.json"]:
-        old.unlink(missing_ok=True)
+    folders = list(scripts.values())
+    for folder in folders:
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in [*folder.glob("*.request"), folder / "result.json"]:
+            old.unlink(missing_ok=True)
+    log_path = folders[0] / "blender.log"
     with tempfile.TemporaryDirectory(prefix="tetflora-window-") as empty, screen() as display:
         environment = {**os.environ, "DISPLAY": display, "BLENDER_USER_RESOURCES": str(resources or empty)}
         # Otherwise Blender would open on the developer's own Wayland screen.
         environment.pop("WAYLAND_DISPLAY", None)
         environment["LIBGL_ALWAYS_SOFTWARE"] = "1"  # a virtual screen has no graphics card
         command = [blender, "--gpu-backend", "opengl", "-p", "0", "0", *map(str, SIZE), "--enable-event-simulate"]
-        command += ["-P", str(DRIVER), "--", str(script_path.resolve()), str(out_dir.resolve())]
-        with (out_dir / "blender.log").open("w") as log:
+        command += ["-P", str(DRIVER), "--", *(str(path.resolve()) for pair in scripts.items() for path in pair)]
+        with log_path.open("w") as log:
             process = subprocess.Popen(
                 command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
             )
             end = time.monotonic() + timeout
             while process.poll() is None and time.monotonic() < end:
-                _answer(out_dir, environment)
+                _answer(folders, environment)
                 time.sleep(0.1)
             late = process.poll() is None
             if late:
                 _end_group(process)
-    result = {"ok": False, "error": None, "values": {}, "pictures": []}
-    if (out_dir / "result.json").exists():
-        result = json.loads((out_dir / "result.json").read_text(encoding="utf-8"))
-    elif late:
-        result["error"] = f"Blender was still busy after {timeout:g} s; see {out_dir / 'blender.log'}"
-    else:
-        result["error"] = f"Blender ended (code {process.returncode}) before the script; see {out_dir / 'blender.log'}"
-    result["pictures"] = sorted(path.name for path in out_dir.glob("*.png"))
-    return result
+    ended = f"was still busy after {timeout:g} s" if late else f"ended (code {process.returncode}) before the script"
+    return [_result(folder, f"Blender {ended}; see {log_path}") for folder in folders]
+
+
+def _result(folder: Path, otherwise: str) -> dict:
+    result = {"ok": False, "error": otherwise, "values": {}}
+    if (folder / "result.json").exists():
+        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    return {**result, "pictures": sorted(path.name for path in folder.glob("*.png"))}
 
 
 def _end_group(process: subprocess.Popen) -> None:

@@ -7,13 +7,15 @@ two seconds, ``yield from ui.picture("name")`` until the picture of the screen i
 
     def steps(ui):
         yield from ui.show_sidebar("TetFlora")
+        yield from ui.click("ops.tetflora.refine(")
         ui.press('F3')
         yield 0.5
         ui.type_text("populate")
         yield from ui.picture("search")
         ui.values["objects"] = len(bpy.data.objects)
 
-Started by devtools/window.py as ``blender --enable-event-simulate -P window_driver.py -- SCRIPT OUT_DIR``.
+Started by devtools/window.py as ``blender --enable-event-simulate -P window_driver.py -- SCRIPT OUT_DIR ...``. Of
+several scripts each begins with the startup file, whether or not the one before has failed.
 """
 
 from __future__ import annotations
@@ -23,15 +25,29 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import bpy
 
 MOMENT = 0.2  # seconds, enough for a redraw under software OpenGL
+ROW = 10  # pixels between two looks for a button; buttons are twice as high
+NOTE = 'F20'  # a key that nothing in Blender listens to
 NAMES = {" ": 'SPACE', ".": 'PERIOD', ",": 'COMMA', "-": 'MINUS', "_": 'MINUS'}
 DIGITS = ('ZERO', 'ONE', 'TWO', 'THREE', 'FOUR', 'FIVE', 'SIX', 'SEVEN', 'EIGHT', 'NINE')
+
+
+class _Note(bpy.types.Operator):
+    """Keep what the clipboard holds, and empty it."""
+
+    bl_idname, bl_label = "wm.tetflora_note", "Note"
+    notes: list[str] = []
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.notes.append(context.window_manager.clipboard)
+        context.window_manager.clipboard = ""
+        return {'FINISHED'}
 
 
 class Ui:
@@ -100,6 +116,51 @@ class Ui:
             region.tag_redraw()
         yield MOMENT
 
+    def places(self, region: str = 'UI', kind: str = 'VIEW_3D', across: Sequence[int] = ()) -> list[tuple[int, int]]:
+        """Where to look for buttons in a region: from above, at pixels from its left edge, or its right if below 0."""
+        found = next(r for r in self.area(kind).regions if r.type == region)
+        columns = [x % found.width for x in across] or [found.width // 3, found.width * 2 // 3]
+        rows = range(found.y + found.height - ROW, found.y, -ROW)
+        return [(found.x + x, y) for x in columns for y in rows]
+
+    def copied(self, places: Sequence[tuple[int, int]], popup: bool = False, **modifiers: bool) -> Iterator[float]:
+        """What Ctrl C copies at each place, gives a list: Blender tells nobody where its buttons are.
+
+        It is an operator's Python command, or with ``shift`` a setting's data path. All places are looked at between
+        two redraws, which take long under software OpenGL. A popup keeps keys to itself: there it is one at a time.
+        """
+        manager = bpy.context.window_manager
+        _Note.notes.clear()
+        manager.clipboard = ""
+        for x, y in places:
+            self.move(x, y)
+            self.move(x + 1, y)  # the first leaves one button, the second enters another
+            self.press('C', ctrl=True, **modifiers)
+            if not popup:
+                self.press(NOTE)
+                continue
+            yield 0.0
+            _Note.notes.append(manager.clipboard)
+            manager.clipboard = ""
+        yield 0.0
+        return list(_Note.notes)
+
+    def find(
+        self, said: str, places: Sequence[tuple[int, int]] | None = None, popup: bool = False, **modifiers: bool
+    ) -> Iterator[float]:
+        """Move to the first button of whose copy something is part, gives its place; LookupError if there is none."""
+        places = self.places() if places is None else places
+        texts = []
+        for some in [[place] for place in places] if popup else [places]:
+            texts += yield from self.copied(some, popup, **modifiers)
+            if found := next((place for place, text in zip(places, texts, strict=False) if said in text), None):
+                self.move(*found)
+                self.move(found[0] + 1, found[1])
+                yield 0.0
+                return found
+        yield from self.picture("not_found")
+        raise LookupError(f"there is no button for {said} among {sorted(set(texts))}")
+
     def until(self, condition: Callable[[], bool], seconds: float, what: str) -> Iterator[float]:
         """Wait until something is true; TimeoutError after some seconds, naming what was waited for."""
         for _ in range(max(1, round(seconds / MOMENT))):
@@ -119,46 +180,62 @@ class Ui:
         yield from self.until(lambda: not request.exists(), 30, f"picture {name}")
 
 
-def _finish(ui: Ui, error: str | None) -> None:
+def _report(ui: Ui, error: str | None) -> None:
     answer = {"ok": error is None, "error": error, "values": ui.values}
     part = ui.out_dir / "result.part"
     part.write_text(json.dumps(answer, indent=1), encoding="utf-8")
     part.rename(ui.out_dir / "result.json")
     if error:
         print(error, file=sys.stderr, flush=True)
-    try:
-        bpy.ops.wm.quit_blender()
-    except RuntimeError:
-        os._exit(1)
 
 
-def main(script: Path, out_dir: Path) -> None:
-    """Load the script and run its steps."""
-    bpy.context.preferences.view.show_splash = False
+def _steps(script: Path, ui: Ui) -> Iterator[float | None]:
     spec = importlib.util.spec_from_file_location("window_script", script)
     module = importlib.util.module_from_spec(spec)
-    ui = Ui(out_dir)
-    steps: Iterator[float | None] | None = None
+    spec.loader.exec_module(module)
+    ui.move(*ui.center())
+    yield from module.steps(ui)
+
+
+def _all_steps(runs: Sequence[tuple[Path, Path]]) -> Iterator[float | None]:
+    for number, (script, out_dir) in enumerate(runs):
+        if number:
+            bpy.ops.wm.read_homefile(use_empty=False)
+            yield 1.0
+        ui, error = Ui(out_dir), None
+        try:
+            yield from _steps(script, ui)
+        except Exception:
+            error = traceback.format_exc()
+        _report(ui, error)
+
+
+def main(runs: Sequence[tuple[Path, Path]]) -> None:
+    """Load scripts, one after the other, and run their steps."""
+    bpy.context.preferences.view.show_splash = False
+    bpy.context.preferences.system.viewport_aa = 'OFF'  # eight draws otherwise, and each takes half a second
+    bpy.utils.register_class(_Note)
+    keys = bpy.context.window_manager.keyconfigs.addon.keymaps.new("Window")
+    keys.keymap_items.new(_Note.bl_idname, NOTE, 'PRESS')
+    steps = _all_steps(runs)
 
     def step() -> float | None:
-        nonlocal steps
         try:
-            if steps is None:
-                spec.loader.exec_module(module)
-                ui.move(*ui.center())
-                steps = module.steps(ui)
             pause = next(steps)
-        except StopIteration:
-            _finish(ui, None)
-        except BaseException:
-            _finish(ui, traceback.format_exc())
-        else:
-            return MOMENT if pause is None else pause
-        return None
+        except BaseException as end:
+            if not isinstance(end, StopIteration):
+                traceback.print_exc()
+            try:
+                bpy.ops.wm.quit_blender()
+            except RuntimeError:
+                os._exit(1)
+            return None
+        return MOMENT if pause is None else pause
 
     # The window is up and drawn once by then. Persistent: a script may open files.
     bpy.app.timers.register(step, first_interval=1.0, persistent=True)
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[sys.argv.index("--") + 1 :][:2]))
+    given = list(map(Path, sys.argv[sys.argv.index("--") + 1 :]))
+    main(list(zip(given[::2], given[1::2], strict=True)))

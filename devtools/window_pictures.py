@@ -41,6 +41,7 @@ def steps(ui: Any) -> Iterator[float | None]:
     """Inside Blender: populate, and show the panels one after the other."""
     import bpy
 
+    bpy.context.preferences.system.viewport_aa = '8'  # as an artist sees it
     yield from ui.show_sidebar("TetFlora")
     with ui.override():
         bpy.ops.tetflora.first_forest('INVOKE_DEFAULT')

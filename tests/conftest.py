@@ -41,6 +41,14 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(Durations(config.rootpath / "out"))
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """With ``--dist loadfile``, see tests/schedule.py; Blender's own Python has no xdist."""
+    from tests.schedule import FileScheduling
+
+    return FileScheduling(config, log) if config.getvalue("dist") == "loadfile" else None
+
+
 @pytest.fixture(scope="session")
 def blender() -> Iterator[ModuleType]:
     """The extension's package, enabled from the source tree; one Blender serves all tests of a process."""

@@ -23,6 +23,11 @@ SHOWN = 10
 QUICK = 0.06
 
 
+def draws_with_eevee(test: str) -> bool:
+    """Whether a test says by its name that EEVEE draws in it."""
+    return "eevee" in test.lower()
+
+
 def cpu_s() -> float:
     """Seconds of processors so far, of this process and of those it waited for."""
     return sum(os.times()[:4])
@@ -46,14 +51,14 @@ class Durations:
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         """Files that took longest the last time begin, so that no process is left alone with one of them at the end.
 
-        A quick run leaves out what took long; what nobody has run yet is run.
+        Before them comes what EEVEE draws, which one process does, see tests/schedule.py. A quick run leaves out what
+        took long; what nobody has run yet is run.
         """
         kept, files = self.kept(), defaultdict(float)
         for name, seconds in kept.items():
             files[name.split("::")[0]] += seconds
-        items.sort(
-            key=lambda item: -files[item.nodeid.split("::")[0]]
-        )  # those of a file stay together: sorts are stable
+        # Those of a file stay together: sorts are stable.
+        items.sort(key=lambda item: (not draws_with_eevee(item.nodeid), -files[item.nodeid.split("::")[0]]))
         if not config.getoption("quick"):
             return
         slow = {name for name, seconds in kept.items() if seconds > QUICK}

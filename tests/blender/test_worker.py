@@ -12,8 +12,10 @@ import operator
 import subprocess
 import sys
 import threading
+import time
 import traceback
 import weakref
+from collections.abc import Iterator
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -40,6 +42,12 @@ def no_thread_is_left():
         thread.join(PATIENCE)
     assert not threads()
     pool.resume()
+
+
+def begin(steps: Iterator) -> None:
+    """Wait for the first step, and leave the processor to the thread meanwhile."""
+    while next(steps) is None:
+        time.sleep(1e-3)
 
 
 def threads() -> list[threading.Thread]:
@@ -194,8 +202,7 @@ def test_closing_ends_the_work_and_drops_what_it_made():
             ended.set()
 
     steps = worker.in_thread(work(), ahead=3)
-    while next(steps) is None:
-        pass
+    begin(steps)
     steps.close()
     assert ended.wait(PATIENCE)
     for thread in threads():
@@ -220,8 +227,7 @@ def test_closing_does_not_wait_and_what_begins_later_does():
         yield 3
 
     steps = worker.in_thread(slow(), ahead=1)
-    while next(steps) is None:
-        pass
+    begin(steps)
     assert begun.wait(PATIENCE)
     steps.close()  # returns although nobody has said go
     assert log == []
@@ -242,8 +248,7 @@ def test_an_error_after_closing_is_nobodys():
         raise ValueError
 
     steps = worker.in_thread(work(), ahead=5)
-    while next(steps) is None:
-        pass
+    begin(steps)
     assert failed.wait(PATIENCE)
     steps.close()
 
@@ -276,8 +281,7 @@ def test_functions_give_their_results():
 
 def test_stop_all_ends_what_waits():
     steps = worker.in_thread(counting(3))
-    while next(steps) is None:
-        pass
+    begin(steps)
     worker.stop_all()
     for thread in threads():
         thread.join(PATIENCE)

@@ -56,6 +56,12 @@ def test_files_that_took_longest_begin(tmp_path: Path) -> None:
     assert run(tmp_path, **again) == ["b::one", "b::two", "c::one", "a::one", "new::one"]
 
 
+def test_what_eevee_draws_comes_before_them(tmp_path: Path) -> None:
+    run(tmp_path, **{"a::one": 0.1, "b::one": 0.2, "a::two[EEVEE]": 0.0})
+    again = {"a::one": 0.0, "a::two[EEVEE]": 0.0, "b::one": 0.0, "c::in_eevee": 0.0}
+    assert run(tmp_path, **again) == ["a::two[EEVEE]", "c::in_eevee", "b::one", "a::one"]
+
+
 def test_tests_whose_file_has_gone_are_forgotten(tmp_path: Path) -> None:
     run(tmp_path, gone=1.0, there=1.0)
     (tmp_path / "gone").unlink()

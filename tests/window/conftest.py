@@ -31,12 +31,25 @@ def pictures() -> Path:
     return Path(os.environ.get("TETFLORA_PICTURES", build.ROOT / "out" / "window"))
 
 
+@pytest.fixture(scope="session")
+def results(request: pytest.FixtureRequest, full_blender: str, resources: Path, pictures: Path) -> dict[str, dict]:
+    """What came of the ``STEPS`` of all files of tests that are run: one Blender does them, from its startup file each.
+
+    A start of Blender, with what it compiles for the first redraws, takes as long as some of them.
+    """
+    files = {item.module.STEPS for item in request.session.items if hasattr(getattr(item, "module", None), "STEPS")}
+    # The last one disables the extension.
+    ordered = sorted(files, key=lambda steps: (steps[0] == "lock_steps", steps))
+    scripts = {Path(__file__).parent / f"{steps}.py": pictures / folder for steps, folder, _ in ordered}
+    seconds = sum(most for _, _, most in ordered)
+    found = window.run_scripts(full_blender, scripts, seconds, resources)
+    return {steps: result for (steps, _, _), result in zip(ordered, found, strict=True)}
+
+
 @pytest.fixture(scope="module")
-def seen(request: pytest.FixtureRequest, full_blender: str, resources: Path, pictures: Path) -> dict:
-    """What the steps of a file of tests have seen in the window: its ``STEPS``."""
-    steps, folder, seconds = request.module.STEPS
-    path = Path(__file__).parent / f"{steps}.py"
-    result = window.run_in_window(full_blender, path, pictures / folder, seconds, resources)
+def seen(request: pytest.FixtureRequest, results: dict[str, dict]) -> dict:
+    """What the steps of a file of tests have seen in the window."""
+    result = results[request.module.STEPS[0]]
     assert result["ok"], result["error"]
     return result["values"]
 

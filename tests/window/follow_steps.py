@@ -18,7 +18,7 @@ alias(INSTALLED)
 from tetflora_addon.blender.results.collection import result_collections  # noqa: E402  (found only now)
 from tetflora_addon.blender.viewport import auto  # noqa: E402
 
-PLANTS, APART = 36, 9.0
+PLANTS, APART = 16, 9.0
 
 
 def steps(ui):

@@ -6,7 +6,6 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-STEP = 10  # pixels between two looks for a button; buttons are twice as high
 PLANTS = 14
 
 
@@ -14,6 +13,7 @@ def steps(ui):
     """See devtools/window_driver.py."""
     scene = bpy.context.scene
     build_ground(scene)
+    scene.render.resolution_x, scene.render.resolution_y = 480, 270
     yield from look(ui)
     yield from ui.show_sidebar("TetFlora")
     ui.values["bare"] = state()
@@ -35,7 +35,7 @@ def steps(ui):
     yield from ui.picture("refined")
 
     # Again, and stopped in the middle. Finer, so that it lasts.
-    scene.tetflora.cutoff, scene.tetflora.leaf_limit = 0.5, 0.1
+    scene.tetflora.cutoff, scene.tetflora.leaf_limit = 0.1, 0.02
     yield from press_button(ui, "tetflora.refine")
     ui.values["running_before_esc"] = running(ui)
     ui.press('ESC')
@@ -52,7 +52,7 @@ def steps(ui):
     scene = bpy.context.scene
     scene.render.engine = 'CYCLES'
     scene.cycles.samples, scene.cycles.use_denoising = 4, False
-    scene.render.resolution_x, scene.render.resolution_y = 240, 135
+    scene.render.resolution_percentage = 50
     ui.values["green"] = yield from render(ui, "render")
     ui.values["after_render"] = state()
     yield from ui.picture("rendered")
@@ -125,25 +125,12 @@ def look(ui):
     yield 0.5
 
 
-def press_button(ui, operator):
-    """Find an operator's button in the sidebar and click on it.
-
-    Blender tells nobody where its buttons are, but Ctrl C over a button copies its Python command.
-    """
-    manager = bpy.context.window_manager
-    region = next(r for r in ui.area().regions if r.type == 'UI')
-    places = [(x, y) for x in (region.width // 3, region.width * 2 // 3) for y in range(region.height - STEP, 0, -STEP)]
-    for x, y in places:
-        manager.clipboard = ""
-        ui.move(region.x + x, region.y + y)
-        yield 0.03
-        ui.press('C', ctrl=True)
-        yield 0.03
-        if manager.clipboard.startswith(f"bpy.ops.{operator}("):
-            ui.values.setdefault("below_top", {})[operator] = region.height - y
-            break
-    else:
-        raise LookupError(f"the sidebar shows no button for {operator}")
+def press_button(ui, operator, popup=()):
+    """Find an operator's button in the sidebar, or among places in a popup, and click on it."""
+    _, y = yield from ui.find(f"bpy.ops.{operator}(", popup or None, bool(popup))
+    if not popup:
+        region = next(r for r in ui.area().regions if r.type == 'UI')
+        ui.values.setdefault("below_top", {})[operator] = region.y + region.height - y
     ui.press('LEFTMOUSE')
     yield 0.1
     ui.move(*ui.center())
@@ -167,7 +154,7 @@ def render(ui, name):
 
     bpy.app.handlers.render_complete.append(note)
     yield from press_key(ui, 'F12')
-    yield from ui.until(lambda: done, 90, "render")
+    yield from ui.until(lambda: done and not bpy.app.is_job_running('RENDER'), 90, "render")
     bpy.app.handlers.render_complete.remove(note)
     yield 1.0
     path = str(ui.out_dir / f"{name}.png")

@@ -24,6 +24,7 @@ def steps(ui):
     bpy.context.scene.tetflora.species_editor.shown = True
     for name, (panel, choice, place) in GALLERIES.items():
         # Alone and open at the top of a tab of its own, so that the picture lies below the panel's header.
+        usual = panel.bl_category, getattr(panel, "bl_options", set()), panel.bl_region_type
         bpy.utils.unregister_class(panel)
         panel.bl_category, panel.bl_options, panel.bl_region_type = name, set(), 'UI'
         bpy.utils.register_class(panel)
@@ -44,3 +45,6 @@ def steps(ui):
             chosen.append([getattr(group, stored), getattr(group, choice)])
             ui.move(*ui.center())
             yield 0.5
+        bpy.utils.unregister_class(panel)
+        panel.bl_category, panel.bl_options, panel.bl_region_type = usual
+        bpy.utils.register_class(panel)

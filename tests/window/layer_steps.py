@@ -25,7 +25,8 @@ def steps(ui):
         bpy.ops.wm.call_panel(name="TETFLORA_PT_add_layer", keep_open=False)
     yield 0.5
     yield from ui.picture("add")
-    yield from click_in_popover(ui, "tetflora.populate")
+    x, middle = ui.center()  # in the left of two columns
+    yield from press_button(ui, "tetflora.populate", [(x - 60, y) for y in range(middle + 300, middle - 400, -8)])
     yield from ui.until(lambda: len(scene.tetflora.layers) and not running(ui), 60, "plants")
     layer = scene.tetflora.layers[0]
     ui.values["planted"] = [layer.made, layer.by_density]
@@ -62,31 +63,6 @@ def steps(ui):
 
 def row_of(ui, operator):
     """How far below the top of the sidebar an operator's button is, pixels."""
-    manager = bpy.context.window_manager
+    _, y = yield from ui.find(f"bpy.ops.{operator}(")
     region = next(r for r in ui.area().regions if r.type == 'UI')
-    for y in range(region.y + region.height - 6, region.y, -6):
-        manager.clipboard = ""
-        ui.move(region.x + region.width // 3, y)
-        yield 0.03
-        ui.press('C', ctrl=True)
-        yield 0.03
-        if manager.clipboard.startswith(f"bpy.ops.{operator}("):
-            return region.y + region.height - y
-    return -1
-
-
-def click_in_popover(ui, operator):
-    """Find an operator's button in the popover around the mouse and click on it."""
-    manager, (x, middle) = bpy.context.window_manager, ui.center()
-    for y in range(middle + 300, middle - 400, -8):
-        manager.clipboard = ""
-        ui.move(x - 60, y)  # in the left of two columns
-        yield 0.03
-        ui.press('C', ctrl=True)
-        yield 0.03
-        if manager.clipboard.startswith(f"bpy.ops.{operator}("):
-            ui.press('LEFTMOUSE')
-            yield 0.2
-            ui.move(*ui.center())
-            return
-    raise LookupError(f"the popover shows no button for {operator}")
+    return region.y + region.height - y

@@ -24,7 +24,15 @@ from tetflora_addon.jobs import Progress  # noqa: E402
 
 def steps(ui):
     """See devtools/window_driver.py."""
-    scene = bpy.context.scene
+    usual = refine.refine_steps
+    try:
+        yield from all_steps(ui, bpy.context.scene)
+    finally:
+        refine.refine_steps = usual
+
+
+def all_steps(ui, scene):
+    """To the end, by hand and by a script, stopped, refused and failing."""
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     scene.camera.location, scene.camera.rotation_euler = (0.0, -60.0, 2.0), (1.5708, 0.0, 0.0)
     for i in range(2):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The first forest in three clicks, then painted on, by mouse and keys; tests/window/test_paint.py judges it."""
+"""Plants painted and set one by one, by mouse and keys; tests/window/test_paint.py judges them."""
 
 import sys
 from pathlib import Path
@@ -9,32 +9,11 @@ import bpy
 import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
-from forest_steps import press_button, press_key, render, running
+from forest_steps import press_key
 
 
 def steps(ui):
     """See devtools/window_driver.py."""
-    yield from ui.show_sidebar("TetFlora")
-    yield from ui.picture("begin")
-
-    # Three clicks from a new file to a forest.
-    yield from press_button(ui, "tetflora.first_forest")
-    yield from ui.until(lambda: plants(), 10, "plants of the first forest")
-    ui.values["first"] = len(plants())
-    ui.values["startup"] = sorted(set(bpy.context.scene.objects.keys()) & {"Cube", "Camera", "Light"})
-    ui.values["through_camera"] = ui.area().spaces.active.region_3d.view_perspective == 'CAMERA'
-    yield from ui.picture("first_forest")
-    bpy.context.scene.render.resolution_percentage = 25  # a slow machine renders it too
-    bpy.context.scene.cycles.samples = 4
-    yield from press_button(ui, "tetflora.refine")
-    yield from ui.until(lambda: bpy.context.scene.tetflora.statistics != "" and not running(ui), 120, "refinement")
-    yield from ui.picture("refined")
-    # The Outliner takes its time for these, and must not be drawn while the render's thread changes what it lists.
-    for number in range(4000):
-        bpy.context.scene.collection.objects.link(bpy.data.objects.new(f"Other {number}", None))
-    ui.values["green"] = yield from render(ui, "first_render")
-    yield from press_key(ui, 'ESC')
-
     # Bare ground seen from above, so that what the brush does can be told from where the mouse is.
     yield from bare_ground(ui)
     settings = bpy.context.scene.tetflora.brush

@@ -14,11 +14,11 @@ sys.path.append(str(Path(__file__).resolve().parents[2]))
 from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
-from tests.window.slow import slowly  # noqa: E402  (found only now)
+from tests.window.forest_steps import press_button  # noqa: E402  (found only now)
+from tests.window.slow import slowly  # noqa: E402
 from tetflora_addon.blender.viewport import levels as levels_job  # noqa: E402
 from tetflora_addon.blender.viewport import state  # noqa: E402
 
-STEP = 10  # pixels between two looks for a button
 SPECIES = ("broadleaf_tree", "conifer", "bush")
 
 
@@ -59,7 +59,16 @@ def steps(ui):
     space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
     space.overlay.show_cursor = False
     space.show_object_viewport_empty = False
-    only_panel()
+    shown = only_panel()
+    try:
+        yield from preview_steps(ui, scene, settings, space)
+    finally:
+        for cls in shown:
+            bpy.utils.register_class(cls)
+
+
+def preview_steps(ui, scene, settings, space):
+    """Plants as shapes, levels, and a camera that is frozen."""
     yield from ui.show_sidebar("TetFlora")
     region = next(r for r in ui.area().regions if r.type == 'WINDOW')
     ui.values["view"] = [region.x, region.y, region.width, region.height]
@@ -173,7 +182,7 @@ def build(scene):
 
 
 def only_panel():
-    """Show the panel of levels alone, open, in the sidebar: a copy under another name, as Blender keeps closed ones."""
+    """Show the panel of levels alone, open: a copy under another name, as Blender keeps closed ones; gives others."""
     shown = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
     ours = next(cls for cls in shown if cls.__name__ == "TETFLORA_PT_developer")
     for cls in shown:
@@ -182,27 +191,7 @@ def only_panel():
     members["poll"] = classmethod(lambda cls, context: True)
     members |= {"bl_space_type": 'VIEW_3D', "bl_region_type": 'UI', "bl_category": "TetFlora", "bl_context": ""}
     bpy.utils.register_class(type("TETFLORA_PT_preview_open", (ours,), members))
-
-
-def press_button(ui, operator):
-    """Find an operator's button in the sidebar and click on it; Ctrl C over a button copies its Python command."""
-    manager = bpy.context.window_manager
-    region = next(r for r in ui.area().regions if r.type == 'UI')
-    x = region.x + region.width // 3
-    for column in (x, region.x + region.width - 56):
-        for y in range(region.y + region.height - STEP, region.y, -STEP):
-            manager.clipboard = ""
-            ui.move(column, y)
-            yield 0.03
-            ui.press('C', ctrl=True)
-            yield 0.03
-            if manager.clipboard.startswith(f"bpy.ops.{operator}("):
-                ui.press('LEFTMOUSE')
-                yield 0.2
-                ui.move(*ui.center())
-                yield 0.1
-                return
-    raise LookupError(f"the sidebar shows no button for {operator}")
+    return shown
 
 
 def shapes(scene):

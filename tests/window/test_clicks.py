@@ -21,8 +21,12 @@ def test_clicks_are_few(seen: dict, pictures: Path, colors: Callable[[Path], int
 
 
 def test_a_first_forest_is_refined_and_rendered(seen: dict) -> None:
-    assert seen["first_forest"]["refined"]
-    assert seen["first_forest"]["green"] > 0.1
+    found = seen["first_forest"]
+    assert 60 <= found["plants"] <= 100
+    assert found["through_camera"]
+    assert found["startup"] == ["Camera", "Cube", "Light"]
+    assert found["refined"]
+    assert found["green"] > 0.1
 
 
 def test_a_mixed_wood_with_cover_grows_on_ones_own_ground_and_is_rendered(seen: dict) -> None:

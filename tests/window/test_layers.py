@@ -9,16 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from devtools import window
-
-HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
-    result = window.run_in_window(full_blender, HERE / "layer_steps.py", pictures / "layers", 240, resources)
-    assert result["ok"], result["error"]
-    return result["values"]
+#: What is done in the window, where its pictures go, and the seconds that it may take.
+STEPS = "layer_steps", "layers", 240
 
 
 def test_scatter_plants_a_wood_by_density(seen: dict) -> None:

@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from devtools import window
 
 HERE = Path(__file__).parent
@@ -16,22 +18,31 @@ def test_programs_for_a_window_are_there() -> None:
     assert window.missing_tools() == []
 
 
-def test_sidebar(full_blender: str, resources: Path, pictures: Path, colors: Callable[[Path], int]) -> None:
-    result = window.run_in_window(full_blender, HERE / "sidebar_steps.py", pictures / "sidebar", 180, resources)
+@pytest.fixture(scope="module")
+def shown(full_blender: str, resources: Path, pictures: Path, tmp_path_factory: pytest.TempPathFactory) -> list[dict]:
+    """What two scripts have seen in one Blender: one that fails, and the sidebar's after it; and what Blender said."""
+    folder = tmp_path_factory.mktemp("broken")
+    script = folder / "broken.py"
+    script.write_text("def steps(ui):\n    yield\n    raise ValueError('raised on purpose')\n", encoding="utf-8")
+    scripts = {script: folder, HERE / "sidebar_steps.py": pictures / "sidebar"}
+    found = window.run_scripts(full_blender, scripts, 300, resources)
+    return [*found, {"log": (folder / "blender.log").read_text(encoding="utf-8", errors="replace")}]
+
+
+def test_sidebar(shown: list[dict], pictures: Path, colors: Callable[[Path], int]) -> None:
+    result = shown[1]
     assert result["ok"], result["error"]
     assert result["values"]["enabled"]
     assert result["values"]["tab"] == "TetFlora"
     assert result["values"]["sidebar_width"] > 100
     assert result["values"]["open_after_n"] is False
     assert result["values"]["preferences_drawn"] > 0
-    assert "Traceback" not in (pictures / "sidebar" / "blender.log").read_text(encoding="utf-8", errors="replace")
     assert "sidebar.png" in result["pictures"]
     assert colors(pictures / "sidebar" / "sidebar.png") > 200
 
 
-def test_an_error_in_the_script_is_reported(full_blender: str, tmp_path: Path) -> None:
-    script = tmp_path / "broken.py"
-    script.write_text("def steps(ui):\n    yield\n    raise ValueError('raised on purpose')\n", encoding="utf-8")
-    result = window.run_in_window(full_blender, script, tmp_path / "out", 120)
-    assert not result["ok"]
-    assert "raised on purpose" in result["error"]
+def test_an_error_in_a_script_is_reported_and_the_next_is_run(shown: list[dict]) -> None:
+    assert not shown[0]["ok"]
+    assert "raised on purpose" in shown[0]["error"]
+    assert shown[1]["ok"]
+    assert shown[2]["log"].count("Traceback") == 1

@@ -70,7 +70,7 @@ class Writer(Hand):
 
     def enter(self, path, value):
         """Copy a number and paste it while the mouse is over the field of a setting."""
-        yield from self.find(path, shift=True)
+        yield from self.ui.find(path, shift=True)
         bpy.context.window_manager.clipboard = str(value)
         self.clicks += 1
         self.ui.press('V', ctrl=True)
@@ -102,7 +102,7 @@ class Writer(Hand):
 
     def across(self, *pixels):
         """Places from top to bottom, by pixels from the right edge of the sidebar."""
-        return self._places('UI', pixels)
+        return self.ui.places(across=pixels)
 
     def scroll(self, steps):
         """Turn the wheel over the sidebar."""
@@ -121,7 +121,7 @@ class Writer(Hand):
 
     def choose_own(self):
         """The last picture of the gallery, after those of the catalog; then take the beech away."""
-        x, y = yield from self.click("ops.tetflora.edit_list(", place=self.beside_lists(), above=20)
+        x, y = yield from self.click("ops.tetflora.edit_list(", self.beside_lists(), above=20)
         yield 1.5
         yield from self.ui.picture("own_trees_gallery")
         self.ui.move(x - 682, y + 89)
@@ -129,7 +129,7 @@ class Writer(Hand):
         self.ui.press('LEFTMOUSE')
         yield 0.5
         yield from self.click("Beech")
-        yield from self.click("ops.tetflora.edit_list(", place=self.beside_lists())
+        yield from self.click("ops.tetflora.edit_list(", self.beside_lists())
 
     def look_by_daylight(self, where=""):
         """The two buttons below Refine, and a choice in Adjust Last Operation."""
@@ -266,7 +266,7 @@ def biome(writer, found):
     layers = bpy.context.scene.tetflora.layers
     found["junipers"] = [before["Junipers"], layers[index].made]
     index = next(n for n, layer in enumerate(layers) if layer.name == "Ground cover")
-    yield from writer.click(f"layers[{index}].shown", place=writer.across(-90, -94), shift=True)
+    yield from writer.click(f"layers[{index}].shown", writer.across(-90, -94), shift=True)
     found["shown"] = layers[index].shown
     yield from writer.view((0.0, -20.0, 2.0), 20.0, 20.0, 60.0)
     yield from writer.look_by_daylight()
@@ -326,7 +326,7 @@ def own_trees(writer, found):
     yield from writer.delete_all()
     tree = model()
     yield from writer.select(tree)
-    yield from writer.click("ops.tetflora.use_as_species(", 'PROPERTIES')
+    yield from writer.click("ops.tetflora.use_as_species(", writer.properties())
     tree.hide_render = True
     tree.hide_set(True)
     yield from writer.grid(60.0, 1.0)
@@ -348,7 +348,7 @@ def own_trees(writer, found):
         point.handle_right = (place[0] + 1.0, place[1], place[2] + 2.5)
     curve.location = (0.0, -14.0, 0.0)
     yield 1.0
-    yield from writer.click("ops.tetflora.use_as_skeleton(", 'PROPERTIES')
+    yield from writer.click("ops.tetflora.use_as_skeleton(", writer.properties())
     found["drawn"] = sum(obj.tetflora.skeleton is not None for obj in bpy.context.scene.objects)
     yield from writer.view((0.0, -12.0, 4.0), 10.0, 8.0, 26.0)
     yield from writer.look_by_daylight('VIEW')

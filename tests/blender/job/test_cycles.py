@@ -14,7 +14,7 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
 
-CYCLES = 16
+CYCLES = 10
 #: Megabytes by which the last half of the cycles may lie above the first, in the median. A result of this scene takes a
 #: third of a megabyte or more, so one that stayed behind in each cycle would lie far above; measured is .1.
 MOST_GROWTH = 2.0

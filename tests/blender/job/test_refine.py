@@ -149,6 +149,17 @@ def test_closing_the_job_leaves_the_scene_as_it_was(steps):
     assert datablocks() == before
 
 
+def test_closing_the_job_before_a_material_is_used_leaves_none():
+    scene = _forest()
+    before = datablocks()
+    running = refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
+    while datablocks()["materials"] == before["materials"]:
+        next(running)
+    assert datablocks()["meshes"] == before["meshes"]
+    running.close()
+    assert datablocks() == before
+
+
 def test_closing_the_job_in_the_middle_of_a_pass_does_not_wait_for_it(monkeypatch):
     """As Esc does: the pass goes on in its thread until it notices, and the scene is as it was at once."""
     scene = _forest()
@@ -256,7 +267,7 @@ def test_the_refined_picture_is_that_of_the_plants():
     compat.shader_tree(world).nodes["Background"].inputs["Color"].default_value = (0.8, 0.8, 0.8, 1.0)
     scene.render.engine = 'CYCLES'
     scene.render.resolution_x, scene.render.resolution_y = 96, 72
-    scene.cycles.samples = 64
+    scene.cycles.samples = 24  # and blocks of 64 pixels: noise is a fifth of the least bound
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
     scene.cycles.transparent_max_bounces = 256
     scene.tetflora.refine_at_render = False

@@ -32,7 +32,7 @@ from tetflora_addon.refinement.lights import Light
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.shared_parts import SharePoints
 
-WIDTH = 96
+WIDTH = 64
 
 
 @cache

@@ -253,6 +253,7 @@ def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Job[None]
                 materials[what] = [baked_material()]
             else:
                 materials[what] = yield from material_steps(run.results.scene, species, block.kind, block.form)
+            run.results.use(materials[what])  # from now on, as Esc may come before its first object
         name = f"{species.name} {block.kind} {block.number:03d}"
         yield
         look = run.results.look_of(block.species)
