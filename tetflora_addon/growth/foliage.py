@@ -10,6 +10,7 @@ that all that is known of them along the branch holds for solids too.
 """
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,12 +166,12 @@ class Leaves(Arrays):
     sky: NDArray[np.floating]  # (3,) or (n, 3) float32: where that is; with the branch in the wind
     stages: Stages | None = None  # on a day of the year; None where all are as in summer
 
-    def take(self, index: Integers) -> Leaves:
+    def take(self, index: Integers) -> Self:
         """As of `Arrays`; what is the same for all stays so."""
         light = self.light if len(self.light) < len(self.key) else self.light[index]
         sky = self.sky if self.sky.ndim == 1 else gathered(self.sky, index)
         own = (gathered(of, index) for of in (self.branch, self.key, self.position, self.frame, self.size))
-        return Leaves(*own, light, sky, None if self.stages is None else self.stages.take(index))
+        return type(self)(*own, light, sky, None if self.stages is None else self.stages.take(index))
 
 
 def leaf_keys(branches: Branches, owner: Integers, index: Integers) -> Keys:
