@@ -213,8 +213,8 @@ def _leaf_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Itera
         one = np.ones(len(branches))
         return one, one, one
 
-    def thin(key: Keys, _place: Floats, _off: Floats, reach: Floats) -> tuple[Integers, Floats]:
-        part = np.clip((reach / (_LONG * pixel)) ** 2, 0.0, 1.0)
+    def thin(key: Keys, _center: Floats, radius: Floats) -> tuple[Integers, Floats]:
+        part = np.clip((2.0 * radius / (_LONG * pixel)) ** 2, 0.0, 1.0)
         kept = np.flatnonzero(uniform(key, _KEPT) < part)
         return kept, 1.0 / part[kept]
 
