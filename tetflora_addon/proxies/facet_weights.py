@@ -100,8 +100,8 @@ def _with_share(tables: Floats, row: Integers, count: Floats, share: Floats | No
     out, shares = by_number(tables[0], row, count), np.array(SHARES)
     # Parts that bear little besides cones or blossoms may have fewer leaves than any plant has.
     low = np.clip(np.searchsorted(-shares, -share), 1, len(tables) - 1)
-    for node in np.unique(low[share < 1.0]).tolist():
-        some = np.flatnonzero((low == node) & (share < 1.0))
+    for node in np.unique(low[share != 1.0]).tolist():
+        some = np.flatnonzero((low == node) & (share != 1.0))
         less, more = (1.0 / by_number(tables[i], row[some], count[some]) for i in (node, node - 1))
         place = np.maximum(share[some] - shares[node], 0.0) / (shares[node - 1] - shares[node])
         out[some] = 1.0 / (less + place * (more - less))
@@ -477,6 +477,8 @@ def _ray_numbers(column: Integers, row: Integers) -> Integers:
 
 SHARES = (1.0, 0.4, 0.1, 0.0)
 """Parts of their leaves that plants have, of which weights are measured."""
+#: Leaves over those of free plants up to which the inverse of weights goes on in a line.
+DENSEST = 2.0
 #: Ages of which weights are measured: fractions of the full one, of the lifespan, and years after death.
 _YOUNG, _OLD, _DEAD = (0.04, 0.1, 0.25, 0.5), (0.9, 0.995), (1.0, 8.0, 30.0)
 #: No plant has weights beyond, however few leaves it has.
@@ -499,7 +501,7 @@ def leaf_shares(flora: Flora, subplants: Branches) -> Floats | None:
         rows, row, crown = flora.rows, subplants.row, subplants.crown.astype(np.float64)
         whole = (rows["order"][row] == 0) & ~rows["continues"][row] & (leafiness < 1.0)
         leafiness = np.where(whole, leafiness * crown[:, LEAVES] / np.maximum(crown[:, WIDTH], 1e-3) ** 2, leafiness)
-    leafiness = np.minimum(leafiness, 1.0)
+    leafiness = np.minimum(leafiness, DENSEST)
     return leafiness if share is None else share * leafiness
 
 

@@ -140,11 +140,15 @@ def _joined(parts: list[Facets]) -> Facets:
 def pushed_outside_view(facets: Facets, distance_to_view: Callable[[NDArray], NDArray], within: bool = False) -> Facets:
     """Facets that are out of view, moved away from it where they would reach into it, so that they keep their area.
 
-    Where there is no room beside it, they are shrunk, or left out. ``distance_to_view`` gives the distance (n,) of
-    points (n, 3) from the view in meters. With ``within``, facets whose middle is in the view stay as they are.
+    Long ones are shorter and wider there. Where there is no room beside it, they are shrunk, or left out.
+    ``distance_to_view`` gives the distance (n,) of points (n, 3) from the view in meters. With ``within``, facets whose
+    middle is in the view stay as they are.
     """
     reach, center = CIRCUMRADIUS * facets.side, facets.center
     away = distance_to_view(center)
+    if facets.stretch is not None:
+        fits = np.maximum(np.minimum(facets.stretch, away / np.maximum(reach, 1e-12)), 1.0)
+        facets = replace(facets, stretch=np.where((away <= 0.0) & within, facets.stretch, fits))
     stay = (away <= 0.0) & within
     short = reach - away
     some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach) & ~stay)

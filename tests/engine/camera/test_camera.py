@@ -61,7 +61,8 @@ def test_a_widened_camera_keeps_its_pixels(kind):
     assert (same.window, same.width, same.height) == (camera.window, camera.width, camera.height)
 
 
-def test_facets_beside_the_view_do_not_reach_into_it():
+@pytest.mark.parametrize("stretch", [None, 3.0])
+def test_facets_beside_the_view_do_not_reach_into_it(stretch):
     camera = _camera("PERSP")
     random = np.random.default_rng(2)
     n = 300
@@ -70,6 +71,7 @@ def test_facets_beside_the_view_do_not_reach_into_it():
     center = _world(camera, (0.6 + random.uniform(-0.3, 0.5, n)) * depth, np.zeros(n), depth)
     a, b = np.linalg.qr(random.normal(size=(n, 3, 2)))[0].transpose(2, 0, 1)
     facets = Facets(center, a, b, random.uniform(0.5, 4, n), np.zeros((n, 3)), np.zeros(n))
+    facets = replace(facets, stretch=None if stretch is None else np.full(n, stretch))
     shrunk = facet_mesh(pushed_outside_view(facets, camera.distance_to_view))
     assert camera.distance_to_view(facet_mesh(facets).positions.astype(float)).min() < -0.1  # they did reach in
     assert camera.distance_to_view(shrunk.positions.astype(float)).min() > -1e-4
