@@ -64,7 +64,7 @@ _TABLE = {
     "blender/assets": f". growth assets {_LOW}",
     "blender/results": f". leaves species refinement emission {_LOW}",
     "blender/placing": f". species growth compiled planting {_LOW} blender/assets",
-    "blender/stands": ". species planting stands blender blender/species blender/scene blender/placing",
+    "blender/stands": ". species compiled planting stands blender blender/species blender/scene blender/placing",
     "blender/geodata": f". species growth compiled planting geodata {_LOW} blender/placing",
     "blender/biomes": f". species growth planting {_LOW} blender/placing blender/stands",
     "blender/job": f". processes species growth compiled camera refinement proxies emission {_LOW} {_ASSETS} "
