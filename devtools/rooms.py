@@ -25,8 +25,8 @@ ADDON = "tetflora_addon"
 PRODUCT = (ADDON, "operators", "panels")
 
 #: Limits of the product: source files, their lines together, lines of one room, levels of imports in ``blender``.
-MAX_FILES = 385
-MAX_LINES = 71_500
+MAX_FILES = 330
+MAX_LINES = 69_500
 MAX_ROOM_LINES = 4_300
 MAX_LEVELS = 10
 
