@@ -22,9 +22,8 @@ from devtools import forms
 from devtools.leaf_area import allometry, by_size
 from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, single_seed
 from tetflora_addon.blender.scene.ages import kind_species
-from tetflora_addon.blender.scene.own_ages import Sizes
-from tetflora_addon.blender.scene.sizes import measure_of, sized
 from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.compiled.recorded_sizes import Sizes, measure_of, sized
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalog import load_species

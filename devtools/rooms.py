@@ -25,8 +25,8 @@ ADDON = "tetflora_addon"
 PRODUCT = (ADDON, "operators", "panels")
 
 #: Limits of the product: source files, their lines together, lines of one room, levels of imports in ``blender``.
-MAX_FILES = 385
-MAX_LINES = 71_500
+MAX_FILES = 330
+MAX_LINES = 69_500
 MAX_ROOM_LINES = 4_300
 MAX_LEVELS = 10
 
@@ -64,7 +64,7 @@ _TABLE = {
     "blender/assets": f". growth assets {_LOW}",
     "blender/results": f". leaves species refinement emission {_LOW}",
     "blender/placing": f". species growth compiled planting {_LOW} blender/assets",
-    "blender/stands": ". species planting stands blender blender/species blender/scene blender/placing",
+    "blender/stands": ". species compiled planting stands blender blender/species blender/scene blender/placing",
     "blender/geodata": f". species growth compiled planting geodata {_LOW} blender/placing",
     "blender/biomes": f". species growth planting {_LOW} blender/placing blender/stands",
     "blender/job": f". processes species growth compiled camera refinement proxies emission {_LOW} {_ASSETS} "

@@ -7,9 +7,9 @@ import bpy
 from ..operators.marks import can_be_explicit, can_be_field
 from ..tetflora_addon.blender.assets.marks import is_species
 from ..tetflora_addon.blender.scene.ages import stage_text
+from ..tetflora_addon.blender.scene.field_points import has_ages
 from ..tetflora_addon.blender.scene.fields import stored_size
 from ..tetflora_addon.blender.scene.objects import has_nodes, is_drop, is_scatter, may_scatter
-from ..tetflora_addon.blender.scene.own_ages import has_ages
 from ..tetflora_addon.blender.scene.skeletons import SKELETON_TYPES
 from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.species.asset_species import name_of

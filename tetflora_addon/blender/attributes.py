@@ -20,7 +20,7 @@ from ..arrays import Floats, Floats32, Integers32, Mask, linear_of
 Geometry = bpy.types.Mesh | bpy.types.PointCloud | bpy.types.Curves
 
 
-class Kind(NamedTuple):
+class AttributeType(NamedTuple):
     """How Blender stores one value of an attribute."""
 
     field: str  # name of the value among the properties of an element
@@ -30,18 +30,18 @@ class Kind(NamedTuple):
 
 #: By Blender's name of the type. Byte colors as they are stored; their field "color" is linear.
 KINDS = {
-    'FLOAT': Kind("value", np.float32),
-    'INT': Kind("value", np.int32),
-    'INT8': Kind("value", np.int8),
-    'BOOLEAN': Kind("value", np.bool_),
-    'FLOAT2': Kind("vector", np.float32, 2),
-    'FLOAT_VECTOR': Kind("vector", np.float32, 3),
-    'QUATERNION': Kind("value", np.float32, 4),
-    'FLOAT_COLOR': Kind("color", np.float32, 4),
-    'BYTE_COLOR': Kind("color_srgb", np.float32, 4),
-    'FLOAT4X4': Kind("value", np.float32, 16),
-    'INT32_2D': Kind("value", np.int32, 2),
-    'INT16_2D': Kind("value", np.int16, 2),
+    'FLOAT': AttributeType("value", np.float32),
+    'INT': AttributeType("value", np.int32),
+    'INT8': AttributeType("value", np.int8),
+    'BOOLEAN': AttributeType("value", np.bool_),
+    'FLOAT2': AttributeType("vector", np.float32, 2),
+    'FLOAT_VECTOR': AttributeType("vector", np.float32, 3),
+    'QUATERNION': AttributeType("value", np.float32, 4),
+    'FLOAT_COLOR': AttributeType("color", np.float32, 4),
+    'BYTE_COLOR': AttributeType("color_srgb", np.float32, 4),
+    'FLOAT4X4': AttributeType("value", np.float32, 16),
+    'INT32_2D': AttributeType("value", np.int32, 2),
+    'INT16_2D': AttributeType("value", np.int16, 2),
 }
 # Geometry without elements lacks these.
 _BUILT_IN = {"position": 'FLOAT_VECTOR', ".edge_verts": 'INT32_2D', ".corner_vert": 'INT', ".corner_edge": 'INT'}
@@ -108,12 +108,12 @@ def members(
     collection: bpy.types.bpy_prop_collection, name: str, width: int = 1, dtype: DTypeLike = np.float32
 ) -> NDArray:
     """A property of all members of a collection, (n,) or (n, width)."""
-    values = _empty(Kind(name, dtype, width), len(collection))
+    values = _empty(AttributeType(name, dtype, width), len(collection))
     collection.foreach_get(name, values.reshape(-1))
     return values
 
 
-def _empty(kind: Kind, size: int) -> NDArray:
+def _empty(kind: AttributeType, size: int) -> NDArray:
     return np.zeros(size if kind.width == 1 else (size, kind.width), kind.dtype)
 
 

@@ -15,14 +15,14 @@ from tetflora_addon import errors
 from tetflora_addon.blender.scene.ages import kind_species, plainly_aged
 from tetflora_addon.blender.scene.fields import read_aged_field
 from tetflora_addon.blender.scene.plants import read_asset_plants, read_plants
-from tetflora_addon.blender.scene.sizes import fits_of, measure_of
-from tetflora_addon.blender.scene.skeletons import age_of, dead_of, is_crowded
 from tetflora_addon.blender.species.asset_species import asset_species
 from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.compiled.recorded_sizes import fits_of, measure_of
 from tetflora_addon.compiled.sizes import measured
 from tetflora_addon.growth.growth import radius_at, trunks
 from tetflora_addon.growth.seeds import BASE, EAST, LEAVES, THICKNESS
 from tetflora_addon.species.catalog import load_species
+from tetflora_addon.species.kinds import Kind
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -67,7 +67,7 @@ def test_plants_have_the_sizes_that_are_recorded():
         tf_crown_offset=('FLOAT_VECTOR', (0.2, 0.0, 0.0)),
     )
     read = plants()
-    assert all(age_of(kind) > 0.0 for kind in read.identifiers)
+    assert all(Kind.read(kind).age > 0.0 for kind in read.identifiers)
     np.testing.assert_allclose(read.crown[:, BASE], 0.5, rtol=1e-5)
     np.testing.assert_allclose(read.crown[:, EAST], 0.2, rtol=1e-5)
     for n, tall in enumerate(height.tolist()):
@@ -184,12 +184,12 @@ def test_the_dead_are_dead_at_the_size_of_their_death():
     obj = history()
     obj.tetflora.stand_year = 28.0
     read = plants()
-    assert sorted(dead_of(kind) > 0.0 for kind in read.identifiers) == [False, True]
+    assert sorted(Kind.read(kind).dead > 0.0 for kind in read.identifiers) == [False, True]
     for n, kind in enumerate(read.identifiers):
         flora = compiled(kind)
         tall = trunks(flora.rows, replace(read.take(read.species == n), species=np.zeros(1, np.int32))).length
-        assert (flora.leaf_count[0] > 0.0) == (dead_of(kind) == 0.0)
-        assert tall == pytest.approx(4.0 if dead_of(kind) else 1.8, rel=0.5)
+        assert (flora.leaf_count[0] > 0.0) == (Kind.read(kind).dead == 0.0)
+        assert tall == pytest.approx(4.0 if Kind.read(kind).dead else 1.8, rel=0.5)
 
 
 def test_growth_that_is_smooth_has_no_jumps():
@@ -201,7 +201,7 @@ def test_growth_that_is_smooth_has_no_jumps():
         read = plants()
         own = np.flatnonzero(read.seed == 2)
         kind = read.identifiers[read.species[own[0]]]
-        ages.append(age_of(kind))
+        ages.append(Kind.read(kind).age)
         length.append(trunks(compiled(kind).rows, replace(read.take(own), species=np.zeros(1, np.int32))).length[0])
     assert 0.0 <= np.diff(ages).min() <= np.diff(ages).max() < 1.5
     assert np.abs(np.diff(np.log(length))).max() < 0.1
@@ -220,8 +220,8 @@ def test_trees_of_a_dense_stand_have_its_habit_and_free_ones_have_not():
     )
     read = plants()
     kinds = [read.identifiers[n] for n in read.species]
-    assert [is_crowded(kind) for kind in kinds] == [True, False, False]
-    assert age_of(kinds[0]) == load_species("beech").ages.full  # tall, but not as thick as an old one
+    assert [Kind.read(kind).crowded for kind in kinds] == [True, False, False]
+    assert Kind.read(kinds[0]).age == load_species("beech").ages.full  # tall, but not as thick as an old one
     assert 0.4 < read.crown[0, LEAVES] < 1.5
     assert 0.5 < read.crown[0, THICKNESS] < 1.5
     plain = plainly_aged(bpy.context.scene, read, None, None)[0]
@@ -246,7 +246,7 @@ def test_trees_keep_their_habit_through_the_years_of_an_animation():
     for year in (12.0, 60.0):
         obj.tetflora.stand_year = year
         read = plants()
-        assert [is_crowded(read.identifiers[n]) for n in read.species[np.argsort(read.seed)]] == [True, False]
+        assert [Kind.read(read.identifiers[n]).crowded for n in read.species[np.argsort(read.seed)]] == [True, False]
 
 
 def test_growth_is_smooth_where_the_year_has_keys():

@@ -20,11 +20,12 @@ from tetflora_addon import errors
 from tetflora_addon.blender.job import contents, forecast, frame_cache, plant_mesh, refine
 from tetflora_addon.blender.placing import canopy, distances, plant_objects, populations, rules
 from tetflora_addon.blender.results.output import result_collections
-from tetflora_addon.blender.scene import ages, fields, own_ages, skeletons
+from tetflora_addon.blender.scene import ages, field_points, fields, skeletons
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.viewport import levels
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.species.catalog import load_species
+from tetflora_addon.species.kinds import Kind
 
 SPECIES = "conifer"
 
@@ -56,9 +57,9 @@ def by_plant(found):
 
 @given(st.text("abc_", min_size=1), st.one_of(st.none(), st.text("de. ", min_size=1)), st.floats(0, 1e4))
 def test_a_kind_tells_its_parts(species, form, age):
-    kind = skeletons.aged_kind(species if form is None else f"{species}\n{form}", age)
-    assert skeletons.species_of(kind) == species
-    assert skeletons.age_of(kind) == age
+    kind = str(Kind(species, form or "", age))
+    assert Kind.read(kind).species == species
+    assert Kind.read(kind).age == age
     assert (kind == species) == (form is None and age == 0.0)
 
 
@@ -70,7 +71,7 @@ def test_forms_and_ages_do_not_get_into_each_others_way(scene):
     (plant,) = row_of_plants([7.0])
     plant.tetflora.skeleton = form
     (kind,) = seeds(scene).identifiers
-    assert (skeletons.species_of(kind), skeletons.skeleton_object_of(kind), skeletons.age_of(kind)) == (
+    assert (Kind.read(kind).species, skeletons.skeleton_object_of(kind), Kind.read(kind).age) == (
         SPECIES,
         form,
         7.0,
@@ -82,7 +83,7 @@ def test_few_ages_are_exact(scene):
     given = [0.0, *np.linspace(1.0, 60.0, ages.MOST).tolist()]
     row_of_plants(given)
     found = by_plant(seeds(scene))
-    assert [skeletons.age_of(found[n][0]) for n in range(len(given))] == pytest.approx(given, rel=1e-6)
+    assert [Kind.read(found[n][0]).age for n in range(len(given))] == pytest.approx(given, rel=1e-6)
     assert {scale for _, scale in found.values()} == {1.0}
 
 
@@ -104,7 +105,7 @@ def test_many_ages_keep_the_heights_of_all(scene):
     for years in (0.0, 7.5):
         scene.tetflora.year.years = years
         found = by_plant(seeds(scene))
-        own = np.array([skeletons.age_of(found[n][0]) for n in range(30)])
+        own = np.array([Kind.read(found[n][0]).age for n in range(30)])
         scale = np.array([found[n][1] for n in range(30)])
         stands = scale * ages.heights(species, own + years)
         np.testing.assert_allclose(stands, ages.heights(species, given.astype(np.float32) + years), rtol=1e-6)
@@ -148,17 +149,17 @@ def test_points_have_ages(scene, name):
     field = _field(kinds=(SPECIES,), seed=('INT', [0, 1, 2]), **{name: ('FLOAT', [0.0, 4.0, 9.5])})
     field.tetflora.age = 50.0
     found = by_plant(seeds(scene))
-    assert [skeletons.age_of(found[n][0]) for n in range(3)] == [0.0, 4.0, 9.5]
+    assert [Kind.read(found[n][0]).age for n in range(3)] == [0.0, 4.0, 9.5]
     field.data.attributes.remove(field.data.attributes[name])
     found = by_plant(seeds(scene))
-    assert {skeletons.age_of(kind) for kind, _ in found.values()} == {50.0}
+    assert {Kind.read(kind).age for kind, _ in found.values()} == {50.0}
 
 
 def test_a_field_is_the_plants_that_it_stands_for(scene):
     row_of_plants(np.linspace(2.0, 70.0, 25).tolist())
     before = by_plant(seeds(scene))
     field = plant_objects.field_from_plants(scene, depsgraph(), list(scene.objects)[1:])
-    assert own_ages.has_ages(field)
+    assert field_points.has_ages(field)
     assert by_plant(seeds(scene)) == before
     back = plant_objects.plants_from_field(scene, depsgraph(), field, 100)
     assert by_plant(seeds(scene)) == before
@@ -183,7 +184,7 @@ def test_instances_of_a_plant_have_its_age(scene):
     shown.instance_type, shown.instance_collection = 'COLLECTION', held
     scene.collection.objects.link(shown)
     (kind,) = seeds(scene).identifiers
-    assert skeletons.age_of(kind) == 6.0
+    assert Kind.read(kind).age == 6.0
 
 
 def populated(scene, **settings):
@@ -212,7 +213,7 @@ def test_a_population_has_the_ages_of_its_rule(scene, store):
         (field,) = made.objects
         found = fields.read_aged_field(field, depsgraph(), np.eye(4)[None])[1]
     else:
-        found = own_ages.stored_ages(made.objects)
+        found = field_points.stored_ages(made.objects)
     assert 30.0 < np.median(found) < 50.0
     assert len(np.unique(found)) == made.number
     assert 0.4 < ((found > 40.0 / 1.3) & (found < 40.0 * 1.3)).mean() < 0.9
@@ -220,12 +221,12 @@ def test_a_population_has_the_ages_of_its_rule(scene, store):
     population.age_spread = 0.0
     assert rules.is_outdated(population)
     run_to_end(populations.make_plants_steps(scene, depsgraph(), population))
-    assert {skeletons.age_of(kind) for kind in seeds(scene).identifiers} == {40.0}
+    assert {Kind.read(kind).age for kind in seeds(scene).identifiers} == {40.0}
 
 
 def test_populations_without_ages_are_as_before(scene):
     population, made = populated(scene, as_field='FIELD')
-    assert not own_ages.has_ages(made.objects[0])
+    assert not field_points.has_ages(made.objects[0])
     assert made.objects[0].tetflora.age == 0.0
     before = rules.fingerprint(population)
     population.age_spread = 0.5

@@ -15,6 +15,7 @@ import numpy as np
 from ...arrays import Floats, Integers, Integers32, quaternions
 from ...camera.camera import origin_near
 from ...compiled.flora import Flora
+from ...compiled.recorded_sizes import Sizes
 from ...errors import TetFloraError
 from ...export.forest import Forest, ForestPart, PointAttributes, Variant, identifiers, written_whole
 from ...export.gltf import write_gltf
@@ -23,16 +24,17 @@ from ...export.obj import write_obj
 from ...export.variants import choose_variants
 from ...growth.seeds import Seeds
 from ...jobs import Job, Progress, part_of
+from ...species.kinds import species_of
 from ...species.species import Species
 from ..attributes import world_matrix
 from ..job.contents import compile_for, in_year
 from ..runtime import JobData, job
 from ..scene.ages import classed
+from ..scene.field_points import AGE
 from ..scene.field_sizes import FIT, NUMBERS, OFFSET
 from ..scene.fields import stored_points
-from ..scene.own_ages import AGE, Sizes
 from ..scene.plants import Source, merged, read_sources
-from ..scene.skeletons import skeleton_object_of, species_of
+from ..scene.skeletons import skeleton_object_of
 from ..worker import call_in_thread, steps_in_thread
 from .surfaces import with_surfaces
 from .usd import ENDINGS, halves, write_usd
@@ -42,7 +44,7 @@ from .usd import ENDINGS, halves, write_usd
 class PlantKind:
     """Plants that are compiled as one species."""
 
-    name: str  # as of `skeletons.kind_of`
+    name: str  # as of `species.kinds`
     flora: Flora
     plants: Integers  # (m,): of all that are exported
     variants: int  # that it gets at most

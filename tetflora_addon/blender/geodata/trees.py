@@ -14,6 +14,7 @@ import numpy as np
 
 from ...arrays import Floats, Floats32, Integers32
 from ...compiled.flora import compile_species
+from ...compiled.recorded_sizes import Sizes, fits_of
 from ...compiled.sizes import crown_of
 from ...errors import SceneError, SpeciesError
 from ...geodata.canopy import checked_canopy, find_trees, heights_above, without_areas
@@ -32,8 +33,6 @@ from ...species.species import Species
 from ..attributes import write
 from ..placing.plant_objects import add_field
 from ..scene.field_sizes import FIT, HEIGHT, NUMBERS, OFFSET, SIZE_ATTRIBUTES
-from ..scene.own_ages import Sizes
-from ..scene.sizes import fits_of
 from ..species.edits import catalog, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .origin import Import, Imported, Steps, importing

@@ -28,6 +28,7 @@ from ...refinement.polygons import Polygons
 from ...refinement.settings import RefinementSettings
 from ...refinement.statistics import Statistics
 from ...species.catalog import list_species, load_species
+from ...species.kinds import Kind
 from ...species.species import Species
 from ..assets.places import Places, read_places
 from ..preferences import preferences
@@ -40,7 +41,6 @@ from ..scene.lights import read_lights, read_sources, sky_suns
 from ..scene.looks import LayerLooks
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants
-from ..scene.skeletons import plain_kind
 from ..settings import check_limits, most_memory, season_of, wind_of, years_of
 
 
@@ -167,8 +167,9 @@ def load_for(
     if not identifiers:
         return [load_species(min(list_species()))]
     # Each species is looked up once, of however many ages there are plants.
-    plain = {kind: resolved_species(scene, kind, depsgraph) for kind in {plain_kind(kind) for kind in identifiers}}
-    return [kind_species(plain[plain_kind(kind)], kind, years) for kind in identifiers]
+    plain = {kind: str(Kind.read(kind).plain) for kind in identifiers}
+    found = {kind: resolved_species(scene, kind, depsgraph) for kind in set(plain.values())}
+    return [kind_species(found[plain[kind]], kind, years) for kind in identifiers]
 
 
 def in_year(scene: bpy.types.Scene, flora: Flora) -> Flora:

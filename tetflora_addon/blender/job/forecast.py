@@ -16,23 +16,22 @@ from numpy.typing import NDArray
 
 from ... import memory
 from ...arrays import Floats, Integers
+from ...compiled.recorded_sizes import ages_of_heights
 from ...compiled.sizes import Crown
 from ...emission.estimate import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
+from ...species.kinds import species_of
 from ..attributes import read, values_of
 from ..runtime import Handlers, Outlook
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
-from ..scene.field_points import PREFIX
+from ..scene.field_points import AGE, PREFIX, sound_ages
 from ..scene.field_sizes import HEIGHT, stored_now
 from ..scene.fields import field_kinds
 from ..scene.objects import objects_within, renderable_objects
-from ..scene.own_ages import AGE, sound_ages
-from ..scene.sizes import ages_of_heights
-from ..scene.skeletons import species_of
 from ..settings import most_memory, season_of
 from ..species.edits import display_height, species_for
 from .contents import check_settings, memory_left, picture_bytes, settings_from

@@ -18,6 +18,7 @@ import numpy as np
 from ...camera.camera import Camera
 from ...camera.view_cells import Around, ViewCells, cell_camera
 from ...growth.seeds import farthest
+from ...species.kinds import species_of
 from ...species.species import Species
 from ..assets.marks import reach_of
 from ..assets.parts import digest_of
@@ -30,7 +31,6 @@ from ..results.output import REPLACED, remove_collection, result_collections
 from ..results.proxies import shade_again
 from ..scene.ages import kind_species
 from ..scene.camera import read_camera
-from ..scene.skeletons import species_of
 from ..settings import season_of, wind_of, years_of
 from ..species.asset_species import asset_species
 from ..species.edits import species_for

@@ -37,6 +37,7 @@ from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
 from ...refinement.settings import FIRST_LOOK, RefinementSettings
 from ...refinement.statistics import Statistics, Stopwatch
+from ...species.kinds import Kind
 from ..assets.parts import Target
 from ..assets.places import Places
 from ..compat import drawn_disc
@@ -53,7 +54,6 @@ from ..results.proxy_kinds import ProxyKind, proxy_kind_of
 from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
-from ..scene.skeletons import look_of
 from ..worker import call_in_thread, nobody_waits, run_to_end, steps_in_thread, written
 from .assets import SceneAssets, asset_warnings, bind_steps, is_plain
 from .contents import (
@@ -380,7 +380,7 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     run.camera, run.given = camera, given.counted_from(camera.origin)
     given = run.given
     results.origin, results.owners = camera.origin, given.looks
-    results.looks = [look_of(kind) for kind in given.species]
+    results.looks = [Kind.read(kind).look for kind in given.species]
     clock.lap("read")
     progress = Progress(0.02, "Compiling species")
     yield progress

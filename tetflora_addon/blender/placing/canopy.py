@@ -15,12 +15,12 @@ import numpy as np
 from ...arrays import Floats
 from ...growth.seeds import BASE, LEAVES, WIDTH
 from ...planting.cover import Canopy, Floor, Habitat, Sheet, Suits, mapping
+from ...species.kinds import species_of
 from ..attributes import world_matrix
 from ..scene.ages import crown_kinds, with_sizes
 from ..scene.crowns import crown_for
+from ..scene.field_points import stored_ages
 from ..scene.fields import field_kinds, fields_of, read_aged_field
-from ..scene.own_ages import stored_ages
-from ..scene.skeletons import species_of
 from ..worker import run_to_end
 
 _kept: dict[str, Floor] = {}  # the last one, by content: settings change more often than the plants above

@@ -13,8 +13,8 @@ import numpy as np
 from ...compiled.sizes import Crown
 from ...errors import SpeciesError
 from ...planting.rules import suggested_distance
+from ...species.kinds import Kind
 from ..scene.crowns import crown_for, crown_to_draw
-from ..scene.skeletons import aged_kind
 from ..settings import active_in
 from ..species.catalog import default_species
 
@@ -90,7 +90,8 @@ def suggestion(
         weights = painted_weights(scene) if of_brush else weights_of(settings)
     except SpeciesError:  # an empty catalog, of which Populate and the brush complain
         return settings.min_distance
-    crowns = [find(scene, aged_kind(identifier, 0.0 if of_brush else settings.age)) for identifier in weights]
+    age = 0.0 if of_brush else settings.age
+    crowns = [find(scene, str(Kind(identifier, age=age))) for identifier in weights]
     if None in crowns:
         return None
     # Plants per square meter, if they are asked for.

@@ -19,15 +19,16 @@ from ...arrays import Floats, Integers32, Mask, quaternions
 from ...errors import SceneError
 from ...jobs import run_to_end
 from ...planting.places import Placement, new_seeds
+from ...species.kinds import species_of
 from .. import settings
 from ..attributes import KINDS, read, values_of, world_matrix, write
 from ..saved_files import VERSION
 from ..scene.ages import plainly_aged, relative_heights
+from ..scene.field_points import stored_ages
 from ..scene.field_sizes import has_history
 from ..scene.fields import FIELD_ATTRIBUTES, field_kinds, fields_of, read_aged_field, stored_size, write_field
-from ..scene.own_ages import stored_ages
 from ..scene.plants import single_plants
-from ..scene.skeletons import kind_of_choice, skeleton_object_of, species_of
+from ..scene.skeletons import kind_of_choice, skeleton_object_of
 from ..species.edits import catalog, display_height
 
 COLLECTION = "TetFlora plants"

@@ -20,12 +20,11 @@ from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Job, Progress
 from ...planting.places import Placement, plant_ages
+from ...species.kinds import MOST_YEARS, Kind
 from ..assets.marks import measure_all
 from ..runtime import JobData, is_there, job
 from ..scene.crowns import crown_steps
 from ..scene.fields import fields_of, stored_size
-from ..scene.own_ages import MOST_YEARS
-from ..scene.skeletons import aged_kind
 from ..settings import BIOME, SCATTER, with_identity
 from ..species.edits import revert_species
 from ..worker import call_in_thread, run_to_end
@@ -124,7 +123,7 @@ def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPla
     refuse_frozen(population)
     species = {entry.species for entry in population.mix}
     measure_all(scene, depsgraph, species)
-    kinds = {aged_kind(identifier, population.age) for identifier in species}
+    kinds = {str(Kind(identifier, age=population.age)) for identifier in species}
     if is_cover(population):
         kinds |= standing(scene)
     yield from crown_steps(progress, scene, kinds)

@@ -11,9 +11,9 @@ from ...parameters import FACTOR, LENGTH, within
 from ...planting.rules import Companion, Rules
 from ...planting.site import Limits
 from ...planting.strokes import Brush
+from ...species.kinds import MOST_YEARS
 from ..declare import FIXED, HIDDEN, boolean, choice, integer, list_of, once, pointer_to, real, string
 from ..runtime import Listeners
-from ..scene.own_ages import MOST_YEARS
 from ..settings import BIOME, FIELD, SCATTER, properties_of, settings_in
 from ..species.catalog import SpeciesChoice, gallery_of, items_for, number_of
 from .distances import SOURCES, choose, follows_species

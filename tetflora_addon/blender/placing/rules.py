@@ -29,10 +29,10 @@ from ...planting.plane import Path, Terrain
 from ...planting.rules import Companion, Rules
 from ...planting.site import Limits, Spots, Zone, distance_lines
 from ...planting.wetness import wet_ground
+from ...species.kinds import species_of
 from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
-from ..scene.skeletons import species_of
 from ..settings import BIOME, SCATTER, active_in, check_limits, with_identity
 from ..species.catalog import default_species
 from ..species.edits import catalog, unknown_text

@@ -17,11 +17,12 @@ from ...leaves.blades import Compound
 from ...leaves.models import LeafModel, leaf_model
 from ...leaves.outlines import Blade
 from ...leaves.surfaces import Needles
+from ...species.kinds import species_of
 from ...species.species import LEAF_KINDS, Species
 from ..attributes import mesh_of
 from ..materials.materials import bark_material, bark_steps, leaf_material
 from ..materials.nodes import is_ours
-from ..scene.skeletons import read_skeleton, skeleton_object_of, species_of
+from ..scene.skeletons import read_skeleton, skeleton_object_of
 from ..species.edits import species_for
 from .meshes import UV_MAP, read_mesh_arrays
 from .output import replaced_material
@@ -158,7 +159,7 @@ def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.
     Parameters
     ----------
     kind_of_plant : str
-        See `scene.skeletons.kind_of`.
+        See `species.kinds`.
 
     Raises
     ------

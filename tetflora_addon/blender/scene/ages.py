@@ -19,15 +19,14 @@ from bpy.app.translations import pgettext_iface as iface
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers, Integers32
+from ...compiled.recorded_sizes import Sizes, at_age, heights, sized
 from ...errors import SpeciesError
 from ...growth.seeds import WIDTH, Seeds
 from ...species.ages import NARROWER, ages_of, stage
+from ...species.kinds import Kind, species_of
 from ...species.species import Species
 from ..settings import years_of
 from ..species.edits import species_for
-from .own_ages import Sizes
-from .sizes import at_age, heights, sized
-from .skeletons import age_of, aged_kind, dead_of, is_aged, is_crowded, later, plain_kind, species_of
 
 #: Classes of a species at most, and years from its death to the last of them.
 MOST, _FALLEN = 12, 40.0
@@ -84,24 +83,24 @@ def plainly_aged(
     Those of a dense stand are free ones with narrow crowns.
     """
     seeds, ages = with_sizes(scene, seeds, ages, sizes)
-    if not any(is_aged(kind) for kind in seeds.identifiers):
+    kinds = [Kind.read(kind) for kind in seeds.identifiers]
+    if not any(kind.age for kind in kinds):
         return seeds, ages
-    years, smaller = np.zeros(len(seeds.identifiers)), np.ones(len(seeds.identifiers))
-    for index, kind in enumerate(seeds.identifiers):
-        years[index], dead = age_of(kind), dead_of(kind)
+    years, smaller = np.array([kind.age for kind in kinds]), np.ones(len(kinds))
+    for index, kind in enumerate(kinds):
         with suppress(SpeciesError):
-            if dead > 0.0:
-                species = species_for(scene, species_of(kind))
-                years[index] = ages_of(species).lifespan + dead
-                smaller[index] = np.divide(*heights(species, np.array([age_of(kind), years[index]])))
-    kinds = tuple(plain_kind(kind) for kind in seeds.identifiers)
+            if kind.dead > 0.0:
+                species = species_for(scene, kind.species)
+                years[index] = ages_of(species).lifespan + kind.dead
+                smaller[index] = np.divide(*heights(species, np.array([kind.age, years[index]])))
     found = years[seeds.species] + (0.0 if ages is None else ages)
     if seeds.crown is not None:
-        close = np.array([is_crowded(kind) for kind in seeds.identifiers])[seeds.species]
+        close = np.array([kind.crowded for kind in kinds])[seeds.species]
         crown = seeds.crown.copy()
         crown[close, WIDTH] *= 1.0 - NARROWER
         seeds = replace(seeds, crown=crown)
-    return replace(seeds, identifiers=kinds, scale=seeds.scale * smaller[seeds.species]), found
+    plain = tuple(str(kind.plain) for kind in kinds)
+    return replace(seeds, identifiers=plain, scale=seeds.scale * smaller[seeds.species]), found
 
 
 def relative_heights(identifier: str, years: NDArray[np.floating]) -> Floats:
@@ -115,8 +114,8 @@ def relative_heights(identifier: str, years: NDArray[np.floating]) -> Floats:
 
 def kind_species(species: Species, kind: str, years: float = 0.0) -> Species:
     """A species as plants of a kind are after so many years."""
-    age, dead, crowded = age_of(kind), dead_of(kind), is_crowded(kind)
-    return at_age(species, *((age, dead + years) if dead > 0.0 else (age + years, 0.0)), crowded)
+    one = Kind.read(kind).later(years)
+    return at_age(species, one.age, one.dead, one.crowded)
 
 
 def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: Floats, many: set[str]) -> Seeds:
@@ -144,9 +143,9 @@ def crown_kinds(
     if ages is None and years == 0.0:
         return tuple(kinds), number.astype(np.int32), np.ones(len(number))
     total = (0.0 if ages is None else ages) + np.full(len(number), years)
-    which = [n for n, kind in enumerate(kinds) if not is_aged(kind)]
+    which = [n for n, kind in enumerate(kinds) if not Kind.read(kind).age]
     total[~np.isin(number, which)] = 0.0
-    older = [later(kind, years) if is_aged(kind) else kind for kind in kinds]
+    older = [str(one.later(years)) if (one := Kind.read(kind)).age else kind for kind in kinds]
     classes, taller = _in_classes(scene, kinds, number, total, 0.0, which)
     return *_by_age(older, number, classes), taller
 
@@ -159,7 +158,7 @@ def _by_age(kinds: Sequence[str], number: Integers, ages: Floats) -> tuple[tuple
         own = np.flatnonzero(number == old)
         different, which = np.unique(ages[own], return_inverse=True)
         out[own] = which.reshape(-1) + len(found)
-        found += [aged_kind(kind, age) for age in different.tolist()]
+        found += [str(Kind.read(kind).aged(age)) for age in different.tolist()]
     return tuple(found), out
 
 

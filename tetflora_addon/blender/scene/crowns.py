@@ -14,13 +14,13 @@ import bpy
 from ...compiled.sizes import Crown, crown_of, known_crown, prepare
 from ...errors import SpeciesError
 from ...jobs import Job, Progress
+from ...species.kinds import species_of
 from ...species.species import Species
 from ..runtime import call_soon, redraw
 from ..species.asset_species import find_asset
 from ..species.edits import display_height, species_for
 from ..worker import call_in_thread
 from .ages import kind_species
-from .skeletons import species_of
 
 #: Of a species that cannot be compiled: radius and base over height; leaf area over radius³, and polygons.
 _RADIUS, _BASE, _AREA, _POLYGONS = 0.2, 0.3, 0.5, 50_000.0

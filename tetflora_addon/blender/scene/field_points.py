@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The points of a field of plants and their attributes, in the field's own space, checked and with defaults."""
+"""The points of a field of plants and their attributes, in the field's own space, checked and with defaults; and ages
+of plants as they are stored.
+"""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -13,8 +15,40 @@ from ...arrays import Floats, Integers, Keys, Mask
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
 from ...planting.places import new_seeds
+from ...species.kinds import MOST_YEARS
 from ..attributes import frames_of, read, values_of
-from .own_ages import AGE, MOST_YEARS, sound_ages, stored_ages
+
+#: Attribute of fields whose plants differ in their ages; one with `PREFIX` overrides it.
+AGE = "age"
+
+
+def stored_ages(plants: Sequence[bpy.types.Object]) -> Floats | None:
+    """Ages (n,) of plants that are objects, or of fields without the attribute; None where all are full-grown.
+
+    Raises
+    ------
+    SceneError
+        An age that a script has stored and no slider gives; names the object.
+    """
+    ages = np.array([obj.tetflora.age for obj in plants], dtype=np.float64)
+    bad = np.flatnonzero(~sound_ages(ages))
+    if len(bad):
+        raise SceneError(
+            f'"{plants[bad[0]].name}": Age is {ages[bad[0]]:g}; it must be from 0 to {MOST_YEARS:,.0f} years. Set it '
+            "again in the TetFlora tab of the sidebar"
+        )
+    return ages if ages.any() else None
+
+
+def has_ages(field: bpy.types.Object) -> bool:
+    """Whether points of a field have ages of their own, as far as they are stored."""
+    return any(name in field.data.attributes for name in (PREFIX + AGE, AGE))
+
+
+def sound_ages(ages: NDArray[np.floating]) -> Mask:
+    """Which ages are numbers within the limits."""
+    return (ages >= 0.0) & (ages <= MOST_YEARS)
+
 
 #: Attributes with this prefix override those without, which other tools may use differently.
 PREFIX = "tf_"

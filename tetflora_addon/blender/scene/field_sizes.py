@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers
+from ...compiled.recorded_sizes import Lives, Sizes
 from ...errors import SceneError
 from ..attributes import values_of
 from .field_points import FieldPoints, Points, joined, point_count, refuse
 from .motion import bags_of, curves_of
-from .own_ages import Lives, Sizes
 
 HEIGHT = "tf_height"
 #: Attributes of numbers, with the most that is sound: meters, and years since death.

@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers, Integers32, Keys
 from ...camera.camera import origin_near
+from ...compiled.recorded_sizes import Sizes
 from ...errors import SceneError
 from ...growth.seeds import Seeds
+from ...species.kinds import species_of
 from ..attributes import values_of, write
 from ..species.asset_species import find_asset
-from .field_points import PREFIX, FieldPoints, parts_of, placed_frames, read_points, refuse
+from .field_points import AGE, PREFIX, FieldPoints, parts_of, placed_frames, read_points, refuse
 from .field_sizes import SIZE_ATTRIBUTES, in_year, read_records, read_sizes, year_curves, year_now
 from .objects import geometry_of
-from .own_ages import AGE, Sizes
-from .skeletons import kind_of, kind_of_choice, species_of
+from .skeletons import kind_of, kind_of_choice
 
 #: Types of objects that can be marked as fields.
 FIELD_TYPES = {'MESH', 'POINTCLOUD'}

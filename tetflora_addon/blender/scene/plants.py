@@ -22,17 +22,18 @@ from ...growth.hashing import child_key, key_of_seed
 from ...growth.seasons import is_gone
 from ...growth.seeds import Seeds, crown_shapes
 from ...growth.wind import rotation_vectors
+from ...species.kinds import Kind, species_of
 from ..attributes import frames_of, world_matrix
 from ..settings import season_of
 from ..species.asset_species import asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalog, edited_infos, species_for
 from .ages import Part, classed
+from .field_points import stored_ages
 from .fields import read_aged_field, read_field_matrices
 from .looks import LayerLooks
 from .motion import exposure, moment, moves
 from .objects import Copies, copies_of, is_drop, may_instance, may_take_part, name_keys, renderable_objects
-from .own_ages import stored_ages
-from .skeletons import kind_of, kind_of_choice, species_of, with_look
+from .skeletons import kind_of, kind_of_choice
 
 
 def gone_species(scene: bpy.types.Scene) -> set[str]:
@@ -159,7 +160,7 @@ def _read_plants(
     owners[: len(found.single)] = [(obj.name, 1) for some in found.single.values() for obj in some]
     aged = classed(scene, [source.part for source in read])
     seen = [
-        replace(seeds, identifiers=tuple(with_look(kind, source.look) for kind in seeds.identifiers))
+        replace(seeds, identifiers=tuple(str(replace(Kind.read(kind), look=source.look)) for kind in seeds.identifiers))
         for source, (_, seeds) in zip(read, aged, strict=True)
     ]
     return merged(seen), tuple(owners), f"Left out {_unknown(found.odd)}" if found.odd else ""

@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plants modeled by hand: curves, mesh edges and hair curves as skeletons, and kinds of plants.
-
-A kind is a text of the species and, if there are any, the skeleton, the age, years since death, and the look (`looks`):
-plants of one kind are compiled once, and are results of their own.
-"""
+"""Plants modeled by hand: curves, mesh edges and hair curves as skeletons, and the kinds of plants that have them."""
 
 import bpy
 import numpy as np
@@ -12,6 +8,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers
 from ...errors import SpeciesError
+from ...species.kinds import Kind
 from ...species.skeletons import (
     Chains,
     Skeleton,
@@ -29,9 +26,6 @@ SKELETON_TYPES = ('CURVE', 'CURVES', 'MESH')
 RADIUS = "radius"  # the attribute's name in hair curves and, by convention, in meshes
 _CATMULL_ROM, _POLY, _BEZIER, _NURBS = range(4)  # Blender's numbers for types of hair curves
 _DEFAULT_STEPS = 12
-# Neither identifiers of species nor names of objects contain a line break.
-_BREAK = "\n"
-_CROWDED = " crowded"  # behind the age of plants of a dense stand
 
 
 def upright_turn(matrix: Floats) -> float:
@@ -205,72 +199,10 @@ def kind_of(plant: bpy.types.Object) -> str:
 
 def kind_of_choice(group: bpy.types.PropertyGroup) -> str:
     """Kind of a group of properties with a species and a skeleton."""
-    return group.species if group.skeleton is None else f"{group.species}{_BREAK}{group.skeleton.name_full}"
-
-
-def aged_kind(kind: str, age: float, dead: float = 0.0, crowded: bool = False) -> str:
-    """The kind of plants of an age in years, or so long after their death at it, from that of full-grown ones.
-
-    The same where the age is 0. ``crowded``: that of a dense stand.
-    """
-    if age == 0.0:
-        return kind
-    end = f"{age!r}{_CROWDED * crowded}{f'{_BREAK}{dead!r}' * (dead > 0.0)}"
-    return f"{kind}{_BREAK}{end}" if _BREAK in kind else f"{kind}{_BREAK}{_BREAK}{end}"
-
-
-def is_aged(kind: str) -> bool:
-    """Whether a kind of plants names an age."""
-    return bool(_part(kind, 2))
-
-
-def plain_kind(kind: str) -> str:
-    """The kind of full-grown plants, from that of any age."""
-    return _BREAK.join(kind.split(_BREAK)[:2]).rstrip(_BREAK)
-
-
-def later(kind: str, years: float) -> str:
-    """The kind of plants of an aged kind after so many years."""
-    age, dead, plain = age_of(kind), dead_of(kind), plain_kind(kind)
-    return aged_kind(plain, *((age, dead + years) if dead > 0.0 else (age + years, 0.0)), is_crowded(kind))
-
-
-def species_of(kind: str) -> str:
-    """Identifier of the species of a kind of plant."""
-    return _part(kind, 0)
+    return group.species if group.skeleton is None else str(Kind(group.species, group.skeleton.name_full))
 
 
 def skeleton_object_of(kind: str) -> bpy.types.Object | None:
     """Object with the skeleton of a kind of plant; None without one."""
-    name = _part(kind, 1)
+    name = Kind.read(kind).skeleton
     return next((o for o in bpy.data.objects if o.name_full == name), None) if name else None
-
-
-def age_of(kind: str) -> float:
-    """Age of a kind of plant in years; 0 is full-grown."""
-    return float(_part(kind, 2).removesuffix(_CROWDED) or 0.0)
-
-
-def is_crowded(kind: str) -> bool:
-    """Whether plants of a kind are those of a dense stand."""
-    return _part(kind, 2).endswith(_CROWDED)
-
-
-def dead_of(kind: str) -> float:
-    """Years since plants of a kind died; 0 alive."""
-    return float(_part(kind, 3) or 0.0)
-
-
-def look_of(kind: str) -> str:
-    """Look of plants of a kind; empty without one."""
-    return _part(kind, 4)
-
-
-def with_look(kind: str, look: str) -> str:
-    """The kind of plants with a look, from that of those without."""
-    return _BREAK.join([*(_part(kind, number) for number in range(4)), look]) if look else kind
-
-
-def _part(kind: str, number: int) -> str:
-    parts = kind.split(_BREAK)
-    return parts[number] if number < len(parts) else ""

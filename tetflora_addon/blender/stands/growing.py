@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats, quaternions
+from ...compiled.recorded_sizes import Sizes, kinds_of_sizes, measure_of
 from ...errors import SceneError, SpeciesError, TetFloraError
 from ...jobs import Job, Progress, part_of
 from ...planting.plane import Terrain, inside_any
@@ -43,8 +44,6 @@ from ..scene.field_sizes import (
     year_curves,
 )
 from ..scene.fields import field_kinds, write_field
-from ..scene.own_ages import Sizes
-from ..scene.sizes import kinds_of_sizes, measure_of
 from ..settings import check_limits
 from ..species.edits import catalog, species_for
 from ..worker import call_in_thread, steps_in_thread

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...compiled.flora import Flora, compile_species
+from ...compiled.recorded_sizes import measure_of
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...jobs import Progress, mapped
@@ -40,7 +41,6 @@ from ..scene.crowns import crown_for
 from ..scene.field_sizes import stand_years
 from ..scene.objects import is_drop, taking_part
 from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
-from ..scene.sizes import measure_of
 from ..settings import season_of, years_of
 from ..species import edits
 from ..worker import call_in_thread, steps_in_thread

@@ -15,13 +15,13 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ...arrays import Floats
+from ...species.kinds import species_of
 from ..job.render import render_errors
 from ..placing.plant_objects import plants_of, positions
 from ..results.proxy_kinds import few_bounces
 from ..runtime import Outlook
 from ..scene.crowns import crown_to_draw
 from ..scene.fields import field_kinds, fields_of
-from ..scene.skeletons import species_of
 
 #: Wider ground is large enough for trees, meters.
 _SMALL = 10.0

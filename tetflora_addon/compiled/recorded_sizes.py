@@ -17,23 +17,22 @@ alone is that of the film.
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ...arrays import Floats, Mask
-from ...compiled.flora import compile_species
-from ...compiled.sizes import fitted, measured
-from ...errors import SpeciesError
-from ...growth.growth import radius_at, trunks
-from ...growth.seeds import LEAVES, PLAIN, THICKNESS, Seeds, crown_shapes
-from ...species.ages import BARE, NARROWER, ages_of, with_age, with_habit
-from ...species.ecology import crown_leaves, ecology_of, one_sided
-from ...species.growing import Ages
-from ...species.species import Species
-from .own_ages import MOST_YEARS, Lives, Sizes
-from .skeletons import age_of, aged_kind, dead_of, is_aged, is_crowded, skeleton_object_of, species_of
+from ..arrays import Arrays, Floats, Integers, Mask
+from ..errors import SpeciesError
+from ..growth.growth import radius_at, trunks
+from ..growth.seeds import LEAVES, PLAIN, THICKNESS, Seeds, crown_shapes
+from ..species.ages import BARE, NARROWER, ages_of, with_age, with_habit
+from ..species.ecology import crown_leaves, ecology_of, one_sided
+from ..species.growing import Ages
+from ..species.kinds import MOST_YEARS, Kind
+from ..species.species import Species
+from .flora import compile_species
+from .sizes import fitted, measured
 
 #: Height of a class over that of the one below, and classes below that of full-grown plants.
 _STEP, _BELOW = 1.5, 9
@@ -51,6 +50,39 @@ _WOODY = 3.0  # meters of height that plants reach whose leaves follow their cro
 #: Crown width for the height over that of a free plant below which one grew between neighbors: halfway, by ratio; of
 #: what dense stands leave bare, the part from which on. Least part of the leaves on its twigs: the crown says how many.
 _CROWDED, _RAISED, _LEAFY = (1.0 - NARROWER) ** 0.5, 0.25, 0.5
+
+
+@dataclass(frozen=True)
+class Lives:
+    """All records (n,) of a history, and the year that is looked at."""
+
+    now: float
+    #: year, height, width, base, dead: (n,): As of `Sizes`
+    year: Floats
+    height: Floats
+    width: Floats
+    base: Floats
+    dead: Floats
+    first: Integers  # (n,): first record of the same plant; its records follow each other
+    species: Integers  # (n,): number of the kind in the field
+
+
+@dataclass(frozen=True)
+class Sizes(Arrays):
+    """Sizes of plants (n,), meters in the field's space; 0 is not known."""
+
+    #: height, diameter, width, base: (n,): Of the plant, of its trunk at 1.3 m, mean width of its crown, height of its
+    #: lowest limb
+    height: Floats
+    diameter: Floats
+    width: Floats
+    base: Floats
+    dead: Floats  # (n,): years since it died; 0 alive
+    offset: Floats  # (n, 2): by which fraction limbs to the east and north are longer
+    fit: Floats  # (n, 2): factors on height and crown width that make up for what is random in the plant
+    #: (n,): First record of the plant among those of ``lives``, where a history is to be animated
+    plant: Integers | None = None
+    lives: Lives | None = None  # all of that history
 
 
 def heights(species: Species, years: Floats) -> Floats:
@@ -105,8 +137,8 @@ def sized(
         if not len(own):
             continue
         with suppress(SpeciesError):
-            species = find(species_of(kind))
-            if skeleton_object_of(kind) is not None:  # it is as it was drawn
+            species = find(Kind.read(kind).species)
+            if Kind.read(kind).skeleton:  # it is as it was drawn
                 scale[own] *= measure_of(species).fitted(seeds.take(own), sizes.take(own))[0]
                 continue
             some = sizes.take(own)
@@ -119,7 +151,7 @@ def sized(
                 own_scale, own_crown = measure.fitted(seeds.take(these), some.take(here))
                 scale[these] *= own_scale
                 crown[these], number[these] = own_crown, len(kinds)
-                kinds.append(aged_kind(kind, age, dead, bool(crowded)))
+                kinds.append(str(Kind.read(kind).aged(age, dead, bool(crowded))))
             if left is not None:
                 left[own] = 0.0
     plain = (crown == PLAIN).all()
@@ -133,11 +165,11 @@ def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> Float
     out = np.ones((len(seeds), 2))
     plain, _ = sized(seeds, None, replace(sizes, fit=out), find)
     crown = np.tile(PLAIN, (len(seeds), 1)) if plain.crown is None else plain.crown
-    for number, kind in enumerate(plain.identifiers):
-        own = np.flatnonzero((plain.species == number) & (sizes.height > 0.0))
-        if len(own) and is_aged(kind) and not dead_of(kind):
-            flora = _still(find(species_of(kind)), age_of(kind), is_crowded(kind)).flora
-            one = replace(plain.take(own), identifiers=(kind,), species=np.zeros(len(own), np.int32), crown=crown[own])
+    for number, text in enumerate(plain.identifiers):
+        own, kind = np.flatnonzero((plain.species == number) & (sizes.height > 0.0)), Kind.read(text)
+        if len(own) and kind.age and not kind.dead:
+            flora = _still(find(kind.species), kind.age, kind.crowded).flora
+            one = replace(plain.take(own), identifiers=(text,), species=np.zeros(len(own), np.int32), crown=crown[own])
             tall, wide = (sizes.height * seeds.scale)[own], (sizes.width * seeds.scale)[own]
             # What has no width keeps that of its kind.
             bare, known = np.flatnonzero(wide <= 0.0), np.flatnonzero(wide > 0.0)
