@@ -48,12 +48,12 @@ results: environment
 # The second also runs when the first has failed. A file's tests share scenes, so each file is one process's; the files
 # that take longest begin.
 BY_FILE = --dist loadfile --no-loadscope-reorder
-ENGINE_TESTS = tests/engine/emission tests/engine tests/attack/engine
+ENGINE_TESTS = tests/attack/engine tests/engine/emission tests/engine
 # What arrays have held is kept for the next ones: a tenth of the time went into pages that were given back in between.
 # Not of Blender's tests, some of which look at what the process has.
 KEEPING = MALLOC_TRIM_THRESHOLD_=268435456 MALLOC_MMAP_THRESHOLD_=33554432
 
-BLENDER_TESTS = tests/blender tests/attack/blender tests/packaging tests/examples
+BLENDER_TESTS = tests/examples tests/attack/blender tests/packaging tests/blender
 
 test: environment
 	@code=0; \
