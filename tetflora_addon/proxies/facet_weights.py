@@ -499,8 +499,10 @@ def leaf_shares(flora: Flora, subplants: Branches) -> Floats | None:
         return share
     if subplants.crown is not None:
         rows, row, crown = flora.rows, subplants.row, subplants.crown.astype(np.float64)
-        whole = (rows["order"][row] == 0) & ~rows["continues"][row] & (leafiness < 1.0)
-        leafiness = np.where(whole, leafiness * crown[:, LEAVES] / np.maximum(crown[:, WIDTH], 1e-3) ** 2, leafiness)
+        denser = crown[:, LEAVES] / np.maximum(crown[:, WIDTH], 1e-3) ** 2
+        # What is more is half in twigs, half in leaves on each.
+        whole = (rows["order"][row] == 0) & ~rows["continues"][row]
+        leafiness = np.where(leafiness < 1.0, leafiness * np.where(whole, denser, np.sqrt(denser)), leafiness)
     leafiness = np.minimum(leafiness, DENSEST)
     return leafiness if share is None else share * leafiness
 
