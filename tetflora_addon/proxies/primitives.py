@@ -25,8 +25,10 @@ from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets
 
 #: Minimum fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
 LEAST_COVER = 0.1
-#: Mean of |cos| over all directions.
-MEAN_COVER = 0.5
+#: Fractions of their area that a level facet and an upright one cover on average, seen from where light falls on level
+#: ground from an even sky: means of |cos| over directions above, weighted by the cosine to the zenith. Of facets that
+#: face all ways alike the mean is a half, from anywhere.
+LEVEL_COVER, UPRIGHT_COVER = 2.0 / 3.0, 4.0 / (3.0 * np.pi)
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,8 @@ def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi) -> Sp
     ----------
     facets : Facets of n
     camera : Camera or None
-        That for which each sphere covers what its facet covers. Without, it covers the mean of that over all
-        directions: for facets that only cast shadows and light up others.
+        That for which each sphere covers what its facet covers. Without, it covers the mean of that over light from
+        above: for facets that only cast shadows and light up others.
     disc : float
         Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than a circle has.
     """
@@ -145,9 +147,9 @@ def facet_mesh(facets: Facets) -> MeshBuffers:
 
 
 def cover_of(facets: Facets, camera: Camera | None) -> Floats:
-    """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over all directions."""
+    """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over light from above."""
     if camera is None:
-        return np.full(len(facets), MEAN_COVER)
+        return UPRIGHT_COVER + (LEVEL_COVER - UPRIGHT_COVER) * facets.normal[:, 2] ** 2
     return np.maximum(facing(facets, camera), LEAST_COVER)
 
 

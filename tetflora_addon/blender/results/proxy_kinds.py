@@ -95,7 +95,7 @@ _FORMS = {
             'AUTOMATIC',
             3,
             "Automatic",
-            "What matches the plants best: microsurfaces",
+            "Microsurfaces where the camera sees them, which match the plants best; microspheres elsewhere",
             'SHADERFX',
             AUTOMATIC,
         ),
