@@ -34,12 +34,15 @@ def steps(ui):
     ui.values["running_after"] = running(ui)
     yield from ui.picture("refined")
 
-    # Again, and stopped in the middle. Finer, so that it lasts.
+    # Again, and stopped in the middle. Larger and finer, so that it lasts.
     scene.tetflora.cutoff, scene.tetflora.leaf_limit = 0.1, 0.02
+    small = scene.render.resolution_x, scene.render.resolution_y
+    scene.render.resolution_x, scene.render.resolution_y = 3840, 2160
     yield from press_button(ui, "tetflora.refine")
     ui.values["running_before_esc"] = running(ui)
     ui.press('ESC')
     yield from ui.until(lambda: not running(ui), 30, "end of the job after Esc")
+    scene.render.resolution_x, scene.render.resolution_y = small
     ui.values["escaped"] = state()
     yield from ui.picture("escaped")
 
