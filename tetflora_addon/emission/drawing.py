@@ -61,10 +61,11 @@ NEVER_TOO_MANY = 50_000.0
 #: Pixels down to which shadows that fall into the view are refined where nobody asks for finer ones, the optical depth
 #: in the shade up to which they are, leaves that a facet stands for there at least, and how many times as many there
 #: may be as of all else out of view. Without, crowns beside the image were too dense, and its borders in the shade
-#: (twice as many pixels were off beside the truth in ``benchmarks exact --cases edge --species birch --size 480x270``).
-SHADOW, LIT, LIT_LEAVES, LIT_TIMES = 4.0, 1.5, 3.0, 3.0
+#: (twice as many pixels were off beside the truth in ``benchmarks exact --cases edge --species birch --size 480x270``);
+#: with a third of this, a fifth more dark blobs at the edge of a wood of beeches and oaks, which lie at its border.
+SHADOW, LIT, LIT_LEAVES, LIT_TIMES = 4.0, 1.5, 3.0, 9.0
 #: How many times as many facets there may be for shadows where somebody asks for finer ones.
-SHADOWS = 6.0
+SHADOWS = 18.0
 #: Meters from which on shadows are the coarser the farther they fall: most of what they reach lies in other shade.
 FALLEN = 8.0
 #: Largest side of facets outside over their distance from the view; meters that count least, and from which on it grows
@@ -286,7 +287,7 @@ class _Tile:
             self._cover()
         self._draw_hidden(list(map(Waiting.concatenate, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))
         # What is outside of a tile's own image was part of something inside: it lies near the border.
-        self._draw_outside(list(map(Waiting.concatenate, frontier.outside)), self._few(OUTSIDE_A_PIXEL, share, most))
+        self._draw_outside(list(map(Waiting.concatenate, frontier.outside)), share, most)
         self._leave_out(self.number - most)
         return not full
 
@@ -327,7 +328,7 @@ class _Tile:
     def draw_outside(self, parts: Sequence[Arrays], share: float) -> None:
         """Parts out of view, a share of all of them."""
         pools = list(map(self.frontier.pool, self.given.kinds, parts))
-        self._draw_outside(pools, self._few(OUTSIDE_A_PIXEL, share, _UNSEEN * share * self.given.most))
+        self._draw_outside(pools, share, _UNSEEN * share * self.given.most)
 
     # -- what is seen ---------------------------------------------------------------------------------------------
 
@@ -470,8 +471,9 @@ class _Tile:
             facets = Facets.concatenate([quarters(facets.take(lit)), replace(smaller, side=0.5 * smaller.side)])
             dark = np.repeat([False, True], [4 * len(lit), len(rest)])
 
-    def _draw_outside(self, pools: list[Waiting], most: float) -> None:
+    def _draw_outside(self, pools: list[Waiting], share: float, most: float) -> None:
         """Parts out of view: facets as large as their distance and the shadows that they throw allow."""
+        few, left = self._few(OUTSIDE_A_PIXEL, share, most), max(1.5 * (most - self.number), 0.0)
 
         def add(facets: Facets, whose: Whose) -> None:
             self._keep(pushed_outside_view(facets, self.coverage.camera.distance_to_view), False, whose)
@@ -480,8 +482,8 @@ class _Tile:
         extents = [self._shadow * self.given.camera.extent_around(pool.center) for pool in fine]
         sides = list(map(np.minimum, map(self._sides_outside, fine), extents))
         times, leaves = (SHADOWS, 1.0) if self.given.shadow else (LIT_TIMES, LIT_LEAVES)
-        self._draw_unseen(fine, sides, times * most, add, leaves)
-        self._draw_unseen(pools, list(map(self._sides_outside, pools)), most, add)
+        self._draw_unseen(fine, sides, min(times * self._few(OUTSIDE_A_PIXEL, share, np.inf), left), add, leaves)
+        self._draw_unseen(pools, list(map(self._sides_outside, pools)), few, add)
 
     def _sides_outside(self, pool: Waiting) -> NDArray[np.float64]:
         """Sides (n,) of facets of parts out of view, meters."""

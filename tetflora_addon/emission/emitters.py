@@ -145,7 +145,9 @@ class AsSpheres:
         """Spheres or triangles."""
         if seen and not self.seen_too:
             return triangles_of(facets)
-        return spheres_of(facets, self.camera if seen else None, self.disc)
+        if seen:
+            return spheres_of(facets, self.camera, self.disc)
+        return spheres_of(facets, None, self.disc, self.camera.distance_to_view(facets.center) > 0.0)
 
 
 def _triangles_everywhere(_camera: Camera, _disc: float) -> FacetConverter:

@@ -18,16 +18,17 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats
+from ..arrays import Arrays, Floats, Mask
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets
 
 #: Minimum fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
 LEAST_COVER = 0.1
-#: Fractions of their area that a level facet and an upright one cover on average, seen from where light falls on level
-#: ground from an even sky: means of |cos| over directions above, weighted by the cosine to the zenith. Of facets that
-#: face all ways alike the mean is a half, from anywhere.
+#: Mean of |cos| over all directions.
+MEAN_COVER = 0.5
+#: The same for a level facet and an upright one over light that falls on level ground from an even sky: directions
+#: above, weighted by the cosine to the zenith.
 LEVEL_COVER, UPRIGHT_COVER = 2.0 / 3.0, 4.0 / (3.0 * np.pi)
 
 
@@ -80,19 +81,24 @@ def triangles_of(facets: Facets) -> Triangles:
     return Triangles(triangle_corners(facets), *_shaded(facets))
 
 
-def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi) -> Spheres:
+def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi, outside: Mask | None = None) -> Spheres:
     """A sphere for each facet.
 
     Parameters
     ----------
     facets : Facets of n
     camera : Camera or None
-        That for which each sphere covers what its facet covers. Without, it covers the mean of that over light from
-        above: for facets that only cast shadows and light up others.
+        That for which each sphere covers what its facet covers. Without, it covers the mean of that over all
+        directions: for facets that only cast shadows and light up others.
     disc : float
         Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than a circle has.
+    outside : (n,) bool, optional
+        Facets out of view, of which shadows on what lies below are seen: they cover the mean over light from above.
     """
-    radius = facets.side * np.sqrt(cover_of(facets, camera) / disc)
+    cover = cover_of(facets, camera)
+    if outside is not None:
+        cover = np.where(outside, UPRIGHT_COVER + (LEVEL_COVER - UPRIGHT_COVER) * facets.normal[:, 2] ** 2, cover)
+    radius = facets.side * np.sqrt(cover / disc)
     return Spheres(facets.center.astype(np.float32), radius.astype(np.float32), *_shaded(facets))
 
 
@@ -147,9 +153,9 @@ def facet_mesh(facets: Facets) -> MeshBuffers:
 
 
 def cover_of(facets: Facets, camera: Camera | None) -> Floats:
-    """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over light from above."""
+    """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over all directions."""
     if camera is None:
-        return UPRIGHT_COVER + (LEVEL_COVER - UPRIGHT_COVER) * facets.normal[:, 2] ** 2
+        return np.full(len(facets), MEAN_COVER)
     return np.maximum(facing(facets, camera), LEAST_COVER)
 
 
