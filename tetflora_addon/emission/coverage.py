@@ -131,8 +131,9 @@ class Coverage:
     def tested(
         self, corners: NDArray[np.floating], wider: float
     ) -> tuple[Footprints, NDArray[np.bool_], list[Projected]]:
-        """Footprints, wider by so many pixels, of polygons with corners (n, k, 3), which are hidden, and where the
-        corners of the others lie.
+        """Which polygons with corners (n, k, 3), meters, are hidden if they are so many pixels wider on each side.
+
+        Returns these wider footprints (n), a mask (n,), and where the corners of all others are, block by block.
         """
         prints, hidden, drawn = [self.of_corners(corners[:0])[0]], [np.zeros(0, bool)], []
         for block in blocks(len(corners), _POLYGONS):

@@ -64,8 +64,6 @@ NEVER_TOO_MANY = 50_000.0
 #: (twice as many pixels were off beside the truth in ``benchmarks exact --cases edge --species birch --size 480x270``);
 #: with a third of this, a fifth more dark blobs at the edge of a wood of beeches and oaks, which lie at its border.
 SHADOW, LIT, LIT_LEAVES, LIT_TIMES = 4.0, 1.5, 3.0, 9.0
-#: How many times as many facets there may be for shadows where somebody asks for finer ones.
-SHADOWS = 18.0
 #: Meters from which on shadows are the coarser the farther they fall: most of what they reach lies in other shade.
 FALLEN = 8.0
 #: Largest side of facets outside over their distance from the view; meters that count least, and from which on it grows
@@ -473,7 +471,7 @@ class _Tile:
 
     def _draw_outside(self, pools: list[Waiting], share: float, most: float) -> None:
         """Parts out of view: facets as large as their distance and the shadows that they throw allow."""
-        few, left = self._few(OUTSIDE_A_PIXEL, share, most), max(1.5 * (most - self.number), 0.0)
+        few, free = (self._few(OUTSIDE_A_PIXEL, share, of) for of in (most, np.inf))
 
         def add(facets: Facets, whose: Whose) -> None:
             self._keep(pushed_outside_view(facets, self.coverage.camera.distance_to_view), False, whose)
@@ -481,8 +479,10 @@ class _Tile:
         fine, pools = map(list, zip(*map(self._for_shadows, self.given.kinds, pools), strict=True))
         extents = [self._shadow * self.given.camera.extent_around(pool.center) for pool in fine]
         sides = list(map(np.minimum, map(self._sides_outside, fine), extents))
-        times, leaves = (SHADOWS, 1.0) if self.given.shadow else (LIT_TIMES, LIT_LEAVES)
-        self._draw_unseen(fine, sides, min(times * self._few(OUTSIDE_A_PIXEL, share, np.inf), left), add, leaves)
+        leaves = 1.0 if self.given.shadow else LIT_LEAVES
+        # Of what a limit leaves, all else has half (`_few`) and these have three times that, since they are opened.
+        room = max(1.5 * (most - self.number), 0.0)
+        self._draw_unseen(fine, sides, min(LIT_TIMES * free, room), add, leaves)
         self._draw_unseen(pools, list(map(self._sides_outside, pools)), few, add)
 
     def _sides_outside(self, pool: Waiting) -> NDArray[np.float64]:

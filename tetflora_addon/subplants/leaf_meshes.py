@@ -32,7 +32,7 @@ from ..growth.foliage import (
 )
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
-from ..growth.seasons import leaf_colors
+from ..growth.seasons import is_seasonal, leaf_colors
 from ..growth.seeds import Branches
 from ..growth.wind import moment
 from ..leaves.kites import KITE, LeafKites, leaf_kites, leaf_planes
@@ -210,7 +210,7 @@ class LevelCopies(LeafCopies):
 
     def buffers(self) -> MeshBuffers:
         """The mesh, once all copies are placed."""
-        self.color[:] = self.level.colors(self.color)
+        self.color = np.asarray(self.level.colors(self.color[: self.done]), np.float32)
         if self.level.solid:
             self.transmission = self._through()
         return replace(super().buffers(), smooth=True)
@@ -307,10 +307,9 @@ def leaf_meshes(
     for kind, step in sorted({(group.kind, group.step) for group in groups}):
         own = [group for group in groups if (group.kind, group.step) == (kind, step)]
         forms = flora.forms[species][kind]
-        # Room for all of them in each form: what is not written takes no memory.
-        number = sum(int(group.counts.sum()) for group in own)
-        for form in range(len(forms)):
-            given = number, float(flora.leaf.transmission[own[0].row[0]]), moment(flora.rows) > 0
+        numbers = sum(group.numbers() for group in own)
+        for form in np.flatnonzero(numbers):
+            given = int(numbers[form]), float(flora.leaf.transmission[own[0].row[0]]), moment(flora.rows) > 0
             copies = _copies(forms[form], step, *given)
             for group in own:
                 group.add(copies, int(form), thin)
@@ -383,6 +382,15 @@ class _LeafBearers:
                 given = (None if of is None else of[own] for of in (self.fraction, self.low, self.high))
                 mixed = lengths[own] if (low[own] < high[own]).any() else None
                 yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given, mixed)
+
+    def numbers(self) -> Integers:
+        """How many leaves there are of each form."""
+        if len(self.forms) == 1 and self.fraction is None and self.lengths is None and not is_seasonal(self.flora.rows):
+            return np.array([self.counts.sum()])
+        out = np.zeros(len(self.forms), np.int64)
+        for part in self._chunks(1):
+            out += np.bincount(self._leaves(part)[3], minlength=len(self.forms))
+        return out
 
     def add(self, copies: LeafCopies, form: int, thin: Thin | None) -> None:
         """Place all leaves of one of the forms that are worth it."""
