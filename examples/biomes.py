@@ -103,6 +103,11 @@ VIEWS = {
 }
 
 
+#: The picture of the README: the wood of birches and pines against a low sun.
+INTERIOR = replace(VIEWS["birch_pine"], lens=30.0, sun=(20.0, 24.0), haze=(0.0009, (0.75, 0.68, 0.5)))
+INTERIOR_SIZE, INTERIOR_SAMPLES = (1600, 900), 64
+
+
 def build(identifier: str, view: View) -> None:
     """Fill an empty scene with a biome, its land, sun and sky."""
     from tetflora_addon.blender.biomes import adding, files
@@ -227,15 +232,18 @@ def _light(scene: bpy.types.Scene, view: View, around: bpy.types.Object) -> None
 
 
 def render_biome(
-    identifier: str, path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, keep: Path | None = None
+    identifier: str, path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, view: View | None = None
 ) -> None:
-    """Render one biome, in an empty scene."""
+    """Render one biome, in an empty scene; as it is shown in menus, if no view is given."""
     session.clean_file()
-    view = VIEWS.get(identifier, View())
+    view = view or VIEWS.get(identifier, View())
     build(identifier, view)
-    if keep is not None:
-        bpy.ops.wm.save_as_mainfile(filepath=str(keep))
     render(path, size, samples, gray=view.gray, beyond=0.1)
+
+
+def render_interior(path: Path) -> None:
+    """Inside a wood that grew, for the README."""
+    render_biome("birch_pine", path, INTERIOR_SIZE, INTERIOR_SAMPLES, INTERIOR)
 
 
 def save_small(source: Path, identifier: str) -> Path:

@@ -43,8 +43,8 @@ _TOWARD = np.array([-0.25, -0.86, 0.44]) / np.linalg.norm([0.25, 0.86, 0.44])
 _SHADOWS = 10.0
 #: Mean of a picture that is well exposed, of its display values.
 _GRAY = 0.34
-#: Pixels of a sheet at most: what fits into the size of a picture of the documentation.
-_LARGEST_SHEET = (1500, 1800)
+#: Width of a picture on the sheet, pixels.
+_CELL = 300
 #: Strength of the sky: bright haze, which opens the shade under crowns.
 _SKY = 0.9
 #: Height of the breast, meters, where foresters measure girth.
@@ -279,23 +279,16 @@ def render_views(
 
 def render_sheet(path: Path) -> None:
     """The views of eight species, a row each, as one picture."""
+    from tetflora_addon.species.catalog import load_species
+
+    from .paper.pictures import save_sheet
+
     with tempfile.TemporaryDirectory() as folder:
-        store_sheet([render_views(identifier, Path(folder)) for identifier in SPECIES], path)
-
-
-def store_sheet(rows: list[list[Path]], path: Path) -> None:
-    """Store pictures of equal size, row by row, as one."""
-    from PIL import Image
-
-    from .paper.pictures import save_jpeg
-
-    width, height = Image.open(rows[0][0]).size
-    sheet = Image.new("RGB", (width * len(rows[0]), height * len(rows)))
-    for j, row in enumerate(rows):
-        for i, one in enumerate(row):
-            sheet.paste(Image.open(one).convert("RGB"), (i * width, j * height))
-    sheet.thumbnail(_LARGEST_SHEET)
-    save_jpeg(sheet, path)
+        cells = []
+        for identifier in SPECIES:
+            name = load_species(identifier).name
+            cells += [(one, f"{name}: {one.stem.split('-')[1]}") for one in render_views(identifier, Path(folder))]
+        save_sheet(cells, len(cells) // len(SPECIES), path, _CELL)
 
 
 def main() -> int:

@@ -75,11 +75,10 @@ def _close_ups(_out: Path) -> None:
 def _wood(_out: Path) -> None:
     import bpy
 
-    from .wood import build, render_dolly, render_interior
+    from .wood import build, render_dolly
 
     build(bpy.context.scene)
     render_dolly(IMAGES / "dolly.jpg")
-    render_interior(IMAGES / "interior.jpg")
 
 
 def _seasons(_out: Path) -> None:
@@ -100,6 +99,13 @@ def _grown(_out: Path) -> None:
     render_grown(IMAGES / "grown.jpg")
 
 
+def _interior(out: Path) -> None:
+    from .biomes import render_interior
+
+    render_interior(out / "interior.png")
+    store(out / "interior.png", IMAGES / "interior.jpg")
+
+
 def _biomes(out: Path) -> None:
     from .biomes import render_sheet
 
@@ -112,7 +118,7 @@ def _assets(_out: Path) -> None:
     main([])
 
 
-#: What makes each image; ``row80`` are three, ``wood`` is dolly and interior.
+#: What makes each image; ``row80`` are three, ``wood`` is the dolly.
 KINDS: dict[str, Callable[[Path], None]] = {
     "row80": _row,
     "landscape": _landscape,
@@ -121,6 +127,7 @@ KINDS: dict[str, Callable[[Path], None]] = {
     "orders": _orders,
     "close_ups": _close_ups,
     "wood": _wood,
+    "interior": _interior,
     "seasons": _seasons,
     "ages": _ages,
     "grown": _grown,

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from devtools import session
 
 from . import stage
-from .close_ups import among_others, render, store_sheet
+from .close_ups import among_others, render
+from .paper.pictures import save_sheet
 from .wood import grid
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -280,7 +281,7 @@ def render_sheet(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
     build(bpy.context.scene)
     with tempfile.TemporaryDirectory() as folder:
         made = render_seasons(Path(folder), tuple(LOOKS), size, samples)
-        store_sheet([made[i : i + 2] for i in range(0, len(made), 2)], path)
+        save_sheet([(one, one.stem.capitalize()) for one in made], 2, path)
 
 
 def main() -> int:

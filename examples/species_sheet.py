@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -13,6 +14,7 @@ import numpy as np
 from tetflora_addon.blender.job import contents, plant_mesh
 from tetflora_addon.blender.materials import materials
 from tetflora_addon.blender.results import leaf_objects, meshes
+from tetflora_addon.compiled.sizes import crown_of
 from tetflora_addon.growth import growth
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import microsurfaces
@@ -22,9 +24,10 @@ from tetflora_addon.subplants import leaf_meshes, tubes
 from tetflora_addon.subplants.pieces import open_branches
 
 from . import stage
-from .studio import render_cells, save_sheet
+from .paper.pictures import save_sheet
+from .studio import render_cells
 
-COLUMNS, WIDTH, HEIGHT = 8, 240, 290
+COLUMNS, SIZE, OPENED_SIZE = 8, (236, 290), (380, 400)
 SEED = 11
 #: The plant that is opened, and how wide one facet of its deferred parts is, meters.
 OPENED, FACET = "beech", 0.3
@@ -36,19 +39,18 @@ def _points(mesh: bpy.types.Mesh) -> np.ndarray:
     return points.reshape(-1, 3)
 
 
-def species_cell(
-    identifier: str, name: str, polygons: dict[str, int], seed: int = SEED
-) -> Callable[[], tuple[np.ndarray, str]]:
-    """Puts one plant of a species into the scene, as a mesh, and its number of polygons into ``polygons``."""
+def species_cell(identifier: str, name: str) -> Callable[[], tuple[np.ndarray, str]]:
+    """Puts one plant of a species into the scene, as a mesh."""
 
     def build() -> tuple[np.ndarray, str]:
         scene = bpy.context.scene
-        empty = stage.plant(scene, identifier, seed, (0.0, 0.0, 0.0))
+        empty = stage.plant(scene, identifier, SEED, (0.0, 0.0, 0.0))
         bpy.context.view_layer.update()
         steps = plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty])
         (plant,) = run_to_end(steps)
-        polygons[identifier] = len(plant.data.polygons)
-        return _points(plant.data), f"{name}\n{polygons[identifier]:,} polygons"
+        points = _points(plant.data)
+        high = points[:, 2].max()
+        return points, f"{name}, {high:.2g} m" if high >= 1.0 else f"{name}, {100.0 * high:.0f} cm"
 
     return build
 
@@ -83,30 +85,18 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
     return build
 
 
-def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | None = None) -> dict[str, int]:
-    """Render one plant of each species of the catalog, as a JPEG.
-
-    Parameters
-    ----------
-    path : Path
-    samples : int
-    identifiers : sequence of str, optional
-        Only these species.
-
-    Returns
-    -------
-    dict of str to int
-        Polygons of each plant.
-    """
+def render_sheet(path: Path, samples: int = 32) -> None:
+    """Render one plant of each species of the catalog, as a JPEG: from the highest to the lowest."""
     known = catalog.list_species()
-    polygons: dict[str, int] = {}
-    cells = [species_cell(one, known[one].name, polygons) for one in (identifiers or known)]
-    save_sheet(render_cells(cells, WIDTH, HEIGHT, samples), COLUMNS, path)
-    return polygons
+    order = sorted(known, key=lambda one: -crown_of(catalog.load_species(one)).height)
+    with tempfile.TemporaryDirectory() as folder:
+        cells = [species_cell(one, known[one].name) for one in order]
+        save_sheet(render_cells(cells, Path(folder), SIZE, samples), COLUMNS, path)
 
 
 def render_opening(path: Path, samples: int = 32) -> None:
     """Render one plant with none of its orders opened, one, and so on to all, as a JPEG."""
     orders = len(catalog.load_species(OPENED).orders)
     cells = [opened_cell(OPENED, number) for number in range(orders + 1)]
-    save_sheet(render_cells(cells, 380, 400, samples), len(cells), path)
+    with tempfile.TemporaryDirectory() as folder:
+        save_sheet(render_cells(cells, Path(folder), OPENED_SIZE, samples), len(cells), path)

@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A light studio for images of single plants, and contact sheets of such images."""
+"""A light studio for images of single plants."""
 
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -24,14 +23,13 @@ _PITCH, _SUN = 9.0, -40.0
 _FLOOR = (0.55, 0.57, 0.58, 1.0)
 
 
-def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
-    """Floor, sun, sky and a camera that frames points (n, 3); the title, of a line or two, stands under them.
+def add_studio(points: np.ndarray, aspect: float) -> None:
+    """Floor, sun, sky and a camera that frames points (n, 3).
 
     Parameters
     ----------
     points : (n, 3) float
         Of the plant that stands at the origin, meters.
-    title : str
     aspect : float
         Width of the image over its height.
     """
@@ -43,8 +41,8 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
     across = 2 * max(abs(low[0]), abs(high[0])) * 1.08
     depth = max(abs(low[1]), abs(high[1])) * math.sin(pitch)
     top, bottom = high[2] * math.cos(pitch) + depth, low[2] * math.cos(pitch) - depth
-    height = max((top - bottom) / 0.86, across / aspect)
-    middle = bottom + (top - bottom) / 2 - 0.05 * height
+    height = max((top - bottom) / 0.94, across / aspect)
+    middle = (top + bottom) / 2
     floor = bpy.data.meshes.new("Floor")
     side = 400 * height
     corners = [(-side, -side, 0), (side, -side, 0), (side, side, 0), (-side, side, 0)]
@@ -68,21 +66,6 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
     camera.data.clip_end = 1000.0 * height
     scene.collection.objects.link(camera)
     scene.camera = camera
-    text = bpy.data.curves.new("Title", 'FONT')
-    two = "\n" in title
-    text.body, text.size, text.align_x = title, (0.042 if two else 0.055) * height, 'CENTER'
-    label = bpy.data.objects.new("Title", text)
-    label.location = (middle - (0.44 if two else 0.47) * height) * up - 0.8 * distance * forward
-    label.rotation_euler = camera.rotation_euler
-    label.visible_shadow = label.visible_diffuse = False
-    ink = bpy.data.materials.new("Ink")
-    tree = compat.shader_tree(ink)
-    tree.nodes.clear()
-    black, output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
-    black.inputs["Color"].default_value = (0.02, 0.02, 0.02, 1.0)
-    tree.links.new(black.outputs[0], output.inputs[0])
-    text.materials.append(ink)
-    scene.collection.objects.link(label)
     stage.daylight(scene, elevation=48.0, azimuth=180.0 - _SUN)
     # The light of a clouded sky around the sun: colored shadows would color the plants.
     background = next(n for n in scene.world.node_tree.nodes if n.type == 'BACKGROUND')
@@ -92,56 +75,32 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
 
 
 def render_cells(
-    cells: Sequence[Callable[[], tuple[np.ndarray, str]]], width: int, height: int, samples: int
-) -> list[np.ndarray]:
-    """Render images of single plants.
+    cells: Sequence[Callable[[], tuple[np.ndarray, str]]], folder: Path, size: tuple[int, int], samples: int
+) -> list[tuple[Path, str]]:
+    """Render images of single plants, and return them with their titles.
 
     Parameters
     ----------
     cells : sequence of callable
         Each puts one plant at the origin of an empty scene and returns its points (n, 3) and a title.
-    width, height : int
-        Pixels of each image.
+    folder : Path
+    size : (int, int)
+        Width and height of each image, pixels.
     samples : int
-
-    Returns
-    -------
-    list of (height, width, 4) float32
-        Display values, the first line at the bottom.
     """
-    pictures = []
-    with tempfile.TemporaryDirectory() as folder:
-        for number, cell in enumerate(cells):
-            session.clean_file()
-            scene = bpy.context.scene
-            add_studio(*cell(), width / height)
-            scene.tetflora.refine_at_render = False
-            scene.render.engine = 'CYCLES'
-            scene.cycles.samples, scene.cycles.use_denoising = samples, True
-            scene.render.resolution_x, scene.render.resolution_y = width, height
-            set_format(scene.render.image_settings, 'PNG')
-            scene.render.filepath = str(Path(folder) / f"{number}.png")
-            bpy.ops.render.render(write_still=True)
-            image = bpy.data.images.load(scene.render.filepath)
-            image.colorspace_settings.name = "Non-Color"
-            pixels = np.zeros(4 * width * height, np.float32)
-            image.pixels.foreach_get(pixels)
-            pictures.append(pixels.reshape(height, width, 4))
-    return pictures
-
-
-def save_sheet(pictures: Sequence[np.ndarray], columns: int, path: Path, quality: int = 88) -> None:
-    """Store images of one size side by side, in rows from the top, as a JPEG."""
-    height, width = pictures[0].shape[:2]
-    rows = math.ceil(len(pictures) / columns)
-    sheet = np.ones((rows * height, columns * width, 4), np.float32) * pictures[0][-1, 0]
-    for number, picture in enumerate(pictures):
-        row, column = divmod(number, columns)
-        top = (rows - 1 - row) * height
-        sheet[top : top + height, column * width : (column + 1) * width] = picture
-    image = bpy.data.images.new("sheet", columns * width, rows * height)
-    image.colorspace_settings.name = "Non-Color"
-    image.pixels.foreach_set(sheet.ravel())
-    image.file_format, image.filepath_raw = 'JPEG', str(path)
-    image.save(quality=quality)
-    bpy.data.images.remove(image)
+    made = []
+    for number, cell in enumerate(cells):
+        session.clean_file()
+        scene = bpy.context.scene
+        points, title = cell()
+        add_studio(points, size[0] / size[1])
+        stage.film(scene)
+        scene.tetflora.refine_at_render = False
+        scene.render.engine = 'CYCLES'
+        scene.cycles.samples, scene.cycles.use_denoising = samples, True
+        scene.render.resolution_x, scene.render.resolution_y = size
+        set_format(scene.render.image_settings, 'PNG')
+        made.append((folder / f"{number}.png", title))
+        scene.render.filepath = str(made[-1][0])
+        bpy.ops.render.render(write_still=True)
+    return made

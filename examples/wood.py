@@ -1,16 +1,15 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mixed wood at the edge of a meadow, on covered ground: from 400 m to one leaf of an oak, and from its inside.
+"""A mixed wood at the edge of a meadow, on covered ground, from 400 m to one leaf of an oak.
 
-    python -m examples.wood            # docs/images/dolly.jpg and interior.jpg
-    python -m examples.wood --out out/wood --pictures interior --width 640
+    python -m examples.wood            # docs/images/dolly.jpg
+    python -m examples.wood --out out/dolly.jpg --width 240
 
 Every picture is refined for its own camera, from one and the same scene.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Callable
@@ -20,14 +19,17 @@ import bpy
 import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
-from PIL import Image
 
 from devtools import session
 
 from . import stage
-from .close_ups import among_others, face_on_leaf, render, store_sheet
+from .close_ups import among_others, face_on_leaf, render
+from .paper.pictures import save_sheet
 
 ROOT = Path(__file__).resolve().parent.parent
+SIZE, SAMPLES = (480, 270), 32
+#: Width of a picture on the sheet, pixels.
+_CELL = 372
 #: Distances of the eight pictures from the leaf, meters.
 DISTANCES = tuple(np.geomspace(400.0, 0.15, 8).tolist())
 #: Relative numbers of the species; how far from each other they stand at least, meters, and how many on a hectare.
@@ -45,9 +47,7 @@ _EYE, _AHEAD = (24.0, 22.0, 1.65), (38.0, 52.0, 3.6)
 _TOWARD = np.array([0.16, -0.98, 0.12]) / np.linalg.norm([0.16, 0.98, 0.12])
 _ELEVATION, _AZIMUTH = 38.0, 236.0
 _SKY = 0.9
-#: Mean of the picture from inside, where sunlit boles would else be white.
-_SHADE = 0.27
-#: The same of what is seen from afar, which lies in the sun, and from nearer.
+#: Mean of the picture of what is seen from afar, which lies in the sun, and from nearer.
 _WIDE, _CLOSER = 0.4, 0.34
 _MASK = "wood"
 
@@ -155,57 +155,29 @@ def leaf_of_the_oak(scene: bpy.types.Scene) -> Vector:
     return Vector(face_on_leaf(flora, "oak", _TOWARD, lowest=1.2)) + scene.objects["The oak"].location
 
 
-def render_dolly(path: Path, size: tuple[int, int] = (480, 270), samples: int = 32) -> None:
+def render_dolly(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
     """Eight pictures from 400 m to the leaf, as a sheet of two rows."""
     scene = bpy.context.scene
     leaf = leaf_of_the_oak(scene)
     with tempfile.TemporaryDirectory() as folder:
-        made = []
-        for number, distance in enumerate(DISTANCES):
+        cells = []
+        for distance in DISTANCES:
             # A lens that shows the whole oak at 16 m, and a leaf at a hand's width.
             aim(scene, leaf, leaf + Vector(_TOWARD * distance), 40.0)
-            made.append(Path(folder) / f"{number}.png")
-            render(made[-1], size, samples, gray=_WIDE if distance > NEAR else _CLOSER)
-        store_sheet([made[:4], made[4:]], path)
-
-
-def render_interior(path: Path, size: tuple[int, int] = (1280, 720), samples: int = 64) -> None:
-    """The wood at the height of the eye."""
-    from .paper.pictures import save_jpeg
-
-    scene = bpy.context.scene
-    eye, ahead = (
-        Vector(p) + Vector((0.0, 0.0, float(height(np.float64(p[0]), np.float64(p[1]))))) for p in (_EYE, _AHEAD)
-    )
-    aim(scene, ahead, eye, 28.0)
-    with tempfile.TemporaryDirectory() as folder:
-        render(Path(folder) / "interior.png", size, samples, gray=_SHADE)
-        save_jpeg(Image.open(Path(folder) / "interior.png").convert("RGB"), path)
+            cells.append((Path(folder) / f"{len(cells)}.png", f"{distance:.2g} m"))
+            render(cells[-1][0], size, samples, gray=_WIDE if distance > NEAR else _CLOSER)
+        save_sheet(cells, 4, path, _CELL)
 
 
 def main() -> int:
-    """Render the pictures of the documentation, or smaller ones."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images")
-    parser.add_argument("--pictures", nargs="+", choices=sorted(PICTURES), default=sorted(PICTURES))
-    parser.add_argument("--width", type=int, help="of each picture, pixels")
-    parser.add_argument("--samples", type=int)
-    arguments = parser.parse_args()
+    """Render the sheet."""
+    given = stage.words(__doc__, ROOT / "docs" / "images" / "dolly.jpg", SIZE, SAMPLES).parse_args()
     session.start()
     session.clean_file()
-    arguments.out.mkdir(parents=True, exist_ok=True)
     build(bpy.context.scene)
-    given = {}
-    if arguments.width:
-        given["size"] = arguments.width, round(arguments.width * 9 / 16)
-    if arguments.samples:
-        given["samples"] = arguments.samples
-    for name in arguments.pictures:
-        PICTURES[name](arguments.out / f"{name}.jpg", **given)
+    render_dolly(given.out, stage.size_of(given, SIZE), given.samples)
     return 0
 
-
-PICTURES = {"dolly": render_dolly, "interior": render_interior}
 
 if __name__ == "__main__":
     sys.exit(main())

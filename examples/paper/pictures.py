@@ -11,7 +11,7 @@ from pathlib import Path
 from PIL import Image, ImageDraw, ImageFont
 
 LARGEST = 500_000  # bytes
-_LINE, _TEXT, _PAPER, _GAP = 20, (30, 30, 30), (250, 250, 250), 4
+_LINE, _LETTERS, _TEXT, _PAPER, _GAP = 24, 16, (30, 30, 30), (255, 255, 255), 4
 
 
 def save_jpeg(picture: Image.Image, path: Path) -> None:
@@ -40,7 +40,7 @@ def save_sheet(cells: Sequence[tuple[Path, str]], columns: int, path: Path, widt
         pictures = [picture.resize((width, height), Image.Resampling.LANCZOS) for picture in pictures]
     across, down = pictures[0].width + _GAP, pictures[0].height + _LINE
     sheet = Image.new("RGB", (columns * across - _GAP, math.ceil(len(cells) / columns) * down), _PAPER)
-    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(_LETTERS)
     for number, (picture, (_, text)) in enumerate(zip(pictures, cells, strict=True)):
         row, column = divmod(number, columns)
         draw.text((column * across + 2, row * down + 2), text, fill=_TEXT, font=font)
