@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import bpy
@@ -39,8 +39,8 @@ def _points(mesh: bpy.types.Mesh) -> np.ndarray:
     return points.reshape(-1, 3)
 
 
-def species_cell(identifier: str, name: str) -> Callable[[], tuple[np.ndarray, str]]:
-    """Puts one plant of a species into the scene, as a mesh."""
+def species_cell(identifier: str, name: str, polygons: dict[str, int]) -> Callable[[], tuple[np.ndarray, str]]:
+    """Puts one plant of a species into the scene, as a mesh, and its number of polygons into ``polygons``."""
 
     def build() -> tuple[np.ndarray, str]:
         scene = bpy.context.scene
@@ -48,7 +48,7 @@ def species_cell(identifier: str, name: str) -> Callable[[], tuple[np.ndarray, s
         bpy.context.view_layer.update()
         steps = plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty])
         (plant,) = run_to_end(steps)
-        points = _points(plant.data)
+        points, polygons[identifier] = _points(plant.data), len(plant.data.polygons)
         high = points[:, 2].max()
         return points, f"{name}, {high:.2g} m" if high >= 1.0 else f"{name}, {100.0 * high:.0f} cm"
 
@@ -85,13 +85,17 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
     return build
 
 
-def render_sheet(path: Path, samples: int = 32) -> None:
-    """Render one plant of each species of the catalog, as a JPEG: from the highest to the lowest."""
-    known = catalog.list_species()
-    order = sorted(known, key=lambda one: -crown_of(catalog.load_species(one)).height)
+def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | None = None) -> dict[str, int]:
+    """Render one plant of each species of the catalog, or of some, as a JPEG, and return the polygons of each plant.
+
+    They stand from the highest to the lowest.
+    """
+    known, polygons = catalog.list_species(), {}
+    order = sorted(identifiers or known, key=lambda one: -crown_of(catalog.load_species(one)).height)
     with tempfile.TemporaryDirectory() as folder:
-        cells = [species_cell(one, known[one].name) for one in order]
+        cells = [species_cell(one, known[one].name, polygons) for one in order]
         save_sheet(render_cells(cells, Path(folder), SIZE, samples), COLUMNS, path)
+    return polygons
 
 
 def render_opening(path: Path, samples: int = 32) -> None:
