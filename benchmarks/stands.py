@@ -331,9 +331,8 @@ def figures(species: str, years: int, trees: Trees) -> list[Figure]:
         counted = trees.diameter[trees.diameter >= _COUNTED]
         tolerance, middle = data["diameters"]["tolerance"], spread_of_diameters(species, trees)
         add("spread of diameters", middle - tolerance, middle + tolerance, counted.std() / counted.mean())
-    low, high = data["leaf_area"]["range"]
-    own = data["leaf_area"]["species"].get(species, (low, high))
-    add("leaf area index", max(low, own[0]), min(high, own[1]), trees.leaves / (1e4 * trees.area))
+    low, high = data["leaf_area"]["species"].get(species, data["leaf_area"]["range"])
+    add("leaf area index", low, high, trees.leaves / (1e4 * trees.area))
     return found
 
 
