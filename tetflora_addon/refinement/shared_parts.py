@@ -260,8 +260,8 @@ class SharedParts(Generic[Parts]):
 PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
 #: The same of leaves that fill a solid, which cannot be opened: there is a point in each square of so many pixels.
 PIXELS_IN_SOLID, FEWEST_IN_SOLID, MOST_IN_SOLID = 3.0, 16, 2048
-#: Points in all of them that get theirs at once, but for the fewest: thousands may lie in front of each other.
-MOST_IN_SOLIDS = 1_000_000
+#: Points beyond the fewest that all parts of a refinement get together: many thousands may lie in front of each other.
+MOST_BEYOND = 1_000_000
 #: Wood that is wider in the view than this part of the image is looked for where it is, whatever share of its plant it
 #: has: such sub-plants are opened at once, and their branches have points so many widths apart, at most so many.
 THICK, APART, MOST_ALONG = 0.08, 1.0, 96
@@ -282,6 +282,7 @@ def share_points(
     lines: Axes | None = None,
     times: int = 1,
     along: Integers | int = 0,
+    room: int = MOST_BEYOND,
 ) -> SharePoints:
     """Points on parts of plants, all in the root.
 
@@ -297,15 +298,18 @@ def share_points(
         How many times as many points as usual.
     along : (n,) int64, optional
         Points on the wood of branches alone at least.
+    room : int, optional
+        Points on leaves that all of them have at most, beyond the fewest.
     """
-    number = times * np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, MOST)).astype(np.int64)
-    wood = np.maximum(np.ceil(WOOD * number).astype(np.int64), along)
     solid = are_solids(flora.rows)[parts.branches.row]
-    squares = (pixels[solid] / PIXELS_IN_SOLID) ** 2
+    squares = np.clip((pixels / PIXELS_IN_SOLID) ** 2, FEWEST_IN_SOLID, MOST_IN_SOLID)
     # Cells that are filled are smaller than what cannot be opened: too few points make holes and lumps of it.
-    squares = np.clip(squares, FEWEST_IN_SOLID, MOST_IN_SOLID)
-    squares *= min(MOST_IN_SOLIDS / (times**2 * max(squares.sum(), 1.0)), 1.0)
-    number[solid] = times**2 * np.ceil(np.maximum(squares, FEWEST_IN_SOLID)).astype(np.int64)
+    times_each, least = np.where(solid, times**2, times), np.where(solid, FEWEST_IN_SOLID, FEWEST)
+    number = np.where(solid, squares, np.clip(pixels / PIXELS_A_POINT, FEWEST, MOST))
+    beyond = times_each * (np.ceil(number).astype(np.int64) - least)
+    part = min(room / max(beyond[parts.totals.leaf_area > 0].sum(), 1), 1.0)
+    number = times_each * least + (beyond * part).astype(np.int64)
+    wood = np.maximum(np.ceil(WOOD * number).astype(np.int64), along)
     made = []
     for leafy in (True, False):
         area = parts.totals.leaf_area if leafy else parts.totals.wood_area
@@ -386,7 +390,7 @@ class SharedPlants(SharedParts[PlantParts]):
 
     def __init__(self, flora: Flora, seeds: Seeds, camera: Camera, filled: bool = False) -> None:
         super().__init__(camera, filled)
-        self.flora = flora
+        self.flora, self._room = flora, MOST_BEYOND
         parts = PlantParts.of_subplants(flora, trunks(flora.rows, seeds)) if len(seeds) else PlantParts.empty()
         self.hold(parts, self.points_on(parts, None) if len(seeds) else SharePoints.empty())
         while (near := self.thick(self.parts) & self.parts.can_open(flora)).any():
@@ -427,7 +431,9 @@ class SharedPlants(SharedParts[PlantParts]):
         if lines is not None:
             along = parts.branches.length / np.maximum(2.0 * APART * parts.branches.radius, 1e-300)
             along = np.where(self.thick(parts), np.minimum(along, MOST_ALONG), 0.0).astype(np.int64)
-        return share_points(self.flora, parts, self.pixels(parts), lines, times=self._times, along=along)
+        made = share_points(self.flora, parts, self.pixels(parts), lines, self._times, along, self._room)
+        self._room -= min(self._room, max(len(made) - self._times * FEWEST * len(parts), 0))
+        return made
 
     def held_apart(self, nodes: int) -> tuple[InCells[Branches], InCells[Pieces]]:
         """As `held`: sub-plants, and branches alone as one piece each."""

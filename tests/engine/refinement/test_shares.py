@@ -345,22 +345,36 @@ def test_what_is_asked_of_a_state_of_the_loop_changes_nothing() -> None:
     np.testing.assert_array_equal(one.transmittance, other.transmittance)
 
 
-def test_solids_in_front_of_each_other_have_no_more_points_than_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A tuft of 5,000 of them had ten million points; one alone has as many as it had, and no area is lost."""
-    monkeypatch.setattr(shared_parts, "MOST_IN_SOLIDS", 5_000)
-    solid = {"length": [2, 0], "thickness": [0.1, 0], "leaves": [90, 0], "leaf_size": [0.1, 0], "leaf_envelope": "box"}
-    flora = support.compiled({**support.small(), "orders": [solid]})
+#: A solid of leaves, which cannot be opened.
+SOLID = {"length": [2, 0], "thickness": [0.1, 0], "leaves": [90, 0], "leaf_size": [0.1, 0], "leaf_envelope": "box"}
+
+
+def test_parts_in_front_of_each_other_have_no_more_points_than_a_limit() -> None:
+    """A tuft of 5,000 solids had ten million points; one alone has as many as it had, and no area is lost."""
+    flora = support.compiled({**support.small(), "orders": [SOLID]})
     numbers = []
     for count in (1, 50):
         parts = PlantParts.of_subplants(flora, trunks(flora.rows, support.grove(count, 0.5)))
-        points = share_points(flora, parts, np.full(count, 1e4))
+        points = share_points(flora, parts, np.full(count, 1e4), room=5_000)
         leaves = points.take(np.flatnonzero(points.leaf > 0))
-        numbers.append(len(leaves))
         area = np.bincount(leaves.part, leaves.leaf, count)
         np.testing.assert_allclose(area, parts.totals.leaf_area, rtol=1e-5)
         assert np.bincount(leaves.part, minlength=count).min() >= shared_parts.FEWEST_IN_SOLID
-    assert numbers[0] == shared_parts.MOST_IN_SOLID
-    assert 4_900 < numbers[1] < 5_100
+        numbers.append(len(leaves) - count * shared_parts.FEWEST_IN_SOLID)
+    assert numbers[0] == shared_parts.MOST_IN_SOLID - shared_parts.FEWEST_IN_SOLID
+    assert 4_900 < numbers[1] <= 5_000
+
+
+@pytest.mark.parametrize("solid", [True, False])
+def test_the_limit_of_points_holds_for_all_calls_together(solid: bool) -> None:
+    """Solids, or plants as large as the image, that come some at a time have no more than all at once."""
+    flora = support.compiled({**support.small(), "orders": [SOLID]} if solid else support.small())
+    camera = support.camera((0, -1e-2, 0), (0, 0, 0))
+    plants = SharedPlants(flora, support.plants([]), camera)
+    parts = PlantParts.of_subplants(flora, trunks(flora.rows, support.grove(2_000, 1e-3)))
+    least = shared_parts.FEWEST_IN_SOLID if solid else shared_parts.FEWEST
+    made = sum(len(plants.points_on(parts, None)) - 2_000 * least for _ in range(9))
+    assert made <= (1.0 + shared_parts.WOOD) * shared_parts.MOST_BEYOND + 9 * 2_000 * (1 + shared_parts.WOOD * least)
 
 
 def test_nobody_is_shared_by_nobody() -> None:
