@@ -22,7 +22,7 @@ from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Job, Progress
 from ..tetflora_addon.parameters import within
 from ..tetflora_addon.planting.rules import Rules
-from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, selected_plants, show_shapes
+from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, selected_plants
 from .layers import ground_found, grounds_to_plant, tell_placed
 
 
@@ -120,7 +120,9 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
             if area.type == 'VIEW_3D':
                 area.spaces.active.region_3d.view_perspective = 'CAMERA'
         note = f" ({note})" if note else ""
-        return self.done(f"Created a forest of {plants} plants{note}. Click Refine to show it, press F12 to render it")
+        return self.done(
+            f"Created a forest of {plants} plants{note}. Press F12 to render it, click Refine to see it here"
+        )
 
 
 def _activate_ground(scene: bpy.types.Scene) -> None:
@@ -187,7 +189,6 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
         select_only(context, [*result.objects, *grounds])
         # The terrain stays selected and active, so that one Scatter can follow another.
         context.view_layer.objects.active = grounds[0]
-        show_shapes(context.scene)
         return tell_placed(self, result)
 
     def _population(

@@ -20,7 +20,7 @@ LINKED = (
     "The plants are linked from another file; use Object > Relations > Make Local, or Object > Library Override > Make"
 )
 NO_VIEWPORT = "This tool requires a 3D viewport"
-NO_CAMERA = "The scene has no active camera; add one with Add > Camera"
+NO_CAMERA = "The scene has no active camera; click Look from Here to add one"
 _SLICE = 0.01  # seconds of work between two looks at the keyboard
 
 #: A condition of an operator: why it is not available in a context, or an empty text.
@@ -141,12 +141,6 @@ def _editable(objects: list[bpy.types.Object], message: str) -> str:
 def selected_plants(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Selected plants that this file may change: those that are linked would be as before when it is opened again."""
     return [obj for obj in plants_of(context.selected_objects) if obj.library is None]
-
-
-def show_shapes(scene: bpy.types.Scene) -> None:
-    """Show plants as simple shapes where nothing is shown of them: points of fields are no picture of plants."""
-    if scene.tetflora.preview.plants == 'NONE':
-        scene.tetflora.preview.plants = 'LIGHT'
 
 
 def select_only(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:

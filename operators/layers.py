@@ -58,7 +58,7 @@ from ..tetflora_addon.blender.stands.growing import (
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError, TetFloraError
 from ..tetflora_addon.jobs import Job, Progress, part_of
-from .base import FileTool, ModalJob, Reporting, counted, in_object_mode, need, select_only, show_shapes
+from .base import FileTool, ModalJob, Reporting, counted, in_object_mode, need, select_only
 
 
 def selected_grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -203,7 +203,6 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: Updated) -> set[str]:
         points.schedule()
-        show_shapes(context.scene)
         context.scene.update_tag()
         made, *rest = result
         if len(made) == 1 and isinstance(made[0], PlacedPlants):
@@ -420,9 +419,10 @@ class TETFLORA_OT_add_biome(ModalJob, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: BiomeResult) -> set[str]:
         points.schedule()
-        show_shapes(context.scene)
         sun = any(o.type == 'LIGHT' and o.data.type == 'SUN' for o in context.scene.objects)
-        more = ". Click Refine to see them" if sun else ". Click Daylight, then Refine, to see them"
+        before = "" if sun else "Daylight, then "
+        before += "" if context.scene.camera else "Look from Here, then "
+        more = f". Click {before}Refine to see them in full"
         numbers = [number for _, number in result.layers]
         return tell_layers(self, f'"{result.name}": ', numbers, result.bare, result.kept, more)
 
@@ -460,7 +460,6 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: CoverResult) -> set[str]:
         points.schedule()
-        show_shapes(context.scene)
         kept = f'; "{result.bare[0]}" keeps its own material' if result.bare else ""
         if not result.made.number:
             return self.refused(f"Nothing grows here: {result.made.reason}")
@@ -482,7 +481,6 @@ class TETFLORA_OT_grow_stand(ModalJob, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: GrownStand) -> set[str]:
         select_only(context, [result.field])
-        show_shapes(context.scene)
         context.scene.update_tag()
         return self.done(f"{counted(result.plants, 'plant')} after {counted(result.years, 'year')}")
 

@@ -38,12 +38,15 @@ class TETFLORA_UL_layers(bpy.types.UIList):
         elif item.biome:
             row.separator(factor=2.0)
         named = item.field if item.kind == FIELD and item.field is not None else item
-        Button("move_layer", 'GRIP', "", {"direction": 'DRAG', "layer": item.uid}).draw(row, emboss=False)
+        handle = row.row()
+        handle.scale_x = 0.6
+        Button("move_layer", 'GRIP', "", {"direction": 'DRAG', "layer": item.uid}).draw(handle, emboss=False)
         row.prop(named, "name", text="", emboss=False, icon=kind.icon)
         right = row.row(align=True)
         right.alignment = 'RIGHT'
         right.label(text=_short(plants_in(item)), icon='FILE_REFRESH' if is_due(item) else 'NONE')
-        right.prop(item, "frozen", text="", emboss=False, icon='FREEZE')
+        if item.frozen:  # what few are leaves its room to the name
+            right.prop(item, "frozen", text="", emboss=False, icon='FREEZE')
         right.prop(item, "shown", text="", emboss=False, icon='HIDE_OFF' if item.shown else 'HIDE_ON')
 
     def filter_items(self, _context, data, propname) -> tuple[list[int], list[int]]:
@@ -134,8 +137,11 @@ class TETFLORA_MT_layers(bpy.types.Menu):
             Button("save_biome", 'FILE_TICK', "Save as Biome..."),
             Button("import_biome", 'IMPORT', "Import Biome..."),
         )
-        if layer is not None and layer.kind == SCATTER:
-            layout.separator()
+        if layer is None:
+            return
+        layout.separator()
+        layout.prop(layer, "frozen")
+        if layer.kind == SCATTER:
             draw_properties(layout, layer, "seed", "tilt", "ground_collection")
             layout.prop_menu_enum(layer, "as_field")
 

@@ -29,7 +29,7 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
             column = layout.box().column()
             column.scale_y = 1.6
             Button("first_forest", 'WORLD').draw(column)
-            layout.label(text="Then click Refine and press F12")
+            layout.label(text="Then press F12 to render it")
         row = layout.row(align=True)
         row.scale_y = 1.4
         row.operator("tetflora.refine", icon='MOD_DECIM')
@@ -93,7 +93,7 @@ def hint(scene: bpy.types.Scene) -> str:
     if settings.statistics:
         return ""
     if settings.refine_at_render:
-        return "Click Refine, then press F12" if is_first_forest(scene) and has_contents(scene) else ""
+        return "F12 renders, Refine shows it here" if is_first_forest(scene) and has_contents(scene) else ""
     # The first object of a collection shows whether it was kept as meshes: a panel cannot look through all objects.
     first = (part.objects[0] if part.objects else None for part in scene.collection.children_recursive)
     kept = any(obj is not None and KIND in obj for obj in first)

@@ -117,12 +117,23 @@ def soon_done():
     scene.tetflora.quality = 'DRAFT'
 
 
+def shapes_of(scene):
+    """Plants as they are shown before they are refined."""
+    state = next(
+        module for name, module in sys.modules.items() if name.endswith("tetflora_addon.blender.viewport.state")
+    )
+    preview = state.find(scene)
+    return preview.shapes if preview else None
+
+
 def first_forest(hand, _scene, found):
     """First Forest, Refine, F12."""
     yield from hand.click("ops.tetflora.first_forest(")
     yield from hand.done()
     found["plants"] = sum(obj.tetflora.is_plant for obj in bpy.context.scene.objects)
     found["startup"] = sorted(set(bpy.context.scene.objects.keys()) & {"Cube", "Camera", "Light"})
+    yield from hand.ui.until(lambda: shapes_of(bpy.context.scene), 60, "shapes")
+    found["shown"] = shapes_of(bpy.context.scene).of
     found["through_camera"] = hand.ui.area().spaces.active.region_3d.view_perspective == 'CAMERA'
     soon_done()
     yield from hand.click("ops.tetflora.refine(")

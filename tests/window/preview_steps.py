@@ -79,7 +79,6 @@ def preview_steps(ui, scene, settings, space):
     ui.values["through"] = space.region_3d.view_perspective
     yield from ui.picture("bare")
 
-    settings.plants = 'LIGHT'
     yield from ui.until(lambda: shapes(scene) is not None, 20, "plants")
     ui.values["plants"] = shapes(scene).plants
     yield from ui.picture("light")

@@ -23,6 +23,7 @@ def test_clicks_are_few(seen: dict, pictures: Path, colors: Callable[[Path], int
 def test_a_first_forest_is_refined_and_rendered(seen: dict) -> None:
     found = seen["first_forest"]
     assert 60 <= found["plants"] <= 100
+    assert found["shown"] > found["plants"]  # and its ground cover
     assert found["through_camera"]
     assert found["startup"] == ["Camera", "Cube", "Light"]
     assert found["refined"]

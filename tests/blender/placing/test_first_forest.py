@@ -177,7 +177,7 @@ def test_the_tab_says_what_comes_next_and_stops_when_it_is_done():
     assert hint(scene) == ""
     bpy.ops.tetflora.first_forest()
     scene = bpy.context.scene
-    assert hint(scene) == "Click Refine, then press F12"
+    assert hint(scene) == "F12 renders, Refine shows it here"
     scene.render.resolution_percentage = 5
     bpy.ops.tetflora.refine()
     assert hint(scene) == ""

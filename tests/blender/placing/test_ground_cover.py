@@ -70,7 +70,6 @@ def test_the_ground_of_a_population_is_covered_by_what_grows_and_falls_there():
     assert [entry.object for entry in cover.grounds] == [ground]
     assert cover.made == fields.stored_size(_field()) > 2000
     assert _field().display_type == 'BOUNDS'  # black points would hide the ground
-    assert bpy.context.scene.tetflora.preview.plants == 'LIGHT'
     assert len(_places("birch_litter")) > 100
     for name in species:
         species_for(bpy.context.scene, name)

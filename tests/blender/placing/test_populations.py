@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Populations: plants that can be placed anew, and what of the artist's is left alone."""
+"""Scatters: plants that can be placed anew, and what of the artist's is left alone."""
 
 from __future__ import annotations
 
@@ -230,7 +230,7 @@ def test_ground_that_is_gone_is_said_and_plants_stay(delete):
         bpy.data.objects.remove(ground)
     else:  # as Blender's Delete does it where something still points to the object
         bpy.context.scene.collection.objects.unlink(ground)
-    with pytest.raises(RuntimeError, match='"Population" has no ground in this scene; select meshes'):
+    with pytest.raises(RuntimeError, match='"Scatter" has no ground in this scene; select meshes'):
         _ops().update_layers(which='ACTIVE')
     assert len(_plants()) == 6
 
@@ -331,7 +331,7 @@ def test_new_populations_begin_like_the_one_that_is_shown():
     other = add_mesh("other", size=5.0)
     select(other)
     _ops().duplicate_layer(to_selected=True)
-    assert [p.name for p in _settings().layers] == ["Population", "Population.001"]
+    assert [p.name for p in _settings().layers] == ["Scatter", "Scatter.001"]
     assert _active().clumping == 0.25
     assert [e.object for e in _active().grounds] == [other]
     assert _active().uid != _settings().layers[0].uid

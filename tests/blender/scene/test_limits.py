@@ -119,7 +119,7 @@ def test_wind_populations_and_brush_have_limits_too(scene):
     for group, name in ((population, "slope_max"), (population, "count"), (population.mix[0], "weight")):
         good = getattr(group, name)
         _store(group, name, -5 if name == "count" else math.nan)
-        with pytest.raises(errors.SceneError, match=r'"Population": .* is (nan|-5); it must be '):
+        with pytest.raises(errors.SceneError, match=r'"Scatter": .* is (nan|-5); it must be '):
             run_to_end(populations.make_plants_steps(scene, depsgraph(), population))
         setattr(group, name, good)
     _store(scene.tetflora.brush, "radius", math.nan)
@@ -135,7 +135,7 @@ def test_erased_places_that_cannot_be_read_are_said(scene, text):
     population = populations.add_population(scene, [ground])
     population.mix.add().species = "bush"
     population.erased = text
-    with pytest.raises(errors.SceneError, match='"Population": its erased places cannot be read; click Clear Erased'):
+    with pytest.raises(errors.SceneError, match='"Scatter": its erased places cannot be read; click Clear Erased'):
         run_to_end(populations.make_plants_steps(scene, depsgraph(), population))
 
 

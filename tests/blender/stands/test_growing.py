@@ -49,7 +49,6 @@ def test_a_stand_grows_on_its_ground_and_has_a_history():
     field = stand_on(ground)
     assert growing.is_stand(field)
     assert field.tetflora.stand_year == 12.0
-    assert bpy.context.scene.tetflora.preview.plants == 'LIGHT'
     young, old = plants_of(field, 4.0), plants_of(field, 12.0)
     assert len(old[0]) > 50
     assert np.median(old[2].height) > 1.5 * np.median(young[2].height)

@@ -15,8 +15,8 @@ from panels.refine import TETFLORA_PT_refine
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.viewport import auto, overlay, state
-from tetflora_addon.blender.viewport.levels import _on_timer, level_steps, read_shapes
+from tetflora_addon.blender.viewport import auto, levels, overlay, state
+from tetflora_addon.blender.viewport.levels import _on_timer, _on_update, level_steps, read_shapes
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -197,6 +197,7 @@ def test_figures_say_what_is_shown():
 def test_undo_keeps_levels_and_lets_go_of_what_was_frozen():
     scene, _, _ = scene_of_plants()
     levels = compute().levels
+    scene.tetflora.preview.plants = 'NONE'
     bpy.ops.ed.undo_push(message="before")
     scene.tetflora.preview.plants = 'LIGHT'
     read_shapes(scene, depsgraph())
@@ -238,6 +239,18 @@ def test_nothing_draws_or_waits_in_the_background():
     scene.tetflora.preview.plants = 'LIGHT'
     assert overlay._handles == []
     assert not bpy.app.timers.is_registered(_on_timer)
+
+
+def test_a_scene_without_plants_is_not_read(monkeypatch):
+    asked = []
+    monkeypatch.setattr(levels, "schedule", lambda: asked.append(True))
+    scene = bpy.context.scene
+    assert scene.tetflora.preview.plants == 'LIGHT'
+    _on_update(scene, SimpleNamespace(updates=[SimpleNamespace(id=scene)]))
+    assert not asked
+    update = SimpleNamespace(id=add_plant(), is_updated_transform=True, is_updated_geometry=False)
+    _on_update(scene, SimpleNamespace(updates=[update]))
+    assert asked
 
 
 def test_every_setting_has_a_name_of_its_own():

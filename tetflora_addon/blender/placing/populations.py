@@ -41,7 +41,7 @@ from .plant_objects import (
 from .properties import MOST_EMPTIES, TetFloraLayer
 from .rules import copy_settings, fingerprint, makes_field, read_search, set_grounds
 
-NAME = "Population"
+NAME = "Scatter"
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ from ..scene.ages import crown_kinds, plainly_aged
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
 from ..scene.field_sizes import stand_years
-from ..scene.objects import is_drop, taking_part
+from ..scene.objects import has_contents, is_drop, taking_part
 from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
 from ..settings import season_of, years_of
 from ..species import edits
@@ -172,7 +172,8 @@ def schedule() -> None:
 def _on_timer() -> None:
     for window in bpy.context.window_manager.windows:
         scene = window.scene
-        if scene.tetflora.preview.plants != 'NONE':
+        # Reading a large scene without plants takes seconds; one that had some has to lose their shapes.
+        if scene.tetflora.preview.plants != 'NONE' and (find(scene) is not None or has_contents(scene)):
             depsgraph = window.view_layer.depsgraph
             if depsgraph is not None:
                 read_shapes(scene, depsgraph)
@@ -191,8 +192,10 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
                 schedule()
                 return
         # Deleted objects are reported only as updates of what they were in.
-        elif isinstance(datablock, (bpy.types.Scene, bpy.types.Collection)) and (
-            preview is None or len(scene.objects) != preview.objects or preview.moment != _moment(scene)
+        elif (
+            preview is not None
+            and isinstance(datablock, (bpy.types.Scene, bpy.types.Collection))
+            and (len(scene.objects) != preview.objects or preview.moment != _moment(scene))
         ):
             schedule()
             return

@@ -116,7 +116,6 @@ def bring_in_step(scene: bpy.types.Scene, *_: object) -> None:
             preview.frozen = None
         elif preview.frozen is None and preview.levels is not None:
             preview.frozen = preview.levels.camera
-    if preview is not None or settings.plants != 'NONE':
         plants_wanted(scene)
 
 
@@ -189,11 +188,12 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         "Plants",
         "How plants appear in viewports. Not rendered, and no objects are created",
         (
-            ('NONE', "None", "Only their empties, or the points of their fields", 0),
             ('LIGHT', "Simple Shapes", "A crown and a trunk of about twenty triangles, in the species' color", 1),
             ('BOUNDS', "Bounds", "Bounding boxes of the species", 2),
+            ('NONE', "None", "Only their empties, or the points of their fields", 0),
         ),
         **FIXED,
+        default='LIGHT',
         update=lambda group, _context: plants_wanted(group.id_data),
     )
     statistics: boolean(

@@ -61,11 +61,12 @@ def _look(scene: bpy.types.Scene) -> Iterator[Warned]:
     settings, camera = scene.tetflora, scene.camera
     for error in render_errors()[-1:]:
         yield Warned("render", "Last render failed", error)
-    yield from _grounds(scene)
+    small, stretched = _grounds(scene)
+    yield from small
     place = _places(scene)
     if camera is None and len(place):
-        text = "The scene has no camera. Turn the view to where you want to look from, and click Look from Here"
-        yield Warned("camera", "No camera", text, "Look from Here")
+        text = "The scene has no camera. Turn the view to where you want to look from; Add puts one there at eye height"
+        yield Warned("camera", "No camera", text, "Add")
     elif len(place):
         yield from _camera(scene, place)
     if len(place) and is_dark(scene):
@@ -82,6 +83,7 @@ def _look(scene: bpy.types.Scene) -> Iterator[Warned]:
     for layer in scene.tetflora.layers:
         if layer.message and not layer.made:
             yield Warned(f"layer {layer.uid}", "No plants", f'"{layer.name}": {layer.message}')
+    yield from stretched
     if text := few_bounces(scene):
         yield Warned("bounces", "Few bounces", text, "Raise", _setter("cycles.transparent_max_bounces", 128))
 
@@ -109,8 +111,10 @@ def is_dark(scene: bpy.types.Scene) -> bool:
     return all(node.type in {'BACKGROUND', 'OUTPUT_WORLD'} for node in tree.nodes)
 
 
-def _grounds(scene: bpy.types.Scene) -> Iterator[Warned]:
-    """Grounds of layers that are too small, or whose scale is not applied."""
+def _grounds(scene: bpy.types.Scene) -> tuple[list[Warned], list[Warned]]:
+    """Grounds of layers that are too small, and those whose scale is not applied."""
+    small: list[Warned] = []
+    stretched: list[Warned] = []
     grounds = dict.fromkeys(e.object for layer in scene.tetflora.layers for e in layer.grounds if e.object is not None)
     for obj in (o for o in grounds if scene in o.users_scene):
         wide = max(obj.dimensions[:2])
@@ -118,10 +122,11 @@ def _grounds(scene: bpy.types.Scene) -> Iterator[Warned]:
             text = (
                 f'"{obj.name}" is {wide:.3g} m wide, and trees are tens of meters tall. Scale it, or take a larger mesh'
             )
-            yield Warned(f"small {obj.name}", "Small ground", text, "Make 100 m", partial(_enlarge, obj))
+            small.append(Warned(f"small {obj.name}", "Small ground", text, "Make 100 m", partial(_enlarge, obj)))
         elif obj.parent is None and obj.data.users == 1 and not np.allclose(obj.scale, 1.0, rtol=1e-3):
             text = f'The scale of "{obj.name}" is not applied: textures on it are stretched. Apply makes it 1'
-            yield Warned(f"scale {obj.name}", "Scale not applied", text, "Apply", partial(_apply, obj))
+            stretched.append(Warned(f"scale {obj.name}", "Scale not applied", text, "Apply", partial(_apply, obj)))
+    return small, stretched
 
 
 def _enlarge(obj: bpy.types.Object, _scene: bpy.types.Scene) -> None:
