@@ -98,7 +98,7 @@ VIEWS = {
         (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.3, haze=_CLEAR, light=1.0, free=5.0
     ),
     "tropical_understory": View(
-        (0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), gray=0.34, haze=_CLEAR, light=1.3, free=4.5
+        (0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), gray=0.42, haze=_CLEAR, light=2.0, free=6.0
     ),
 }
 
@@ -185,8 +185,8 @@ def _add(run_to_end, adding, scene, biome, land):
 
 
 def _around(biome: object, adding: object) -> bpy.types.Object:
-    """The same land around the hectare."""
-    mesh, _, _ = grid("Ground", _LAND, 4.0, adding.SIDE, lambda x, y: adding.heights(x, y, biome.ground))
+    """The same land around the hectare, with the same corners along its border: nothing shows between the two."""
+    mesh, _, _ = grid("Ground", _LAND, adding.STEP, adding.SIDE, lambda x, y: adding.heights(x, y, biome.ground))
     around = bpy.data.objects.new("Ground", mesh)
     around.tetflora.is_occluder = True
     return around

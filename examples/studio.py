@@ -36,7 +36,7 @@ def add_studio(points: np.ndarray, aspect: float) -> None:
     scene = bpy.context.scene
     # A few twigs that reach far out must not make the rest small.
     low, high = np.quantile(points, 0.002, axis=0), np.quantile(points, 0.998, axis=0)
-    low[2] = min(low[2], 0.0)
+    low[2] = 0.0  # tips of blades that bend down that far are below the ground, as in a meadow
     pitch = math.radians(_PITCH)
     across = 2 * max(abs(low[0]), abs(high[0])) * 1.08
     depth = max(abs(low[1]), abs(high[1])) * math.sin(pitch)
