@@ -5,7 +5,8 @@
 A field of birches and spruces goes to USD and comes back; plants count that are the same in all bytes. Levels are those
 of a variant whose corrections were found for another one of its species, seen from the distances where they take over.
 Readers are USD's own checker, pygltflib and trimesh: each fault that they find, and each number of plants or polygons
-that they read otherwise, is an error.
+that they read otherwise, is an error. With options: pictures of what Blender reads back, and readers that development
+does not need.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from tetflora_addon.export.levels import differences, levels_of
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalog import load_species
 
+from . import export_readers, reimport
 from .report import Targets, cpu_s
 
 PLANTS, QUICK_PLANTS = 1_000_000, 20_000
@@ -53,13 +55,20 @@ QUICK_TARGETS: Targets = {**TARGETS, "plants_back": {"min": QUICK_PLANTS}}
 
 def options(parser: argparse.ArgumentParser) -> None:
     """What else can be asked for."""
-    parser.add_argument("--species", help="species of levels, with commas")
+    parser.add_argument("--species", help="species of levels and of pictures, with commas")
+    parser.add_argument("--pictures", action="store_true", help="colors of what Blender's importers read, and no else")
+    parser.add_argument("--engine", choices=("CYCLES", "EEVEE"), default="CYCLES", help="of these pictures")
+    parser.add_argument("--readers", type=Path, help="a folder with npm's gltf-validator; with assimp and mitsuba")
 
 
-def run(given: argparse.Namespace) -> dict[str, float]:
-    """All figures."""
+def run(given: argparse.Namespace) -> dict[str, float] | None:
+    """All figures, or a part that prints its own."""
     chosen = given.species.split(",") if given.species else QUICK_SPECIES if given.quick else SPECIES
     with tempfile.TemporaryDirectory() as folder:
+        if given.pictures:
+            return reimport.color_errors(Path(folder), chosen, given.engine)
+        if given.readers:
+            return _read_elsewhere(Path(folder), given.readers.resolve())
         figures = _there_and_back(Path(folder), QUICK_PLANTS if given.quick else PLANTS)
         figures["validator_errors"] = float(_validated(Path(folder)))
     return figures | _levels(chosen)
@@ -133,6 +142,14 @@ def _validated(folder: Path) -> int:
     indices = [read.accessors[p.indices].count // 3 for mesh in read.meshes for p in mesh.primitives]
     errors += sum(len(mesh.faces) for mesh in meshes) > sum(indices)
     return errors + sum(not np.isfinite(mesh.vertices).all() for mesh in meshes)
+
+
+def _read_elsewhere(folder: Path, validator: Path) -> None:
+    """Let programs read a small set that share no code with Blender."""
+    _forest(6, ("bush", "fern"))
+    glb, obj = (_exported(folder / f"small.{ending}", variants=1).path for ending in ("glb", "obj"))
+    export_readers.validate(validator, glb)
+    export_readers.compare_silhouettes(obj)
 
 
 def _levels(species: tuple[str, ...]) -> dict[str, float]:

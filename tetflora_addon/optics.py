@@ -15,6 +15,15 @@ from .arrays import Floats
 #: Fraction of light that the waxy surface of leaves mirrors without color (4 % at a refractive index of 1.5); what they
 #: scatter is the rest times their color.
 GLOSS = 0.04
+#: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
+#: absorb on the whole way. Products over 1 are cut off.
+THROUGH_TINT = np.array([1.15, 1.1, 0.55])
+#: How much more than the mean of both sides a leaf's underside reflects diffusely, and the upper side less: fewer
+#: pigments lie under its surface, hence most in blue. A third of what three species show (docs/species.md), because
+#: spheres and shells have no sides: where leaves become proxies, light must not jump.
+PALER = (0.16, 0.12, 0.3)
+#: How much rougher the gloss of the underside is.
+HAIRY = 0.2
 
 
 def recollision_albedo(albedo: Floats, weight: Floats) -> Floats:

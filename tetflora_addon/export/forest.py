@@ -18,8 +18,16 @@ from ..errors import TetFloraError
 from ..files import PART, replace
 from .levels import PlantLevel
 
-#: Light that comes from everywhere and is mirrored by a surface (Fresnel), and the surface's index of refraction.
-_MIRRORED = (0.0, 0.0263, 0.0447, 0.061, 0.0918), (1.0, 1.1, 1.2, 1.3, 1.5)
+#: Light from everywhere that surfaces mirror: a row for each roughness, for indices of refraction. Smooth ones by
+#: Fresnel's formulas, others as measured of Cycles' Principled BSDF in a white world.
+_ROUGHNESS, _INDEX = (0.0, 0.25, 0.5, 0.75, 1.0), (1.0, 1.1, 1.2, 1.3, 1.5)
+_MIRRORED = (
+    (0.0, 0.0263, 0.0447, 0.061, 0.0918),
+    (0.0, 0.0142, 0.0312, 0.0474, 0.0777),
+    (0.0, 0.0083, 0.02, 0.0323, 0.0578),
+    (0.0, 0.0039, 0.0106, 0.0186, 0.0367),
+    (0.0, 0.0018, 0.0055, 0.0101, 0.0211),
+)
 #: Attributes of points by name, each with its type and values.
 PointAttributes = Mapping[str, tuple[str, NDArray]]
 
@@ -39,8 +47,8 @@ class BakedSurface:
 
     @property
     def index(self) -> float:
-        """Index of refraction of a smooth surface that mirrors as much, on average over directions."""
-        return float(np.interp(self.gloss, *_MIRRORED))
+        """Index of refraction of a surface as rough that mirrors as much, on average over directions."""
+        return float(np.interp(self.roughness, _ROUGHNESS, [np.interp(self.gloss, row, _INDEX) for row in _MIRRORED]))
 
 
 @dataclass(frozen=True)

@@ -118,6 +118,8 @@ def _add_material(document: _Document, folder: Path, surface: BakedSurface) -> i
         textures[name] = {"index": document.add("textures", {"source": image})}
     metallic: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": surface.roughness}
     metallic |= {"baseColorTexture": textures["color"]} if "color" in textures else {}
+    if "roughness" in textures:  # its blue would be the metallic part, which the factor makes 0
+        metallic |= {"roughnessFactor": 1.0, "metallicRoughnessTexture": textures["roughness"]}
     made = {"name": surface.name, "pbrMetallicRoughness": metallic, "doubleSided": surface.sided}
     made["extensions"] = {"KHR_materials_ior": {"ior": surface.index}}
     made |= {"normalTexture": textures["normal"]} if "normal" in textures else {}
@@ -176,7 +178,7 @@ def _primitive(document: _Document, mesh: MeshBuffers, material: int) -> dict[st
     owner, corner = corner_triangles(mesh)
     corners, owner = corner.reshape(-1), np.repeat(owner, 3)
     rows = np.column_stack([mesh.corner_verts[corners], mesh.attributes["UVMap"][1][corners].view(np.int32)])
-    normal = vertex_normals(mesh)[mesh.corner_verts[corners]] if mesh.smooth else _normals(mesh)[owner]
+    normal = vertex_normals(mesh)[mesh.corner_verts[corners]] if mesh.smooth else face_normals(mesh)[owner]
     rows = rows if mesh.smooth else np.column_stack([rows, owner])
     key = np.ascontiguousarray(rows, np.int32).view([("", np.int32)] * rows.shape[1])[:, 0]
     _, first, index = np.unique(key, return_index=True, return_inverse=True)
@@ -191,7 +193,7 @@ def _primitive(document: _Document, mesh: MeshBuffers, material: int) -> dict[st
     return {"attributes": attributes, "indices": indices, "material": material}
 
 
-def _normals(mesh: MeshBuffers) -> Floats32:
+def face_normals(mesh: MeshBuffers) -> Floats32:
     """Unit normals (f, 3) of faces."""
     owner, corner = triangles(mesh)
     a, b, c = (mesh.positions[corner[:, k]] for k in range(3))
@@ -202,7 +204,7 @@ def _normals(mesh: MeshBuffers) -> Floats32:
 
 def vertex_normals(mesh: MeshBuffers) -> Floats32:
     """Unit normals (v, 3) of vertices, means of those of their faces."""
-    face, normal = np.repeat(np.arange(mesh.polygons), np.diff(mesh.face_offsets)), _normals(mesh)
+    face, normal = np.repeat(np.arange(mesh.polygons), np.diff(mesh.face_offsets)), face_normals(mesh)
     sums = [np.bincount(mesh.corner_verts, normal[face, k], len(mesh.positions)) for k in range(3)]
     return _unit(np.stack(sums, axis=1))
 

@@ -301,18 +301,36 @@ class Grid:
 
     def view(self, meshes: Sequence[MeshBuffers]) -> PlantView:
         """Meshes from the direction: a cell shows what is nearest to the eye at its middle."""
-        rows, columns = self.shape
-        depth, face = np.full(rows * columns, -np.inf, np.float32), np.zeros(rows * columns, np.int64)
-        colors, first = [], 0
+        depth, face = self.nearest(meshes)
+        shown = depth > -np.inf
+        colors = np.concatenate([mesh.attributes["tf_color"][1] for mesh in meshes])
+        mean = colors[face[shown]].mean(axis=0, dtype=np.float64) if shown.any() else np.zeros(3)
+        return PlantView(shown.reshape(self.shape), tuple(mean.tolist()))
+
+    def nearest(self, meshes: Sequence[MeshBuffers]) -> tuple[Floats32, Integers]:
+        """How far toward the eye what cells (h × w) show is, -inf where nothing is, and its face, counted through."""
+        number = self.shape[0] * self.shape[1]
+        depth, face, first = np.full(number, -np.inf, np.float32), np.zeros(number, np.int64), 0
         for mesh in meshes:
-            color = mesh.attributes["tf_color"][1]
             owner, corners = triangles(mesh)
             self._draw(mesh.positions[corners], owner + first, depth, face)
-            colors.append(color)
-            first += len(color)
-        shown = depth > -np.inf
-        mean = np.concatenate(colors)[face[shown]].mean(axis=0, dtype=np.float64) if shown.any() else np.zeros(3)
-        return PlantView(shown.reshape(rows, columns), tuple(mean.tolist()))
+            first += mesh.polygons
+        return depth, face
+
+    def places(self, depth: Floats32) -> Floats:
+        """Places (k, 3) in the middle of cells that show something, by their depths (h × w)."""
+        shown = np.flatnonzero(depth > -np.inf)
+        row, column = np.divmod(shown, self.shape[1])
+        flat = self.cell * (np.stack([column, row], axis=1) + self.low + 0.5)
+        return np.column_stack([flat, depth[shown]]) @ _axes(self.toward).T
+
+    def reaches(self, places: Floats, depth: Floats32, slack: float) -> Mask:
+        """Places (k, 3) that nothing hides from the eye, by depths (h × w), but what is within so many meters."""
+        at = in_axes(places, _axes(self.toward))
+        column, row = np.clip(
+            np.floor(at[:, :2] / self.cell).astype(np.int64) - self.low, 0, np.array(self.shape)[::-1] - 1
+        ).T
+        return at[:, 2] >= depth[row * self.shape[1] + column] - slack
 
     def _draw(self, corners: Floats32, owner: Integers, depth: Floats32, face: Integers) -> None:
         """Put triangles (t, 3, 3) of faces (t,) into the cells where they are the nearest."""

@@ -16,7 +16,7 @@ from itertools import permutations, product
 import numpy as np
 
 from ..arrays import Floats
-from ..optics import GLOSS
+from ..optics import GLOSS, THROUGH_TINT
 
 #: Reflected (n, 3), transmitted (n, 3) and mirrored (n,) fractions of light, see `scattered_fractions`.
 Fractions = tuple[Floats, Floats, Floats]
@@ -29,9 +29,6 @@ _COSINE = np.array([np.pi, 2.0 * np.pi / 3.0, np.pi / 4.0])[BAND]
 # McLaren's improved snub cube (Hardin and Sloane, "McLaren's Improved Snub Cube and Other New Spherical Designs in
 # Three Dimensions", 1996): means over its 24 points are exact for polynomials up to degree 7.
 _SNUB = (0.8662468181078206, 0.4225186537611115, 0.2666354015167047)
-#: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
-#: absorb on the whole way. Products over 1 are cut off.
-THROUGH_TINT = np.array([1.15, 1.1, 0.55])
 #: Roughness of the waxy surface's own, colorless reflection.
 GLOSS_ROUGHNESS = 0.6
 

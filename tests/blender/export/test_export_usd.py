@@ -18,6 +18,7 @@ from tetflora_addon.blender.attributes import image_pixels, linear_rgb, values_o
 from tetflora_addon.blender.export.forest import ExportOrder, export_steps
 from tetflora_addon.blender.export.usd import forest_steps
 from tetflora_addon.blender.geodata.origin import Import
+from tetflora_addon.blender.materials.nodes import Graph, surface_material
 from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.worker import run_to_end
@@ -195,9 +196,17 @@ def test_a_folder_that_is_not_there_is_named(blender, tmp_path):
         export(tmp_path / "gone" / "f.usdc")
 
 
+def unevenly_rough(graph: Graph, _material: bpy.types.Material) -> None:
+    checker = graph.outputs("ShaderNodeTexChecker", {"Scale": 8.0})["Fac"]
+    shader = graph.node("ShaderNodeBsdfPrincipled", {"Roughness": checker})
+    graph.node("ShaderNodeOutputMaterial", {"Surface": shader})
+
+
 def test_blender_reads_the_plant_with_its_textures(blender, tmp_path, pxr):
     """Its own importer finds the same surface, and images whose mean is the color of the leaves."""
     add_plant("one", "bush", 3)
+    entry = scene().tetflora.output.species.add()
+    entry.species, entry.bark = "bush", surface_material("own bark", 1, unevenly_rough)
     run_to_end(export_steps(scene(), depsgraph(), ExportOrder(tmp_path / "f.usdc", 1, 1, bake=True)))
     assert bpy.data.scenes.keys() == [scene().name]
     assert not [image for image in bpy.data.images if image.type == 'UV_TEST' or "bake" in image.name]
@@ -206,7 +215,9 @@ def test_blender_reads_the_plant_with_its_textures(blender, tmp_path, pxr):
     leaf = next(o for o in bpy.data.objects if o.name.startswith("leaf"))
     assert len(leaf.data.polygons) > 1000
     images = {Path(image.filepath).name: image for image in bpy.data.images if image.size[0]}
-    assert set(images) == {f"bush_{part}_{kind}.png" for part in ("leaf", "bark") for kind in ("color", "normal")}
+    expected = {f"bush_{part}_{kind}.png" for part in ("leaf", "bark") for kind in ("color", "normal")}
+    assert set(images) == expected | {"bush_bark_roughness.png"}
+    assert image_pixels(images["bush_bark_roughness.png"])[..., 0].std() > 0.1
     pixels = linear_rgb(images["bush_leaf_color.png"], image_pixels(images["bush_leaf_color.png"]))
     shown = image_pixels(images["bush_leaf_color.png"])[..., 3] > 0.5
     color = values_of(leaf.data.attributes["displayColor"]).mean(axis=0)[:3]

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pygltflib
@@ -70,6 +71,26 @@ def test_gltf_has_all_places_and_levels(forest, tmp_path):
         one = trimesh.transformations.quaternion_matrix((w, x, y, z))[:3, :3]
         other = trimesh.transformations.quaternion_matrix((a, b, c, d))[:3, :3]
         np.testing.assert_allclose(one, swap @ other @ swap.T, atol=1e-6)
+
+
+def test_gltf_has_roughness_as_a_number_or_a_texture(forest, tmp_path):
+    (tmp_path / "rough.png").write_bytes(png(np.full((2, 2, 3), 0.3, np.float32), linear=True))
+    (variant,) = forest.variants
+    rough = replace(variant.surfaces["leaf"], textures={"roughness": "rough.png"})
+    given = replace(variant, surfaces={**variant.surfaces, "leaf": rough})
+    list(write_gltf(tmp_path / "f.glb", replace(forest, variants=(given,))))
+    found = {m.name: m.pbrMetallicRoughness for m in pygltflib.GLTF2().load(str(tmp_path / "f.glb")).materials}
+    assert found["bush_bark"].metallicRoughnessTexture is None
+    assert found["bush_bark"].roughnessFactor == rough.roughness
+    assert found["bush_leaf"].metallicRoughnessTexture is not None
+    assert (found["bush_leaf"].roughnessFactor, found["bush_leaf"].metallicFactor) == (1.0, 0.0)
+
+
+def test_rough_surfaces_mirror_as_much_by_a_larger_index():
+    smooth, rough = (BakedSurface("leaf", (0.1, 0.2, 0.05), gloss=0.02, roughness=r).index for r in (0.0, 0.5))
+    assert 1.0 < smooth < 1.1
+    assert rough == pytest.approx(1.2)
+    assert BakedSurface("bark", (0.1, 0.1, 0.1), roughness=0.9).index == 1.0
 
 
 def test_gltf_has_the_surface_of_each_level(forest, tmp_path):

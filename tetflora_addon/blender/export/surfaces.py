@@ -30,14 +30,17 @@ from ...export.images import (
     tiled,
     within,
 )
+from ...export.opaque import Sides, opaque, sides_of
 from ...jobs import Job, Progress
-from ...optics import GLOSS
+from ...optics import GLOSS, HAIRY
 from ..attributes import image_pixels, write
 from ..results.leaf_objects import materials_of
 from ..species.edits import species_for
 
 #: Roughness of what has not been baked.
 _ROUGH = {"bark": 0.9}
+#: What roughness varies by at most where it is a number, not a texture.
+_EVEN = 0.02
 _LEAF = 0.1  # meters to a leaf, for the depth of what is baked
 _ABOVE = 4.0  # meters up a trunk where its bark is baked: beyond what is peculiar to its foot
 
@@ -77,6 +80,7 @@ def with_surfaces(
     bake : bool
         Whether veins, bark and relief are baked; otherwise, textures have colors and outlines only.
     """
+    variants = list(_opaque(variants))
     looks = _looks(variants)
     found: dict[tuple[str, str], BakedSurface] = {}
     for number, look in enumerate(looks):
@@ -89,6 +93,15 @@ def with_surfaces(
         levels = tuple(in_atlas(level, own) for level in variant.levels)
         made.append(replace(variant, levels=levels, surfaces={part: found[variant.species, part] for part in own}))
     return tuple(made)
+
+
+def _opaque(variants: Sequence[Variant]) -> Iterator[Variant]:
+    """Variants in colors for materials that let no light through, as the first of their species shows its leaves."""
+    sides: dict[str, Sides] = {}
+    for variant in variants:
+        if variant.species not in sides:
+            sides[variant.species] = sides_of(variant.levels)
+        yield replace(variant, levels=opaque(variant.levels, sides[variant.species]))
 
 
 def _looks(variants: Sequence[Variant]) -> list[_Look]:
@@ -114,23 +127,26 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
         given = (low, look.palette.size, 1.0 if is_bark else _LEAF)
         images = baked(material, look.color, look.mean("tf_transmission"), TEXELS, *given)
         images = {name: tiled(own) if is_bark else within(own) for name, own in images.items()}
-    rough = float(images.pop("roughness", np.full(1, _ROUGH.get(look.part, 0.5))).mean())
+    roughness = images.pop("roughness", np.full(1, _ROUGH.get(look.part, 0.5)))
     detail = images.get("color", np.ones((TEXELS, TEXELS, 3), np.float32))
     shown = None if is_bark else outline(look.palette, look.meshes[0])
     seen = detail.reshape(-1, 3) if shown is None else detail[shown]
     detail = detail / np.maximum(seen.mean(axis=0), 1e-6)
     files = {"color": atlas(look.palette, detail, shown)}
-    if "normal" in images:
-        files["normal"] = np.tile(images["normal"], (*look.palette.grid[::-1], 1))
+    if np.ptp(roughness) > _EVEN:  # TetFlora's own materials are evenly rough
+        images["roughness"] = roughness
+    for key in images.keys() - files.keys():
+        files[key] = np.tile(images[key], (*look.palette.grid[::-1], 1))
     names = {}
     for key, texels in files.items():
         names[key] = f"{textures}/{look.name}_{key}.png"
         (folder / textures).mkdir(exist_ok=True)
-        (folder / names[key]).write_bytes(png(texels, linear=key == "normal"))
-        half = png(halved(texels), linear=key == "normal")
+        (folder / names[key]).write_bytes(png(texels, linear=key != "color"))
+        half = png(halved(texels), linear=key != "color")
         (folder / textures / f"{look.name}_{key}_half.png").write_bytes(half)
     color = tuple(look.color.tolist())
     gloss = 0.0 if is_bark else GLOSS * (1.0 - look.mean("tf_dull"))
+    rough = float(roughness.mean()) + (0.0 if is_bark else HAIRY / 2.0)  # of both sides
     return BakedSurface(look.name, color, look.mean("tf_transmission"), rough, gloss, not is_bark, names)
 
 

@@ -14,22 +14,17 @@ from typing import Any
 
 import bpy
 
-from ...light.scattering import THROUGH_TINT
-from ...optics import GLOSS
+from ...optics import GLOSS, HAIRY, PALER, THROUGH_TINT
 from .nodes import LEAF_GREEN, Graph, Term, node_group
 
 # Raise this when nodes or numbers change; `blade_version` then makes new materials as well.
 _VERSION = 3
 
 UNIT = (0.0, 1.0)
-#: How much more than the mean of both sides a leaf's underside reflects diffusely, and the upper side less: fewer
-#: pigments lie under its surface, hence most in blue. A third of what three species show (docs/species.md), because
-#: spheres and shells have no sides: where leaves become proxies, light must not jump.
-PALER = (0.16, 0.12, 0.3)
 #: How much more than the mean of both sides the upper side mirrors: its wax is smooth, the underside hairy.
 GLOSSIER = 0.1
-#: How much rougher the gloss of the underside is, and the upper side's where no blade says otherwise.
-HAIRY, WAXY = 0.2, 0.5
+#: Roughness of the upper side's gloss where no blade says otherwise.
+WAXY = 0.5
 #: What of `GLOSS` is mirrored at all angles, and how much is added at a grazing one: g (a + b (1 - cos)^5), whose mean
 #: over all directions is g, as the cosine-weighted mean of (1 - cos)^5 is 1/21.
 _FACING, _GRAZING = 0.85, 0.15 * 21.0

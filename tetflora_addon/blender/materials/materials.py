@@ -11,10 +11,10 @@ from typing import Any
 import bpy
 
 from ...emission.light import BACK, FRONT
-from ...optics import GLOSS
+from ...optics import GLOSS, HAIRY
 from ..compat import disable_bump_correction
 from .bark import bark_group, bark_version, place_group
-from .blade import HAIRY, WAXY, blade_group, blade_version, paler, sheen
+from .blade import WAXY, blade_group, blade_version, paler, sheen
 from .microsphere import WHITE, scatter_group
 from .nodes import Graph, Term, is_own, surface_material
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import bpy
 
-from ...light import scattering
+from ... import optics
 from ...light.scattering import GLOSS_ROUGHNESS
 from ...optics import GLOSS
 from ..compat import blend_in_mesh_order, disable_bump_correction, loses_summed_lobes
@@ -32,7 +32,7 @@ _SCATTER_VERSION = 2
 WHITE = (1.0, 1.0, 1.0, 1.0)
 UNIT = (0.0, 1.0)
 #: The engine's, as a color of a socket.
-THROUGH_TINT = (*scattering.THROUGH_TINT.tolist(), 1.0)
+THROUGH_TINT = (*optics.THROUGH_TINT.tolist(), 1.0)
 #: Inputs of the cloud that the shell's group has as well.
 LOBE_INPUTS = (
     ("p", 'Float', 1.0, UNIT, "Diffuse weight of the particle and plane terms"),

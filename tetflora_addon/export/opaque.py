@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colors of leaves for materials that let no light through, and whose two sides are alike.
+
+Formats have no material of thin sheets that all readers know. So what passes through leaves, and that their undersides
+are paler, goes into their color: the one with which they are as bright, on average over views from beside, in the light
+of sun and sky. Which sides are lit and seen is counted in views of the plant, with its own shadows.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Floats, spiral
+from ..buffers import MeshBuffers
+from ..optics import PALER, THROUGH_TINT
+from .gltf import face_normals
+from .levels import VIEWS, Grid, PlantLevel
+
+#: Heights of light, each in how many directions, and the irradiance of level ground from above or below: as much from
+#: the sun at 45 degrees as from the sky, and what the ground reflects, a fifth.
+_LIGHT = (
+    (np.full(8, np.sqrt(0.5)), 1.0),
+    ((np.arange(12) + 0.5) / 12, 1.0),
+    ((np.arange(6) + 0.5) / -6, 0.4),
+)
+#: Cells along a plant, and in how many of these its leaves do not shade themselves.
+_CELLS, _SLACK = 128, 1.5
+#: Faces of the level that is looked at: it covers what the full plant does.
+_MOST = 20_000
+#: By the kind of parts (3,): how much is seen of light that falls on upper sides, and on undersides, together 1, and
+#: beside these of light from the other side of the faces that are seen.
+Sides = Mapping[str, Floats]
+
+
+def opaque(levels: Sequence[PlantLevel], sides: Sides) -> tuple[PlantLevel, ...]:
+    """Levels of a plant in such colors, by the sides that plants of its kind show."""
+    return tuple(
+        replace(level, parts=tuple((kind, _recolored(mesh, sides.get(kind, _EVEN))) for kind, mesh in level.parts))
+        for level in levels
+    )
+
+
+def sides_of(levels: Sequence[PlantLevel]) -> Sides:
+    """Which sides of leaves a plant shows."""
+    level = next((level for level in levels if level.polygons <= _MOST), levels[-1])
+    return dict(zip([kind for kind, _ in level.parts], _sides([mesh for _, mesh in level.parts]), strict=True))
+
+
+#: As much of light is seen from where it falls on an upper side, and on an underside, as comes through.
+_EVEN = np.array([0.5, 0.5, 1.0])
+
+
+def _recolored(mesh: MeshBuffers, sides: Floats) -> MeshBuffers:
+    upper, under, through = sides
+    passed = mesh.attributes["tf_transmission"][1][:, None]
+    reflected = (1.0 - passed) * (1.0 - (passed > 0.0) * np.array(PALER) * (upper - under))
+    color = mesh.attributes["tf_color"][1] * (reflected + passed * THROUGH_TINT * through)
+    color = np.clip(color, 0.0, 1.0).astype(np.float32)
+    return replace(mesh, attributes={**mesh.attributes, "tf_color": ("FACE", color)})
+
+
+def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
+    """As `Sides`, (n, 3), for meshes (n) of a plant."""
+    points, normal = (np.concatenate(of) for of in ([m.positions for m in meshes], [face_normals(m) for m in meshes]))
+    part = np.repeat(np.arange(len(meshes)), [mesh.polygons for mesh in meshes])
+    cell = float(np.ptp(points, axis=0).max()) / _CELLS
+    lamps = [(Grid.around(toward, cell, points, cell), bright) for toward, bright in _lamps()]
+    shadows = [lamp.nearest(meshes)[0] for lamp, _ in lamps]
+    found = np.zeros((3, len(meshes)))
+    for grid in (Grid.around(toward, cell, points, cell) for toward in VIEWS):
+        depth, face = grid.nearest(meshes)
+        face, place = face[depth > -np.inf], grid.places(depth)
+        front = normal[face] @ grid.toward > 0.0
+        for (lamp, bright), shadow in zip(lamps, shadows, strict=True):
+            falls = normal[face] @ lamp.toward
+            seen = bright * np.abs(falls) * lamp.reaches(place, shadow, _SLACK * cell)
+            kinds = np.where(front == (falls > 0.0), np.where(front, 0, 1), 2)
+            np.add.at(found, (kinds, part[face]), seen)
+    return (found / np.maximum(found[:2].sum(axis=0), 1e-30)).T
+
+
+def _lamps() -> Iterator[tuple[Floats, float]]:
+    """Directions (3,) to light, and the irradiance from each of what faces it."""
+    for z, level in _LIGHT:
+        yield from ((toward, level / np.abs(z).sum()) for toward in spiral(z, np.arange(len(z)), 2.4))
