@@ -176,7 +176,8 @@ class TETFLORA_OT_daylight(Reporting, bpy.types.Operator):
             _cover(scene, height, self.clouds, self.haze)
         else:
             kept.append(f'the world "{scene.world.name}"')
-        rest = f"; {' and '.join(kept)} stay as they are" if kept else ""
+        stay = "stay as they are" if len(kept) > 1 else "stays as it is"
+        rest = f"; {' and '.join(kept)} {stay}" if kept else ""
         return self.done(f"The sun stands {np.degrees(height):.0f}° high{rest}")
 
 

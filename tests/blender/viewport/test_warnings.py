@@ -158,3 +158,17 @@ def test_an_animated_camera_stays_and_nothing_to_stand_on_is_told():
     bpy.ops.tetflora.look()
     assert bpy.context.scene.camera != camera
     assert tuple(camera.location) == (5.0, 0.0, 2.0)
+
+
+def test_a_closed_wood_is_dark_inside_until_it_is_brightened():
+    add_camera((0.0, 0.0, 1.7))
+    beeches = [
+        add_plant(f"{x} {y}", species="beech", location=(6.0 * x, 6.0 * y, 0.0)) for x in (-1, 1) for y in (-1, 1)
+    ]
+    assert "shade" not in _keys()
+    for n, beech in enumerate(beeches * 5):
+        near = beech.copy()
+        near.location.x += 1.5 * n
+        bpy.context.scene.collection.objects.link(near)
+    _mend("shade")
+    assert bpy.context.scene.view_settings.exposure > 2.0

@@ -29,6 +29,7 @@ _SIDE = 100.0  # of ground that was too small, meters
 #: Light of a world from all around that shows plants; a new file's gray is 0.05.
 _DARK = 0.1
 _NEAR = 20.0  # meters around the camera where crowns are looked at
+_OVERHEAD = 3.0  # meters above the camera, where crowns shade it
 
 
 @dataclass(frozen=True)
@@ -172,9 +173,14 @@ def _crowns(scene: bpy.types.Scene, at: Floats) -> list[tuple[Floats, float, flo
 def _camera(scene: bpy.types.Scene, place: Floats) -> Iterator[Warned]:
     camera = scene.camera
     at = np.array(camera.matrix_world.translation)
-    if any(_holds(at, *one) for one in _crowns(scene, at)):
+    crowns = _crowns(scene, at)
+    if any(_holds(at, *one) for one in crowns):
         text = f'"{camera.name}" is inside a crown: leaves fill the picture. Move takes it to the nearest open place'
         yield Warned("crown", "In a crown", text, "Move", _step_out)
+    above = sum(radius**2 for foot, radius, height in crowns if foot[2] + height > at[2] + _OVERHEAD)
+    if above > _NEAR**2 and scene.view_settings.exposure == 0.0:
+        text = "The camera is in a closed wood, which is dark inside. Brighten raises Exposure in Color Management"
+        yield Warned("shade", "Dark wood", text, "Brighten", _setter("view_settings.exposure", 2.5))
     text, most = cut_off(scene, place)
     if text:
         yield Warned("clip", "Clip End", text, "Raise", _setter("camera.data.clip_end", 1.2 * most))
